@@ -1,1 +1,1 @@
-"""Many designs: swept over ranges of their keys, or searched for one that meets requirements."""
+"""Sweep many designs over ranges of their keys, or search for one that meets requirements."""

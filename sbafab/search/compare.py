@@ -1,4 +1,6 @@
-"""Two designs compared: keys, rules and predicted figures that differ, and a page with pictures."""
+"""Compare two designs: differences in keys, rules and predicted figures, and a page with
+pictures.
+"""
 
 from __future__ import annotations
 
@@ -51,18 +53,18 @@ MAIN = {
     Quantity.WATER_TIME: ANYWHERE,
     Quantity.SHUT_STIFFNESS: ANYWHERE,
 }
-"""Figures that a reader looks for first, at these conditions."""
+"""The most important figures, at these conditions."""
 DIGITS = 4
-"""Figures that agree to so many digits do not differ."""
+"""Figures that agree to this many significant digits count as equal."""
 SIZE = 640, 512
-"""Pixels of a picture."""
+"""Width of a picture, pixels."""
 _ROW = re.compile(r"(.+\.csv):(\d+)")
 
 
 @dataclass(frozen=True)
 class ComparedDesign:
-    """One of the two designs: ``source`` is what was given, ``rules`` the worst margin of each,
-    ``figures`` those to design with, and the stack's stiffness, which ``find`` knows.
+    """One of the two designs: ``source`` is the argument, ``rules`` the worst margin of each,
+    ``figures`` the figures to design with, and the stack's stiffness as in ``find``.
     """
 
     source: str
@@ -88,7 +90,7 @@ class ComparedDesign:
 
 @dataclass(frozen=True)
 class KeyDifference:
-    """A key that differs, and its two values; None where a design has no such key."""
+    """A key that differs, and its two values; None if a design has no such key."""
 
     key: str
     values: tuple[Any, Any]
@@ -96,7 +98,7 @@ class KeyDifference:
 
 @dataclass(frozen=True)
 class RuleDifference:
-    """A rule whose verdict or margin differs, or without a limit what was measured; None where a
+    """A rule whose verdict or margin differs, or its measured value if it has no limit; None if a
     design has no such finding.
     """
 
@@ -106,7 +108,7 @@ class RuleDifference:
 
 @dataclass(frozen=True)
 class FigurePair:
-    """A figure of both designs; None where a design has none."""
+    """A figure of both designs; None if a design lacks it."""
 
     quantity: Quantity
     at: Conditions
@@ -114,7 +116,7 @@ class FigurePair:
 
     @property
     def name(self) -> str:
-        """Quantity and conditions in words."""
+        """Quantity and conditions as text."""
         return self.quantity.named(self.at)
 
     @property
@@ -124,12 +126,12 @@ class FigurePair:
 
     @property
     def is_main(self) -> bool:
-        """True for figures that a reader looks for first."""
+        """True for the most important figures."""
         return _is_main(self.quantity, self.at)
 
     @property
     def differs(self) -> bool:
-        """True where the values differ in the first DIGITS digits, or one is missing."""
+        """True if the values differ in the first DIGITS digits, or one is missing."""
         first, second = self.figures
         if first is None or second is None:
             return True
@@ -138,7 +140,7 @@ class FigurePair:
 
 @dataclass(frozen=True)
 class DesignComparison:
-    """Two designs, and what differs between them. Values stand in the order of ``designs``."""
+    """Two designs and their differences. Values are in the order of ``designs``."""
 
     designs: tuple[ComparedDesign, ComparedDesign]
     keys: tuple[KeyDifference, ...]
@@ -148,7 +150,7 @@ class DesignComparison:
 
     @property
     def names(self) -> tuple[str, str]:
-        """Names of the designs; where they are equal, of the sources, or these as given."""
+        """Names of the designs; if these are equal, their sources."""
         first, second = self.designs
         names = first.design.name, second.design.name
         files = Path(first.source).name, Path(second.source).name
@@ -231,7 +233,7 @@ def figure_entry(pair: FigurePair) -> FigureEntry:
 
 def load_compared(source: str | Path, changes: Iterable[Change] = ()) -> Design:
     """Return the design of a template, a design file, an output folder, or a row of a sweep such as
-    ``out/1dof-5mm-sweep/sweep.csv:12``. Raises DesignError where there is none.
+    ``out/1dof-5mm-sweep/sweep.csv:12``. Raises DesignError if there is none.
     """
     row = _ROW.fullmatch(str(source))
     if row is not None and not Path(source).exists():
@@ -246,7 +248,7 @@ def load_compared(source: str | Path, changes: Iterable[Change] = ()) -> Design:
 
 
 def _swept(table: Path, number: int) -> Design:
-    """Return the design of a row of a sweep by its number, from the journal beside the table."""
+    """Return the design of a row of a sweep by row number, from the journal beside the table."""
     try:
         with table.open(encoding="utf-8", newline="") as opened:
             rows = [row for row in csv.DictReader(opened) if row.get("number") == str(number)]
@@ -271,7 +273,7 @@ def _swept(table: Path, number: int) -> Design:
 
 
 def _journal_keys(journal: Path, sha256: str) -> dict[str, Any] | None:
-    """Return the keys of a design in a sweep's journal; None where it is not there."""
+    """Return the keys of a design in a sweep's journal; None if it is not there."""
     with journal.open(encoding="utf-8") as opened:
         for line in opened:
             if sha256 not in line:
@@ -293,9 +295,9 @@ def compare(
     flow_ml_min: float = PredictionRequest.flow_ml_min,
     progress: Progress = ignore_progress,
 ) -> DesignComparison:
-    """Return what differs between two designs, at pressures in kPa, by default the first of
-    ``usual_pressures``. Raises DesignError where one cannot be built, and for pressures or a flow
-    out of range.
+    """Return the differences between two designs, at pressures in kPa, by default the first of
+    ``usual_pressures``. Raises DesignError if one cannot be built, and for pressures or a flow out
+    of range.
     """
     if pressures_kpa is not None and not pressures_kpa:
         raise DesignError("pressures_kpa is empty; a comparison needs one pressure or more")
@@ -340,7 +342,7 @@ def _rules(designs: Two) -> Iterable[RuleDifference]:
 def _verdict(margin: RuleMargin | None) -> tuple[str, float | None] | None:
     if margin is None:
         return None
-    # A yield has no limit where none is asked for, and still is more or less.
+    # A yield without a limit still differs by its value.
     return margin.verdict, margin.measured if margin.margin is None else margin.margin
 
 
@@ -361,14 +363,14 @@ NOTHING = "-"
 
 
 def value_text(value: object) -> str:
-    """Return the value of a key as people read it."""
+    """Return the value of a key for display."""
     if value is None:
         return NOTHING
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def margin_text(margin: RuleMargin | None) -> str:
-    """Return verdict and margin of a rule; what was measured where there is no limit."""
+    """Return verdict and margin of a rule; the measured value if there is no limit."""
     if margin is None:
         return NOTHING
     if margin.margin is None:
@@ -389,7 +391,7 @@ def reached_text(figure: Figure | None) -> str:
 
 @dataclass(frozen=True)
 class PicturePair:
-    """Pictures of both designs as data URIs, or the sentence that stands in place of one."""
+    """Pictures of both designs as data URIs, or a sentence in place of one."""
 
     title: str
     pictures: tuple[str, str]
@@ -399,7 +401,7 @@ class PicturePair:
 def write_page(comparison: DesignComparison, out: Path) -> Path:
     """Write ``out``/compare/compare.html beside an old one, swap it in, and return its folder.
 
-    Raises OutputError where it cannot be written.
+    Raises OutputError if it cannot be written.
     """
     folder = out / FOLDER
     try:
@@ -414,7 +416,7 @@ def write_page(comparison: DesignComparison, out: Path) -> Path:
 
 
 def compare_html(comparison: DesignComparison) -> str:
-    """Return the whole page; style and pictures stand in it, nothing is fetched."""
+    """Return the whole page; style and pictures are inline, nothing is fetched."""
     return (
         environment(Path(__file__).parent)
         .get_template(TEMPLATE)
@@ -440,7 +442,7 @@ def _flat(comparison: DesignComparison) -> PicturePair:
 
 
 def _inflated(comparison: DesignComparison) -> PicturePair:
-    """Return pictures at one scale: chambers side by side with one filled, others with all."""
+    """Return pictures at one scale: with several chambers one is filled, otherwise all are."""
     pressure = comparison.pressures_kpa[0]
     bodies, notes = [], ["", ""]
     for number, each in enumerate(comparison.designs):

@@ -1,8 +1,8 @@
-"""Search for the design that meets requirements and is best in one quantity.
+"""Search for the design that meets all requirements and is best in one quantity.
 
-All designs are evaluated where they are few; else a coarse grid and local searches from its best
-points, or Optuna, then steps from the best candidate. Rules are checked only for what would become
-the best. The result says which constraints bind, and can be written as a design file.
+Small spaces are evaluated completely; else a coarse grid and local searches from its best points,
+or Optuna, then steps from the best candidate. Rules are checked only for a candidate that would
+become the best. The result lists the binding constraints and can be written as a design file.
 """
 
 from __future__ import annotations
@@ -89,11 +89,11 @@ class FindRequest:
 
 @dataclass(frozen=True)
 class FoundDesign:
-    """Result of a search: the ``best`` design, or the nearest miss where none holds.
+    """Result of a search: the ``best`` design, or the nearest miss if none passes.
 
-    ``front``: passing designs that none of those tried improves on in the goal and in every
-    requirement; some of all ``on_front`` that there are. ``ends``: keys that only their range
-    stops. ``is_cut_short``: more tries might have led to a better one.
+    ``front``: Pareto-optimal passing designs, in the goal and every requirement, a selection of
+    ``on_front`` designs. ``ends``: keys limited only by their range. ``is_cut_short``: more tries
+    might have led to a better one.
     """
 
     problem: SearchProblem
@@ -113,17 +113,17 @@ class FoundDesign:
 
     @property
     def without_room(self) -> list[Spare]:
-        """Rules on lengths that hold and have nothing to spare."""
+        """Rules on lengths that pass with nothing to spare."""
         return without_room(self.best)
 
     @property
     def missed(self) -> list[str]:
-        """Requirements and rules that the best design breaks, a sentence each."""
+        """Requirements and rules that the best design breaks, one sentence each."""
         return misses(self.problem, self.best)
 
     @property
     def measured(self) -> dict[str, Counterpart]:
-        """Measured values of the paper, by quantity, where its model is off by over a quarter."""
+        """Measured values of the paper, by quantity, if its model is off by over a quarter."""
         if self.best.laminate is None:
             return {}
         subject = self._subject
@@ -135,8 +135,8 @@ class FoundDesign:
 
     @cached_property
     def intervals(self) -> dict[str, tuple[float, float]]:
-        """90 % intervals of what would be measured of the best design, by quantity in its unit,
-        where a calibration says so.
+        """90 % intervals for measurements of the best design, by quantity in its unit, if it has a
+        calibration.
         """
         if self.best.laminate is None:
             return {}
@@ -152,9 +152,7 @@ class FoundDesign:
 
     @cached_property
     def flags(self) -> dict[str, tuple[Flag, ...]]:
-        """What figures of the best design are not to be trusted for, by quantity, where there is
-        something, as ``predict`` flags them.
-        """
+        """Limits to trust in figures of the best design, by quantity, as flagged by ``predict``."""
         if self.best.laminate is None:
             return {}
         each = {q.label: self._subject.flags(q) for q in self.problem.quantities}
@@ -168,14 +166,14 @@ class FoundDesign:
 
     @property
     def broken_rules(self) -> list[str]:
-        """The broken ones among the rules."""
+        """The failing rules."""
         return broken_rules(self.best)
 
 
 def free_keys(request: FindRequest) -> tuple[Free, ...]:
-    """Return the keys that may change, within what the requirements say of them.
+    """Return the free keys, restricted by the requirements on them.
 
-    Raises DesignError, also where the design has no such quantity.
+    Raises DesignError, also if the design has no such quantity.
     """
     quantities = SearchProblem(request.design, request.requirements, request.goal).quantities
     for quantity in quantities:
@@ -202,19 +200,19 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
 
 
 OF_FILMS = ("films.", "layup.")
-"""Beginnings of keys that change a design's films."""
+"""Prefixes of keys that change a design's films."""
 KNOWN_BY_FILM = ("mass", "burst", "reference_stroke")
-"""Quantities that are known or not by a design's films alone, and quick to evaluate."""
+"""Quantities whose availability depends only on a design's films, and quick to evaluate."""
 
 
 def _refuse_unknown_films(quantities: Sequence[RequestedQuantity], design: Design) -> None:
-    """Raises DesignError for a quantity that is not known of a design's films, whatever its sizes:
-    no candidate could be evaluated.
+    """Raises DesignError if a quantity is unknown for a design's films at any size: no candidate
+    could be evaluated.
     """
     try:
         laminate = build(design)
     except SbafabError:
-        return  # the search may start from sizes that cannot be
+        return  # the search may start from impossible sizes
     subject, form = Subject(design, laminate), design.form
     has_modulus = all(layer.film.elastic for layer in laminate.tpe_layers)
     for quantity in quantities:
@@ -231,9 +229,7 @@ def _refuse_unknown_films(quantities: Sequence[RequestedQuantity], design: Desig
 
 
 def _refuse_unsure(request: FindRequest, sure: float) -> None:
-    """Raises DesignError for a probability that is none, and for requirements that cannot hold with
-    one.
-    """
+    """Raises DesignError for an invalid probability, and for requirements that cannot have one."""
     if not 0.5 < sure < 1:
         raise DesignError(f"sure = {sure:g} must be above 0.5 and below 1, such as 0.9")
     design = request.design
@@ -256,7 +252,9 @@ def _refuse_unsure(request: FindRequest, sure: float) -> None:
 def _refuse_fixed(
     requirement: Requirement, keys: Mapping[str, object], free: Sequence[Free]
 ) -> None:
-    """Raises DesignError for a key that is asked to be what it is not, and may not change."""
+    """Raises DesignError if a requirement on a key contradicts its value and the key is not
+    free.
+    """
     key = requirement.quantity.key
     value = keys.get(key or "")
     if isinstance(value, str):
@@ -274,8 +272,8 @@ def _refuse_fixed(
 
 
 def _refuse_bend(quantity: RequestedQuantity, design: Design, free: Sequence[Free]) -> None:
-    """Raises DesignError for a bend of an actuator that does not bend, or of more chambers than
-    leave one empty, where they stay as many as they are.
+    """Raises DesignError for a bend if the actuator does not bend, or if no chamber would stay
+    empty while their number is fixed.
     """
     if quantity.name != "bend":
         return
@@ -291,7 +289,7 @@ def _refuse_bend(quantity: RequestedQuantity, design: Design, free: Sequence[Fre
 
 
 def _within(free: Free, requirements: Sequence[Requirement]) -> Free:
-    """The range within what requirements say of the key itself. Raises DesignError for none."""
+    """The range restricted by requirements on the key itself. Raises DesignError if it is empty."""
     for requirement in requirements:
         if requirement.quantity.key != free.key:
             continue
@@ -347,7 +345,7 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
 
 
 def _commonest_reason(space: SearchSpace) -> str:
-    """Return why most candidates were refused, in the words of the nearest one."""
+    """Return why most candidates were refused, as in the nearest one's message."""
     refused = sorted(space.trials.values(), key=lambda trial: trial.rank)
     counts = Counter(trial.refused_at for trial in refused)
     nearest = max(refused, key=lambda trial: counts[trial.refused_at])
@@ -359,16 +357,16 @@ def _commonest_reason(space: SearchSpace) -> str:
 
 
 SHOWN = 8
-"""Designs of the Pareto front that are shown."""
+"""Most designs of the Pareto front that are shown."""
 TIGHT = ("bond-width", "mask-overhang", "tube-fit", "film-limits", "press-fit", "pin-fit")
-"""Rules whose margins a design can be changed to widen."""
+"""Rules with margins that a design change can widen."""
 LITTLE = 0.005
-"""Share of a limit that is nothing to spare."""
+"""Largest share of a limit that counts as nothing to spare."""
 
 
 @dataclass(frozen=True)
 class Binding:
-    """A step of one key that would be better, and what it breaks."""
+    """A step of one key that would improve the design, and what it breaks."""
 
     key: str
     value: Any
@@ -377,7 +375,7 @@ class Binding:
 
 @dataclass(frozen=True)
 class Spare:
-    """A rule whose worst value, ``measured`` in ``unit``, has nothing to spare, and where."""
+    """A rule whose worst value, ``measured`` in ``unit``, has nothing to spare, and its place."""
 
     rule: str
     measured: float
@@ -388,7 +386,7 @@ class Spare:
 @dataclass(frozen=True)
 class RangeEnd:
     """A key at the end of its range that would be better beyond, ``above`` or below: ``low`` to
-    ``high`` in steps of ``step``, mm or a number of balloons, as the key is.
+    ``high`` in steps of ``step``, in mm or balloons, depending on the key.
     """
 
     key: str
@@ -400,7 +398,7 @@ class RangeEnd:
 
     @property
     def wider(self) -> tuple[float, float]:
-        """Ends of a range twice as wide, and at least a step wider, towards what is better."""
+        """Ends of a range twice as wide, and at least a step wider, in the better direction."""
         span = max(self.high - self.low, self.step)
         if self.above:
             return self.low, self.high + span
@@ -422,9 +420,9 @@ def without_room(best: Trial) -> list[Spare]:
 
 
 def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> list[Binding]:
-    """Return the binding constraints: what each single step that would improve the design breaks.
+    """Return the binding constraints: what each improving single step breaks.
 
-    Of the nearest miss: the steps to designs that cannot be made, or that no model knows.
+    For the nearest miss: the steps to designs that cannot be made, or that no model covers.
     """
     constraints = []
     for axis, neighbour in _steps(point):
@@ -452,7 +450,7 @@ def _is_nearer(
 
 
 def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> list[RangeEnd]:
-    """Return the keys whose range alone stops a better design, or a nearer miss."""
+    """Return the keys whose range alone prevents a better design, or a nearer miss."""
     ends = []
     for axis, neighbour in _steps(point):
         is_inside = space.lows[axis] <= neighbour[axis] <= space.highs[axis]
@@ -470,7 +468,7 @@ def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> list[RangeE
 
 
 def _steps(point: GridPoint) -> list[tuple[int, GridPoint]]:
-    """The places a step of one key away, each with the key's number."""
+    """The places one step of one key away, each with the key's number."""
     count = len(point)
     return [
         (
@@ -482,10 +480,10 @@ def _steps(point: GridPoint) -> list[tuple[int, GridPoint]]:
 
 
 def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
-    """Return passing designs, rules included, that none of those tried improves on in everything.
+    """Return the Pareto-optimal designs among those tried that pass all rules, and their number.
 
-    The best first, also where another one equals it in the goal, then in the order of the goal;
-    where they are many the ends and some between. With it how many there are.
+    The best is first, also if another one equals it in the goal; the rest are in the order of the
+    goal. If they are many, the ends and some between are returned.
     """
     problem = space.problem
     sides = [
@@ -515,21 +513,21 @@ def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
 
 
 def _spread(numbers: list[int]) -> list[int]:
-    """Some of them, evenly, the first and the last among them."""
+    """Some of them, evenly spaced, including the first and the last."""
     if len(numbers) <= SHOWN:
         return numbers
     return [numbers[round(at * (len(numbers) - 1) / (SHOWN - 1))] for at in range(SHOWN)]
 
 
-# The place of a finding in an actuator, in words.
+# The place of a finding in an actuator, as text.
 
 
 RING = 1.0
-"""mm round a bore or the lumen that still belong to it: a bond and its mask."""
+"""Distance around a bore or the lumen that still belongs to it: a bond and its mask, mm."""
 
 
 def place_text(laminate: Laminate, where: Place) -> str:
-    """For example "at the lumen", "at the inlet tab of chamber2"; empty where nothing is known."""
+    """For example "at the lumen", "at the inlet tab of chamber2"; empty if unknown."""
     if where.x is None or where.y is None:
         return ""
     x, y = where.x, where.y
@@ -547,15 +545,15 @@ def place_text(laminate: Laminate, where: Place) -> str:
     return "at the rim"
 
 
-# The design file of the result: that of the starting design with the new values.
+# The design file of the result: the starting design's file with the new values.
 
 
 FOUND = "found.toml"
-"""The file in a folder that ``-o`` names."""
+"""The default file name in the folder of ``-o``."""
 
 
 def refuse_existing(target: Path) -> None:
-    """Raises OutputError for a file that exists: nobody's design is overwritten."""
+    """Raises OutputError if the file exists: designs are never overwritten."""
     if target.exists():
         raise OutputError(
             f"{target} exists and is not overwritten; name another folder with -o or file with "
@@ -566,7 +564,7 @@ def refuse_existing(target: Path) -> None:
 def found_toml(
     source: str | Path, assignments: Sequence[str], name: str, result: FoundDesign, target: Path
 ) -> str:
-    """Return the text of the design file ``target`` of a result, its figures as comments."""
+    """Return the text of the design file ``target`` of a result, with its figures as comments."""
     changes: list[Change] = [*assignments, dict(result.best.values), {"name": name}]
     data = override(read_toml(design_path(source)), changes)
     data = override(data, [_paths_beside(target, data, result.problem.design)])
@@ -595,8 +593,8 @@ def _interval_text(result: FoundDesign, subject: Requirement | Goal) -> str:
 
 
 def _paths_beside(target: Path, data: Mapping[str, Any], design: Design) -> dict[str, str]:
-    """Return the paths of a design's drawings, kit and calibration, by key, from the folder of
-    ``target`` on, so that this can be moved together with them.
+    """Return the paths of a design's drawings, kit and calibration, by key, relative to the folder
+    of ``target``, so that all can be moved together.
     """
     files = {**design.drawings}
     if KIT in data and design.kit not in kit_names():
@@ -612,7 +610,7 @@ def _paths_beside(target: Path, data: Mapping[str, Any], design: Design) -> dict
 
 
 def write_found(text: str, target: Path) -> None:
-    """Raises OutputError where it cannot be written, also where a file came to be meanwhile."""
+    """Raises OutputError if it cannot be written, also if a file appeared meanwhile."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with target.open("x", encoding="utf-8", newline="\n") as opened:

@@ -1,6 +1,6 @@
-"""One design measured: rules with their margins, predicted figures, and what all its keys are.
+"""Measure one design: rules with their margins, predicted figures, and all its keys.
 
-As a program it measures one design after the other, and may be killed at any moment.
+As a program it measures designs one after the other, and may be killed at any moment.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from sbafab.rules.deck import AT_MOST
 from sbafab.rules.finding import Finding, Place, Verdict
 
 SweepOutcome = Literal["passes", "fails", "refused", "crashed", "too long"]
-"""Every rule holds; a rule failed; no such design can be made; its process died; or took too long.
+"""Every rule passes; a rule failed; the design cannot be made; its process died; or took too long.
 """
 SweepRow = dict[str, Any]
-"""What is known of one design, in values that JSON has. ``outcome`` and ``reason`` are always
-there; ``sha256``, ``keys``, ``rules``, ``yield`` (share of good builds and the ends of its
-interval), ``figures`` by their ``FigureKey`` where the design could be measured so far, and the
-messages of the rules that ``failed``."""
+"""The measurements of one design, as JSON values. ``outcome`` and ``reason`` are always present;
+``sha256``, ``keys``, ``rules``, ``yield`` (share of good builds and the ends of its interval),
+``figures`` by their ``FigureKey`` if the design could be measured so far, and the messages of the
+rules that ``failed``."""
 
 
 def measured(
@@ -48,7 +48,7 @@ def measured(
 ) -> SweepRow:
     """Return the row of the design in ``tables`` with ``values`` set; never raises a SbafabError.
 
-    ``folder`` is where relative paths start, ``pressures`` kPa are those of forces and strokes.
+    Relative paths start at ``folder``; ``pressures``, kPa, are for forces and strokes.
     """
     row: SweepRow = {"outcome": "refused", "reason": ""}
     try:
@@ -98,9 +98,9 @@ ORDER: tuple[Verdict, ...] = ("fail", "waived", "warn", "pass")
 
 
 class RuleMargin(NamedTuple):
-    """A rule's worst verdict, and by how much the worst value keeps its limit: below 0 it does not.
+    """A rule's worst verdict, and the margin of the worst value to its limit: below 0 it fails.
 
-    ``margin`` is None where nothing was measured, or where there is no limit.
+    ``margin`` is None if nothing was measured, or if there is no limit.
     """
 
     rule: str
@@ -114,14 +114,14 @@ class RuleMargin(NamedTuple):
 
     @property
     def share(self) -> float | None:
-        """The margin as a share of the limit, where that is not 0."""
+        """The margin as a share of the limit, unless that is 0."""
         if self.margin is None:
             return None
         return self.margin / self.limit if self.limit else self.margin
 
 
 def margin_of(finding: Finding) -> float | None:
-    """By how much a finding keeps its limit, in its unit."""
+    """Margin of a finding to its limit, in its unit."""
     if finding.measured is None or finding.limit is None:
         return None
     more = finding.measured - finding.limit
@@ -129,7 +129,9 @@ def margin_of(finding: Finding) -> float | None:
 
 
 def margins(findings: Iterable[Finding]) -> dict[str, RuleMargin]:
-    """The worst of each rule, in the deck's order; what a rule waives by itself counts for none."""
+    """The worst of each rule, in the deck's order; findings waived by the rule itself are
+    ignored.
+    """
     worst: dict[str, RuleMargin] = {}
     for finding in findings:
         if finding.verdict == "waived" and not finding.by_user:
@@ -156,7 +158,7 @@ def _severity(margin: RuleMargin) -> tuple[int, float]:
     return ORDER.index(margin.verdict), share if share is not None else 0.0
 
 
-# The version of the program to the last line: rows of different versions are never mixed.
+# The exact version of the program: rows of different versions are never mixed.
 
 
 @cache
@@ -173,17 +175,17 @@ def fingerprint() -> str:
     return f"{sbafab.__version__}+{total.hexdigest()[:12]}"
 
 
-# The process: a job a line from standard input, a row a line to standard output. When its input
-# ends, because whoever started it is gone, so does it, in the middle of a job if need be.
+# The process: one job per line from standard input, one row per line to standard output. It ends
+# when its input ends, because the parent is gone, even in the middle of a job.
 
 
 def main() -> None:
     """Measures until standard input ends."""
-    # Ctrl-C goes to all processes of a terminal; the one that started this ends it.
+    # Ctrl-C goes to all processes of a terminal; the parent ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     prepare()
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8", newline="\n")
-    # What a library prints must not stand among the answers.
+    # Output of libraries must not mix with the answers.
     os.dup2(2, 1)
     jobs: queue.SimpleQueue[str] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(sys.stdin, jobs), daemon=True).start()

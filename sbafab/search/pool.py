@@ -1,4 +1,4 @@
-"""Jobs run beside each other: in threads of this machine, or on a Dask cluster."""
+"""Run jobs in parallel: in threads of this machine, or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from sbafab.process import processors
 from sbafab.search.measure import SweepRow, fingerprint
 
 AHEAD = 3
-"""Jobs a worker is handed before it has done the first."""
+"""Jobs handed to a worker before it finishes the first."""
 POLL = 1.0
-"""Seconds after which a progress that waits is told so."""
+"""Interval of progress calls while waiting, s."""
 CONNECT = 10
-"""Seconds that a scheduler has to answer."""
+"""Time for a scheduler to answer, s."""
 DASK_EXTRA = 'Dask is not installed: pip install "sbafab[dask]"'
 
 
@@ -35,14 +35,14 @@ class Pool(NamedTuple):
 
 @contextmanager
 def local_pool(workers: int | None = None) -> Iterator[Pool]:
-    """A thread a worker, each with a process of its own; none outlives the block."""
+    """One thread per worker, each with its own process; none outlives the block."""
     size = workers or processors()
     open_all()
     executor = ThreadPoolExecutor(size)
     try:
         yield Pool(executor, size)
     finally:
-        # Killed processes let the threads that wait for them go on, and end.
+        # Killed processes release the threads that wait for them.
         executor.shutdown(wait=False, cancel_futures=True)
         close_all()
         executor.shutdown()
@@ -52,7 +52,7 @@ def local_pool(workers: int | None = None) -> Iterator[Pool]:
 def dask_pool(address: str) -> Iterator[Pool]:
     """The workers of the cluster behind a scheduler's address, which must have sbafab installed.
 
-    Raises OutputError where there is no scheduler, DesignError without the extra.
+    Raises OutputError if there is no scheduler, DesignError without the extra.
     """
     try:
         from distributed import Client
@@ -82,10 +82,10 @@ def run_jobs(
     done: Callable[[str, SweepRow], None],
     waiting: Callable[[], None],
 ) -> None:
-    """Run every job once and pass its key and row to ``done`` as soon as it ends; in no order.
+    """Run every job once and pass its key and row to ``done`` as soon as it ends, in any order.
 
-    Few jobs are in the works at any time, so that memory does not grow with their number.
-    ``waiting`` is called every second in which none ends.
+    Few jobs are pending at any time, so that memory does not grow with their number. ``waiting`` is
+    called in every second in which no job ends.
     """
     remaining = iter(jobs)
     running: dict[Future[SweepRow], str] = {}
@@ -118,7 +118,7 @@ def _row(future: Future[SweepRow]) -> SweepRow:
     try:
         row = future.result()
     except Exception as error:
-        # A cluster gives up a job whose workers died under it several times.
+        # A cluster gives up a job after its workers died several times.
         message = " ".join(str(error).split())[:300]
         row = {"outcome": "crashed", "reason": f"{type(error).__name__}: {message}", "seconds": 0.0}
     if row["outcome"] == "unlike":
@@ -131,24 +131,24 @@ def _row(future: Future[SweepRow]) -> SweepRow:
 
 # Each thread hands its jobs to its own process, which is killed after the time limit.
 #
-# The same function runs in the threads of this process and in those of a Dask worker.
+# The same function runs in threads of this process and of a Dask worker.
 
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""One a process: several processes share the processors already."""
+"""One numeric thread per process: several processes already share the processors."""
 ATTEMPTS = 2
-"""A process may die by somebody else's doing; a design that kills two in a row is to blame."""
+"""A process may be killed from outside; a design that kills two in a row is to blame."""
 
 COMMAND = (sys.executable, "-m", "sbafab.search.measure")
 
 MeasureJob = dict[str, Any]
-"""The keyword arguments of ``measured``, and ``program``, which has to do it."""
+"""The keyword arguments of ``measured``, and the ``program`` version required."""
 
 _thread = threading.local()
 
 
 class _Started:
-    """The processes that run, and whether more may be started."""
+    """The running processes, and whether more may be started."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
@@ -178,7 +178,7 @@ class Child:
             _started.children.add(self)
 
     def answer(self, job: MeasureJob, seconds: float) -> SweepRow:
-        """The row of a job; one that says why where the process dies or takes longer."""
+        """The row of a job; a row with the reason if the process dies or takes too long."""
         late = threading.Event()
 
         def stop() -> None:
@@ -206,7 +206,7 @@ class Child:
         }
 
     def _exchange(self, job: str) -> str:
-        """The answer to a line, cut short where the process died."""
+        """The answer to a line, truncated if the process died."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         with suppress(OSError, ValueError):
@@ -231,7 +231,7 @@ class Child:
 
 
 def guarded(job: MeasureJob, seconds: float) -> SweepRow:
-    """The row of a job, measured in this thread's own process; dead ones are replaced."""
+    """The row of a job, measured in this thread's own process; dead processes are replaced."""
     row: SweepRow = {}
     for _ in range(ATTEMPTS):
         child = getattr(_thread, "child", None)
@@ -240,7 +240,7 @@ def guarded(job: MeasureJob, seconds: float) -> SweepRow:
                 child.close()
             child = _thread.child = Child()
         row = child.answer(job, seconds)
-        # What Python could still say of a crash is said the same way again.
+        # A crash that Python could still report is reported in the same way on a retry.
         if row["outcome"] != "crashed" or child.is_alive:
             return row
     return row
@@ -253,7 +253,7 @@ def open_all() -> None:
 
 
 def close_all() -> None:
-    """Kills the processes that threads of this process have started, and has them start no more."""
+    """Kills the processes started by threads of this process, and prevents new ones."""
     with _started.lock:
         _started.may_start = False
         children = list(_started.children)

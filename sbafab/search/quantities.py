@@ -1,8 +1,8 @@
 """Quantities of requirements: sizes, mass, yield, stroke, bend, force, stiffness, time, and a
 design's keys.
 
-Each is the figure that ``predict`` has, from the same function: a stroke is its free stroke at a
-pressure; bends, forces, stiffness and times are those of the elastic stack.
+Each is the figure of ``predict``, from the same function: a stroke is its free stroke at a
+pressure; bends, forces, stiffness and times come from the elastic stack.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ from sbafab.models.stack import MOST_PRESSURE, Stack, stack
 
 
 class QuantityName(NamedTuple):
-    """A quantity as people write it, with its unit, and what it is."""
+    """A quantity as users write it, with its unit and meaning."""
 
     written: str
     unit: str
@@ -132,16 +132,17 @@ UNITS = {
     "kPa": KILOPASCALS,
     "N mm": {"N mm": 1.0, "Nmm": 1.0, "mNm": 1.0, "Nm": 1000.0},
 }
-"""Of masses, forces, angles, times, stiffness and pressures; lengths have those of design files."""
+"""Units of masses, forces, angles, times, stiffness and pressures; lengths have the units of design
+files."""
 _VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 UNDER_VACUUM = ("slip",)
-"""Quantities at pressures below that of the atmosphere."""
+"""Quantities at pressures below atmospheric."""
 KEYS = {"lumen": "lumen.diameter"}
-"""Quantities that are keys: they are asked for, and need no model."""
+"""Quantities that are keys: requirements may name them, and no model is needed."""
 ROUND_A_TUBE = ("deflated_diameter", "inflated_diameter", "reached_diameter")
 REACHED, WIDEST = "reached_diameter", "inflated_diameter"
-"""Inflated round a tube: the lower figure, for a wall that it must reach, and the upper end, for
-one that it must not touch."""
+"""Inflated diameters around a tube: the lower figure, for a wall that it must reach, and the upper
+end, for one that it must not touch."""
 AS_DRAWN = ("overall_diameter", "outline_diameter", "width", "length", "lumen", "mass", "yield")
 """Quantities of the drawing and its tolerances; all other names are predicted."""
 HOW = (
@@ -182,8 +183,8 @@ class RequestedQuantity:
 def read_quantity(
     text: str, kpa: float | None = None, flow_ml_min: float = WATER_FLOW
 ) -> RequestedQuantity:
-    """Return the quantity of a text; ``kpa`` counts where it names no pressure, ``flow_ml_min``
-    where a time names no flow. Raises DesignError.
+    """Return the quantity of a text; ``kpa`` is used if it names no pressure, ``flow_ml_min`` if a
+    time names no flow. Raises DesignError.
     """
     name, *places = (part.strip() for part in text.split("@"))
     name = name if "." in name else name.replace("-", "_").lower()
@@ -202,7 +203,7 @@ def read_quantity(
 
 
 def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:
-    """The quantity to hold a limit against: of the inflated diameters the one that is safer."""
+    """The quantity to compare with a limit: of the inflated diameters, the conservative one."""
     if quantity.name not in (REACHED, WIDEST):
         return quantity
     return replace(quantity, name=REACHED if at_least else WIDEST)
@@ -264,16 +265,16 @@ def _with_flow(places: list[str], text: str, flow_ml_min: float) -> RequestedQua
 
 
 def named_pressure(texts: list[str]) -> float | None:
-    """The highest pressure that any of the quantities names, or the largest vacuum, kPa."""
+    """The highest pressure named by any of the quantities, or the largest vacuum, kPa."""
     places = [place for text in texts for place in text.split("@")[1:]]
     named = [kilopascals for place in places if (kilopascals := _kilopascals(place)) is not None]
     return max(named, key=abs, default=None)
 
 
 def _kilopascals(place: str) -> float | None:
-    """The pressure of a text such as 50kPa, its unit in capitals or not; None where it is none.
+    """The pressure of a text such as 50kPa, its unit in capitals or not; None if it is not one.
 
-    MPa and mPa are not the same: a unit that is written like another one is none.
+    MPa and mPa are not the same: an ambiguous unit is rejected.
     """
     match = _PRESSURE.fullmatch(place)
     if match is None:
@@ -320,7 +321,7 @@ def _share(text: str) -> float:
 
 
 def shown_value(quantity: RequestedQuantity, value: float) -> str:
-    """A figure with its unit, as people read it."""
+    """A figure with its unit, for display."""
     if quantity.name == "force" and value < 0:
         return "none, it does not rise that far"
     return f"{value:.4g} {quantity.unit}".rstrip()
@@ -344,10 +345,10 @@ def read_sure(text: str) -> float:
 
 @dataclass(frozen=True)
 class Subject:
-    """A design whose quantities are evaluated; each is computed once.
+    """A design with its quantities, each computed once.
 
-    ``given``: factors in place of those of the design's calibration, ``origin`` the subject at the
-    latter, whose stack serves the other factors where it can. Its maps reach ``most_kpa``.
+    ``given``: factors in place of the calibration's, ``origin``: the subject at the calibration's
+    factors, whose stack is reused for others if possible. Its maps reach ``most_kpa``.
     """
 
     design: Design
@@ -365,7 +366,7 @@ class Subject:
         return {key: value for key, value, _ in keys_of(self.design)}
 
     def value(self, quantity: RequestedQuantity, share_of_good: Callable[[], float]) -> float:
-        """Raises DesignError where the design has no such quantity, or no model knows it."""
+        """Raises DesignError if the design has no such quantity, or no model covers it."""
         kpa = kpa_of(quantity)
         if kpa is not None:
             refuse_beyond_burst(self.laminate, kpa)
@@ -401,7 +402,7 @@ class Subject:
         return estimate
 
     def flags(self, quantity: RequestedQuantity) -> tuple[Flag, ...]:
-        """Return what the quantity's figure is not to be trusted for, as in ``predict``."""
+        """Return the limits to trust in the quantity's figure, as in ``predict``."""
         group, kpa = group_of(quantity, self.design.form), kpa_of(quantity)
         missed = 0.0
         if quantity.name == "burst":
@@ -429,8 +430,8 @@ class Subject:
         return self._force(self._stroke_of(quantity), kpa)
 
     def _stroke_of(self, quantity: RequestedQuantity) -> float:
-        """Return the stroke in mm at which a force is blocked; a share of it is what it is in
-        ``predict``. Raises DesignError for a share where there is no reference stroke.
+        """Return the stroke in mm at which a force is blocked; a share is relative to the reference
+        stroke, as in ``predict``. Raises DesignError for a share if there is no reference stroke.
         """
         if not quantity.share:
             return quantity.stroke or 0.0
@@ -464,10 +465,10 @@ class Subject:
     def interval(
         self, quantity: RequestedQuantity, share: float = SHARE
     ) -> tuple[float, float] | None:
-        """Return the interval that holds what would be measured of a quantity with a probability of
-        ``share``; None without a calibration, and where no calibrated model gives it.
+        """Return the interval that holds a measurement of the quantity with a probability of
+        ``share``; None without a calibration, and if no calibrated model gives it.
 
-        Raises DesignError where the calibration's other factors lead out of the model's range.
+        Raises DesignError if other factors of the calibration lead out of the model's range.
         """
         if quantity.name == "burst":
             return burst_uncertainty(self._burst, share)[0]
@@ -481,7 +482,7 @@ class Subject:
 
         def value_at(factors: Factors) -> float:
             value = self._at(factors).value(quantity, lambda: math.nan)
-            # Below 0 a force is how far it is from one, to search by.
+            # Below 0 a force is only a distance from one, for the search.
             return max(value, 0.0) if is_force else value
 
         delay = "water_delay" if quantity.name == "time" else ""
@@ -530,14 +531,14 @@ class Subject:
         if push <= 0:
             maps = self._stack.maps
             free = sum(float(maps[level].free_height(kpa)) for level in self._stack.levels)
-            # How far it is from getting there, in the force of so much of it.
+            # The shortfall of stroke, as the force for that much of it.
             least = min(kind.pocket for kind in kinds)
             return -kpa / 1000 * math.pi * least**2 * max(stroke / max(free, 1e-6) - 1, 0.0)
         refuse_stretched(float(held_stretch(kinds, [kpa], [stroke])[0]))
         return form.pushing * push
 
     def counterpart(self, quantity: RequestedQuantity) -> Counterpart | None:
-        """Return the paper's measured value where the model is off by over a quarter, or None."""
+        """Return the paper's measured value if the model is off by over a quarter, else None."""
         figure = self._figure(quantity)
         if figure is None:
             return None
@@ -545,7 +546,9 @@ class Subject:
         return counterpart(self.design.form, *figure, self.factors.calibration, of_papers)
 
     def _figure(self, quantity: RequestedQuantity) -> tuple[Quantity, Conditions, ModelId] | None:
-        """Return the figure in ``predict`` and its model; None if the paper measured none such."""
+        """Return the figure in ``predict`` and its model; None if the paper has no such
+        measurement.
+        """
         kpa = quantity.kpa or 0.0
         if quantity.name == "height":
             folded = self._actuator.folded
@@ -563,21 +566,21 @@ class Subject:
             return Quantity.WATER_TIME, at, ModelId.STACK_IN_TIME
         if quantity.name == "lateral_stiffness":
             return Quantity.SHUT_STIFFNESS, Conditions(kpa=kpa), ModelId.STACK_SHUT
-        # Of the three heights at which forces were measured the nearest.
+        # The nearest of the three heights at which forces were measured.
         share = self._stroke_of(quantity) / self._actuator.reference_stroke
         near = min(HEIGHTS, key=lambda height: abs(height - share))
         return Quantity.BLOCKED_FORCE, Conditions(kpa=kpa, share=near), ModelId.ELASTIC_STACK
 
 
 def kpa_of(quantity: RequestedQuantity) -> float | None:
-    """Return the gauge pressure in kPa that a quantity is at; None for one at none."""
+    """Return the gauge pressure in kPa of a quantity; None if it has none."""
     if quantity.name == "time":
         return FULL_KPA
     return quantity.kpa if quantity.name in AT_PRESSURE else None
 
 
 def group_of(quantity: RequestedQuantity, form: Form) -> str | None:
-    """Return the group of a quantity's discrepancy; None where no calibrated model gives it."""
+    """Return the group of a quantity's discrepancy; None if no calibrated model gives it."""
     if quantity.name == "height":
         return "flat height"
     if quantity.name in ASKED:
@@ -590,12 +593,12 @@ def group_of(quantity: RequestedQuantity, form: Form) -> str | None:
 
 @lru_cache(maxsize=4096)
 def free_height(kind: Balloon, kpa: float) -> float:
-    """By how many mm a balloon rises. Raises BeyondError where its film does not stand it."""
+    """Free height (mm) of a balloon. Raises BeyondError if its film does not stand it."""
     return free_rise(Counter([kind]), kpa).stroke
 
 
 def refuse_unknown_key(quantity: RequestedQuantity, design: Design) -> None:
-    """Raises DesignError for a key that the design does not have, with the one that is meant."""
+    """Raises DesignError for an unknown key, with the likely one."""
     if "." in quantity.name and quantity.name not in key_paths(type(design)):
         design.with_({quantity.name: 1})
     if quantity.name == "lumen" and design.form.lumen is None:

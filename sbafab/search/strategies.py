@@ -1,8 +1,8 @@
 """Search strategies: coarse grid, local searches, and Optuna.
 
 A local search takes steps along a key, along two keys against each other, and with one key held
-fixed: where a requirement ties keys together, only a step of one key that the others follow leads
-on.
+fixed: if a requirement ties keys together, only a step of one key that the others follow makes
+progress.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from sbafab.search.trial import IMPOSSIBLE, GridPoint, SearchSpace
 
 GRID_SHARE = 0.25
 WALK_SHARE = 0.6
-"""Of all tries: for the coarse grid, and until the walks from far places have to end."""
+"""Shares of all tries: for the coarse grid, and the point where walks from far places must end."""
 STARTS = 4
-"""Designs of the grid from which to go on."""
+"""Designs of the grid from which to continue."""
 FEW = 40
-"""Values of a key that is held still in turn: balloons, not diameters."""
+"""Most values of a key that is held fixed in turn: balloons, not diameters."""
 FIXED_STEPS = (-1, 1, -2, 2)
-"""Steps of the key that is then held still."""
+"""Steps of the key that is then held fixed."""
 SEED = 20_240
 
 
@@ -38,7 +38,7 @@ def try_every_design(space: SearchSpace) -> None:
 def explore(space: SearchSpace) -> None:
     """Evaluate a coarse grid, then search locally from its best points that lie far apart.
 
-    While nothing holds it starts anew from random points, as long as there are tries.
+    While no design passes, it restarts from random points, as long as tries are left.
     """
     space.limit = round(WALK_SHARE * space.tries)
     _grid(space)
@@ -56,7 +56,7 @@ def explore(space: SearchSpace) -> None:
 
 
 def refine(space: SearchSpace) -> None:
-    """Search locally from the best until no neighbour and no search with a key fixed is better."""
+    """Search locally from the best until no neighbour and no search with a fixed key is better."""
     space.limit = space.tries
     while not space.is_over:
         point = _walk(space, space.best()[0], [1] * len(space.free))
@@ -91,7 +91,7 @@ def _has_better_walk(space: SearchSpace, point: GridPoint) -> bool:
 def _grid(space: SearchSpace) -> None:
     """Evaluate a coarse grid, as fine as its share of the tries allows.
 
-    Keys that are words stay as they begin: the walks from the grid change them.
+    Keys with words keep their starting value: the walks from the grid change them.
     """
     room = max(8.0, GRID_SHARE * space.tries)
     numbers = sum(not free.choices for free in space.free)
@@ -112,7 +112,7 @@ def _grid(space: SearchSpace) -> None:
 
 
 def _starts(space: SearchSpace) -> list[GridPoint]:
-    """Return the starting design's point and the best points of the grid that lie far apart."""
+    """Return the starting point and the best points of the grid that lie far apart."""
     starts = [space.nearest()]
     for point in sorted(space.trials, key=lambda point: space.trials[point].rank):
         is_far = all(
@@ -128,7 +128,7 @@ def _starts(space: SearchSpace) -> list[GridPoint]:
 
 
 def _descend(space: SearchSpace, start: GridPoint) -> None:
-    """Search locally with steps that are halved where none is better."""
+    """Search locally with steps that are halved if none is better."""
     point, share = start, 4
     while share <= 2 * max(space.counts) and not space.is_over:
         point = _walk(space, point, [max(1, count // share) for count in space.counts])
@@ -136,10 +136,10 @@ def _descend(space: SearchSpace, start: GridPoint) -> None:
 
 
 def _walk(space: SearchSpace, point: GridPoint, stride: Sequence[int]) -> GridPoint:
-    """Return where improving steps lead: along a key, or along two against each other.
+    """Return the end of improving steps: along one key, or along two against each other.
 
-    Where two requirements meet, only a step of both keys leads on. A move that improved is tried
-    again. A key whose stride is 0 is held still.
+    Where two requirements meet, only a step of both keys makes progress. A move that improved is
+    repeated. A key whose stride is 0 is held fixed.
     """
     moves = neighbours(stride)
     stale = 0
@@ -175,11 +175,11 @@ def shifted(space: SearchSpace, point: GridPoint, move: Sequence[int]) -> GridPo
     return inside if inside != point else None
 
 
-# Wider ranges for keys whose best value is at an end of the range.
+# Widen ranges of keys whose best value is at an end of the range.
 
 
 TIMES = 4
-"""How often a range is made wider, by its own width each time."""
+"""Most times a range is widened, by its own width each time."""
 
 
 def widen_ranges(space: SearchSpace) -> None:
@@ -196,7 +196,7 @@ def widen_ranges(space: SearchSpace) -> None:
 
 
 def _widen_ends(space: SearchSpace, point: GridPoint) -> bool:
-    """Widen the ranges at whose end the point lies; return True if there was any."""
+    """Widen the ranges at whose end the point lies; return True if any was."""
     has_widened = False
     for axis, free in enumerate(space.free):
         count = space.counts[axis]
@@ -227,7 +227,7 @@ EXTRA = 'Optuna is not installed: pip install "sbafab[optuna]"'
 
 
 def with_optuna(search: SearchSpace, storage: str | None) -> None:
-    """Evaluate designs that Optuna proposes, and leave a share of the tries for the last steps.
+    """Evaluate designs that Optuna proposes, and keep a share of the tries for the final steps.
 
     ``storage`` is the URL of the database in which the search resumes. Raises DesignError without
     the extra.
@@ -236,7 +236,7 @@ def with_optuna(search: SearchSpace, storage: str | None) -> None:
         import optuna
     except ImportError:
         raise DesignError(EXTRA) from None
-    # Of a search that is stopped it would tell a trial that failed, with a traceback.
+    # If a search is stopped, Optuna would report a failed trial with a traceback.
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     tries = max(1, round(WALK_SHARE * search.tries))
     try:
@@ -259,14 +259,14 @@ def with_optuna(search: SearchSpace, storage: str | None) -> None:
             for free, count in zip(search.free, search.counts, strict=True)
         )
         candidate = search.trial(point)
-        # What misses is worse than all that holds, by how much it misses.
+        # A miss is worse than every passing design, by the amount of the miss.
         return (
             candidate.cost
             if candidate.holds
             else IMPOSSIBLE * (1 + min(candidate.missed, IMPOSSIBLE))
         )
 
-    # What is stored was tried by an earlier run: here it is looked up again, and tried no more.
+    # Stored trials come from an earlier run: they are looked up again, not tried again.
     done = study.get_trials(states=[optuna.trial.TrialState.COMPLETE])
     for old in done:
         search.trial(tuple(old.params[free.key] for free in search.free))

@@ -1,4 +1,4 @@
-"""A sweep: every design measured once, its rows in a journal, then tables and a page."""
+"""A sweep: measure every design once, journal its rows, then write tables and a page."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 SECONDS = 300.0
-"""How long one design may take."""
+"""Time limit per design, s."""
 MEASURED = "measuring designs"
 
 
@@ -51,8 +51,8 @@ class SweepRequest:
     """Designs and settings of a sweep: ``samples`` drawn by Latin hypercube, or the whole grid.
 
     ``workers`` processes of this machine (as many as processors by default), or the cluster behind
-    ``dask``; each design may take ``seconds``. ``all_columns``: the tables hold every key, rule
-    and figure. Without ``pressures_kpa`` they are those of a prediction.
+    ``dask``; each design may take ``seconds``. ``all_columns``: the tables hold every key, rule and
+    figure. ``pressures_kpa`` default to a prediction's.
     """
 
     design: Design
@@ -76,7 +76,7 @@ class SweepRequest:
 class SweptDesigns:
     """Result of a sweep: its folder, number of designs by outcome, number measured in this run.
 
-    ``table`` holds the rows; ``no_longer_asked`` designs of an earlier sweep stood in the tables
+    ``table`` holds the rows; ``no_longer_asked`` counts designs of an earlier sweep in the tables
     that it has replaced.
     """
 
@@ -90,7 +90,7 @@ class SweptDesigns:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """A row a design, with the columns of ``sweep.csv``; units stand in their names."""
+        """One row per design, with the columns of ``sweep.csv``; units are in their names."""
         names = [column.name for column in self.table.written]
         return [
             dict(zip(names, cells, strict=True)) for cells in self.table.cells(self.table.written)
@@ -102,7 +102,7 @@ class SweptDesigns:
 
 
 class SweepStopped(KeyboardInterrupt):
-    """An interrupt that knows how many of the ``designs`` are ``measured``."""
+    """An interrupt with the number of ``designs`` and of those ``measured``."""
 
     def __init__(self, measured: int, designs: int, *signal: object) -> None:
         super().__init__(*signal)
@@ -120,10 +120,10 @@ def designs_of(request: SweepRequest) -> list[Values]:
 
 
 def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress) -> SweptDesigns:
-    """Measures all designs into ``out/<name>-sweep/`` and returns what came of them.
+    """Measures all designs into ``out/<name>-sweep/`` and returns the result.
 
-    What an earlier run measured there counts, as long as design, values and program are the same.
-    Raises DesignError for bad input, OutputError where nothing can be written or no worker answers.
+    Measurements of an earlier run are reused if design, values and program are the same. Raises
+    DesignError for bad input, OutputError if nothing can be written or no worker answers.
     """
     values = designs_of(request)
     folder = out / f"{request.design.name}-sweep"
@@ -188,7 +188,7 @@ def _measure(
 
 
 def _keys(request: SweepRequest, values: Sequence[Values]) -> list[str]:
-    """A hash of each design and of what is asked of it, by this program."""
+    """A hash of each design and of the request, for this program version."""
     question = [fingerprint(), design_sha256(request.design), list(request.pressures_kpa)]
     return [
         hashlib.sha256(json.dumps([*question, _contents(design_values)]).encode()).hexdigest()
@@ -197,7 +197,7 @@ def _keys(request: SweepRequest, values: Sequence[Values]) -> list[str]:
 
 
 def _contents(values: Values) -> dict[str, Any]:
-    """The values; for a drawing or a kit, what is in the file."""
+    """The values; for a drawing or a kit, the file's content."""
     return {
         key: hashlib.sha256(Path(value).read_bytes()).hexdigest()
         if key in (OUTLINE, KIT) and isinstance(value, str) and Path(value).is_file()
@@ -207,7 +207,7 @@ def _contents(values: Values) -> dict[str, Any]:
 
 
 def _from_here(varied: Varied) -> Varied:
-    """With paths of drawings and kits starting where the user stands, wherever they are read."""
+    """With paths of drawings and kits relative to the working directory, wherever they are read."""
     if varied.key not in (OUTLINE, KIT):
         return varied
     paths = tuple(
@@ -253,15 +253,14 @@ def _locked(folder: Path) -> Iterator[None]:
         ) from None
 
 
-# The journal: a line a measured design, only appended, from which a sweep resumes.
+# The journal: one line per measured design, append-only, from which a sweep resumes.
 
 
 class Journal:
-    """Rows of measured designs in a file, by the hash of design and request; read where needed.
+    """Rows of measured designs in a file, by the hash of design and request; read when needed.
 
-    A line that a killed run left unfinished is passed over, and its design measured again; so is
-    one that took too long in less than ``seconds``. Raises OutputError where the file cannot be
-    written.
+    A line left incomplete by a killed run is skipped and its design measured again; so is a design
+    that timed out at a limit below ``seconds``. Raises OutputError if the file cannot be written.
     """
 
     def __init__(self, path: Path, seconds: float) -> None:
@@ -302,20 +301,20 @@ class Journal:
         self._file.flush()
 
     def rows(self, keys: Iterator[str]) -> Iterator[SweepRow]:
-        """The rows of these keys, in their order, one in memory at a time."""
+        """The rows of these keys, in order, one in memory at a time."""
         with self.path.open("rb") as opened:
             for key in keys:
                 opened.seek(self._places[key])
                 yield json.loads(opened.readline())["row"]
 
     def close(self) -> None:
-        """Has what was written reach the disk."""
+        """Flushes the written rows to disk."""
         self._file.flush()
         os.fsync(self._file.fileno())
         self._file.close()
 
     def _key(self, line: bytes) -> str | None:
-        """The key of a whole line that need not be measured again."""
+        """The key of a complete line that need not be measured again."""
         try:
             entry = json.loads(line)
             key, row = entry["key"], entry["row"]

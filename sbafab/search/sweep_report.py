@@ -1,8 +1,8 @@
 """Reports of a sweep: its rows as CSV and Parquet, and a page of outcomes and trade-offs.
 
-Both tables hold the same columns and the same bytes whoever measured the rows, and when; how long
-each design took is in a file of its own. The page is self-contained: style and pictures stand in
-it, nothing is fetched.
+Both tables have the same columns and the same bytes, whoever measured the rows and when; the time
+of each design is in a separate file. The page is self-contained: style and pictures are inline,
+nothing is fetched.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ from sbafab.search.vary import Values, Varied
 from sbafab.spreadsheet import write_rows
 from sbafab.version import GENERATOR
 
-# The tables: a design a row, in the order in which they were asked.
+# The tables: one design per row, in the order requested.
 
 
 CSV, JOURNAL = "sweep.csv", "journal.jsonl"
 """Files of a sweep's folder."""
 PARTS = (("verdict", 0), ("margin", 1), ("measured", 2), ("limit", 3))
-"""Columns of each rule, and where they stand in its list."""
+"""Columns of each rule, and their index in its list."""
 HEAD = ("number", "sha256", "outcome", "reason")
-"""The first columns, whatever is varied."""
+"""The first columns of every table."""
 FIRST = (
     Quantity.OUTLINE_DIAMETER,
     Quantity.OVERALL_DIAMETER,
@@ -50,28 +50,28 @@ FIRST = (
     Quantity.MASS,
     Quantity.REFERENCE_STROKE,
 )
-"""Figures that are looked for first, whatever the pressure."""
+"""The most important figures without a pressure."""
 MOVED = (Quantity.FREE_STROKE, Quantity.BEND, Quantity.BLOCKED_FORCE)
-"""Those at a pressure."""
+"""The most important figures at a pressure."""
 YIELD = ("yield", "yield.low", "yield.high")
-"""Share of good builds, and the interval of 95 % that its number of random builds leaves."""
+"""Share of good builds, with its 95 % interval for this number of random builds."""
 LITTLE = 0.005
-"""Share of a limit that is nothing to spare."""
+"""Largest share of a limit that counts as nothing to spare."""
 BATCH = 1000
-"""Rows in memory at a time."""
+"""Most rows in memory at a time."""
 
 
 class Column(NamedTuple):
-    """A column: its name, and whether it holds nothing but numbers."""
+    """A column: its name, and whether it is purely numeric."""
 
     name: str
     is_number: bool
 
 
 class Table:
-    """Rows of a sweep, read again each time, so that as many fit as the disk holds.
+    """Rows of a sweep, read again for each pass, so that only the disk limits their number.
 
-    Files get the columns that a reader looks for first; ``is_whole``: all of them.
+    Files get the most important columns; ``is_whole``: all of them.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Table:
     def columns(self) -> tuple[Column, ...]:
         """Columns of all rows: keys, the varied ones first, then rules, then figures.
 
-        A column with a text in any row holds texts.
+        A column with a text in any row is a text column.
         """
         kinds: dict[str, bool] = {}
         order: tuple[dict[str, None], ...] = ({}, {}, {}, {})
@@ -125,8 +125,8 @@ class Table:
         return {_heading(key): FigureKey.read(key) for key in keys}
 
     def first(self, quantity: Quantity, at: Conditions) -> str | None:
-        """Return the column of the first figure of a quantity, at conditions that meet ``at``, by
-        the model that ``predict`` designs with: the calibrated one, else the first.
+        """Return the column of the first figure of a quantity, at conditions that match ``at``, by
+        the model to design with: the calibrated one, else the first.
         """
         found = [c for c, of in self.figures.items() if of.quantity is quantity and of.at.meet(at)]
         if not found:
@@ -147,7 +147,7 @@ class Table:
         yield from YIELD
 
     def _binding(self) -> Iterator[str]:
-        """Yield verdict and margin of the rules that fail, warn or pass without margin anywhere."""
+        """Yield verdict and margin of rules that anywhere fail, warn or pass without margin."""
         not_passing = {
             name
             for row in self.rows()
@@ -160,7 +160,7 @@ class Table:
                 yield from (f"{name}.verdict", f"{name}.margin")
 
     def cells(self, columns: Sequence[Column] | None = None) -> Iterator[list[Any]]:
-        """The cells of every row in these columns, or in all; None where there is nothing."""
+        """The cells of every row in these columns, or in all; None for empty cells."""
         chosen = self.columns if columns is None else columns
         for row in self._flat():
             every = {name: cell for part in row for name, cell in part.items()}
@@ -170,7 +170,7 @@ class Table:
         for number, (row, values) in enumerate(zip(self.rows(), self.values, strict=True), 1):
             cells = (number, row.get("sha256", ""), row["outcome"], row["reason"])
             head = dict(zip(HEAD, cells, strict=True))
-            # What was asked stands there even where no design came of it.
+            # Varied values are listed even if no design resulted.
             shares = dict(zip(YIELD, row.get("yield", ()), strict=False))
             by_column = {_heading(key): value for key, value in row.get("figures", {}).items()}
             figures = {**shares, **by_column}
@@ -179,7 +179,7 @@ class Table:
     @staticmethod
     @contextmanager
     def replacing(path: Path) -> Iterator[IO[str]]:
-        """A file that takes its place when it is whole."""
+        """A file that is swapped in once it is complete."""
         begun = path.with_name(f".{path.name}.part")
         with begun.open("w", encoding="utf-8", newline="") as opened:
             yield opened
@@ -209,14 +209,14 @@ def _cell(value: Any, is_number: bool) -> Any:
 
 
 def write_csv(table: Table, path: Path) -> None:
-    """Writes every row in the table's ``written`` columns; empty cells are what is not known."""
+    """Writes every row in the table's ``written`` columns; unknown values are empty cells."""
     with table.replacing(path) as opened:
         names = [column.name for column in table.written]
         write_rows(opened, chain([names], table.cells(table.written)))
 
 
 def write_times(table: Table, path: Path) -> None:
-    """Writes the seconds that each design took."""
+    """Writes the time of each design, s."""
     with table.replacing(path) as opened:
         rows = (
             [number, row.get("sha256", ""), row.get("seconds")]
@@ -226,7 +226,7 @@ def write_times(table: Table, path: Path) -> None:
 
 
 def write_parquet(table: Table, path: Path) -> bool:
-    """Writes the same as Parquet, numbers as doubles; False where pyarrow is not installed."""
+    """Writes the same as Parquet, numbers as doubles; False if pyarrow is not installed."""
     try:
         import pyarrow as pa
         from pyarrow import parquet
@@ -262,7 +262,7 @@ def _batches(rows: Iterator[list[Any]]) -> Iterator[list[list[Any]]]:
 
 
 def refuse_foreign(path: Path) -> None:
-    """Raises OutputError where a table stands that no sweep has written."""
+    """Raises OutputError if there is a table that no sweep has written."""
     if not path.exists():
         return
     with path.open(newline="", encoding="utf-8", errors="replace") as opened:
@@ -297,15 +297,15 @@ LOOKS = {
     "crashed": "#000000",
     "too long": "#cc79a7",
 }
-"""Colour of an outcome, with a mark of its own: told apart by the colour blind and in grey."""
+"""Colour of an outcome, with its own mark: distinct for the colour blind and in grey."""
 BINS = 12
 MOST_BARS = 30
 IN_ROW = 3
-"""Panels beside each other."""
+"""Panels per row."""
 
 
 class Objective(NamedTuple):
-    """A column, what it is called, and whether more of it is better."""
+    """A column, its label, and whether more of it is better."""
 
     column: str
     label: str
@@ -314,7 +314,7 @@ class Objective(NamedTuple):
 
 @dataclass(frozen=True)
 class Dots:
-    """A value each of some designs, with outcomes; None where a design has none."""
+    """One value for each of some designs, with outcomes; None if a design lacks it."""
 
     outcomes: Sequence[str]
     columns: dict[str, Sequence[Any]]
@@ -345,7 +345,9 @@ def passes_svg(dots: Dots, keys: Sequence[str]) -> str:
 
 
 def trades_svg(dots: Dots, pairs: Sequence[tuple[Objective, Objective]]) -> tuple[str, set[int]]:
-    """A panel a pair with the front of what passes, and the numbers of the designs on any front."""
+    """One panel per pair with the front of passing designs, and the numbers of designs on any
+    front.
+    """
     on_front: set[int] = set()
     panels = []
     for x, y in pairs:
@@ -366,7 +368,7 @@ def _drawn(title: str, panels: Sequence[Panel]) -> str:
 
 
 def _bars(dots: Dots, key: str) -> Panel:
-    """Designs of each outcome, one on top of the other, by value or in equal bins of it."""
+    """Stacked counts of designs by outcome, by value or in equal bins of it."""
     names, group = _groups(dots.columns[key])
     counts = {outcome: [0] * len(names) for outcome in LOOKS}
     for outcome, place in zip(dots.outcomes, group, strict=True):
@@ -392,7 +394,7 @@ def _better(objective: Objective) -> str:
 
 
 def _groups(column: Sequence[Any]) -> tuple[list[str], list[int]]:
-    """Names of the values, or of bins where there are many, and the place of each design."""
+    """Names of the values, or of bins if there are many, and the index of each design."""
     distinct = list(dict.fromkeys(map(repr, column)))
     if len(distinct) <= MOST_BARS or not all(map(_is_number, column)):
         if all(map(_is_number, column)):
@@ -417,11 +419,11 @@ GOOD_BUILDS = Objective(YIELD[0], "share of good builds", True)
 INTRODUCTION = (Quantity.MASS, Quantity.OVERALL_DIAMETER, Quantity.DEFLATED_DIAMETER)
 MOST_REASONS = 12
 MOST_ROWS = 60
-"""Designs on a front that the page lists; all are in the tables."""
+"""Most designs on a front that the page lists; all are in the tables."""
 
 
 class _Cause(NamedTuple):
-    """Cause of failure of so many ``designs``, with the number of one as an example."""
+    """Cause of failure of this many ``designs``, with the number of one as an example."""
 
     name: str
     designs: int
@@ -463,7 +465,7 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
 def _measured(
     design: Design, table: Table, objectives: Sequence[Objective]
 ) -> Iterator[tuple[str, str]]:
-    """Yield the paper's measured values for figures whose model is off by more than a quarter."""
+    """Yield the paper's measured values for figures with a model off by more than a quarter."""
     calibration = factors_of(design).calibration
     for objective in objectives:
         figure = table.figures.get(objective.column)
@@ -486,7 +488,7 @@ def _shown_value(value: Any) -> str:
 
 
 def _objectives(table: Table) -> list[Objective]:
-    """Size and mass, the first stroke and force that were predicted, and the yield."""
+    """Size and mass, the first predicted stroke and force, and the yield."""
     names = [column.name for column in table.columns]
     wanted = [(table.first(quantity, ANYWHERE), False) for quantity in INTRODUCTION]
     stroke = table.first(Quantity.FREE_STROKE, ANYWHERE)
@@ -505,7 +507,7 @@ def _label(column: str) -> str:
 
 
 def _read(table: Table, wanted_columns: Sequence[str]) -> tuple[Dots, list[_Cause]]:
-    """Return the wanted columns, and the causes of failure, the commonest first."""
+    """Return the objectives' columns, and the causes of failure, the most common first."""
     names = [column.name for column in table.columns]
     places = {name: names.index(name) for name in (*wanted_columns, "outcome", "reason")}
     columns: dict[str, list[Any]] = {name: [] for name in places}
@@ -540,16 +542,16 @@ def _pairs(objectives: Sequence[Objective], dots: Dots) -> list[tuple[Objective,
 
 
 def front(rows: Sequence[Sequence[float]], more: Sequence[bool]) -> list[int]:
-    """Return the numbers of the rows that none dominates, in their order; of equal ones the first.
+    """Return the numbers of the non-dominated rows, in order; of equal rows the first.
 
-    ``more`` says of each value whether more of it is better.
+    ``more`` says for each value whether more of it is better.
     """
     signed = [
         tuple(-value if up else value for value, up in zip(row, more, strict=True)) for row in rows
     ]
     order = sorted(range(len(signed)), key=lambda number: (signed[number], number))
     best: list[int] = []
-    # Whatever betters a row comes before it in this order.
+    # Every row that dominates another comes before it in this order.
     for number in order:
         if not any(_dominates(signed[better], signed[number]) for better in best):
             best.append(number)
@@ -557,5 +559,5 @@ def front(rows: Sequence[Sequence[float]], more: Sequence[bool]) -> list[int]:
 
 
 def _dominates(first: Sequence[float], second: Sequence[float]) -> bool:
-    """Return True if the first row is nowhere worse; equal rows come in their order."""
+    """Return True if the first row is nowhere worse; equal rows keep their order."""
     return all(a <= b for a, b in zip(first, second, strict=True))

@@ -1,4 +1,4 @@
-"""A design changed as little as a yield needs, beside the one given: what the yield costs."""
+"""Change a design as little as a target yield needs, and compare it with the original."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ DESIGNS = "as given", "changed"
 
 @dataclass(frozen=True)
 class ReachedYield:
-    """The ``design`` for a yield, None where none reaches it; ``found`` says how it was changed.
+    """The ``design`` for a yield, None if none reaches it; ``found`` describes the changes.
 
-    ``comparison`` holds both designs with their figures; None where nothing was changed.
+    ``comparison`` holds both designs with their figures; None if nothing was changed.
     """
 
     found: YieldDesign
@@ -36,17 +36,17 @@ class ReachedYield:
 
     @property
     def design(self) -> Design | None:
-        """The changed design; the one given where that is enough, None where no change is."""
+        """The changed design; the original if it suffices, None if no change does."""
         return self.found.design
 
     @property
     def sentence(self) -> str:
-        """What was changed and the share that it reaches, or why nothing is."""
+        """The changes and the share they reach, or why there are none."""
         return self.found.sentence
 
     @property
     def changes(self) -> tuple[KeyDifference, ...]:
-        """Each key that was changed, with its value as given and as changed."""
+        """Each changed key, with its old and new value."""
         return tuple(
             KeyDifference(key, (value_of(self.found.given, key), value))
             for key, value in self.found.changes.items()
@@ -90,7 +90,7 @@ def reach_yield(
 ) -> ReachedYield:
     """Return the design that reaches a yield of ``target`` by few changes, and what they cost.
 
-    Keys that are ``fixed`` stay. Raises DesignError for a share that is not between 0 and 1.
+    Keys in ``fixed`` do not change. Raises DesignError for a share that is not between 0 and 1.
     """
     found = advice.reach_yield(design, target, fixed, progress)
     if found.design is None or not found.changes:

@@ -1,4 +1,4 @@
-"""Requirements, the search space of a design's free keys, and candidates evaluated once each."""
+"""Requirements, the search space of a design's free keys, and candidates, each evaluated once."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Requirement:
     at_least: bool
 
     def margin(self, value: float) -> float:
-        """Return by what share of the limit a value keeps it; below 0 it does not."""
+        """Return the margin of a value as a share of the limit; negative if it breaks the limit."""
         more = value - self.limit if self.at_least else self.limit - value
         return more / (abs(self.limit) or 1.0)
 
@@ -91,7 +91,7 @@ GOOD_IF_MORE = (
     ),
     *ASKED,
 )
-"""Of these as much as can be is best, of all others as little."""
+"""Quantities to maximise; all others are minimised."""
 
 
 def read_all(
@@ -99,8 +99,8 @@ def read_all(
 ) -> tuple[tuple[Requirement, ...], Goal]:
     """The requirements of ``QUANTITY=VALUE`` texts, and the goal. Raises DesignError.
 
-    A quantity at a pressure that names none is one at the highest that any of them names, a time
-    without a flow is at ``flow_ml_min``.
+    A quantity without its pressure takes the highest pressure named by any of them, a time without
+    a flow takes ``flow_ml_min``.
     """
     pairs = [(text, True) for text in least] + [(text, False) for text in most]
     kpa = named_pressure([text.partition("=")[0] for text, _ in pairs] + [best])
@@ -127,12 +127,12 @@ def _read(text: str, at_least: bool, kpa: float | None, flow_ml_min: float) -> R
 
 
 def _refuse_contradictions(requirements: Sequence[Requirement], texts: Sequence[str]) -> None:
-    """Raises DesignError where one quantity must be more than it may be."""
+    """Raises DesignError if a quantity's lower limit is above its upper limit."""
     for least, least_text in zip(requirements, texts, strict=True):
         for most, most_text in zip(requirements, texts, strict=True):
             if not least.at_least or most.at_least or least.limit <= most.limit:
                 continue
-            # The inflated diameter that must reach is never more than the one that must not touch.
+            # The inflated diameter that must reach never exceeds the one that must not touch.
             if least.quantity == safer(most.quantity, at_least=True):
                 raise DesignError(
                     f"--min {shown(least_text)} and --max {shown(most_text)} contradict each "
@@ -145,23 +145,23 @@ def _refuse_contradictions(requirements: Sequence[Requirement], texts: Sequence[
 
 YIELD = "registration-yield"
 IMPOSSIBLE = 1e6
-"""By how much a design misses whose film would not stand what it is asked for, and by the excess:
-by more than any that does. One that cannot be made at all misses by twice as much."""
+"""Miss of a design whose film would fail under the requirement, plus the excess: more than any
+design whose film holds. A design that cannot be made misses by twice as much."""
 GridPoint = tuple[int, ...]
-"""A design by the step at which each free key stands."""
+"""A design by the step of each free key."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """An evaluated candidate. ``rules`` is None where they were not checked.
+    """An evaluated candidate. ``rules`` is None if they were not checked.
 
-    ``values`` are those of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
-    ``missed`` is by what share requirements and rules are missed, all together; 0 where none is.
-    ``cost``, in the unit of the goal, is the less the better; ``mass`` is in g. ``refused``
-    says why no such design can be made, ``refused_at`` is the place in the program that said so:
-    one a reason, whatever its numbers. ``intervals``, by quantity in its unit, are those whose
-    ends are held against limits, where requirements are to hold with a probability. ``words``:
-    number of keys, of those that are words, that differ from the starting design's.
+    ``values`` are of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
+    ``missed`` is the total share by which requirements and rules are missed; 0 if none is. A lower
+    ``cost``, in the unit of the goal, is better; ``mass`` is in g. ``refused`` says why the design
+    cannot be made, ``refused_at`` is the place in the program that raised it: one per reason,
+    whatever its numbers. ``intervals``, by quantity in its unit, have ends that are compared with
+    limits, if requirements have a probability. ``words`` counts keys with words that differ from
+    the starting design's.
     """
 
     values: Mapping[str, Any]
@@ -183,16 +183,16 @@ class Trial:
 
     @property
     def rank(self) -> tuple[float, float, float, int]:
-        """Sort key, best first: share missed, then cost, then mass, then changed words."""
+        """Sort key, best first: missed share, then cost, mass and changed words."""
         return self.missed, self.cost, self.mass, self.words
 
     def value(self, requirement: Requirement | Goal) -> float:
-        """The figure that a requirement or the goal is about, in its unit."""
+        """The figure for a requirement or the goal, in its unit."""
         return self.figures[requirement.quantity.label]
 
     def judged(self, requirement: Requirement) -> float:
-        """Return the value that is held against the limit, in its unit: the end of the interval on
-        its side, where there is one.
+        """Return the value to compare with the limit, in its unit: the end of the interval on its
+        side, if there is one.
         """
         return judged(requirement, self.figures, self.intervals)
 
@@ -209,7 +209,7 @@ def judged(
 
 @dataclass(frozen=True)
 class SearchProblem:
-    """Requirements, the goal, and the design whose keys change.
+    """Requirements, the goal, and the design to change.
 
     Each requirement on a predicted quantity must hold with the probability ``sure``, if any.
     """
@@ -225,7 +225,7 @@ class SearchProblem:
 
     @property
     def quantities(self) -> list[RequestedQuantity]:
-        """The quantities to evaluate: those of the requirements first, then the goal's."""
+        """The quantities to evaluate: the requirements' first, then the goal's."""
         return [*(requirement.quantity for requirement in self.requirements), self.goal.quantity]
 
     def subject(self, design: Design, laminate: Laminate) -> Subject:
@@ -272,7 +272,7 @@ def _raised_at(error: Exception) -> str:
 
 
 def _mass(laminate: Laminate) -> float:
-    """The films' mass in g, by which equals are told apart; 0 where a density is not known."""
+    """The films' mass in g, the tie-breaker; 0 if a density is unknown."""
     try:
         return film_mass(laminate)
     except DesignError:
@@ -280,7 +280,7 @@ def _mass(laminate: Laminate) -> float:
 
 
 def _short(rule: RuleMargin) -> float:
-    """Return by what share a failing rule misses its limit."""
+    """Return the share by which a failing rule misses its limit."""
     if rule.verdict != "fail":
         return 0.0
     return max(1e-3, -(rule.share or 0.0))
@@ -303,8 +303,8 @@ def _figures(
 def _intervals(
     problem: SearchProblem, subject: Subject, sure: float
 ) -> dict[str, tuple[float, float]]:
-    """Return the intervals beyond each end of which a measured value lies with a probability of
-    ``1 - sure``.
+    """Return intervals whose ends a measured value passes with a probability of ``1 - sure``
+    each.
     """
     each = {
         requirement.quantity.label: subject.interval(requirement.quantity, 2 * sure - 1)
@@ -326,7 +326,7 @@ def figure_text(problem: SearchProblem, trial: Trial, requirement: Requirement) 
 
 
 def misses(problem: SearchProblem, trial: Trial) -> list[str]:
-    """Return what a candidate breaks, a sentence each: requirements, then rules."""
+    """Return what a candidate breaks, one sentence each: requirements, then rules."""
     if trial.refused:
         return [trial.refused]
     broken = [
@@ -345,35 +345,36 @@ def value_said(value: Any) -> str:
 
 
 def keys_said(values: Mapping[str, Any]) -> str:
-    """Keys with their values, as people read them."""
+    """Keys with their values, for display."""
     return ", ".join(f"{key} = {value_said(value)}" for key, value in values.items())
 
 
 def broken_rules(trial: Trial) -> list[str]:
-    """Return the rules that a candidate breaks, a sentence each."""
+    """Return the rules that a candidate breaks, one sentence each."""
     failed = [margin for margin in (trial.rules or {}).values() if margin.verdict == "fail"]
     return [f"{margin.rule}: {margin.message}" for margin in failed]
 
 
-# The search space: the keys that a search may change, ``KEY=LOW:HIGH:STEP``, and the candidates by
-# their steps, each evaluated once.
+# The search space: the free keys, ``KEY=LOW:HIGH:STEP``, and the candidates by their steps, each
+# evaluated once.
 
 
 PROGRESS_LABEL = "trying designs"
 
 
 def numbers_of(value: Any) -> list[float]:
-    """The numbers of a key that lists some, such as one diameter a balloon; else none."""
+    """The numbers of a key with a list, such as one diameter per balloon; else empty."""
     return list(map(float, value)) if isinstance(value, list | tuple) and value else []
 
 
 def read_free(
     design: Design, texts: Sequence[str], fixed: Sequence[str] = (), assigned: Sequence[str] = ()
 ) -> tuple[Free, ...]:
-    """The family's own keys without those ``fixed``, and those of the ``texts`` in their place.
+    """The family's own keys without those ``fixed``, replaced by the keys of the ``texts`` if
+    given.
 
-    Keys that are ``given`` by hand stay as they are, but for lists, which are scaled as a whole;
-    what the design must fit gives its chamber. Raises DesignError.
+    Keys ``given`` by hand do not change, except lists, which are scaled as a whole; an envelope to
+    fit determines the chamber. Raises DesignError.
     """
     keys = {key: value for key, value, _ in keys_of(design)}
     assigned = [key for key in assigned if not numbers_of(keys.get(key))]
@@ -395,7 +396,7 @@ def read_free(
                 f"--fix {shown(key)}: a search changes {', '.join(free) or 'nothing'} by default"
             )
         del free[key]
-    # What is named is free whatever the requirements name.
+    # Named keys are free whatever the requirements name.
     free |= {free_key.key: free_key for free_key in varied}
     if "stack.balloons" in free and numbers_of(keys.get("chamber.diameter")):
         raise DesignError(
@@ -406,8 +407,8 @@ def read_free(
 
 
 def free_of(design: Design, free: Iterable[Free | str]) -> tuple[Free, ...]:
-    """The keys that a program names, in place of the family's own: each a ``Free`` or a text, or
-    one text alone. Raises DesignError.
+    """The keys that a caller names, in place of the family's own: each a ``Free`` or a text, or one
+    text alone. Raises DesignError.
     """
     each = [free] if isinstance(free, str) else list(free) if isinstance(free, Iterable) else [free]
     for key in each:
@@ -422,7 +423,7 @@ def free_of(design: Design, free: Iterable[Free | str]) -> tuple[Free, ...]:
 
 
 def _free_of(text: str) -> Free:
-    """``KEY=LOW:HIGH:STEP``, or ``KEY=word,word`` of a key that takes one of some words."""
+    """``KEY=LOW:HIGH:STEP``, or ``KEY=word,word`` for a key with a choice of words."""
     stepped = read_varied(text, "--free")
     if stepped.values and all(isinstance(value, str) for value in stepped.values):
         return Free.of_words(stepped.key, stepped.values)
@@ -440,8 +441,8 @@ def _free_of(text: str) -> Free:
 class SearchSpace:
     """The candidates evaluated so far, each once, by the steps of their free keys.
 
-    ``lows`` and ``highs`` are the least and the largest step of each key. No more than ``tries``
-    candidates are evaluated; ``limit`` is where the stage that runs now has to end.
+    ``lows`` and ``highs`` are the least and the largest step of each key. At most ``tries``
+    candidates are evaluated; the current stage ends at ``limit``.
     """
 
     def __init__(
@@ -471,11 +472,11 @@ class SearchSpace:
         return [high - low + 1 for low, high in zip(self.lows, self.highs, strict=True)]
 
     def number(self, axis: int, point: GridPoint) -> float:
-        """The value of a key at a place; of a list its largest number."""
+        """The value of a key at a point; for a list its largest number."""
         return round(self.free[axis].low + point[axis] * self.free[axis].step, 6)
 
     def values(self, point: GridPoint) -> Mapping[str, Any]:
-        """The keys' values at a place, whole numbers where low and step are.
+        """The keys' values at a point, whole numbers if low and step are.
 
         A list, such as the diameters of a tapered stack, is scaled as a whole.
         """
@@ -483,7 +484,7 @@ class SearchSpace:
         for axis, free in enumerate(self.free):
             value = self.number(axis, point)
             if free.choices:
-                # Out of its range a word stays the last one.
+                # Beyond its range a word stays the last one.
                 last = len(free.choices) - 1
                 values[free.key] = free.choices[min(max(point[axis], 0), last)]
                 continue
@@ -496,7 +497,7 @@ class SearchSpace:
         return values
 
     def nearest(self) -> GridPoint:
-        """Return the point of the starting design, or the nearest to it in the space."""
+        """Return the starting design's point, or the nearest to it in the space."""
         steps = []
         for free in self.free:
             value: Any = self._keys.get(free.key)
@@ -517,9 +518,9 @@ class SearchSpace:
         )
 
     def trial(self, point: GridPoint, checks_rules: bool = True) -> Trial:
-        """Return the candidate at a point; one that would be the best so far has its rules checked.
+        """Return the candidate at a point; its rules are checked if it would be the best so far.
 
-        Without ``checks_rules`` it has not: rules take most of the time.
+        Without ``checks_rules`` they are not: rules take most of the time.
         """
         if point not in self.trials:
             self._tell(PROGRESS_LABEL, len(self.trials), self.tries)
@@ -565,7 +566,9 @@ class SearchSpace:
         return replace(evaluated(self.problem, trial.values, with_rules=True), words=trial.words)
 
     def best(self) -> tuple[GridPoint, Trial]:
-        """Return the best candidate, rules checked; where they make it worse, the next is tried."""
+        """Return the best candidate, rules checked; if they make it worse, the next one is
+        tried.
+        """
         while True:
             best = min(self.trials, key=lambda point: self.trials[point].rank)
             trial = self.trials[best]

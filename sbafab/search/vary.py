@@ -1,4 +1,4 @@
-"""Keys varied over values: grids and Latin hypercubes of designs."""
+"""Vary keys over values: grids and Latin hypercubes of designs."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ MOST_VALUES = 10_000
 DIGITS = 6
 
 Values = Mapping[str, Any]
-"""A value for each key that is varied, by dotted key."""
+"""A value for each varied key, by dotted key."""
 
 
 @dataclass(frozen=True)
 class Varied:
-    """A key with the values that it takes; without values, all numbers from ``low`` to ``high``."""
+    """A key with its values; without values, all numbers from ``low`` to ``high``."""
 
     key: str
     values: tuple[Any, ...] = ()
@@ -37,8 +37,8 @@ class Varied:
 
 
 def varied_keys(vary: Mapping[str, str | Iterable[Any]] | Sequence[str]) -> tuple[Varied, ...]:
-    """Return the keys of texts such as ``"stack.balloons=3,6"``, or of the values by key: several,
-    one, or the text after the equals sign. Raises DesignError.
+    """Return the varied keys of texts such as ``"stack.balloons=3,6"``, or of values by key:
+    several, one, or the text after the equals sign. Raises DesignError.
     """
     if not isinstance(vary, Mapping):
         return tuple(read_varied(text) for text in ([vary] if isinstance(vary, str) else vary))
@@ -64,7 +64,7 @@ def read_varied(text: str, option: str = "--vary") -> Varied:
         raise DesignError(f"{option} {shown(text)} is not KEY=VALUES; {_example(option)}")
     if ":" in values:
         return _range(key, values.split(":"), text, option)
-    # A list in brackets is one value; what else a comma parts are several.
+    # A list in brackets is one value; otherwise commas separate values.
     table = override({}, [f"values=[{values}]"])["values"]
     if not isinstance(table, list):
         table = [override({}, [f"value={value.strip()}"])["value"] for value in values.split(",")]
@@ -105,7 +105,7 @@ def _range(key: str, parts: Sequence[str], text: str, option: str) -> Varied:
 
 
 def _exact(text: str) -> Decimal:
-    """The number, mm where it has a unit. Raises ValueError."""
+    """The number, in mm if it has a unit. Raises ValueError."""
     return Decimal(repr(millimetres(text)))
 
 
@@ -123,7 +123,7 @@ def _varied(key: str, values: Sequence[Any], text: str, option: str) -> Varied:
 
 
 def refuse_unknown(design: Design, varied: Sequence[Varied], option: str = "--vary") -> None:
-    """Raises DesignError for a key that the design does not know, and for one varied twice."""
+    """Raises DesignError for a key unknown to the design, and for one varied twice."""
     keys = [varied_key.key for varied_key in varied]
     for varied_key in varied:
         if keys.count(varied_key.key) > 1:
@@ -131,7 +131,7 @@ def refuse_unknown(design: Design, varied: Sequence[Varied], option: str = "--va
                 f"{option} {varied_key.key} is given twice; put all its values into one"
             )
         if varied_key.key not in key_paths(type(design)):
-            # Says which key may be meant.
+            # Suggests the likely key.
             design.with_(
                 {varied_key.key: varied_key.values[0] if varied_key.values else varied_key.low}
             )
@@ -169,7 +169,7 @@ def grid(varied: Sequence[Varied]) -> Iterator[Values]:
 
 
 def latin_hypercube(varied: Sequence[Varied], samples: int, seed: int) -> Iterator[Values]:
-    """``samples`` designs that take each key's range in equal parts, each part once.
+    """``samples`` designs that divide each key's range into equal parts and use each part once.
 
     The same seed draws the same designs. Raises DesignError for more than are allowed.
     """
@@ -184,7 +184,7 @@ def latin_hypercube(varied: Sequence[Varied], samples: int, seed: int) -> Iterat
     names = [varied_key.key for varied_key in varied]
     drawn = set()
     for values in zip(*columns, strict=True):
-        # Few values leave few combinations: each is one design.
+        # Few values give few combinations: each is used for one design.
         if repr(values) not in drawn:
             drawn.add(repr(values))
             yield dict(zip(names, values, strict=True))
