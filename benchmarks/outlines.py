@@ -60,11 +60,10 @@ def built_and_checked(edges: int, turn: int) -> float:
     Each turn has an outline of its own: what is asked again of the same one is remembered.
     """
     from sbafab.actuators import build, load_design
-    from sbafab.output.checked import limits
     from sbafab.rules.deck import run_deck
 
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "outline.dxf"
         save(path, edges, 1 + turn / 1000)
         design = load_design(DESIGN, [f"chamber.outline={path}"])
-        return own_seconds(lambda: run_deck(build(design), limits(design)))
+        return own_seconds(lambda: run_deck(build(design), design))

@@ -16,7 +16,7 @@ def rules_and_cut_files(balloons: int, turn: int) -> float:
     from sbafab.actuators import build, load_design
     from sbafab.cutting.kerf import compensated_paths
     from sbafab.cutting.layer_files import write_layer_files
-    from sbafab.output.checked import cut_settings, limits
+    from sbafab.output.checked import cut_settings
     from sbafab.rules.deck import run_deck
 
     another = f"chamber.diameter={5 + turn / 1000}"
@@ -25,7 +25,7 @@ def rules_and_cut_files(balloons: int, turn: int) -> float:
         folder = Path(name)
         began = time.process_time()
         laminate = build(design)
-        run_deck(laminate, limits(design))
+        run_deck(laminate, design)
         settings = cut_settings(design, ())
         paths = compensated_paths(laminate, settings)
         files = write_layer_files(laminate, paths, folder, settings)

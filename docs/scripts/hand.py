@@ -7,11 +7,8 @@ the designs it built keep their limits that often.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from sbafab.actuators import build, load_design
-from sbafab.output.checked import limits
-from sbafab.rules.limits import Tolerances
+from sbafab.design.sections import Registration
 from sbafab.rules.registration_yield import simulate
 
 BUILT = ("1dof-5mm", "1dof-10mm", "3dof-15mm")
@@ -22,9 +19,12 @@ FACTORS = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5)
 def share(name: str, factor: float, builds: int = 10_000) -> float:
     """Share of good builds of a template whose hand is ``factor`` times as rough as the default."""
     design = load_design(name)
-    usual = Tolerances()
-    hand = replace(usual, placement=factor * usual.placement, turn=factor * usual.turn)
-    wanted = replace(limits(design), tolerances=hand, yield_builds=builds)
+    usual = design.registration
+    hand = {
+        "hand_placement": factor * usual.hand_placement,
+        "hand_turn": factor * usual.hand_turn,
+    }
+    wanted = design.with_(registration=hand, rules={"yield_builds": builds})
     return simulate(build(design), wanted).whole.value
 
 
@@ -33,9 +33,9 @@ def main() -> None:
     names = (*BUILT, "radial-15mm")
     print("| hand | " + " | ".join(f"`{name}`" for name in names) + " |")
     print("|---" * (len(names) + 1) + "|")
-    usual = Tolerances()
+    usual = Registration.model_construct()
     for factor in FACTORS:
-        hand = f"{factor * usual.placement:.3g} mm, {factor * usual.turn:.3g} degrees"
+        hand = f"{factor * usual.hand_placement:.3g} mm, {factor * usual.hand_turn:.3g} degrees"
         print(f"| {hand} | " + " | ".join(f"{share(name, factor):.1%}" for name in names) + " |")
 
 

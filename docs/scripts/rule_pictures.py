@@ -6,15 +6,16 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
+from sbafab.design.records import Design
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region, coord, disc, path_data, rectangle
 from sbafab.laminate.films import MASKS, STRUCTURAL, Ink, ink
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding
-from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.measures import Measures
 from sbafab.rules.registration_yield import simulate
+from tests.designs import PAPER, errors
 from tests.rules.conftest import built, spoiled
 from tests.rules.routed import cut_through, laminate_of, straight
 from tests.rules.test_deck import EARS, EXACT, FAULTS, ONE
@@ -46,7 +47,7 @@ def pair(rule: str) -> Pair:
     return OTHERS[rule]() if rule in OTHERS else _of_fault(rule)
 
 
-def _found(rule: str, laminate: Laminate, limits: Limits = EXACT) -> Finding:
+def _found(rule: str, laminate: Laminate, limits: Design = EXACT) -> Finding:
     (one,) = (own for own in RULES if own.name == rule)
     findings = run_rule(one, Measures(laminate, limits))
     return next((f for f in findings if f.verdict in ("fail", "warn")), findings[0])
@@ -140,7 +141,7 @@ def _pressure_rating() -> Pair:
 
 
 def _pin_fit() -> Pair:
-    cut = replace(EXACT, tolerances=Tolerances(0.1, 0, 0, 0))
+    cut = EXACT.with_(registration=errors(cutting=0.1))
     drawings = []
     for pin in (1.0, 1.19):
         laminate = built(*ONE, f"bore.pin_diameter={pin}")
@@ -154,7 +155,7 @@ def _pin_fit() -> Pair:
 def _worst_case() -> Pair:
     """The wall of the lowest balloon as drawn, and moved by what a rough hand may move it."""
     good = built(*ONE)
-    rough = Limits(tolerances=Tolerances(0.1, 0.004, 0.5, 0))
+    rough = PAPER.with_(registration=errors(cutting=0.1, pin=0.004, placement=0.5))
     found = _found("registration-worst-case", good, rough)
     layer = good.layer(3)
     bad = spoiled(good, 3, layer.profile.moved(0.5, 0.0))
@@ -176,8 +177,8 @@ def _nets() -> Pair:
 
 def _yield() -> Pair:
     """A hundred builds each, those that miss a limit in red, as many as the rule counts."""
-    few = Limits(yield_builds=2000)
-    rough = replace(few, tolerances=Tolerances(placement=0.12, turn=0.6))
+    few = PAPER.with_("rules.yield_builds=2000")
+    rough = few.with_("registration.hand_placement=0.12", "registration.hand_turn=0.6")
     good, usual = built(*ONE, EARS), built(*ONE)
     shares = (simulate(good, few).whole.value, simulate(usual, rough).whole.value)
     found = _found("registration-yield", usual, rough)

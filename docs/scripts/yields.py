@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sbafab.actuators import build, load_design
-from sbafab.output.checked import limits
 from sbafab.rules.registration_yield import simulate
 from sbafab.runs.run import RunRequest, generate
 from tests.judge.yields import judged_yield
@@ -81,7 +80,7 @@ def judged(source: str, keys: tuple[str, ...], builds: int = BUILDS) -> JudgedYi
     """Return both shares of good builds of a design."""
     drawn = GALLERY / f"{source}.toml"
     design = load_design(drawn if drawn.is_file() else source, keys, WAIVED)
-    share = simulate(build(design), limits(design)).whole
+    share = simulate(build(design), design).whole
     with tempfile.TemporaryDirectory() as folder:
         quick = design.with_({"rules.yield_builds": 100})
         run = generate(RunRequest(quick, Path(folder), ("cut", "press")))

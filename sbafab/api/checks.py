@@ -10,7 +10,6 @@ from sbafab.api.designs import Source, build, command, either_of, load
 from sbafab.assemblies.records import Assembly
 from sbafab.design.files import Change
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.checked import limits
 from sbafab.process import Progress
 from sbafab.reports.nets_svg import NetMap, net_map
 from sbafab.rules.deck import RULES, run_rule
@@ -48,7 +47,7 @@ def checking(
     long rules, and what it raises ends the deck. Raises DesignError.
     """
     design = load(source)
-    measures = Measures(laminate or build(design), limits(design), pause or (lambda: None))
+    measures = Measures(laminate or build(design), design, pause or (lambda: None))
     for rule in RULES:
         yield rule.name, Findings(run_rule(rule, measures))
 
@@ -63,7 +62,7 @@ def nets_of(source: Source, *changes: Change, **tables: Any) -> NetMap:
     """
     design = load(source, *changes, **tables)
     laminate = build(design)
-    found = connectivity(laminate, limits(design), faults=bool(laminate.nets))
+    found = connectivity(laminate, design, faults=bool(laminate.nets))
     return net_map(laminate, found)
 
 

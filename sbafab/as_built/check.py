@@ -60,12 +60,11 @@ from sbafab.laminate.folding import halves
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.formulas import sizes
 from sbafab.output.checked import Checked
-from sbafab.output.checked import limits as limits_of
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.rules import film_limits, nets
 from sbafab.rules.deck import RULES, run_deck, run_rule
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, Limits, lowered
+from sbafab.rules.limits import TOLERANCE, lowered
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Rule
 
@@ -81,7 +80,6 @@ class AsBuiltFolder:
 
     claims: Manifest
     design: Design
-    limits: Limits
     files: tuple[LayerFile, ...]
     laminate: Laminate | None
     problems: tuple[Problem, ...]
@@ -156,10 +154,10 @@ def _by_hashes(
 def _run_deck(built: AsBuiltFolder) -> tuple[Finding, ...]:
     """Return the findings of the rules on the layers as cut."""
     if built.laminate is None:
-        return rules_by_layer(built.files, built.claims, built.design, built.limits)
+        return rules_by_layer(built.files, built.claims, built.design)
     if built.is_expected and built.design_findings is not None:
         return built.design_findings
-    measures = Measures(built.laminate, built.limits)
+    measures = Measures(built.laminate, built.design)
     return tuple(finding for rule in RULES for finding in findings_as_built(rule, measures))
 
 
@@ -196,7 +194,7 @@ def _read_job(folder: Path, works: Mapping[str, WrittenDesign] | None) -> Folder
             continue
         built = replace(built, measured=_run_deck(built))
         folders.append(built)
-        lowered_limits += lowered(limits_of(built.design))
+        lowered_limits += lowered(built.design)
         design_findings = [*_findings(built)]
         layers = layer_departures(built)
         design_findings += findings_of(DESIGNED, layers, AS_DESIGNED) if layers else []
@@ -279,9 +277,8 @@ def read_folder(
             message = f"the layers do not lie over each other as films of one stack ({error})"
             problems.append(Problem(INTEGRITY, message))
     design_findings = work.findings if work is not None else None
-    limits = limits_of(design)
     return AsBuiltFolder(
-        claims, design, limits, tuple(files), laminate, tuple(problems), expected, design_findings
+        claims, design, tuple(files), laminate, tuple(problems), expected, design_findings
     )
 
 
@@ -350,7 +347,7 @@ def as_designed(built: AsBuiltFolder) -> Checked:
     in_chords = built.claims.curves is not None
     laminate = build(built.design) if in_chords else built.expected.laminate
     is_known = built.is_expected and not in_chords
-    findings = built.measured if is_known else run_deck(laminate, limits_of(built.design))
+    findings = built.measured if is_known else run_deck(laminate, built.design)
     return Checked(built.design, laminate, findings)
 
 
@@ -429,7 +426,7 @@ def findings_as_built(rule: Rule, measures: Measures) -> list[Finding]:
 
 
 def rules_by_layer(
-    files: Sequence[LayerFile], claims: Manifest, design: Design, limits: Limits
+    files: Sequence[LayerFile], claims: Manifest, design: Design
 ) -> tuple[Finding, ...]:
     """Return the findings of rules on single layers; every other rule fails as not run."""
     layers = stacked_layers(files, design)
@@ -448,7 +445,7 @@ def rules_by_layer(
     )
     why = "it needs every layer, and not all could be read" if lost else "there is no whole stack"
     findings: list[Finding] = []
-    measures = Measures(some, limits)
+    measures = Measures(some, design)
     for rule in RULES:
         if layers and rule.name in BY_LAYER:
             findings += findings_as_built(rule, measures)

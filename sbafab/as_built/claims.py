@@ -23,7 +23,7 @@ from sbafab.errors import OutputError
 from sbafab.laminate.folding import fold_roots
 from sbafab.laminate.joints import chamber_gaps
 from sbafab.laminate.laminate import Layer
-from sbafab.output.checked import kerf_widths, limits, warnings
+from sbafab.output.checked import warnings
 from sbafab.output.manifest import (
     JobManifest,
     KerfClaim,
@@ -220,7 +220,7 @@ def design_problems(claims: Manifest, design: Design, digest: str) -> list[Probl
         for key, claimed, stated in agree
         if claimed != stated
     ]
-    for material, width in kerf_widths(design).items():
+    for material, width in design.kerf_widths.items():
         claimed = claims.kerf.get(material)
         expected = kerf_claim(width)
         if claimed != expected:
@@ -230,7 +230,7 @@ def design_problems(claims: Manifest, design: Design, digest: str) -> list[Probl
                     f"{_kerf(expected)} by design.toml"
                 )
             )
-    problems += lowered_problems(claims.lowered_limits, lowered(limits(design)))
+    problems += lowered_problems(claims.lowered_limits, lowered(design))
     for rule in claims.waived:
         if rule not in design.rules.waive:
             problems.append(claim(f"{rule} is waived in the manifest and not in design.toml"))

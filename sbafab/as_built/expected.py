@@ -29,7 +29,7 @@ from sbafab.output.checked import cut_settings
 from sbafab.rules import registration_yield
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding
-from sbafab.rules.limits import TOLERANCE, Limits
+from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.measures import Measures
 
 AGREEMENT = 2 * TOLERANCE
@@ -178,12 +178,12 @@ def in_agreement(regions: Sequence[Region]) -> list[Region]:
 
 
 def refuse_coarse(
-    laminate: Laminate, paths: Mapping[str, Region], settings: CutSettings, limits: Limits
+    laminate: Laminate, paths: Mapping[str, Region], settings: CutSettings, design: Design
 ) -> None:
     """Raise DesignError if a passing laminate fails a rule when its ``paths`` are cut in chords."""
     error = settings.curves.chord_error
     try:
-        failed = _first_failure(as_cut(laminate, paths, settings), limits)
+        failed = _first_failure(as_cut(laminate, paths, settings), design)
     except (OutputError, GeometryError) as failure:
         raise DesignError(_refusal(error, f"leave no sound contours: {failure}")) from failure
     if failed is not None:
@@ -212,9 +212,9 @@ def as_cut(laminate: Laminate, paths: Mapping[str, Region], settings: CutSetting
     )
 
 
-def _first_failure(laminate: Laminate, limits: Limits) -> Finding | None:
+def _first_failure(laminate: Laminate, design: Design) -> Finding | None:
     """Return the first failure that is not waived, without the yield, or None."""
-    measures = Measures(laminate, limits)
+    measures = Measures(laminate, design)
     return next(
         (
             finding

@@ -43,7 +43,7 @@ from sbafab.errors import DesignError, SbafabError
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.formulas import size_phrases, sizes
 from sbafab.output.advice import Advice, advise
-from sbafab.output.checked import checks, limits, refuse_undoable
+from sbafab.output.checked import checks, refuse_undoable
 from sbafab.output.job import CheckedJob, check_job
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
@@ -197,7 +197,7 @@ def _against_netlist(outcome: CheckOutcome, job: CheckedJob, file: Path) -> Chec
     """Return the outcome with the findings of a design against a netlist."""
     (checked,) = job.designs
     netlist = read_netlist(file)
-    more = netlist_findings(checked.laminate, limits(checked.design), netlist, file.name)
+    more = netlist_findings(checked.laminate, checked.design, netlist, file.name)
     findings = (*outcome.findings, *more)
     return outcome._replace(findings=findings, groups=[Group(outcome.name, findings)])
 

@@ -38,6 +38,7 @@ from sbafab.design.films import (
     FaceBondings,
     Films,
     LayerFilms,
+    material,
     without_other_products,
 )
 from sbafab.design.kits import inlet_of_kit, load_kit, under_kit
@@ -63,8 +64,10 @@ from sbafab.design.sections import (
 )
 from sbafab.design.toml_table import Section
 from sbafab.errors import DesignError
+from sbafab.geometry.offset import Kerf
 from sbafab.geometry.region import Region
-from sbafab.laminate.base_plate import lone_pin_error, pin_error
+from sbafab.laminate.base_plate import PlateMachine, lone_pin_error, pin_error
+from sbafab.laminate.films import Material
 from sbafab.laminate.joints import FaceBond, Fold
 from sbafab.notebook import table_html
 
@@ -226,6 +229,19 @@ class Design(Section):
         if registration.pin_error is not None:
             return registration.pin_error
         return lone_pin_error(self.thickest_pin, registration.plate_made_by)
+
+    @property
+    def plate_machine(self) -> PlateMachine | None:
+        """What makes the base plate's holes; None if the pins' error is stated, or bonds drawn."""
+        is_stated = self.registration.pin_error is not None or self.form.is_drawn
+        return None if is_stated else self.registration.plate_made_by
+
+    @property
+    def kerf_widths(self) -> dict[Material, Kerf | None]:
+        """Full kerf width (or that along x and y) by material, None if not measured."""
+        kerfs = {"TPE": self.laser.kerf_tpe, "PTFE": self.laser.kerf_ptfe}
+        kerfs |= {material(name): film.kerf for name, film in self.films.others.items()}
+        return {name: None if isinstance(kerf, str) else kerf for name, kerf in kerfs.items()}
 
     @property
     def strip_width(self) -> float:

@@ -24,6 +24,7 @@ from sbafab.design.toml_table import Section, writable
 from sbafab.design.units import CELSIUS, SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.laminate.base_plate import PlateMachine
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, film_name
+from sbafab.laminate.joints import SeamTool
 
 MOST = 1000
 """Actuators of one order."""
@@ -268,6 +269,10 @@ class Inlet(Section):
     """How far the inlet tab reaches past the outline (the paper gives none)."""
 
 
+GUIDED_TOOL = 0.3
+"""mm: error of place of a seam's tool other than a laser; ours, nobody measured it."""
+
+
 class Registration(Section):
     """What keeps the layers in register, and how far off they may lie."""
 
@@ -323,6 +328,12 @@ class Registration(Section):
     def hole_diameter(self) -> float:
         """Diameter of the holes in ears and tails."""
         return self.pin_diameter + self.pin_clearance
+
+    def error_of_seam(self, tool: SeamTool) -> float:
+        """Return the most by which a seam of a tool lies off its path, mm."""
+        if self.seam_error is not None:
+            return self.seam_error
+        return self.cutting_error if tool == "laser" else GUIDED_TOOL
 
 
 MountCoordinate = Annotated[float, Millimetres(-500, 500)]
@@ -593,6 +604,16 @@ class Rules(Section):
         if not isinstance(names, list | tuple):
             return names
         return [name for name in names if name not in REMOVED_RULES]
+
+    @property
+    def channels_open_at_kpa(self) -> float:
+        """Pressure at which a channel of a net must open."""
+        return self.opening_pressure_kpa or 100.0
+
+    @property
+    def longest_dead_end(self) -> float:
+        """Widths that a blind branch of a net may be long."""
+        return self.dead_end or 2.0
 
 
 class Models(Section):

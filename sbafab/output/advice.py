@@ -8,14 +8,13 @@ seed, so that it does not rest on the draws it was chosen by.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, get_args
 
 from sbafab.actuators import build
 from sbafab.design.records import REGISTRATIONS, Design
 from sbafab.errors import DesignError
 from sbafab.laminate.base_plate import PlateMachine
-from sbafab.output.checked import limits
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.deck import run_deck
 from sbafab.rules.registration_yield import SEED, Share, simulate
@@ -93,7 +92,7 @@ def advise(design: Design, target: float, progress: Progress = ignore_progress) 
     rules' limits on.
     """
     if not design.uses(BOND):
-        share = simulate(build(design), limits(design), CHECK_SEED).whole
+        share = simulate(build(design), design, CHECK_SEED).whole
         return Advice(target, design.registration.method, share=share)
     rules = design.rules
     start = {BOND: rules.bond_width, OVERHANG: rules.mask_overhang}
@@ -313,7 +312,7 @@ class _Trials:
             laminate = build(design)
         except DesignError:
             return None
-        return simulate(laminate, limits(design), seed).whole
+        return simulate(laminate, design, seed).whole
 
     def share(self, steps: Steps) -> Share | None:
         """The share by the seed of the rule, counted once."""
@@ -328,7 +327,8 @@ class _Trials:
     def broken(self, steps: Steps) -> set[str]:
         """The rules that the design fails, but for the one that limits the yield."""
         design = self._changed(steps)
-        untargeted = replace(limits(design), target_yield=None)
+        rules = design.rules.model_copy(update={"target_yield": None})
+        untargeted = design.model_copy(update={"rules": rules})
         findings = run_deck(build(design), untargeted)
         return {finding.rule for finding in findings if finding.verdict == "fail"}
 

@@ -42,8 +42,6 @@ from sbafab.output.checked import (
     RunPart,
     checks,
     hole_notes,
-    kerf_widths,
-    limits,
 )
 from sbafab.output.manifest import as_json
 from sbafab.output.schema_ids import PREDICTION_SCHEMA, SIMULATE_SCHEMA
@@ -413,7 +411,7 @@ def order_of(checked: Checked, folder: str = "") -> Job:
         findings=checked.findings,
         fixture=f"{folder}{FIXTURE}" if checked.laminate.pins else None,
         underlay=f"{folder}{UNDERLAY}" if guides(checked.laminate) else None,
-        kerf={str(name): kerf for name, kerf in kerf_widths(design).items()},
+        kerf={str(name): kerf for name, kerf in design.kerf_widths.items()},
     )
 
 
@@ -425,7 +423,7 @@ def findings_page(
     from sbafab.reports.traveller.findings import Inspected, findings_html
 
     inspected = [
-        Inspected(checked.design.name, checked.findings, checked.laminate, limits(checked.design))
+        Inspected(checked.design.name, checked.findings, checked.laminate, checked.design)
         for checked in designs
     ]
     if between:

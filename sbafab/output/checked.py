@@ -14,13 +14,13 @@ from sbafab.actuators.stacking import used_films
 from sbafab.cutting.entries import Entries
 from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings, Recipes
-from sbafab.design.films import KerfWidth, Sheet, material
+from sbafab.design.films import Sheet, material
 from sbafab.design.identity import citation, design_sha256
 from sbafab.design.recipes import recipes_for
 from sbafab.design.records import Design
 from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError, GeometryError
-from sbafab.geometry.offset import Kerf, widths
+from sbafab.geometry.offset import widths
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate
@@ -32,7 +32,7 @@ from sbafab.pressing.schedule import Schedule, plate_holes, schedule
 from sbafab.process import Progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding, Verdict, summary
-from sbafab.rules.limits import CHECKED_AGAINST, USUAL, Limits, Tolerances, lowered
+from sbafab.rules.limits import CHECKED_AGAINST, lowered
 from sbafab.simulators.simulator import Name
 from sbafab.version import GENERATOR
 
@@ -91,14 +91,14 @@ class Checked:
     @property
     def lowered(self) -> tuple[str, ...]:
         """The limits that the design sets below the usual ones."""
-        return lowered(limits(self.design))
+        return lowered(self.design)
 
 
 def check(design: Design, progress: Progress | None = None) -> Checked:
     """Build the laminate of a design and run the rule deck on it. Raises DesignError."""
     try:
         laminate = build(design)
-        return Checked(design, laminate, run_deck(laminate, limits(design), progress))
+        return Checked(design, laminate, run_deck(laminate, design, progress))
     except GeometryError as error:
         raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
 
@@ -165,55 +165,9 @@ def checks(
 # A design's sections as the settings that rules, cutting and pressing take.
 
 
-def kerf_widths(design: Design) -> dict[Material, Kerf | None]:
-    """Return the full kerf width (or that along x and y) by material, None if not measured."""
-    widths = _kerfs(design).items()
-    return {name: None if isinstance(kerf, str) else kerf for name, kerf in widths}
-
-
-def _kerfs(design: Design) -> dict[Material, KerfWidth]:
-    further = {material(name): film.kerf for name, film in design.films.others.items()}
-    return {"TPE": design.laser.kerf_tpe, "PTFE": design.laser.kerf_ptfe, **further}
-
-
 def warnings(design: Design) -> dict[Material, str]:
     """Return the warning that cut files of a film must carry, by material."""
     return {name: film.warning for name, film in used_films(design).items() if film.warning}
-
-
-def limits(design: Design) -> Limits:
-    on_pins, on_one = design.pin_error, design.lone_pin_error
-    is_set = design.registration.pin_error is not None or design.form.is_drawn
-    return Limits(
-        bond_width=design.rules.bond_width,
-        mask_overhang=design.rules.mask_overhang,
-        least_feature=design.laser.least_feature,
-        kerf={name: kerf for name, kerf in kerf_widths(design).items() if kerf is not None},
-        heated_width=design.press.platen_width,
-        heated_length=design.press.platen_length,
-        validated_balloons=design.rules.validated_balloons,
-        tolerances=Tolerances(
-            cutting=design.registration.cutting_error,
-            pin=on_pins,
-            lone_pin=on_one if on_one < on_pins else None,
-            placement=design.registration.hand_placement,
-            turn=design.registration.hand_turn,
-            seam=design.registration.seam_error,
-        ),
-        unknown_kerf=design.laser.unknown_kerf,
-        pin_stretch=design.registration.pin_stretch,
-        worst_bond_width=design.rules.worst_bond_width,
-        worst_mask_overhang=design.rules.worst_mask_overhang,
-        opening_pressure=design.rules.opening_pressure_kpa or USUAL.opening_pressure,
-        dead_end=design.rules.dead_end or USUAL.dead_end,
-        target_yield=design.rules.target_yield,
-        yield_builds=design.rules.yield_builds,
-        minutes_for=design.press.timed_films,
-        working_pressure=design.acceptance.working_pressure_kpa,
-        safety_factor=design.acceptance.safety_factor,
-        waive=frozenset(design.rules.waive),
-        plate=None if is_set else design.registration.plate_made_by,
-    )
 
 
 def cut_settings(
@@ -222,9 +176,9 @@ def cut_settings(
     return CutSettings(
         design=design.name,
         design_sha256=design_sha256(design),
-        kerf_widths=kerf_widths(design),
+        kerf_widths=design.kerf_widths,
         waived=waived,
-        lowered=lowered(limits(design)),
+        lowered=lowered(design),
         curves=curves,
         generator=GENERATOR,
         warnings=warnings(design),
@@ -265,7 +219,7 @@ def stocks(design: Design) -> dict[Material, Stock]:
         name: Stock.model_construct(
             **dict(sheets[name][1]), turns=(0, 2) if isinstance(kerf, tuple) else TURNS
         )
-        for name, kerf in _kerfs(design).items()
+        for name, kerf in design.kerf_widths.items()
     }
 
 
@@ -281,7 +235,7 @@ USUAL_TABS = 3
 
 def entries(design: Design) -> dict[Material, Entries]:
     """Return lead-ins, overcuts and tabs of the films that have any."""
-    kerfs, found = kerf_widths(design), {}
+    kerfs, found = design.kerf_widths, {}
     for name, (key, sheet) in _sheets(design).items():
         if sheet.lead_in is sheet.overcut is sheet.tab_width is None:
             continue

@@ -20,7 +20,7 @@ from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import PLACES, from_dict, nest
 from sbafab.nesting.records import Nest, NestPart
-from sbafab.output.checked import Checked, DesignPlan, check, limits, stocks
+from sbafab.output.checked import Checked, DesignPlan, check, stocks
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, Schema
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.deck import has_failed, run_deck
@@ -107,9 +107,7 @@ def _check_assembly(assembly: Assembly, progress: Progress) -> CheckedJob:
     refuse_other_film(designs)
     try:
         checked = tuple(
-            Checked(
-                part.design, part.laminate, run_deck(part.laminate, limits(part.design), progress)
-            )
+            Checked(part.design, part.laminate, run_deck(part.laminate, part.design, progress))
             for part in assembled.designs
         )
     except GeometryError as error:

@@ -28,7 +28,7 @@ from sbafab.laminate.joints import SeamKind, SeamTool
 from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, Role
 from sbafab.meshing.mesh_files import MeshFile
 from sbafab.models.formulas import sizes
-from sbafab.output.checked import DesignPlan, kerf_widths, warnings
+from sbafab.output.checked import DesignPlan, warnings
 from sbafab.output.swap import SCHEMA, BatchSchema
 from sbafab.pressing.cycles import Runs, design_runs
 from sbafab.version import GENERATOR
@@ -325,7 +325,7 @@ def manifest(
                 for pin in laminate.pins
             ),
         ),
-        kerf={name: kerf_claim(width) for name, width in kerf_widths(design).items()},
+        kerf={name: kerf_claim(width) for name, width in design.kerf_widths.items()},
         waived=checked.waived,
         lowered_limits=checked.lowered,
         sizes={name: round(value, 6) for name, value in sizes(design, laminate).items()},

@@ -22,7 +22,6 @@ from sbafab.models.formulas import usual_pressures
 from sbafab.models.paper import FORCE_KPA
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
-from sbafab.output.checked import limits
 from sbafab.rules.registration_yield import simulate
 from sbafab.version import GENERATOR
 
@@ -105,7 +104,7 @@ def promised(built: Design | Assembled) -> Build:
         actuator, predicted = assembled_sha256(built), {}
         parts = [(part.design, part.laminate, len(part.parts)) for part in built.designs]
     designs = [design for design, _, _ in parts]
-    shares = [simulate(laminate, limits(design)).whole for design, laminate, _ in parts]
+    shares = [simulate(laminate, design).whole for design, laminate, _ in parts]
     builds = max(share.builds for share in shares)
     good = math.prod(share.value**count for share, (*_, count) in zip(shares, parts, strict=True))
     return Build(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from sbafab.design.records import Design
 from sbafab.geometry.width import Width
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits, at, holds
+from sbafab.rules.limits import at, holds
 from sbafab.rules.measures import DistinctInterface, Measures, distinct_interfaces, interface_name
 from sbafab.rules.rule import Explanation, Rule
 
@@ -13,7 +14,7 @@ NAME = "bond-width"
 
 def check(measures: Measures) -> list[Finding]:
     """The least width of any bond, measured between facing edges."""
-    laminate, limits = measures.laminate, measures.limits
+    laminate, design = measures.laminate, measures.design
     worst: tuple[float, Width | None, DistinctInterface] | None = None
     for distinct in distinct_interfaces(laminate):
         bond = distinct.interface.bond
@@ -24,12 +25,12 @@ def check(measures: Measures) -> list[Finding]:
         if worst is None or value < worst[0] - 1e-9:
             worst = value, width, distinct
     if worst is None:
-        return [_finding(None, limits, Place(), "the laminate has no bond to measure")]
+        return [_finding(None, design, Place(), "the laminate has no bond to measure")]
     value, width, distinct = worst
     interface = distinct.interface
     x, y = width.middle if width else (None, None)
     place = Place(interface.index, interface.layer_indices, x, y)
-    return [_finding(value, limits, place, _message(value, width, distinct, limits))]
+    return [_finding(value, design, place, _message(value, width, distinct, design))]
 
 
 RULE = Rule(
@@ -45,23 +46,25 @@ RULE = Rule(
 )
 
 
-def _finding(value: float | None, limits: Limits, place: Place, message: str) -> Finding:
-    good = value is not None and holds(value, limits.bond_width)
-    return Finding(NAME, "pass" if good else "fail", limits.bond_width, value, "mm", place, message)
+def _finding(value: float | None, design: Design, place: Place, message: str) -> Finding:
+    good = value is not None and holds(value, design.rules.bond_width)
+    return Finding(
+        NAME, "pass" if good else "fail", design.rules.bond_width, value, "mm", place, message
+    )
 
 
-def _message(value: float, width: Width | None, distinct: DistinctInterface, limits: Limits) -> str:
+def _message(value: float, width: Width | None, distinct: DistinctInterface, design: Design) -> str:
     where = interface_name(distinct.interface) + distinct.suffix
     if width is None:
         if distinct.interface.seams and not distinct.interface.pressed:
             return f"nothing bonds at {where}: its seams lie beside the films; move their paths"
         return f"nothing bonds at {where}: the mask covers all of it; make the mask smaller"
     narrowest = f"the narrowest bond is {value:.3f} mm, at {where}, {at(width.middle)}"
-    if holds(value, limits.bond_width):
+    if holds(value, design.rules.bond_width):
         return narrowest
     remedy = "raise bond.width, or move the edges on either side apart there"
     if not value:
         remedy = "round the sharp corner there"
     elif distinct.interface.seams and not distinct.interface.pressed:
         remedy = "make the seam there wider, or move its path inward from the film's edge"
-    return f"{narrowest}; it needs {limits.bond_width:g}: {remedy}"
+    return f"{narrowest}; it needs {design.rules.bond_width:g}: {remedy}"

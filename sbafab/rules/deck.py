@@ -12,13 +12,14 @@ from dataclasses import replace
 from typing import get_args
 
 from sbafab import plugins
+from sbafab.design.records import Design
 from sbafab.design.sections import RuleName
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.plugins import Plugins
 from sbafab.process import Progress
 from sbafab.rules.finding import Finding
-from sbafab.rules.limits import Limits, lowered
+from sbafab.rules.limits import lowered
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Rule
 
@@ -40,11 +41,11 @@ AT_MOST = frozenset(rule.name for rule in RULES if rule.at_most)
 
 
 def run_deck(
-    laminate: Laminate, limits: Limits, progress: Progress | None = None
+    laminate: Laminate, design: Design, progress: Progress | None = None
 ) -> tuple[Finding, ...]:
     """Return the findings of every rule in the deck's order; failures the user waived say so."""
     findings: list[Finding] = []
-    measures = Measures(laminate, limits)
+    measures = Measures(laminate, design)
     for number, rule in enumerate(RULES):
         if progress is not None:
             progress(rule.name, number, len(RULES))
@@ -54,9 +55,9 @@ def run_deck(
 
 def run_rule(rule: Rule, measures: Measures) -> list[Finding]:
     """Return the findings of a rule; failures the user waived and lowered limits are marked."""
-    weak = lowered(measures.limits, rule.name)
+    weak = lowered(measures.design, rule.name)
     findings = [_against(weak, finding) for finding in rule.check(measures)]
-    if rule.name not in measures.limits.waive:
+    if rule.name not in measures.design.rules.waive:
         return findings
     return [_waived(finding) if finding.verdict == "fail" else finding for finding in findings]
 

@@ -13,13 +13,14 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from sbafab.design.records import Design
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import LOOSE, Interface, Laminate, Pin
 from sbafab.rules.boundary import Facing, beside, edges_along, outward_reach, without_slivers
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, Limits, at, holds
+from sbafab.rules.limits import TOLERANCE, at, holds
 from sbafab.rules.margins import pin_at
 from sbafab.rules.measures import Measures, distinct_interfaces
 from sbafab.rules.rule import Explanation, Rule
@@ -43,7 +44,7 @@ class _Overhang(NamedTuple):
 
 def check(measures: Measures) -> list[Finding]:
     """Return the largest unintended weld; without any, the least overhang of masks there."""
-    laminate, limits = measures.laminate, measures.limits
+    laminate, design = measures.laminate, measures.design
     pairs = _distinct(measures.facing)
     welds = [*_past_films(pairs), *_at_rims(laminate)]
     if welds:
@@ -51,7 +52,7 @@ def check(measures: Measures) -> list[Finding]:
     message = "films of two balloons meet where they are meant to bond, and nowhere else"
     clear = Finding(NAME, "pass", 0.0, 0.0, "mm2", Place(), message)
     overhangs = [o for pair, _ in pairs for o in _overhangs(pair.gap, laminate.pins, measures)]
-    return [clear, _least(overhangs, limits)] if overhangs else [clear]
+    return [clear, _least(overhangs, design)] if overhangs else [clear]
 
 
 RULE = Rule(
@@ -149,9 +150,9 @@ def _welded(welds: Sequence[_Weld], laminate: Laminate) -> Finding:
     return Finding(NAME, "fail", 0.0, area, "mm2", place, message)
 
 
-def _least(overhangs: Sequence[_Overhang], limits: Limits) -> Finding:
+def _least(overhangs: Sequence[_Overhang], design: Design) -> Finding:
     worst = min(overhangs, key=lambda overhang: round(overhang.value, 9))
-    gap, limit = worst.gap, limits.mask_overhang
+    gap, limit = worst.gap, design.rules.mask_overhang
     good = holds(worst.value, limit)
     message = (
         f"layers {gap.below.index} and {gap.above.index} face each other past films that end "

@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from sbafab.design.records import Design
 from sbafab.errors import GeometryError
 from sbafab.geometry.offset import beam_path, widths
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import TAPER, Width, least_gap, least_width, place_of
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits, at, holds
+from sbafab.rules.limits import at, holds
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Explanation, Rule
 
@@ -33,9 +34,9 @@ class _Feature(NamedTuple):
 
 def check(measures: Measures) -> list[Finding]:
     """The finest web, slot or gap of any layer; and whether the cut path keeps every contour."""
-    laminate, limits = measures.laminate, measures.limits
-    limit = limits.least_feature
-    lost = _lost_to_kerf(laminate, limits)
+    laminate, design = measures.laminate, measures.design
+    limit = design.laser.least_feature
+    lost = _lost_to_kerf(laminate, design)
     if lost is not None:
         return [lost]
     finest = _finest(laminate)
@@ -89,11 +90,11 @@ def _finer(layers: Iterable[tuple[Layer, Region]], than: float) -> _Feature | No
     return finest
 
 
-def _lost_to_kerf(laminate: Laminate, limits: Limits) -> Finding | None:
+def _lost_to_kerf(laminate: Laminate, design: Design) -> Finding | None:
     """The first layer whose cut path has other contours than its profile."""
     for layers in laminate.patterns.values():
         layer = layers[0]
-        kerf = limits.kerf.get(layer.film.material, 0.0)
+        kerf = design.kerf_widths.get(layer.film.material) or 0.0
         if max(widths(kerf)) == 0:
             continue
         place, fault = Place(None, (layer.index,)), "loses or joins a hole or piece"

@@ -12,6 +12,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
+from sbafab.design.records import Design
+from sbafab.design.sections import Registration
 from sbafab.geometry.contour import nanometres
 from sbafab.geometry.edges import Point
 from sbafab.geometry.nearby import boxes_meet
@@ -19,7 +21,7 @@ from sbafab.geometry.region import Region, centroid
 from sbafab.laminate.assembly import AssemblyStep, laying
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import LOOSE, Laminate
-from sbafab.rules.limits import Tolerances
+from sbafab.rules.limits import error_on_pins
 
 EARS = 'set registration.method = "ears" (drawn layers: draw ears, list their pins)'
 """Remedy where a hand places what pins could hold."""
@@ -129,7 +131,7 @@ def lay_up(laminate: Laminate) -> list[Laid]:
     return laid
 
 
-def freedoms(laminate: Laminate, tolerances: Tolerances, laid: Sequence[Laid]) -> Freedoms:
+def freedoms(laminate: Laminate, design: Design, laid: Sequence[Laid]) -> Freedoms:
     """Return the freedoms of each piece of each layer, from every step that it goes through.
 
     Two pieces lie off each other by the freedoms that they do not share. ``laid`` is the result of
@@ -141,18 +143,15 @@ def freedoms(laminate: Laminate, tolerances: Tolerances, laid: Sequence[Laid]) -
         for layer in laminate.layers
         for piece in range(counts[layer.pattern])
     }
+    registration, on_pins = design.registration, error_on_pins(design, laminate)
     for number, item in enumerate(laid, 1):
-        ways = (
-            ()
-            if item.stays
-            else _body_freedoms(item, number, tolerances, tolerances.on_pins(laminate))
-        )
+        ways = () if item.stays else _body_freedoms(item, number, registration, on_pins)
         if item.under is not None:
             ways = (*by_part[item.under], *ways)
         for part in item.body:
             by_part[part] += ways
     for seam in laminate.seams:
-        by_part |= _of_seam(laminate, seam, by_part, tolerances)
+        by_part |= _of_seam(laminate, seam, by_part, design)
     return Freedoms(by_part)
 
 
@@ -162,7 +161,7 @@ def seam_part(seam: Seam, piece: int = 0) -> Part:
 
 
 def _of_seam(
-    laminate: Laminate, seam: Seam, by_part: Mapping[Part, Sequence[Freedom]], tools: Tolerances
+    laminate: Laminate, seam: Seam, by_part: Mapping[Part, Sequence[Freedom]], design: Design
 ) -> dict[Part, tuple[Freedom, ...]]:
     """Freedoms of a seam: those of the film above, on which its path is laid, and its tool's."""
     films = laminate.layer(seam.above).profile.pieces
@@ -170,14 +169,14 @@ def _of_seam(
     step = next(
         (s.number for s in laying(laminate) if s.joining and s.joining.seam is seam), seam.order
     )
-    most, (layer, _) = tools.of_seam(seam.tool), seam_part(seam)
+    most, (layer, _) = design.registration.error_of_seam(seam.tool), seam_part(seam)
     off = Freedom(step, layer, seam.below, seam.above, 0, most, seam=seam.name)
     ways = (*by_part[Part(seam.above, under)], *((off,) if most > 0 else ()))
     return {seam_part(seam, piece): ways for piece in range(len(seam.region.pieces))}
 
 
 def _body_freedoms(
-    laid: Laid, number: int, tolerances: Tolerances, on_pins: float
+    laid: Laid, number: int, hand: Registration, on_pins: float
 ) -> tuple[Freedom, ...]:
     """Freedoms that a step gives a body; ``on_pins`` mm off its place on its pins."""
     pins = laid.pins
@@ -187,11 +186,11 @@ def _body_freedoms(
         return Freedom(laid.step, number, lowest, highest, len(pins), most, centre)
 
     loose = min(pins.values(), default=0.0)
-    shift = freedom(on_pins + loose if pins else tolerances.placement)
+    shift = freedom(on_pins + loose if pins else hand.hand_placement)
     if len(pins) >= 2:
         both = [shift, freedom(*_turn_on(pins))]
     else:
-        both = [shift, freedom(math.radians(tolerances.turn), laid.centre)]
+        both = [shift, freedom(math.radians(hand.hand_turn), laid.centre)]
     return tuple(way for way in both if way.most > 0)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
+from sbafab.design.records import Design
 from sbafab.geometry.cache import cached, cached_batch
 from sbafab.geometry.edge_table import (
     CellOrder,
@@ -31,7 +32,7 @@ from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Interface, Laminate, Pin
 from sbafab.rules.boundary import END_ROOM, STEEP, Facing, Reach
 from sbafab.rules.freedoms import Freedom, Freedoms, Part, seam_part
-from sbafab.rules.limits import TOLERANCE, Limits, holds
+from sbafab.rules.limits import TOLERANCE, holds
 from sbafab.rules.seam_overlaps import Overlap
 
 if TYPE_CHECKING:
@@ -195,7 +196,7 @@ def _signature(interface: Interface, moves: Freedoms) -> tuple[object, ...]:
     )
 
 
-def _loss(interface: Interface, limits: Limits, moves: Freedoms) -> float:
+def _loss(interface: Interface, design: Design, moves: Freedoms) -> float:
     """Return the most that an interface's margins lose when everything moves together, mm.
 
     A place that is wider than the narrowest by more than this is never the worst.
@@ -204,7 +205,7 @@ def _loss(interface: Interface, limits: Limits, moves: Freedoms) -> float:
     loose = {id(freedom): freedom for ways in ways_of_parts for freedom in ways}.values()
     box = interface.contact.bounds
     together = sum([freedom.most * _farthest(freedom, box) for freedom in loose], 0.0)
-    return 2 * limits.tolerances.cutting + together
+    return 2 * design.registration.cutting_error + together
 
 
 def _farthest(freedom: Freedom, box: Bounds) -> float:
@@ -223,15 +224,15 @@ class InterfaceGroup(NamedTuple):
 
     @staticmethod
     def of(
-        interfaces: Sequence[Interface], limits: Limits, moves: Freedoms, bond: Width | None
+        interfaces: Sequence[Interface], design: Design, moves: Freedoms, bond: Width | None
     ) -> InterfaceGroup:
-        return InterfaceGroup(tuple(interfaces), _loss(interfaces[0], limits, moves), bond)
+        return InterfaceGroup(tuple(interfaces), _loss(interfaces[0], design, moves), bond)
 
 
 def narrow_places(
     groups: Sequence[InterfaceGroup],
     pins: tuple[Pin, ...],
-    limits: Limits,
+    design: Design,
     reaches: Sequence[Sequence[tuple[Edge, Reach]]],
     overlaps: Sequence[Sequence[Overlap]],
 ) -> list[dict[MarginKind, Places]]:
@@ -247,7 +248,7 @@ def narrow_places(
         bond = group.interfaces[0].whole_bond
         widest[bond] = max(slack, widest.get(bond, 0.0))
     queries: list[tuple[int, MarginKind, BondQuery | OverhangQuery]] = []
-    flush = limits.mask_overhang
+    flush = design.rules.mask_overhang
     for number, (group, slack) in enumerate(zip(groups, slacks, strict=True)):
         interface = group.interfaces[0]
         if interface.contact.is_empty:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
 from sbafab.laminate.laminate import Interface, Pin
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits, at, holds
+from sbafab.rules.limits import at, holds
 from sbafab.rules.margins import pin_at
 from sbafab.rules.measures import DistinctInterface, Measures, distinct_interfaces, interface_name
 from sbafab.rules.rule import Explanation, Rule
@@ -27,7 +28,7 @@ class _Overhang(NamedTuple):
 
 def check(measures: Measures) -> list[Finding]:
     """The least reach of any mask past an edge that bounds unbonded film, and pins' waivers."""
-    laminate, limits = measures.laminate, measures.limits
+    laminate, design = measures.laminate, measures.design
     free: list[_Overhang] = []
     pinned: dict[str, list[_Overhang]] = {}
     bare: list[DistinctInterface] = []
@@ -38,12 +39,12 @@ def check(measures: Measures) -> list[Finding]:
         for edge, reach in measures.reaches(distinct.interface):
             overhang = _Overhang(reach.value, edge.nearest(reach.at), distinct)
             pin = pin_at(edge, laminate.pins)
-            if pin is not None and not holds(overhang.value, limits.mask_overhang):
+            if pin is not None and not holds(overhang.value, design.rules.mask_overhang):
                 pinned.setdefault(pin.name, []).append(overhang)
             else:
                 free.append(overhang)
-    waived = [_waived(pin, pinned[pin.name], limits) for pin in laminate.pins if pin.name in pinned]
-    return [_main(free, bare, limits), *waived]
+    waived = [_waived(pin, pinned[pin.name], design) for pin in laminate.pins if pin.name in pinned]
+    return [_main(free, bare, design), *waived]
 
 
 RULE = Rule(
@@ -58,8 +59,8 @@ RULE = Rule(
 )
 
 
-def _main(free: list[_Overhang], bare: list[DistinctInterface], limits: Limits) -> Finding:
-    limit = limits.mask_overhang
+def _main(free: list[_Overhang], bare: list[DistinctInterface], design: Design) -> Finding:
+    limit = design.rules.mask_overhang
     if bare:
         interface = bare[0].interface
         message = (
@@ -88,7 +89,7 @@ def _main(free: list[_Overhang], bare: list[DistinctInterface], limits: Limits) 
     )
 
 
-def _waived(pin: Pin, overhangs: list[_Overhang], limits: Limits) -> Finding:
+def _waived(pin: Pin, overhangs: list[_Overhang], design: Design) -> Finding:
     worst = min(overhangs, key=lambda overhang: overhang.value)
     interface = worst.distinct.interface
     patterns = {
@@ -103,7 +104,7 @@ def _waived(pin: Pin, overhangs: list[_Overhang], limits: Limits) -> Finding:
     return Finding(
         NAME,
         "waived",
-        limits.mask_overhang,
+        design.rules.mask_overhang,
         worst.value,
         "mm",
         Place(interface.index, interface.layer_indices, *pin.centre),

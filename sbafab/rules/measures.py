@@ -1,4 +1,4 @@
-"""Measures that several rules share: computed once for a laminate under one set of limits."""
+"""Measures that several rules share: computed once for a laminate against one design."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cache, cached_property
 from typing import NamedTuple
 
+from sbafab.design.records import Design
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Edge
 from sbafab.geometry.region import Region
@@ -15,7 +16,6 @@ from sbafab.laminate.folding import lies_on
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.boundary import Facing, Reach, edges_along, facing_films, outward_reach
 from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
-from sbafab.rules.limits import Limits
 from sbafab.rules.margins import (
     SHARP,
     InterfaceGroup,
@@ -35,20 +35,20 @@ class Measures:
     """
 
     def __init__(
-        self, laminate: Laminate, limits: Limits, pause: Callable[[], None] = lambda: None
+        self, laminate: Laminate, design: Design, pause: Callable[[], None] = lambda: None
     ) -> None:
         self.laminate = laminate
-        self.limits = limits
+        self.design = design
         self.pause = pause
         self._bond = cache(_bond)
         self._reaches = cache(_reaches)
 
-    def by_hand(self, limits: Limits) -> Measures:
-        """Measures of the same laminate under ``limits`` with a hand no rougher than this one.
+    def by_hand(self, design: Design) -> Measures:
+        """Measures of the same laminate under ``design`` with a hand no rougher than this one.
 
         Places that are narrow with the rougher hand include all that are so with a steadier one.
         """
-        steadier = Measures(self.laminate, limits, self.pause)
+        steadier = Measures(self.laminate, design, self.pause)
         steadier.margins, steadier.laid = self.margins, self.laid
         steadier.seam_ends = self.seam_ends
         return steadier
@@ -80,7 +80,7 @@ class Measures:
     @cached_property
     def moves(self) -> Freedoms:
         """Freedoms of every piece of every layer."""
-        return freedoms(self.laminate, self.limits.tolerances, self.laid)
+        return freedoms(self.laminate, self.design, self.laid)
 
     @cached_property
     def laid(self) -> list[Laid]:
@@ -95,19 +95,19 @@ class Measures:
     def seam_ends(self) -> list[SeamEnds]:
         """What seams end on in the first of every set of equal interfaces."""
         first = [interfaces[0] for interfaces in self._equal_interfaces]
-        return seam_ends(self.laminate, first, self.limits.tolerances.of_seam)
+        return seam_ends(self.laminate, first, self.design.registration.error_of_seam)
 
     @cached_property
     def margins(self) -> list[InterfaceMargins]:
         """The narrow places of every interface."""
-        limits = self.limits
+        design = self.design
         groups = [
-            InterfaceGroup.of(interfaces, limits, self.moves, self.bond(interfaces[0]))
+            InterfaceGroup.of(interfaces, design, self.moves, self.bond(interfaces[0]))
             for interfaces in self._equal_interfaces
         ]
         reaches = [self.reaches(group.interfaces[0]) for group in groups]
         overlaps = [ends.overlaps for ends in self.seam_ends]
-        places_of_groups = narrow_places(groups, self.laminate.pins, limits, reaches, overlaps)
+        places_of_groups = narrow_places(groups, self.laminate.pins, design, reaches, overlaps)
         return [
             InterfaceMargins(group.interfaces, places)
             for group, places in zip(groups, places_of_groups, strict=True)

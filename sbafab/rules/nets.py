@@ -14,6 +14,7 @@ from functools import cached_property
 from itertools import chain
 from typing import Literal, NamedTuple
 
+from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
 from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region
@@ -23,7 +24,7 @@ from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.laminate.netlist import Netlist, compare
 from sbafab.rules.boundary import without_slivers
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits, at
+from sbafab.rules.limits import at
 from sbafab.rules.measures import Measures
 from sbafab.rules.opening_pressure import hardest_place
 from sbafab.rules.rule import Explanation, Rule
@@ -102,10 +103,10 @@ class Connectivity:
 
 def check(measures: Measures) -> list[Finding]:
     """Return a finding for every fault, and one for the channel that is hardest to open."""
-    laminate, limits = measures.laminate, measures.limits
+    laminate, design = measures.laminate, measures.design
     if not laminate.nets:
         return []
-    found = connectivity(laminate, limits)
+    found = connectivity(laminate, design)
     findings = [_failed(fault, fault.message) for fault in found.faults]
     if not findings:
         nets = declared(laminate)
@@ -115,7 +116,7 @@ def check(measures: Measures) -> list[Finding]:
             "nothing else"
         )
         findings.append(Finding(NAME, "pass", 0.0, 0.0, "faults", Place(), message))
-    return [*findings, *_openings(found.narrow, laminate, limits)]
+    return [*findings, *_openings(found.narrow, laminate, design)]
 
 
 def _failed(fault: NetFault, message: str) -> Finding:
@@ -150,7 +151,7 @@ def declared(laminate: Laminate) -> tuple[Net, ...]:
     return (*laminate.nets, *alone)
 
 
-def connectivity(laminate: Laminate, limits: Limits, faults: bool = True) -> Connectivity:
+def connectivity(laminate: Laminate, design: Design, faults: bool = True) -> Connectivity:
     """Return the voids of a laminate, the nets that they belong to, and what is not as declared.
 
     Without ``faults`` these are not searched for.
@@ -160,7 +161,7 @@ def connectivity(laminate: Laminate, limits: Limits, faults: bool = True) -> Con
         reading.opens(),
         reading.shorts(),
         reading.leaks(),
-        reading.dead_ends(limits.dead_end),
+        reading.dead_ends(design.rules.longest_dead_end),
         reading.strays(),
     )
     owners = tuple(
@@ -172,12 +173,12 @@ def connectivity(laminate: Laminate, limits: Limits, faults: bool = True) -> Con
         owners,
         reading.groups(),
         tuple(chain(*differences)) if faults else (),
-        tuple(reading.narrow(limits)) if faults else (),
+        tuple(reading.narrow(design)) if faults else (),
     )
 
 
 def netlist_findings(
-    laminate: Laminate, limits: Limits, netlist: Netlist, file: str
+    laminate: Laminate, design: Design, netlist: Netlist, file: str
 ) -> list[Finding]:
     """Return the findings of a laminate against a netlist alone, in place of its own nets.
 
@@ -192,7 +193,7 @@ def netlist_findings(
         Net(name, tuple(member for member in members if member in names))
         for name, members in netlist.nets.items()
     )
-    found = connectivity(replace(laminate, ports=ports, nets=nets), limits)
+    found = connectivity(replace(laminate, ports=ports, nets=nets), design)
     comparison = compare(found.groups, netlist.nets)
     findings = [
         Finding(NETLIST, "fail", 0.0, 1.0, "differences", Place(), _missing(name, file, names))
@@ -460,13 +461,13 @@ class _Reading:
 
     # Widths.
 
-    def narrow(self, limits: Limits) -> Iterable[NarrowPlace]:
+    def narrow(self, design: Design) -> Iterable[NarrowPlace]:
         """Yield the place of every cavity of a net that is hardest to open at worst."""
         for number, cavity in enumerate(self.cavities):
             names = self.owners.get(self.part(number), ())
             if names and not cavity.is_open_film:
                 gap = self.interface(cavity.interface)
-                edges = VoidEdges.of(gap, limits)
+                edges = VoidEdges.of(gap, design)
                 place = hardest_place(self.laminate, gap, cavity.region, edges)
                 if place is not None:
                     yield NarrowPlace(names[0], cavity.interface, *place)
@@ -673,10 +674,10 @@ def _labels(home: Mapping[_Terminal, int | None], part: int) -> str:
 
 
 def _openings(
-    narrow: Sequence[NarrowPlace], laminate: Laminate, limits: Limits
+    narrow: Sequence[NarrowPlace], laminate: Laminate, design: Design
 ) -> Iterable[Finding]:
     """Yield the channel that takes most pressure to open; a warning where that is not known."""
-    limit = limits.opening_pressure
+    limit = design.rules.channels_open_at_kpa
     known = [(place.pressure, place) for place in narrow if place.pressure is not None]
     if known:
         pressure, worst = max(known, key=lambda row: row[0])
@@ -688,7 +689,7 @@ def _openings(
             f"the channel of net {worst.net} that is hardest to open is drawn "
             f"{worst.width.value:.3f} mm wide, at interface {worst.interface} "
             f"({at(worst.width.middle)}), and {left} at worst "
-            f"({VoidEdges.of(interface, limits).words()})"
+            f"({VoidEdges.of(interface, design).words()})"
         )
         if worst.left > 0:
             message += f"; it opens by a film's thickness at {pressure:.3g} kPa (clamped plate)"

@@ -11,11 +11,12 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from sbafab.design.records import Design
 from sbafab.laminate.assembly import assembly, distinct_layers
 from sbafab.laminate.base_plate import pin_deviations
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, Limits, at
+from sbafab.rules.limits import TOLERANCE, at, error_on_pins
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Explanation, Rule
 
@@ -45,22 +46,23 @@ class _Fit(NamedTuple):
 
 def check(measures: Measures) -> list[Finding]:
     """Return the largest stretch of a film over a pin, against the share that is allowed."""
-    laminate, limits = measures.laminate, measures.limits
-    fits = list(_fits(laminate, limits))
+    laminate, design = measures.laminate, measures.design
+    limit = design.registration.pin_stretch
+    fits = list(_fits(laminate, design))
     if not fits:
         message = "no pin holds a layer"
-        return [Finding(NAME, "pass", limits.pin_stretch, None, "", Place(), message)]
+        return [Finding(NAME, "pass", limit, None, "", Place(), message)]
     worst = max(fits, key=lambda fit: round(fit.stretch, 9))
     # What a hole may miss its drawing by counts for it.
-    good = worst.stretch <= limits.pin_stretch + 2 * TOLERANCE / max(worst.least, TOLERANCE)
+    good = worst.stretch <= limit + 2 * TOLERANCE / max(worst.least, TOLERANCE)
     pin = worst.pin
     message = (
-        f"{_stretch_text(worst)}; {100 * limits.pin_stretch:.4g}% at most is allowed: the "
+        f"{_stretch_text(worst)}; {100 * limit:.4g}% at most is allowed: the "
         f"{worst.drawn:.3f} mm hole of layer {worst.layer.index} ({worst.layer.name}) may come out "
         f"{max(worst.least, 0.0):.3f} mm wide, and the pin {pin.name} at {at(pin.centre)} up to "
         f"{worst.most:.3f} mm; {_threaded(laminate, pin)} films are threaded on this pin"
     )
-    if worst.layer.film.material not in limits.kerf:
+    if design.kerf_widths.get(worst.layer.film.material) is None:
         message += "; its kerf is not measured, so holes come out wider by it and hold less"
     if not good:
         message += (
@@ -69,9 +71,7 @@ def check(measures: Measures) -> list[Finding]:
         )
     value = None if math.isinf(worst.stretch) else worst.stretch
     place = Place(None, (worst.layer.index,), *pin.centre)
-    return [
-        Finding(NAME, "pass" if good else "fail", limits.pin_stretch, value, "", place, message)
-    ]
+    return [Finding(NAME, "pass" if good else "fail", limit, value, "", place, message)]
 
 
 RULE = Rule(
@@ -96,10 +96,10 @@ def _stretch_text(fit: _Fit) -> str:
     return f"no film must stretch over its pin ({fit.least - fit.most:.3f} mm to spare at worst)"
 
 
-def _fits(laminate: Laminate, limits: Limits) -> Iterator[_Fit]:
+def _fits(laminate: Laminate, design: Design) -> Iterator[_Fit]:
     """Every pin in every pattern that hangs on it in a step."""
     visited = set()
-    on_pins = limits.tolerances.on_pins(laminate)
+    on_pins = error_on_pins(design, laminate)
     for step in assembly(laminate):
         for layer in distinct_layers(laminate, step.adds):
             for pin in step.pins:
@@ -113,7 +113,7 @@ def _fits(laminate: Laminate, limits: Limits) -> Iterator[_Fit]:
                     if abs(2 * circle[1] - pin.hole) < LOOSE:
                         # A hole off its place leaves the pin that much less room.
                         drawn = 2 * (circle[1] - math.dist(circle[0], pin.centre))
-                        least = drawn - 2 * (limits.tolerances.cutting + on_pins)
+                        least = drawn - 2 * (design.registration.cutting_error + on_pins)
                         yield _Fit(pin, layer, 2 * circle[1], least)
 
 

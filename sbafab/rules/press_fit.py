@@ -21,15 +21,15 @@ STIFFEST = 1000.0
 
 def check(measures: Measures) -> list[Finding]:
     """Return the laminate's size against the platen, either way round, and the warnings."""
-    laminate, limits = measures.laminate, measures.limits
+    laminate, design = measures.laminate, measures.design
     low_x, low_y, high_x, high_y = laminate.bounds
     short, long = sorted((high_x - low_x, high_y - low_y))
-    narrow, wide = sorted((limits.heated_width, limits.heated_length))
+    narrow, wide = sorted(design.press.platen)
     # The side with less room to spare decides.
     measured, limit = min(((short, narrow), (long, wide)), key=lambda side: side[1] - side[0])
     good = measured <= limit + TOLERANCE
     size = f"the laminate measures {high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
-    platen = f"{limits.heated_width:g} x {limits.heated_length:g} mm"
+    platen = f"{design.press.platen_width:g} x {design.press.platen_length:g} mm"
     message = f"{size} and lies within the heated area of {platen}"
     place = Place()
     if not good:
@@ -40,17 +40,18 @@ def check(measures: Measures) -> list[Finding]:
         )
         place = Place(None, (largest.index,), high_x, high_y)
     findings = [Finding(NAME, "pass" if good else "fail", limit, measured, "mm", place, message)]
-    if laminate.balloons > limits.validated_balloons:
+    validated = design.rules.validated_balloons
+    if laminate.balloons > validated:
         remedy = "press a test piece of this height first"
         message = (
-            f"{remedy}: {laminate.balloons} balloons are more than the {limits.validated_balloons} "
+            f"{remedy}: {laminate.balloons} balloons are more than the {validated} "
             "that have been built and tested; heat may not reach the middle of the stack"
         )
         findings.append(
             Finding(
                 NAME,
                 "warn",
-                float(limits.validated_balloons),
+                float(validated),
                 float(laminate.balloons),
                 "balloons",
                 Place(),
@@ -58,7 +59,7 @@ def check(measures: Measures) -> list[Finding]:
                 remedy=remedy,
             )
         )
-    return findings + _unstated(laminate, limits.minutes_for) + _too_stiff(laminate)
+    return findings + _unstated(laminate, design.press.timed_films) + _too_stiff(laminate)
 
 
 RULE = Rule(

@@ -20,7 +20,8 @@ KEY = "acceptance.working_pressure_kpa"
 
 def check(measures: Measures) -> list[Finding]:
     """Return the burst estimate of the weakest pocket against the working pressure."""
-    stated, factor = measures.limits.working_pressure, measures.limits.safety_factor
+    acceptance = measures.design.acceptance
+    stated, factor = acceptance.working_pressure_kpa, acceptance.safety_factor
     working = UNSTATED if stated is None else stated
     if working <= 0:
         return [_passed("it works under a vacuum, by which no film bursts")]

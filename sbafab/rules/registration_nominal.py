@@ -12,7 +12,7 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.rules.channel_clear import ON_ONE_PIN, Channel, channels, tooling_pins
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import at
+from sbafab.rules.limits import TOLERANCE, at
 from sbafab.rules.measures import Measures, distinct_interfaces
 from sbafab.rules.rule import Explanation, Rule
 
@@ -28,8 +28,8 @@ class _Departure(NamedTuple):
 
 def check(measures: Measures) -> list[Finding]:
     """The largest departure of a hole from its axis or pin, or of an outline from its twin."""
-    laminate, limits = measures.laminate, measures.limits
-    limit = limits.registration_tolerance
+    laminate = measures.laminate
+    limit = TOLERANCE
     departures = [*_off_axis(laminate), *_off_pins(laminate), *_off_outline(laminate)]
     if not departures:
         message = "no two layers have to lie over each other"

@@ -11,12 +11,13 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from sbafab.design.records import Design
 from sbafab.geometry.on_demand import np
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.freedoms import EARS, Freedom
-from sbafab.rules.limits import Limits, Tolerances, at, holds, least_passing
+from sbafab.rules.limits import at, holds, least_passing
 from sbafab.rules.margins import (
     InterfaceMargins,
     Margin,
@@ -73,13 +74,16 @@ class Remaining(NamedTuple):
 
 def least_remaining(measures: Measures) -> list[Remaining]:
     """Return the worst place of every group of equal interfaces, for bond and overhang."""
-    forms, limits = measures.forms, measures.limits
+    forms, design = measures.forms, measures.design
     begins = forms.begins[:-1]
     drawn = forms.by_quantity(
-        {"bond": least_passing(limits.bond_width), "overhang": least_passing(limits.mask_overhang)}
+        {
+            "bond": least_passing(design.rules.bond_width),
+            "overhang": least_passing(design.rules.mask_overhang),
+        }
     )
     # Both edges are cut: two contours, or one that is off on either side.
-    cut = forms.nominal - forms.cut_edges * limits.tolerances.cutting
+    cut = forms.nominal - forms.cut_edges * design.registration.cutting_error
     is_counted = (forms.nominal >= drawn) | (forms.cut_edges == 0)
     firm = np.where(is_counted, cut - forms.pinned_loss, math.inf)
     pinned = np.minimum.reduceat(firm, begins).tolist()
@@ -109,19 +113,19 @@ def least_remaining(measures: Measures) -> list[Remaining]:
 
 def check(measures: Measures) -> list[Finding]:
     """The least remaining bond and overhang, each with its place and largest contribution."""
-    limits, remaining = measures.limits, least_remaining(measures)
-    bond = _finding("bond", limits.worst_bond_width, remaining, measures)
-    overhang = _finding("overhang", limits.worst_mask_overhang, remaining, measures)
+    design, remaining = measures.design, least_remaining(measures)
+    bond = _finding("bond", design.rules.worst_bond_width, remaining, measures)
+    overhang = _finding("overhang", design.rules.worst_mask_overhang, remaining, measures)
     # bond-width reports seams that are too narrow as drawn.
     edges = [
         edge
         for ends in measures.seam_ends
         for edge in ends.edges
-        if holds(edge.seam.width, limits.bond_width)
+        if holds(edge.seam.width, design.rules.bond_width)
     ]
     least = min(edges, key=lambda edge: round(edge.width, 9), default=None)
     if least is not None and bond.verdict != "fail" and not holds(least.width, bond.limit or 0.0):
-        bond = _at_edge(least, limits)
+        bond = _at_edge(least, design)
     return [bond, overhang]
 
 
@@ -159,7 +163,7 @@ def _finding(
     interface = worst.interfaces[0]
     margin = worst.margin
     dearest = costs(pushes(margin, worst.group.first, measures.moves))
-    message = _message(worst, margin, dearest, measures.limits.tolerances)
+    message = _message(worst, margin, dearest, measures.design)
     remedy = ""
     if verdict == "fail":
         by_seams = any(freedom.seam for freedom, _ in dearest)
@@ -176,26 +180,26 @@ def _finding(
             f"interface{'s' if short > 1 else ''}, {_why(least_pinned.pinned)}"
         )
     if quantity == "bond":
-        message += _plate(verdict == "fail", measures.laminate, measures.limits)
+        message += _plate(verdict == "fail", measures.laminate, measures.design)
     place = Place(interface.index, interface.layer_indices, *margin.middle)
     value = max(0.0, worst.worst)
     return Finding(NAME, verdict, limit, value, "mm", place, message, remedy=remedy)
 
 
-def _plate(failed: bool, laminate: Laminate, limits: Limits) -> str:
+def _plate(failed: bool, laminate: Laminate, design: Design) -> str:
     """Return the command for a plate that a workshop can make, where several pins hold layers."""
-    if limits.plate is None or len(laminate.pins) < 2:
+    if design.plate_machine is None or len(laminate.pins) < 2:
         return ""
     command = f"`{for_a_cnc_mill('DESIGN')}`"
-    if limits.plate == "cnc-mill":
+    if design.plate_machine == "cnc-mill":
         return f" ({command} finds by how much)" if failed else ""
-    exact = f"its pins are to stand within {limits.tolerances.pin:g} mm, which takes a jig borer: "
-    return f"; {exact if limits.plate == 'jig-borer' else ''}for a plate from a CNC mill, {command}"
+    exact = ""
+    if design.plate_machine == "jig-borer":
+        exact = f"its pins are to stand within {design.pin_error:g} mm, which takes a jig borer: "
+    return f"; {exact}for a plate from a CNC mill, {command}"
 
 
-def _message(
-    worst: Remaining, margin: Margin, dearest: Sequence[Push], tolerances: Tolerances
-) -> str:
+def _message(worst: Remaining, margin: Margin, dearest: Sequence[Push], design: Design) -> str:
     """The value, its place and the largest contribution there."""
     where = f"{interface_name(worst.interfaces[0])}{worst.distinct.suffix}"
     text = (
@@ -205,7 +209,8 @@ def _message(
     if not dearest and margin.is_overlap:
         return f"{text}; nothing can move"
     if not dearest:
-        return f"{text}; cutting takes {2 * tolerances.cutting:.3f} mm and nothing can move"
+        cutting = design.registration.cutting_error
+        return f"{text}; cutting takes {2 * cutting:.3f} mm and nothing can move"
     freedom, cost = dearest[0]
     return f"{text}; largest contribution: {_source(freedom)}, {cost:.3f} mm"
 
@@ -218,12 +223,13 @@ def _what(margin: Margin, interface: Interface) -> str:
     return f"overlap of seams {of} and {on}"
 
 
-def _at_edge(bond: EdgeBond, limits: Limits) -> Finding:
+def _at_edge(bond: EdgeBond, design: Design) -> Finding:
     """The finding of a seam that may end too near to the edge of a film, or short of it."""
-    interface, seam, limit = bond.interface, bond.seam, limits.worst_bond_width
+    interface, seam, limit = bond.interface, bond.seam, design.rules.worst_bond_width
+    error = design.registration.error_of_seam(seam.tool)
     left = f"bonds only {_mm(bond.width)}" if bond.width > 0 else "ends short"
     message = (
-        f"with its end {limits.tolerances.of_seam(seam.tool):g} mm off its path, seam {seam.name} "
+        f"with its end {error:g} mm off its path, seam {seam.name} "
         f"{left} of the film's edge at {interface_name(interface)}, {at(bond.at)}, where it parts "
         f"two voids; it needs {limit:g}: {STEADIER}"
     )

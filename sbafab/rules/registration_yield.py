@@ -13,11 +13,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+from sbafab.design.records import Design
+from sbafab.design.sections import Registration
 from sbafab.geometry.on_demand import np
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.freedoms import EARS, Freedom, Freedoms
-from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
+from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.margins import QUANTITIES, LinearForms, MarginKind, Owner, seated
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Explanation, Rule
@@ -84,15 +86,15 @@ class MarginRows(NamedTuple):
     sign: Floats
 
 
-def rows_of(forms: LinearForms, layers: Sequence[Sequence[int]], limits: Limits) -> MarginRows:
+def rows_of(forms: LinearForms, layers: Sequence[Sequence[int]], design: Design) -> MarginRows:
     """Return the margins that can come short at all, by the two contours whose edges they join.
 
     Kinds are in the order of the first of them. ``layers`` are those of each group, by seat.
     """
     room = forms.nominal - forms.by_quantity(
-        {"bond": limits.worst_bond_width, "overhang": limits.worst_mask_overhang}
+        {"bond": design.rules.worst_bond_width, "overhang": design.rules.worst_mask_overhang}
     )
-    cut = forms.cut_edges * limits.tolerances.cutting
+    cut = forms.cut_edges * design.registration.cutting_error
     (short,) = np.nonzero(room - cut - forms.loss < -TOLERANCE)
     between = forms.between.take(short)
     # Owners in the order of their first short margin.
@@ -231,8 +233,8 @@ class Yield:
 
 def check(measures: Measures) -> list[Finding]:
     """Return the share of good builds, against ``target_yield`` if the design sets one."""
-    laminate, limits = measures.laminate, measures.limits
-    return [finding_of(simulate(laminate, limits, SEED, measures), laminate, limits)]
+    laminate, design = measures.laminate, measures.design
+    return [finding_of(simulate(laminate, design, SEED, measures), laminate, design)]
 
 
 RULE = Rule(
@@ -249,10 +251,10 @@ RULE = Rule(
 )
 
 
-def finding_of(outcome: Yield, laminate: Laminate, limits: Limits) -> Finding:
+def finding_of(outcome: Yield, laminate: Laminate, design: Design) -> Finding:
     """Return the finding of a yield."""
     low, high = outcome.whole.interval
-    target = limits.target_yield
+    target = design.rules.target_yield
     verdict: Verdict = "pass"
     if target is not None:
         verdict = "pass" if low >= target else "fail"
@@ -261,7 +263,7 @@ def finding_of(outcome: Yield, laminate: Laminate, limits: Limits) -> Finding:
     message = (
         f"{outcome.whole.value:.2%} of {outcome.whole.builds} random builds keep every limit "
         f"(95 % interval {low:.2%} to {high:.2%}){_by_interface(outcome)}; errors are assumed "
-        f"spread evenly, up to {_by_hand(limits.tolerances)}"
+        f"spread evenly, up to {_by_hand(design.registration)}"
     )
     if target is None:
         message += "; no least share is asked for (rules.target_yield)"
@@ -298,29 +300,29 @@ def _remedy(laminate: Laminate) -> str:
     return wider
 
 
-def _by_hand(errors: Tolerances) -> str:
+def _by_hand(errors: Registration) -> str:
     """The design's assumed placement errors in words."""
     return (
-        f"{errors.placement:g} mm and {errors.turn:g} degree where a hand places"
+        f"{errors.hand_placement:g} mm and {errors.hand_turn:g} degree where a hand places"
         f"{_calibrated(errors)}"
     )
 
 
-def _calibrated(tolerances: Tolerances) -> str:
+def _calibrated(errors: Registration) -> str:
     """Source of the hand's figures, if they are the usual ones."""
-    usual = Tolerances()
-    if (tolerances.placement, tolerances.turn) != (usual.placement, usual.turn):
+    usual = Registration.model_construct()
+    if (errors.hand_placement, errors.hand_turn) != (usual.hand_placement, usual.hand_turn):
         return ""
     return f" (calibrated on the paper's success rate of {PAPER_SUCCESS:.0%}, not measured)"
 
 
 def simulate(
-    laminate: Laminate, limits: Limits, seed: int = SEED, measures: Measures | None = None
+    laminate: Laminate, design: Design, seed: int = SEED, measures: Measures | None = None
 ) -> Yield:
     """Return the yield of random builds of a laminate; the same seed gives the same shares."""
-    measures = measures or Measures(laminate, limits)
+    measures = measures or Measures(laminate, design)
     layers = [seated(group.first) for group in measures.margins]
-    rows = rows_of(measures.forms, layers, limits)
+    rows = rows_of(measures.forms, layers, design)
     indices = sorted(
         {interface.index for group in measures.margins for interface in group.interfaces}
     )
@@ -370,10 +372,10 @@ def _counted(
     seed: int,
 ) -> Yield:
     """Draw the builds, in batches, and count those in which all rows keep room."""
-    limits = measures.limits
+    design = measures.design
     errors, drawn_rows = _drawn_errors(rows.kinds, measures)
     places = [np.searchsorted(indices, of_kind.interfaces) for of_kind in errors]
-    total = first_builds = limits.yield_builds or _quick_number(len(indices))
+    total = first_builds = design.rules.yield_builds or _quick_number(len(indices))
     short_of = np.zeros(len(indices), dtype=np.intp)
     quantities = dict.fromkeys(QUANTITIES, 0)
     whole = drawn_builds = 0
@@ -386,7 +388,7 @@ def _counted(
         lacks = {quantity: np.zeros(builds, dtype=bool) for quantity in QUANTITIES}
         for number, (kind, of_kind) in enumerate(zip(rows.kinds, errors, strict=True)):
             interface, build = short_builds(
-                rows, number, of_kind.first, limits.tolerances.cutting, numbers
+                rows, number, of_kind.first, design.registration.cutting_error, numbers
             )
             is_short[places[number][interface], build] = True
             lacks[kind.quantity][build] = True
@@ -395,7 +397,7 @@ def _counted(
         for quantity, one in lacks.items():
             quantities[quantity] += int(np.count_nonzero(one))
         drawn_builds += builds
-        if limits.yield_builds is None and drawn_builds == first_builds:
+        if design.rules.yield_builds is None and drawn_builds == first_builds:
             total = _precise_number(Share(total - whole, total))
     return Yield(
         Share(total - whole, total),

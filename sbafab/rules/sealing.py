@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, strip
 from sbafab.geometry.width import Width
 from sbafab.laminate.laminate import Chamber, Interface, Laminate
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits, at
+from sbafab.rules.limits import at
 from sbafab.rules.measures import Measures, distinct_interfaces
 from sbafab.rules.rule import Explanation, Rule
 from sbafab.rules.void_edges import VoidEdges
@@ -53,7 +54,7 @@ def check(measures: Measures) -> list[Finding]:
         *_wrong_reaches(laminate, graph, owners),
         *_loose_films(laminate),
     ]
-    offences = offences or list(_closing(laminate, graph, owners, measures.limits))
+    offences = offences or list(_closing(laminate, graph, owners, measures.design))
     if not offences:
         pockets = "1 pocket" if len(owners) == 1 else f"{len(owners)} pockets"
         message = f"{pockets} sealed, each reached from the inlet of its own chamber alone"
@@ -235,12 +236,12 @@ def _foreign(
 
 
 def _closing(
-    laminate: Laminate, graph: VoidGraph, owners: dict[Void, frozenset[str]], limits: Limits
+    laminate: Laminate, graph: VoidGraph, owners: dict[Void, frozenset[str]], design: Design
 ) -> Iterator[_Offence]:
     """Yield a place of each pocket between seams that parts it when these lie off their paths."""
     for void, names in owners.items():
         interface = laminate.interfaces[void.level - 1]
-        edges = VoidEdges.of(interface, limits)
+        edges = VoidEdges.of(interface, design)
         region = graph.pieces[void]
         inlets = [inlet for inlet in laminate.inlets if inlet.chamber in names]
         held = [

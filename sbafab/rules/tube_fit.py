@@ -16,6 +16,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from sbafab.design.records import Design
 from sbafab.geometry.edges import Edge, Line, Point
 from sbafab.geometry.nearby import EdgeIndex, boxes_meet
 from sbafab.geometry.region import Region, strip
@@ -24,7 +25,7 @@ from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer
 from sbafab.rules.boundary import Reach, outward_reach
 from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.limits import TOLERANCE, Limits, at, holds
+from sbafab.rules.limits import TOLERANCE, at, holds
 from sbafab.rules.measures import Measures, distinct_interfaces
 from sbafab.rules.rule import Explanation, Rule
 from sbafab.rules.void_edges import VoidEdges
@@ -56,13 +57,13 @@ class _Fit(NamedTuple):
 
 def check(measures: Measures) -> list[Finding]:
     """The strip's width at the mouth and along its run, and its bonds; tubes on holes of films."""
-    laminate, limits = measures.laminate, measures.limits
-    fits = [fit for inlet in laminate.inlets for fit in _fits(inlet, laminate, limits)]
+    laminate, design = measures.laminate, measures.design
+    fits = [fit for inlet in laminate.inlets for fit in _fits(inlet, laminate, design)]
     on_holes = [
         fit
         for port in laminate.ports
         if port.kind == "hole"
-        for fit in _on_hole(port, laminate, limits)
+        for fit in _on_hole(port, laminate, design)
     ]
     if on_holes and not fits:
         return [_of_holes(on_holes)]
@@ -81,7 +82,7 @@ def check(measures: Measures) -> list[Finding]:
         message = (
             f"{worst.feature} of {worst.inlet.chamber} is drawn {worst.drawn:.3f} mm wide, "
             f"{at(worst.at)}, and {_made(worst.interface)} {worst.value:.3f} at worst "
-            f"({_edges(worst.interface, limits).words()}); a tube of "
+            f"({_edges(worst.interface, design).words()}); a tube of "
             f"{worst.inlet.tube_diameter:g} beside its strip needs {worst.limit:.3f}"
         )
     # What only the seams' places take from a strip leaves it open, if narrow for its tube.
@@ -152,7 +153,7 @@ def _of_holes(fits: Sequence[_HoleFit]) -> Finding:
     return Finding(NAME, verdict, worst.limit, worst.value, "mm", place, message)
 
 
-def _on_hole(port: Port, laminate: Laminate, limits: Limits) -> Iterator[_HoleFit]:
+def _on_hole(port: Port, laminate: Laminate, design: Design) -> Iterator[_HoleFit]:
     """Yield how far the tube covers the hole, and how far film goes on round it.
 
     Both are measured from the port's place, where the tube's middle is glued.
@@ -166,12 +167,13 @@ def _on_hole(port: Port, laminate: Laminate, limits: Limits) -> Iterator[_HoleFi
             break
     else:
         words = f"{here} is in no outer film, so no tube can be glued there"
-        yield _HoleFit(beside[0], port, 0.0, limits.bond_width, words, "draw it in the film")
+        yield _HoleFit(beside[0], port, 0.0, design.rules.bond_width, words, "draw it in the film")
         return
     reach = max(_farthest(edge, port.at) for edge in hole.edges)
     if port.tube_diameter is not None:
-        kerf = 0.0 if layer.film.material in limits.kerf else limits.unknown_kerf
-        cut = 2 * (reach + limits.tolerances.cutting) + kerf
+        is_known = design.kerf_widths.get(layer.film.material) is not None
+        kerf = 0.0 if is_known else design.laser.unknown_kerf
+        cut = 2 * (reach + design.registration.cutting_error) + kerf
         words = (
             f"{here} is drawn {2 * reach:.3f} mm wide and cut {cut:.3f} at worst; a tube of "
             f"{port.tube_diameter:g} is glued on it"
@@ -182,9 +184,11 @@ def _on_hole(port: Port, laminate: Laminate, limits: Limits) -> Iterator[_HoleFi
     film = others.distance_to_edge(port.at) - reach
     words = (
         f"{here} has {film:.3f} mm of film round it; to glue its tube on it needs "
-        f"{limits.bond_width:g}"
+        f"{design.rules.bond_width:g}"
     )
-    yield _HoleFit(layer, port, film, limits.bond_width, words, "move what is cut beside it away")
+    yield _HoleFit(
+        layer, port, film, design.rules.bond_width, words, "move what is cut beside it away"
+    )
 
 
 def _farthest(edge: Edge, p: Point) -> float:
@@ -197,7 +201,7 @@ def _farthest(edge: Edge, p: Point) -> float:
 # Inlets between two films.
 
 
-def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
+def _fits(inlet: Inlet, laminate: Laminate, design: Design) -> list[_Fit]:
     for distinct in distinct_interfaces(laminate):
         interface = distinct.interface
         if interface.kind != "chamber":
@@ -210,8 +214,8 @@ def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
             (x, y), (dx, dy) = inlet.mouth, inlet.direction
             ends = [(x + dy * offset, y - dx * offset) for offset in (low, high)]
             opening = _Fit(inlet, interface, MOUTH, 0.0, needed, inlet.mouth, "")
-            run = _along_run(inlet, interface, needed, limits)
-            return [_at_worst(opening, ends[0], ends[1], limits), *run]
+            run = _along_run(inlet, interface, needed, design)
+            return [_at_worst(opening, ends[0], ends[1], design), *run]
     message = "open a mask strip to the tab's end"
     gaps = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
     if gaps and not any(interface.pressed for interface in gaps):
@@ -220,7 +224,7 @@ def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
     return [_Fit(inlet, None, MOUTH, 0.0, needed, inlet.mouth, message)]
 
 
-def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits) -> list[_Fit]:
+def _along_run(inlet: Inlet, interface: Interface, needed: float, design: Design) -> list[_Fit]:
     if inlet.length < TOLERANCE:
         return []
     x, y = inlet.mouth
@@ -245,12 +249,12 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
     if wide is not None:
         edge, reach = wide
         strip_fit = _Fit(inlet, interface, "the strip", 0.0, needed, reach.at, "")
-        fits.append(_at_worst(strip_fit, edge.nearest(reach.at), reach.at, limits))
+        fits.append(_at_worst(strip_fit, edge.nearest(reach.at), reach.at, design))
     bonded = _least(sides, bonds)
     if bonded is not None:
         value, place = bonded[1]
         remedy = "make the tab wider, by bond.width or in the shape of a drawn layer"
-        limit = limits.bond_width
+        limit = design.rules.bond_width
         fits.append(_Fit(inlet, interface, BOND, value, limit, place, remedy, value, value))
     return fits
 
@@ -260,16 +264,16 @@ def _least(edges: Sequence[Edge], reaches: Sequence[Reach | None]) -> tuple[Edge
     return min(both, key=lambda pair: pair[1].value, default=None)
 
 
-def _edges(interface: Interface | None, limits: Limits) -> VoidEdges:
+def _edges(interface: Interface | None, design: Design) -> VoidEdges:
     if interface is None:
-        return VoidEdges(limits.tolerances.cutting, limits.unknown_kerf, ())
-    return VoidEdges.of(interface, limits)
+        return VoidEdges(design.registration.cutting_error, design.laser.unknown_kerf, ())
+    return VoidEdges.of(interface, design)
 
 
-def _at_worst(fit: _Fit, p: Point, q: Point, limits: Limits) -> _Fit:
+def _at_worst(fit: _Fit, p: Point, q: Point, design: Design) -> _Fit:
     """Return the fit of a strip between two points of its edges, with what is left at worst."""
     drawn = Width(math.dist(p, q), p, q)
-    edges = _edges(fit.interface, limits)
+    edges = _edges(fit.interface, design)
     value = edges.left(drawn).value
     least = math.ceil(round((fit.limit + drawn.value - value) * 1000, 6)) / 1000
     remedy = f"make it {least:.3f} mm wide, by inlet.width or in the shape of a drawn layer"

@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
+from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
 from sbafab.geometry.facing_places import facing_places_of
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_width
 from sbafab.laminate.laminate import Interface
-from sbafab.rules.limits import Limits
 from sbafab.rules.margins import bonding_seams
 
 NEAR: Final = 1e-5
@@ -34,14 +34,14 @@ class VoidEdges:
     seams: tuple[tuple[Region, float], ...]
 
     @staticmethod
-    def of(interface: Interface, limits: Limits) -> VoidEdges:
-        cutting, seams = limits.tolerances.cutting, bonding_seams(interface)
+    def of(interface: Interface, design: Design) -> VoidEdges:
+        cutting, seams = design.registration.cutting_error, bonding_seams(interface)
         cut = interface.masks or (interface.below, interface.above)
-        is_known = all(layer.film.material in limits.kerf for layer in cut)
+        is_known = all(design.kerf_widths.get(layer.film.material) is not None for layer in cut)
         return VoidEdges(
             cutting,
-            0.0 if is_known else limits.unknown_kerf,
-            tuple((seam.region, limits.tolerances.of_seam(seam.tool)) for seam in seams),
+            0.0 if is_known else design.laser.unknown_kerf,
+            tuple((seam.region, design.registration.error_of_seam(seam.tool)) for seam in seams),
         )
 
     @property

@@ -105,7 +105,7 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
     if built is None or built.laminate is None:
         message = f"{nets.name} was not compared: not all layers could be read"
         return (*findings, Finding(NETLIST, "fail", None, None, "", Place(), message))
-    return (*findings, *netlist_findings(built.laminate, built.limits, netlist, nets.name))
+    return (*findings, *netlist_findings(built.laminate, built.design, netlist, nets.name))
 
 
 def design_problems_of(folder: Path, read: FolderReadBack) -> list[Problem]:

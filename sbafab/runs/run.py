@@ -35,7 +35,6 @@ from sbafab.output.checked import (
     DesignPlan,
     RunPart,
     check,
-    limits,
     plan_design,
 )
 from sbafab.output.folder import close_folder, write_folder
@@ -225,7 +224,7 @@ def _plan(
     for each in designs:
         if each.paths and request.curves.in_chords:
             checked = each.checked
-            refuse_coarse(checked.laminate, each.paths, each.settings, limits(checked.design))
+            refuse_coarse(checked.laminate, each.paths, each.settings, checked.design)
     plan = plan_job(job, designs, target, progress)
     if job.schema != SCHEMA:
         return plan

@@ -17,7 +17,7 @@ from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.mechanisms import ASKED
 from sbafab.models.paper import WATER_FLOW
 from sbafab.models.stack import MOST_PRESSURE
-from sbafab.output.checked import Checked, limits, refuse_undoable
+from sbafab.output.checked import Checked, refuse_undoable
 from sbafab.process import Progress
 from sbafab.rules.deck import run_deck
 from sbafab.search.measure import RuleMargin, margins
@@ -241,7 +241,7 @@ def evaluated(problem: SearchProblem, values: Mapping[str, Any], with_rules: boo
         laminate = build(design)
         rules = None
         if with_rules or problem.needs_yield:
-            findings = run_deck(laminate, limits(design))
+            findings = run_deck(laminate, design)
             rules = margins(findings)
             checked = Checked(design, laminate, findings)
             if not checked.failed:

@@ -23,11 +23,11 @@ from sbafab.models.figures import PredictionRequest
 from sbafab.models.pouch import half_angle
 from sbafab.models.prediction import predict
 from sbafab.rules.deck import run_deck
-from sbafab.rules.limits import Limits
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
+from tests.designs import PAPER
 
-FEW = Limits(yield_builds=50)
+FEW = PAPER.with_("rules.yield_builds=100")
 POCKET, BOND, OVERHANG, BORE = 5.0, 0.75, 0.5, 1.04
 END = POCKET / 2 + BOND + 5.0
 

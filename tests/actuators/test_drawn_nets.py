@@ -18,9 +18,9 @@ from sbafab.laminate.joints import Net, Port
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding
-from sbafab.rules.limits import Limits
+from tests.designs import PAPER
 
-FEW = Limits(yield_builds=50)
+FEW = PAPER.with_("rules.yield_builds=100")
 
 ROUTED = """
 # Two pockets, each fed through a hole of the middle film: one from an inlet, one from a hole.

@@ -17,10 +17,10 @@ from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import pin_holes
 from sbafab.rules.deck import has_failed, run_deck
-from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
+from tests.designs import PAPER
 
 COUNT = int(os.environ.get("SBAFAB_EAR_OUTLINES", "4"))
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="100mm" viewBox="0 0 100 100">'
@@ -60,14 +60,14 @@ def assert_held(laminate: Laminate) -> None:
             for piece in layers[0].profile.pieces:
                 tools = [p for p in laminate.pins_in(piece) if p.centre not in bores]
                 assert len(tools) >= 2, layers[0].name
-    assert [f.verdict for f in pin_holes.check(Measures(laminate, Limits()))] == ["pass"]
+    assert [f.verdict for f in pin_holes.check(Measures(laminate, PAPER))] == ["pass"]
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_ears_reach_from_the_outline_that_is_drawn(name: str, tmp_path: Path) -> None:
     laminate = made(drawn(tmp_path, SHAPES[name], "chamber.count=1"))
     assert_held(laminate)
-    assert not has_failed(run_deck(laminate, Limits(yield_builds=100))), name
+    assert not has_failed(run_deck(laminate, PAPER.with_("rules.yield_builds=100"))), name
 
 
 @pytest.mark.parametrize("number", range(COUNT))

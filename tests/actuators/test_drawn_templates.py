@@ -17,11 +17,11 @@ from sbafab.meshing.solid import MASKLESS_GAP, cavity, solid
 from sbafab.models.figures import PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.rules.deck import run_deck
-from sbafab.rules.limits import Limits
 from sbafab.runs.run import RunRequest, generate
+from tests.designs import PAPER
 from tests.quick import few
 
-FEW = Limits(yield_builds=50)
+FEW = PAPER.with_("rules.yield_builds=100")
 DRAWN = [
     name
     for name in template_names()

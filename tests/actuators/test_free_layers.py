@@ -19,9 +19,9 @@ from sbafab.laminate.joints import balloon_numbers
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import seam_steps
 from sbafab.rules.deck import run_deck
-from sbafab.rules.limits import Limits
+from tests.designs import PAPER
 
-FEW = Limits(yield_builds=50)
+FEW = PAPER.with_("rules.yield_builds=100")
 SIDE, WIDTH, TAB = 40.0, 1.0, 4.0
 WELDED: dict[str, Any] = {
     "name": "welded",

@@ -9,7 +9,6 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.design.files import design_path
 from sbafab.errors import DesignError
-from sbafab.output.checked import limits
 from sbafab.rules.deck import run_rule
 from sbafab.rules.measures import Measures
 from sbafab.rules.tube_fit import RULE as TUBE_FIT
@@ -47,7 +46,7 @@ def test_a_width_unlike_the_drawn_strip_is_named() -> None:
     findings = {}
     for width in (2.0, 3.0):
         design = load_design("pouch").with_({"chambers": [{**chamber, "width": width}]})
-        findings[width] = run_rule(TUBE_FIT, Measures(build(design), limits(design)))
+        findings[width] = run_rule(TUBE_FIT, Measures(build(design), design))
     assert [finding.verdict for finding in findings[2.0]] == ["pass"]
     *_, unlike = findings[3.0]
     assert unlike.verdict == "warn"

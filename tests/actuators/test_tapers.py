@@ -20,8 +20,8 @@ from sbafab.actuators import build, load_design
 from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import facing_films
-from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
+from tests.designs import PAPER
 
 SEED = 12
 ASKED = int(os.environ.get("SBAFAB_TAPERS", "6"))
@@ -101,7 +101,7 @@ def test_films_of_a_random_taper_do_not_meet(template: str, number: int) -> None
         # Only where they end at pins do masks stop short; no such place is near here.
         for region, masks in pairs.values():
             assert (wider(region, OVERHANG - 0.01) - masks).area < DUST
-    verdicts = {finding.verdict for finding in facing_films.check(Measures(laminate, Limits()))}
+    verdicts = {finding.verdict for finding in facing_films.check(Measures(laminate, PAPER))}
     assert verdicts == {"pass"}
 
 
@@ -124,7 +124,7 @@ def test_the_rule_measures_what_polygons_measure(sizes: list[int], area: float) 
     laminate = build(load_design("1dof-5mm", settings))
     small = disc((0.0, 0.0), 3.75) - disc((0.0, 0.0), 1.25)
     faulty = with_profile(laminate, 8, small)
-    (found,) = facing_films.check(Measures(faulty, Limits()))
+    (found,) = facing_films.check(Measures(faulty, PAPER))
     assert found.verdict == "fail"
     assert found.measured == pytest.approx(area, abs=0.01)
     assert found.measured == pytest.approx(bare(facing(faulty)), abs=DUST)

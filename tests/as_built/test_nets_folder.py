@@ -19,12 +19,12 @@ from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, disc, strip
 from sbafab.laminate.netlist import compare, parchmint_nets, read_netlist
 from sbafab.rules.finding import Finding
-from sbafab.rules.limits import Limits
 from sbafab.rules.nets import netlist_findings
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.actuators.test_drawn_nets import ROUTED
 from tests.as_built.doctoring import Doctor
+from tests.designs import PAPER
 from tests.importing.test_parchmint import circuit as circuit_of_two_channels
 from tests.importing.test_parchmint import written
 from tests.site.formats import hold
@@ -207,7 +207,7 @@ def test_connections_join_components_layer_by_layer_and_a_via_joins_layers() -> 
 def test_an_imported_circuit_matches_its_own_file(tmp_path: Path) -> None:
     laminate = written(circuit_of_two_channels(), tmp_path).laminate
     path = tmp_path / "circuit.json"
-    (finding,) = netlist_findings(laminate, Limits(), read_netlist(path), path.name)
+    (finding,) = netlist_findings(laminate, PAPER, read_netlist(path), path.name)
     assert finding.message == "circuit.json: 2 nets joined as listed, and to nothing else"
     # Another channel in the netlist is an open of the layers.
     document = circuit_of_two_channels()
@@ -215,7 +215,7 @@ def test_an_imported_circuit_matches_its_own_file(tmp_path: Path) -> None:
         {"id": "d", "layer": "f", "source": {"component": "in1"}, "sinks": [{"component": "in2"}]}
     )
     path.write_text(json.dumps(document), encoding="utf-8")
-    (finding,) = netlist_findings(laminate, Limits(), read_netlist(path), path.name)
+    (finding,) = netlist_findings(laminate, PAPER, read_netlist(path), path.name)
     assert (finding.verdict, finding.message[:34]) == ("fail", "circuit.json: net net1 is open: in")
 
 

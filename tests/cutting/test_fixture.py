@@ -13,7 +13,7 @@ from sbafab.actuators import build, load_design
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.fixture import PATH, fixture, plate_corner, write_fixture
 from sbafab.cutting.properties import Curves, CutSettings
-from sbafab.output.checked import hole_notes, limits
+from sbafab.output.checked import hole_notes
 
 SETTINGS = CutSettings("test", "0" * 64)
 
@@ -98,6 +98,6 @@ def test_a_machine_that_bores_less_true_is_told_on_the_drawing() -> None:
         design = load_design("3dof-15mm", [f'registration.plate_made_by="{machine}"'])
         notes = hole_notes(design, build(design))
         assert f"each hole within {position:g} of its place" in notes[-1]
-        assert limits(design).tolerances.pin == pytest.approx(position + play / 2)
+        assert design.pin_error == pytest.approx(position + play / 2)
     given = load_design("3dof-15mm", ["registration.pin_error=0.01"])
-    assert limits(given).tolerances.pin == 0.01
+    assert given.pin_error == 0.01

@@ -57,9 +57,9 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
 
 
 def _asked_of_deck(built: as_built.AsBuiltFolder) -> str:
-    """Design, limits, and the rules that are run: some checks leave out all or some."""
+    """Design, and the rules that are run: some checks leave out all or some."""
     names = [rule.name for rule in as_built.RULES]
-    return design_sha256(built.design) + repr((built.limits, built.design_findings, names))
+    return built.design.model_dump_json() + repr((built.design_findings, names))
 
 
 def _remembered(work: Callable[..., Any], key: Callable[..., str]) -> Callable[..., Any]:

@@ -22,8 +22,8 @@ from sbafab.importing.sources import import_source
 from sbafab.importing.write import Written, write_imported
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.deck import run_deck
-from sbafab.rules.limits import Limits
 from sbafab.runs.run import RunRequest, generate
+from tests.designs import PAPER
 from tests.importing.conftest import Importing
 from tests.properties.designs import Draft, valid
 from tests.properties.test_designs import share
@@ -51,7 +51,7 @@ DESIGNS: dict[str, tuple[str, list[str]]] = {
     "pinned": (str(GALLERY / "pinned-15mm.toml"), []),
     "lobed ears": ("3dof-15mm", ["registration.method=ears", "stack.balloons=2"]),
 }
-FEW = Limits(yield_builds=50)
+FEW = PAPER.with_("rules.yield_builds=100")
 
 
 def folder_of(source: str, changes: list[str], out: Path) -> tuple[Laminate, Path]:

@@ -14,7 +14,7 @@ import pytest
 from sbafab.importing.layer_table import import_table
 from sbafab.importing.write import Written, write_imported
 from sbafab.rules.deck import run_deck
-from sbafab.rules.limits import Limits
+from tests.designs import PAPER
 from tests.importing.conftest import Importing
 
 LAYERS = """file,role,film,layer,pieces
@@ -52,7 +52,7 @@ def written(source: Path) -> Written:
 
 
 def failing(made: Written) -> set[str]:
-    findings = run_deck(made.laminate, Limits(yield_builds=50))
+    findings = run_deck(made.laminate, PAPER.with_("rules.yield_builds=100"))
     return {finding.rule for finding in findings if finding.verdict == "fail"}
 
 

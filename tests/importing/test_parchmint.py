@@ -20,8 +20,8 @@ from sbafab.cli import app
 from sbafab.errors import SbafabError
 from sbafab.importing.parchmint import import_parchmint
 from sbafab.importing.write import Written, write_imported
-from sbafab.rules.limits import Limits
 from sbafab.rules.nets import connectivity
+from tests.designs import PAPER
 from tests.importing.conftest import Importing
 from tests.quick import few
 
@@ -119,7 +119,7 @@ def test_the_nets_of_a_circuit_match_its_channels(tmp_path: Path) -> None:
         frozenset(("in1", "via1-flow", "via1-control", "valve")),
         frozenset(("in2", "tank")),
     }
-    assert connectivity(laminate, Limits()).faults == ()
+    assert connectivity(laminate, PAPER).faults == ()
 
 
 def test_an_end_on_a_layer_without_the_component_joins_nothing(tmp_path: Path) -> None:
@@ -175,12 +175,12 @@ def test_a_channel_that_crosses_another_is_a_short(tmp_path: Path) -> None:
         [21500, 11500],
     ]
     laminate = written(rewired(circuit(), crossing), tmp_path).laminate
-    assert {fault.kind for fault in connectivity(laminate, Limits()).faults} >= {"short"}
+    assert {fault.kind for fault in connectivity(laminate, PAPER).faults} >= {"short"}
 
 
 def test_a_channel_that_ends_before_its_component_is_an_open(tmp_path: Path) -> None:
     laminate = written(rewired(circuit(), [[1500, 11500], [18000, 11500]]), tmp_path).laminate
-    assert {fault.kind for fault in connectivity(laminate, Limits()).faults} >= {"open"}
+    assert {fault.kind for fault in connectivity(laminate, PAPER).faults} >= {"open"}
 
 
 @pytest.mark.parametrize("scale", [0.5, 1, 2])
@@ -210,7 +210,7 @@ def test_a_node_without_a_size_joins_its_channels(gap: int, scale: float, tmp_pa
     }
     laminate = written(document, tmp_path).laminate
     assert [set(net.ports) for net in laminate.nets] == [{"in", "up", "out"}]
-    kinds = [fault.kind for fault in connectivity(laminate, Limits()).faults]
+    kinds = [fault.kind for fault in connectivity(laminate, PAPER).faults]
     assert [kind for kind in kinds if kind != "dead-end"] == (["open"] if gap else [])
 
 
@@ -400,7 +400,7 @@ def test_circuits_of_others_are_wired_as_a_union_of_shapely_says(
         laminate = written(copy.deepcopy(document), tmp_path).laminate
     except SbafabError as error:
         pytest.skip(str(error))
-    kinds = {fault.kind for fault in connectivity(laminate, Limits()).faults}
+    kinds = {fault.kind for fault in connectivity(laminate, PAPER).faults}
     layers = [row["id"] for row in document["layers"] if row["type"] != "INTEGRATION"]
     is_sound = all(real == declared for real, declared in (groups(document, i) for i in layers))
     assert is_sound == (not kinds & {"open", "short"})

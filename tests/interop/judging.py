@@ -17,8 +17,8 @@ from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_gap, least_width
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import film_limits, margins, mask_overhang
-from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures, distinct_interfaces
+from tests.designs import PAPER
 
 UNIT = 1e-5
 """mm of one step of KLayout's grid."""
@@ -119,7 +119,7 @@ def _distances(pairs: kdb.EdgePairs) -> list[float]:
 
 def overhang(laminate: Laminate) -> Compared | None:
     """The least reach of a mask past a free film edge that it covers."""
-    ours = mask_overhang.check(Measures(laminate, Limits()))[0].measured
+    ours = mask_overhang.check(Measures(laminate, PAPER))[0].measured
     if ours is None:
         return None
     found: list[tuple[float, int]] = []

@@ -19,9 +19,9 @@ from sbafab.laminate.folding import flat_part, fold_roots, halves, toward
 from sbafab.laminate.joints import Fold
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.deck import run_deck
-from sbafab.rules.limits import Limits
+from tests.designs import PAPER
 
-FEW = Limits(yield_builds=50)
+FEW = PAPER.with_("rules.yield_builds=100")
 LINE = ((-20.0, -15.0), (-20.0, 15.0))
 
 

@@ -11,7 +11,7 @@ from sbafab.cli import main
 from sbafab.design.records import Design
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.output.advice import CHECK_SEED, SEED, YieldDesign, advise, reach_yield
-from sbafab.output.checked import AdviceEntry, check, limits
+from sbafab.output.checked import AdviceEntry, check
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.registration_yield import simulate
 from sbafab.search.target_yield import ReachedYield
@@ -21,7 +21,7 @@ SMALL = ("1dof-5mm", "stack.balloons=2", "rules.yield_builds=1000")
 
 def lower_end(*assignments: str, seed: int = SEED) -> float:
     design: Design = load_design(SMALL[0], (*SMALL[1:], *assignments))
-    return simulate(build(design), limits(design), seed).whole.interval[0]
+    return simulate(build(design), design, seed).whole.interval[0]
 
 
 def test_what_is_advised_reaches_the_target_and_less_does_not() -> None:
@@ -69,7 +69,7 @@ def is_good(found: YieldDesign) -> bool:
     assert found.design is not None
     assert found.share is not None
     assert found.design.rules.target_yield == found.target <= found.share.interval[0]
-    again = simulate(build(found.design), limits(found.design), CHECK_SEED).whole
+    again = simulate(build(found.design), found.design, CHECK_SEED).whole
     return not check(found.design).failed and again == found.share
 
 
@@ -127,7 +127,7 @@ def test_the_command_for_a_cnc_mill_makes_a_design_that_may_be_cut(tmp_path: Pat
     assert changed == pytest.approx((0.79, 0.53), abs=0.011)
     # As it is drawn, with wider holes' places, it must not be cut.
     given = load_design("3dof-15mm", ["registration.plate_made_by=cnc-mill"])
-    assert has_failed(run_deck(build(given), limits(given)))
+    assert has_failed(run_deck(build(given), given))
 
 
 def test_what_is_fixed_stays_and_the_best_is_said() -> None:
@@ -138,7 +138,7 @@ def test_what_is_fixed_stays_and_the_best_is_said() -> None:
     assert found.best_changes == {"registration.sequence": "middle-first"}
     order = "registration.sequence=middle-first"
     design = load_design(SMALL[0], (*SMALL[1:], *MORE, order))
-    assert found.best == simulate(build(design), limits(design)).whole
+    assert found.best == simulate(build(design), design).whole
     assert "do not --set bond.width, mask.overhang, registration.method" in found.sentence
 
 

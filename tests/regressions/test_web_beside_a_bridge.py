@@ -15,7 +15,6 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.geometry.edges import unit
 from sbafab.geometry.region import strip, union
-from sbafab.output.checked import limits
 from sbafab.rules import bond_width
 from sbafab.rules.measures import Measures
 
@@ -67,7 +66,7 @@ def test_the_web_is_as_wide_as_shapely_finds_it(tmp_path: Path) -> None:
     laminate = replace(laminate, layers=tuple(layers))
     (bond,) = laminate.interfaces[0].bond.shapely().geoms
     web = min(bond.exterior.distance(hole) for hole in bond.interiors)
-    (finding,) = bond_width.check(Measures(laminate, limits(design)))
+    (finding,) = bond_width.check(Measures(laminate, design))
     assert finding.verdict == "fail"
     assert finding.measured == pytest.approx(web, abs=2e-3)
     assert web < 0.6

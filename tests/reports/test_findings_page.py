@@ -8,7 +8,6 @@ from typing import Any
 from lxml import html as lxml_html
 
 from sbafab.actuators import build, load_design
-from sbafab.output.checked import limits
 from sbafab.reports.traveller.findings import Inspected, findings_html
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding, Place
@@ -16,7 +15,7 @@ from sbafab.rules.finding import Finding, Place
 
 def page(*given: str) -> Any:
     design = load_design("1dof-5mm", given)
-    laminate, asked = build(design), limits(design)
+    laminate, asked = build(design), design
     found = run_deck(laminate, asked)
     one = Inspected(design.name, found, laminate, asked)
     return lxml_html.fromstring(findings_html(design.name, "0" * 64, "sbafab 1", [one]))
@@ -60,7 +59,7 @@ def test_words_from_outside_stay_words() -> None:
 def test_no_pin_is_offered_that_the_press_could_not_have_out() -> None:
     """A pin under loose films can neither be pushed from below nor drawn: none is offered."""
     design = load_design("3dof-15mm", ("stack.balloons=2",))
-    laminate, asked = build(design), limits(design)
+    laminate, asked = build(design), design
     one = Inspected(design.name, run_deck(laminate, asked), laminate, asked)
     text = findings_html(design.name, "0" * 64, "sbafab 1", [one])
     assert "Remedies" in text

@@ -14,7 +14,6 @@ from lxml import html as lxml_html
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.nesting.records import Nest
-from sbafab.output.checked import limits
 from sbafab.pressing.cycles import design_runs
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.drawing import TIMES
@@ -452,7 +451,7 @@ def test_a_long_sheet_is_drawn_in_rows_across_the_page(sheet_files: Any) -> None
 def test_narrow_holes_are_tried_on_their_pins_before_the_press(sheet_files: Any) -> None:
     design, laminate = built("3dof-15mm")
     plan = schedule(laminate, design)
-    tight = [finding for finding in run_deck(laminate, limits(design)) if finding.rule == "pin-fit"]
+    tight = [finding for finding in run_deck(laminate, design) if finding.rule == "pin-fit"]
     job = Job(SHA, "sbafab 1.0.0", findings=tuple(tight))
     sheets = sheet_files(laminate)
     tree = lxml_html.fromstring(traveller_html(Work(design, laminate, plan, sheets, job)))

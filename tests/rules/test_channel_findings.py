@@ -14,12 +14,12 @@ from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import channel_clear, sealing, tube_fit
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
+from tests.designs import PAPER
 from tests.rules.compared import only, same
 
 AXIS = (0.0, 0.0)
-LIMITS = Limits()
+LIMITS = PAPER
 ONE = ("1dof-5mm", "stack.balloons=3")
 LOBED = ("3dof-15mm", "stack.balloons=3")
 TUBE = math.pi / 2 * (0.8 + 0.025)
@@ -241,7 +241,7 @@ def test_tube_fit_of_two_faults_tells_the_worse(good: Good, spoil: Spoil) -> Non
 
 
 def test_tube_fit_counts_no_kerf_that_is_known(good: Good) -> None:
-    found = only(tube_fit.check(Measures(good(*ONE), Limits(kerf={"PTFE": 0.12}))))
+    found = only(tube_fit.check(Measures(good(*ONE), PAPER.with_("laser.kerf_ptfe=0.12"))))
     assert found.measured == pytest.approx(1.4)
     assert "cut 1.400 at worst (0.1 on each edge); " in found.message
 
@@ -362,7 +362,7 @@ def test_a_tube_covers_its_hole_as_cut_at_its_widest(good: Good) -> None:
     assert narrow.message.endswith(
         ": make the hole smaller, or take a wider tube (inlet.tube_outer_diameter)"
     )
-    measured = Limits(kerf={"TPE": 0.12})
+    measured = PAPER.with_("laser.kerf_tpe=0.12")
     assert only(tube_fit.check(Measures(on_hole(good, 1.25, HOLE), measured))).verdict == "pass"
 
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import NamedTuple, get_args
 
 import pytest
 
+from sbafab.design.records import Design
 from sbafab.design.sections import RuleName
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, disc, rectangle, strip
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.deck import has_failed, rule_names, run_deck
-from sbafab.rules.limits import Limits, Tolerances
+from tests.designs import PAPER, errors
 from tests.quick import few
 from tests.rules.conftest import built
 
@@ -192,12 +192,12 @@ def bores() -> Region:
 
 
 # Without a target no share of good builds fails, so a few builds will do.
-FEW = Limits(yield_builds=100)
+FEW = PAPER.with_("rules.yield_builds=100")
 # Faults as drawn; what errors add is tested apart.
-EXACT = replace(FEW, tolerances=Tolerances(0, 0, 0, 0))
+EXACT = FEW.with_(registration=errors())
 
 
-def failing(laminate: Laminate, limits: Limits = FEW) -> set[str]:
+def failing(laminate: Laminate, limits: Design = FEW) -> set[str]:
     findings = run_deck(laminate, limits)
     return {finding.rule for finding in findings if finding.verdict == "fail"}
 
@@ -228,10 +228,13 @@ def test_a_pocket_too_wide_for_its_pressure_fails_pressure_rating_alone(
     good: Callable[..., Laminate], spoil: Callable[..., Laminate]
 ) -> None:
     """367 kPa with a radius of 2.5 mm (paper, Sec. 4), in proportion: 340 at 2.7."""
-    laminate, limits = good("1dof-5mm", "bond.width=1"), replace(FEW, working_pressure=170.0)
+    laminate, limits = (
+        good("1dof-5mm", "bond.width=1"),
+        FEW.with_("acceptance.working_pressure_kpa=170.0"),
+    )
     assert failing(laminate, limits) == set()
     wider = spoil(laminate, 6, disc(AXIS, 2.71) - disc(AXIS, 0.5), None)
-    assert failing(wider, replace(FEW, working_pressure=169.0)) == set()
+    assert failing(wider, FEW.with_("acceptance.working_pressure_kpa=169.0")) == set()
     (found,) = (f for f in run_deck(wider, limits) if f.verdict == "fail")
     assert found.rule == "pressure-rating"
     assert found.measured == pytest.approx(367 * 2.5 / 2.71)
@@ -239,15 +242,15 @@ def test_a_pocket_too_wide_for_its_pressure_fails_pressure_rating_alone(
 
 
 def test_kerf_that_closes_a_bore_fails_film_limits_alone(good: Callable[..., Laminate]) -> None:
-    laminate = good(*ONE)
-    assert failing(laminate, replace(EXACT, kerf={"TPE": 0.1, "PTFE": 0.1})) == set()
-    assert failing(laminate, replace(EXACT, kerf={"PTFE": 1.01})) == {"film-limits"}
+    laminate = good(*ONE, "bore.diameter=0.95")
+    assert failing(laminate, EXACT.with_("laser.kerf_tpe=0.1", "laser.kerf_ptfe=0.1")) == set()
+    assert failing(laminate, EXACT.with_("laser.kerf_ptfe=1")) == {"film-limits"}
 
 
 def test_a_pin_too_thick_for_its_holes_fails_pin_fit_alone(good: Callable[..., Laminate]) -> None:
     # A hole of 1.0 with the cutting error of 0.1 on each side, and a pin of 1.19 to m6.
-    cut = replace(EXACT, tolerances=Tolerances(0.1, 0, 0, 0), worst_bond_width=0.0)
-    cut = replace(cut, worst_mask_overhang=0.0)
+    cut = EXACT.with_(registration=errors(cutting=0.1), rules={"worst_bond_width": 0.0})
+    cut = cut.with_("rules.worst_mask_overhang=0.0")
     thick = good(*ONE, "bore.pin_diameter=1.19")
     assert failing(good(*ONE), cut) == set()
     assert failing(thick, cut) == {"pin-fit"}
@@ -296,12 +299,12 @@ def test_a_waived_failure_stops_nothing_and_says_so(
     good: Callable[..., Laminate], spoil: Callable[..., Laminate]
 ) -> None:
     narrow = spoil(good(*ONE), 4, disc(AXIS, 3.75) - disc(AXIS, 1.2))
-    findings = run_deck(narrow, replace(EXACT, waive=frozenset({"bond-width"})))
+    findings = run_deck(narrow, EXACT.with_(rules={"waive": ["bond-width"]}))
     assert not has_failed(findings)
     waived = next(finding for finding in findings if finding.rule == "bond-width")
     assert waived.verdict == "waived"
     assert waived.message.startswith("waived by the design: ")
-    assert has_failed(run_deck(narrow, replace(EXACT, waive=frozenset({"sealing"}))))
+    assert has_failed(run_deck(narrow, EXACT.with_(rules={"waive": ["sealing"]})))
 
 
 def test_findings_come_in_the_decks_order(good: Callable[..., Laminate]) -> None:

@@ -13,7 +13,6 @@ import pytest
 
 from sbafab.actuators import build, records
 from sbafab.design.records import validated
-from sbafab.output.checked import limits
 from sbafab.rules.deck import run_rule
 from sbafab.rules.facing_films import RULE as FACING
 from sbafab.rules.finding import Finding
@@ -92,7 +91,7 @@ def facing(bonds: Bonds) -> Finding:
     if not tables["seams"]:
         del tables["seams"]
     design = validated(tables, records(), Path())
-    return run_rule(FACING, Measures(build(design), limits(design)))[0]
+    return run_rule(FACING, Measures(build(design), design))[0]
 
 
 @pytest.mark.parametrize(

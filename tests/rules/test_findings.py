@@ -11,12 +11,12 @@ from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import bond_width, film_limits, mask_overhang, piece_count
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
+from tests.designs import PAPER
 from tests.rules.compared import only, same
 
 AXIS = (0.0, 0.0)
-LIMITS = Limits()
+LIMITS = PAPER
 ONE = ("1dof-5mm", "stack.balloons=3")
 FILM = disc(AXIS, 3.25) - disc(AXIS, 0.5)
 NOWHERE = Place()
@@ -205,8 +205,9 @@ def test_a_layer_in_other_pieces(
 
 
 def test_film_limits_of_a_wide_kerf(good: Good) -> None:
-    found = only(film_limits.check(Measures(good(*ONE), Limits(kerf={"PTFE": 1.01}))))
-    assert (found.verdict, found.limit, found.measured, found.unit) == ("fail", 1.01, None, "mm")
+    laminate = good(*ONE, "bore.diameter=0.95")
+    found = only(film_limits.check(Measures(laminate, PAPER.with_("laser.kerf_ptfe=1"))))
+    assert (found.verdict, found.limit, found.measured, found.unit) == ("fail", 1.0, None, "mm")
     assert found.where.layers == (2,)
     assert found.message.startswith("layer 2 (002_PTFE_chamber-mask) ")
     assert found.message.endswith("; widen what is narrower than the kerf")
@@ -214,7 +215,7 @@ def test_film_limits_of_a_wide_kerf(good: Good) -> None:
 
 def test_film_limits_of_a_coarse_laser(good: Good) -> None:
     assert same(
-        only(film_limits.check(Measures(good(*ONE), Limits(least_feature=1.2)))),
+        only(film_limits.check(Measures(good(*ONE), PAPER.with_("laser.least_feature=1.2")))),
         Finding(
             "film-limits",
             "fail",

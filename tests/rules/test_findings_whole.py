@@ -13,12 +13,12 @@ from sbafab.output.checked import FindingEntry
 from sbafab.rules import press_fit, registration_nominal
 from sbafab.rules.deck import run_rule
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Explanation, Rule
+from tests.designs import PAPER
 
 AXIS = (0.0, 0.0)
-LIMITS = Limits()
+LIMITS = PAPER
 ONE = ("1dof-5mm", "stack.balloons=3")
 FILM = disc(AXIS, 3.25) - disc(AXIS, 0.5)
 Good = Callable[..., Laminate]
@@ -70,7 +70,7 @@ def test_a_layer_that_is_too_large(
 
 def test_more_balloons_than_were_ever_built(good: Good) -> None:
     _, warning = press_fit.check(
-        Measures(good("1dof-5mm", "stack.balloons=3"), Limits(validated_balloons=2))
+        Measures(good("1dof-5mm", "stack.balloons=3"), PAPER.with_("rules.validated_balloons=2"))
     )
     assert warning == Finding(
         "press-fit",
@@ -87,7 +87,7 @@ def test_more_balloons_than_were_ever_built(good: Good) -> None:
 
 def test_minutes_that_nobody_stated_have_no_limit(good: Good) -> None:
     """A share of films "<= 0 films" would be no limit that a reader can keep."""
-    _, warning = press_fit.check(Measures(good(*ONE), Limits(minutes_for=())))
+    _, warning = press_fit.check(Measures(good(*ONE), PAPER.with_(press={"minutes_for": []})))
     assert (warning.rule, warning.verdict) == ("press-fit", "warn")
     assert (warning.limit, warning.measured, warning.unit) == (None, None, "")
     assert "nobody stated press minutes for" in warning.message
@@ -208,7 +208,7 @@ def test_a_laminate_without_twins_has_nothing_to_register(good: Good) -> None:
 def test_a_failure_that_the_user_waives_is_marked_as_the_users() -> None:
     failure = Finding("sealing", "fail", 0.0, 2.0, "voids", Place(3, (5, 6, 7)), "two pockets leak")
     rule = Rule("sealing", lambda _: [failure], Explanation("", "", ""))
-    waived = Limits(waive=frozenset({"sealing"}))
+    waived = PAPER.with_(rules={"waive": ["sealing"]})
     assert run_rule(rule, Measures(None, waived)) == [  # type: ignore[arg-type]
         replace(
             failure,

@@ -5,11 +5,9 @@ from __future__ import annotations
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.actuators.one_dof import OneDofDesign
 from sbafab.design.sections import Laser, Rules
-from sbafab.output.checked import limits
 from sbafab.rules.deck import run_deck
-from sbafab.rules.limits import Limits, lowered
+from sbafab.rules.limits import lowered
 
 WEAKER = [
     ("rules.bond_width=0.3", "bond_width 0.3 (paper 0.75)"),
@@ -57,12 +55,12 @@ NO_LIMITS = {"waive", "target_yield", "yield_builds", "kerf_tpe", "kerf_ptfe"} |
 
 @pytest.mark.parametrize(("setting", "said"), WEAKER)
 def test_a_lower_limit_is_named(setting: str, said: str) -> None:
-    assert lowered(limits(load_design("1dof-5mm", [setting]))) == (said,)
+    assert lowered(load_design("1dof-5mm", [setting])) == (said,)
 
 
 @pytest.mark.parametrize("setting", STRICTER)
 def test_a_stricter_one_is_not(setting: str) -> None:
-    assert lowered(limits(load_design("1dof-5mm", [setting]))) == ()
+    assert lowered(load_design("1dof-5mm", [setting])) == ()
 
 
 def test_every_key_of_rules_and_laser_is_decided_on() -> None:
@@ -72,14 +70,13 @@ def test_every_key_of_rules_and_laser_is_decided_on() -> None:
 
 
 def test_a_design_s_own_limits_are_the_usual_ones() -> None:
-    """What is usual stands in the rules; the design's defaults agree with it."""
-    design = OneDofDesign(name="any", family="1dof")
-    assert limits(design) == Limits(plate="jig-borer")
+    for template in ("1dof-5mm", "3dof-15mm", "radial-15mm"):
+        assert lowered(load_design(template)) == ()
 
 
 def test_the_findings_of_its_rules_say_so() -> None:
     design = load_design("1dof-5mm", ["stack.balloons=2", "rules.bond_width=0.3"])
-    findings = run_deck(build(design), limits(design))
+    findings = run_deck(build(design), design)
     said = {f.rule for f in findings if "limits lowered: bond_width 0.3 (paper 0.75)" in f.message}
     assert said == {"bond-width", "tube-fit"}
     assert not any("lowered" in f.message for f in findings if f.rule not in said)

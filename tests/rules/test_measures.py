@@ -25,11 +25,11 @@ from sbafab.rules import (
 )
 from sbafab.rules.boundary import outward_reach
 from sbafab.rules.finding import Finding
-from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.measures import Measures
+from tests.designs import PAPER
 
 AXIS = (0.0, 0.0)
-LIMITS = Limits()
+LIMITS = PAPER
 ONE = ("1dof-5mm", "stack.balloons=3")
 LOBED = ("3dof-15mm", "stack.balloons=3")
 Good = Callable[..., Laminate]
@@ -279,7 +279,7 @@ def test_a_laminate_may_lie_either_way_round(good: Good) -> None:
     # 12.5 x 7.5 with the tab's mask strip.
     laminate = good("1dof-5mm")
     for width, length, verdict in ((8, 13, "pass"), (13, 8, "pass"), (12, 12, "fail")):
-        limits = Limits(heated_width=width, heated_length=length)
+        limits = PAPER.with_(press={"platen_width": width, "platen_length": length})
         assert press_fit.check(Measures(laminate, limits))[0].verdict == verdict
 
 
@@ -304,9 +304,9 @@ def test_equal_profiles_are_measured_once(
 
 
 def test_what_is_measured_once_is_measured_of_that_laminate(good: Good) -> None:
-    one = Measures(good("1dof-5mm", "stack.balloons=2"), Limits())
-    more = Measures(good("1dof-5mm", "stack.balloons=4"), Limits())
+    one = Measures(good("1dof-5mm", "stack.balloons=2"), PAPER)
+    more = Measures(good("1dof-5mm", "stack.balloons=4"), PAPER)
     assert len(one.moves) < len(more.moves)
     assert one.moves is one.moves
-    wide = Limits(tolerances=Tolerances(placement=0.4))
+    wide = PAPER.with_("registration.hand_placement=0.4")
     assert Measures(one.laminate, wide).moves != one.moves

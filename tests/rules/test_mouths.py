@@ -17,9 +17,9 @@ from sbafab.laminate.joints import Net, Port
 from sbafab.laminate.laminate import Chamber, Inlet, Laminate
 from sbafab.rules import sealing, tube_fit
 from sbafab.rules.finding import Finding
-from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
 from sbafab.rules.nets import connectivity
+from tests.designs import PAPER
 
 FILM = rectangle((-20.0, -8.0), (20.0, 8.0))
 PLACES = pytest.mark.parametrize(
@@ -70,7 +70,7 @@ class Drawn:
 
 
 def sealed(laminate: Laminate) -> Finding:
-    (finding,) = sealing.check(Measures(laminate, Limits()))
+    (finding,) = sealing.check(Measures(laminate, PAPER))
     return finding
 
 
@@ -97,7 +97,7 @@ def test_an_opening_past_its_mouth_leaks(
     leak = sealed(laminate)
     assert (leak.verdict, leak.where.interface) == ("fail", 1)
     assert words in leak.message
-    (fault,) = connectivity(with_nets(laminate), Limits()).faults
+    (fault,) = connectivity(with_nets(laminate), PAPER).faults
     assert (fault.kind, fault.nets) == ("leak", ("a",))
     assert words in fault.message
     # It is named on the edge, past the mouth's end.
@@ -117,7 +117,7 @@ def test_an_opening_within_its_mouth_is_sealed(
     laminate = place.laminate(channel(low, high), {"a": (0.0, 2.0)})
     laminate = replace(laminate, chambers=(Chamber("a", (place.at(5, (low + high) / 2),)),))
     assert sealed(laminate).verdict == "pass"
-    assert connectivity(with_nets(laminate), Limits()).faults == ()
+    assert connectivity(with_nets(laminate), PAPER).faults == ()
 
 
 def test_a_mouth_may_be_written_to_two_digits() -> None:
@@ -138,13 +138,13 @@ def test_what_opens_into_one_mouth_is_joined(scale: float, turn: float, by: Poin
     wide = place.laminate(voids, {"a": (0.0, 8.0), "c": (5.75, 1.5)})
     port = Port("b", 1, 3, place.at(5, 2.75))
     nets = (Net("a", ("a",)), Net("b", ("b",)), Net("c", ("c",)))
-    (short,) = connectivity(replace(wide, ports=(port,), nets=nets), Limits()).faults
+    (short,) = connectivity(replace(wide, ports=(port,), nets=nets), PAPER).faults
     assert (short.kind, short.nets, short.interface) == ("short", ("a", "b"), 1)
     assert ": both open into the mouth of a; " in short.message
     assert short.at == pytest.approx(place.at(-20, 2.75), abs=1e-6)
     # In a mouth of its own it is joined to none.
     own = place.laminate(voids, {"a": (0.0, 3.0), "b": (2.75, 2.0), "c": (5.75, 1.5)})
-    assert connectivity(with_nets(own), Limits()).faults == ()
+    assert connectivity(with_nets(own), PAPER).faults == ()
     assert sealed(own).verdict == "pass"
     # A mouth that takes in the next one's feeds its pocket.
     foreign = place.laminate(voids, {"a": (0.0, 8.0), "b": (2.75, 2.0), "c": (5.75, 1.5)})
@@ -159,6 +159,6 @@ def test_a_tube_goes_into_one_opening(scale: float, turn: float, by: Point) -> N
     voids = channel(-3.0, 0.0) | channel(1.0, 3.0)
     laminate = Drawn(scale, turn, by).laminate(voids, {"a": (0.0, 8.0)})
     inlet = replace(laminate.inlets[0], length=0.0)
-    finding, *_ = tube_fit.check(Measures(replace(laminate, inlets=(inlet,)), Limits()))
+    finding, *_ = tube_fit.check(Measures(replace(laminate, inlets=(inlet,)), PAPER))
     # Both edges may be cut 0.1 off, and a kerf of 0.1 is not measured.
     assert finding.measured == pytest.approx(3 * scale - 0.3)

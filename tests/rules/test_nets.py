@@ -13,10 +13,10 @@ from sbafab.laminate.joints import Fold, Net, Port
 from sbafab.laminate.laminate import Chamber, Laminate
 from sbafab.laminate.netlist import Netlist
 from sbafab.rules import sealing
-from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.measures import Measures
 from sbafab.rules.nets import check, connectivity, netlist_findings
 from sbafab.rules.void_axes import Terminal, axis_of, blind_ends
+from tests.designs import PAPER
 from tests.quick import few
 from tests.rules import routed
 from tests.rules.conftest import built
@@ -31,7 +31,7 @@ from tests.rules.routed import (
     xy,
 )
 
-LIMITS = Limits(tolerances=Tolerances(cutting=0), unknown_kerf=0)
+LIMITS = PAPER.with_("registration.cutting_error=0", "laser.unknown_kerf=0")
 """Channels are cut as they are drawn."""
 NEAR = 1.0
 """Furthest in mm that a fault may be named from its place."""
@@ -108,7 +108,7 @@ def test_a_channel_too_narrow_to_open_fails_at_its_neck() -> None:
     assert (opening.verdict, opening.where.interface) == ("fail", 1)
     assert (opening.where.x, opening.where.y) == pytest.approx((10.0, 4.0), abs=1.0)
     assert "is drawn 0.200 mm wide" in opening.message
-    wider = replace(LIMITS, opening_pressure=1e6)
+    wider = LIMITS.with_("rules.opening_pressure_kpa=10000")
     assert check(Measures(laminate_of(routes), wider))[1].verdict == "pass"
 
 

@@ -16,12 +16,12 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, disc, rectangle, strip
 from sbafab.laminate.joints import Net, Port
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.nets import NarrowPlace, connectivity
+from tests.designs import PAPER
 from tests.quick import few
 from tests.rules.routed import Routes, laminate_of, routed, xy
 
-AS_DRAWN = Limits(tolerances=Tolerances(cutting=0), unknown_kerf=0)
+AS_DRAWN = PAPER.with_("registration.cutting_error=0", "laser.unknown_kerf=0")
 
 
 def plate(films: Sequence[tuple[float, float]], width: float) -> float:

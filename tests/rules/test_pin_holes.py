@@ -12,13 +12,13 @@ from sbafab.laminate.laminate import Laminate, Pin
 from sbafab.rules import pin_holes
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding
-from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.measures import Measures
+from tests.designs import PAPER, errors
 
 Good = Callable[..., Laminate]
 Spoil = Callable[..., Laminate]
 EARS = 'registration.method="ears"'
-LIMITS = Limits(tolerances=Tolerances(0, 0, 0, 0), yield_builds=100)
+LIMITS = PAPER.with_(registration=errors(), rules={"yield_builds": 100})
 
 
 def found(laminate: Laminate) -> Finding:

@@ -9,9 +9,10 @@ import pytest
 from sbafab.geometry.edges import Point
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.freedoms import Freedom, Laid, Part, freedoms
-from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
+from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.measures import Measures
 from sbafab.rules.pin_fit import check
+from tests.designs import PAPER
 
 Good = Callable[..., Laminate]
 BASE = Part(1, 0)
@@ -20,7 +21,7 @@ BASE = Part(1, 0)
 def ways_on(laminate: Laminate, pins: dict[Point, float]) -> tuple[Freedom, ...]:
     """Return the freedoms of the base, laid on pins with such play, mm."""
     laid = Laid([BASE], 1, pins, next(iter(pins)), None, stays=False)
-    return freedoms(laminate, Tolerances(pin=0.004), [laid])[BASE]
+    return freedoms(laminate, PAPER, [laid])[BASE]
 
 
 @pytest.mark.parametrize(
@@ -55,7 +56,7 @@ def test_cutting_and_pins_both_narrow_a_hole(good: Good) -> None:
     """A hole of 1 mm, its edge and its place off by 0.01 and 0.02 all round: 0.94. The pin of 0.6
     to m6 is up to 0.608 thick, which leaves 0.332; one of 0.99, up to 0.998, widens it.
     """
-    limits = Limits(tolerances=Tolerances(cutting=0.01, pin=0.02))
+    limits = PAPER.with_("registration.cutting_error=0.01", "registration.pin_error=0.02")
     [loose] = check(Measures(good("1dof-5mm", "bore.pin_diameter=0.6"), limits))
     assert loose.measured == 0.0
     assert "(0.332 mm to spare at worst)" in loose.message
@@ -71,6 +72,8 @@ def test_a_stretch_may_miss_what_is_allowed_by_what_a_hole_may(
 ) -> None:
     """The hole of 0.94 may miss its drawing by the tolerance on each side, two of them in all."""
     allowed = 0.998 / 0.94 - 1 - missed * TOLERANCE / 0.94
-    limits = Limits(tolerances=Tolerances(cutting=0.01, pin=0.02), pin_stretch=allowed)
+    limits = PAPER.with_(
+        registration={"cutting_error": 0.01, "pin_error": 0.02, "pin_stretch": allowed}
+    )
     [found] = check(Measures(good("1dof-5mm", "bore.pin_diameter=0.99"), limits))
     assert found.verdict == verdict

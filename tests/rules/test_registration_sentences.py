@@ -8,18 +8,20 @@ from dataclasses import replace
 
 import pytest
 
+from sbafab.actuators import load_design
+from sbafab.design.records import Design
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import registration_worst_case
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.freedoms import EARS, Freedom
-from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.margins import Push
 from sbafab.rules.measures import Measures
 from sbafab.rules.registration_worst_case import costs
 from sbafab.rules.registration_yield import Share, Yield, finding_of, simulate
+from tests.designs import PAPER, errors
 
 ONE = ("1dof-5mm", "stack.balloons=3")
-NONE = Tolerances(0, 0, 0, 0)
+NONE = errors()
 TURN = math.radians(2)
 Good = Callable[..., Laminate]
 
@@ -31,13 +33,13 @@ def films_only(laminate: Laminate) -> Laminate:
     )
 
 
-def worst_of(laminate: Laminate, limits: Limits) -> tuple[Finding, Finding]:
+def worst_of(laminate: Laminate, limits: Design) -> tuple[Finding, Finding]:
     bond, overhang = registration_worst_case.check(Measures(laminate, limits))
     return bond, overhang
 
 
 def test_nothing_moves_without_errors(good: Good) -> None:
-    bond, overhang = worst_of(good(*ONE), Limits(tolerances=NONE))
+    bond, overhang = worst_of(good(*ONE), PAPER.with_(registration=NONE))
     assert (bond.verdict, bond.limit, bond.measured) == ("pass", 0.5, pytest.approx(0.75))
     assert (overhang.verdict, overhang.limit, overhang.measured) == ("pass", 0.25, 0.5)
     assert (bond.rule, bond.unit) == ("registration-worst-case", "mm")
@@ -49,13 +51,15 @@ def test_nothing_moves_without_errors(good: Good) -> None:
 
 
 def test_cutting_alone(good: Good) -> None:
-    bond, _ = worst_of(good(*ONE), Limits(tolerances=Tolerances(0.1, 0, 0, 0)))
+    bond, _ = worst_of(good(*ONE), PAPER.with_(registration=errors(cutting=0.1)))
     assert bond.measured == pytest.approx(0.55)
     assert bond.message.endswith("; cutting takes 0.200 mm and nothing can move")
 
 
 def test_a_layer_on_its_only_pin_costs_most(good: Good) -> None:
-    bond, _ = worst_of(good(*ONE), Limits(tolerances=Tolerances(placement=0, turn=0)))
+    bond, _ = worst_of(
+        good(*ONE), PAPER.with_("registration.hand_placement=0", "registration.hand_turn=0")
+    )
     assert bond.verdict == "pass"
     assert bond.message.endswith(
         "; largest contribution: turn about the only pin of layer 3 in step 1, 0.004 mm"
@@ -65,7 +69,9 @@ def test_a_layer_on_its_only_pin_costs_most(good: Good) -> None:
 def test_a_layer_on_several_pins_cannot_turn(good: Good) -> None:
     # Walls stand on the pins of three bores and of the lumen.
     walls = films_only(good("3dof-15mm", "stack.balloons=3"))
-    bond, _ = worst_of(walls, Limits(tolerances=Tolerances(placement=0, turn=0)))
+    bond, _ = worst_of(
+        walls, PAPER.with_("registration.hand_placement=0", "registration.hand_turn=0")
+    )
     assert "largest contribution: play on the pins of layer" in bond.message
     assert bond.message.endswith(", 0.004 mm")
 
@@ -75,22 +81,22 @@ def test_a_plate_that_takes_a_jig_borer_names_the_command_for_a_mill(good: Good)
         "`sbafab generate DESIGN --set registration.plate_made_by=cnc-mill --target-yield 0.9`"
     )
     tip, one = good("3dof-15mm", "stack.balloons=3"), good(*ONE)
-    bond, overhang = worst_of(tip, Limits(plate="jig-borer"))
+    bond, overhang = worst_of(tip, load_design("1dof-5mm"))
     within = "its pins are to stand within 0.004 mm, which takes a jig borer"
     assert bond.message.endswith(f"; {within}: for a plate from a CNC mill, {command}")
     assert command not in overhang.message
     # A mill's plate, 0.029, leaves too little of the 0.75.
-    milled = Limits(plate="cnc-mill", tolerances=Tolerances(pin=0.029))
+    milled = load_design("1dof-5mm", ["registration.plate_made_by=cnc-mill"])
     bond, _ = worst_of(tip, milled)
     assert bond.verdict == "fail"
     assert bond.message.endswith(f" wider ({command} finds by how much)")
     # The place of a plate's only pin does not matter.
-    assert command not in worst_of(one, Limits(plate="jig-borer"))[0].message
-    assert command not in worst_of(tip, Limits())[0].message
+    assert command not in worst_of(one, load_design("1dof-5mm"))[0].message
+    assert command not in worst_of(tip, PAPER)[0].message
 
 
 def test_a_failure_says_what_is_left_without_the_hand(good: Good) -> None:
-    limits = Limits(tolerances=Tolerances(0.2, 0.004, 0.2, 1.0))
+    limits = PAPER.with_(registration=errors(cutting=0.2, pin=0.004, placement=0.2, turn=1.0))
     bond, overhang = worst_of(good(*ONE), limits)
     assert (bond.verdict, overhang.verdict) == ("fail", "fail")
     # 0.75 - 2 x 0.2 - 2 x 0.004, and likewise from 0.5; less than nothing is reported as none.
@@ -107,12 +113,14 @@ def test_a_failure_says_what_is_left_without_the_hand(good: Good) -> None:
 
 
 def test_what_is_short_as_drawn_says_so(good: Good) -> None:
-    limits = Limits(
-        bond_width=0.8,
-        worst_bond_width=0.76,
-        mask_overhang=0.6,
-        worst_mask_overhang=0.55,
-        tolerances=NONE,
+    limits = PAPER.with_(
+        rules={
+            "bond_width": 0.8,
+            "worst_bond_width": 0.76,
+            "mask_overhang": 0.6,
+            "worst_mask_overhang": 0.55,
+        },
+        registration=NONE,
     )
     bond, overhang = worst_of(good(*ONE), limits)
     assert (bond.verdict, overhang.verdict) == ("warn", "warn")
@@ -126,7 +134,7 @@ def test_what_is_short_as_drawn_says_so(good: Good) -> None:
 
 
 def test_films_without_masks_have_no_overhang(good: Good) -> None:
-    bond, overhang = worst_of(films_only(good(*ONE)), Limits())
+    bond, overhang = worst_of(films_only(good(*ONE)), PAPER)
     assert bond.verdict == "pass"
     # From the bore at 0.5 to the outline at 3.25.
     assert "of the 2.750 mm bond at bond interface 1 (layers 1 and 2)" in bond.message
@@ -142,7 +150,7 @@ def test_films_without_masks_have_no_overhang(good: Good) -> None:
 
 
 def test_layers_that_turn_together_cost_their_levers(good: Good) -> None:
-    bond, overhang = worst_of(good(*ONE), Limits(tolerances=Tolerances(0, 0, 0, 2)))
+    bond, overhang = worst_of(good(*ONE), PAPER.with_(registration=errors(turn=2)))
     # Wall and mask each turn about the pin in step 1, at the tab's end 8.25 from it.
     assert bond.measured == pytest.approx(0.75 - 2 * 8.25 * TURN, abs=1e-6)
     assert bond.message.endswith(
@@ -156,7 +164,7 @@ def test_layers_that_turn_together_cost_their_levers(good: Good) -> None:
 
 
 def test_a_layer_laid_by_hand_costs_most(good: Good) -> None:
-    bond, overhang = worst_of(good(*ONE), Limits(tolerances=Tolerances(0, 0, 0.3, 0)))
+    bond, overhang = worst_of(good(*ONE), PAPER.with_(registration=errors(placement=0.3)))
     # The first separator lies by hand in the middle stack, which lies so on the bottom balloon.
     assert bond.measured == pytest.approx(0.75 - 2 * 0.3)
     assert (bond.where.interface, bond.where.layers) == (2, (3, 4, 5))
@@ -172,7 +180,7 @@ def test_a_layer_laid_by_hand_costs_most(good: Good) -> None:
 def test_where_ears_are_no_help_care_is_advised(good: Good) -> None:
     # As if its pins were ears already: what is still loose is for the hand.
     eared = replace(good(*ONE), registration="ears")
-    bond, overhang = worst_of(eared, Limits(tolerances=Tolerances(0, 0, 0.3, 0)))
+    bond, overhang = worst_of(eared, PAPER.with_(registration=errors(placement=0.3)))
     assert (bond.verdict, overhang.verdict) == ("warn", "warn")
     assert bond.message.startswith("align layer ")
     assert bond.remedy.endswith(
@@ -184,7 +192,7 @@ def test_where_ears_are_no_help_care_is_advised(good: Good) -> None:
 
 def test_a_mask_that_turns_in_its_pocket_is_aligned_with_care(good: Good) -> None:
     # Its strip turns about the bore: 0.8 to the side at the mouth.
-    limits = Limits(worst_mask_overhang=0.48, tolerances=Tolerances(0, 0, 0, 2))
+    limits = PAPER.with_(rules={"worst_mask_overhang": 0.48}, registration=errors(turn=2))
     _, overhang = worst_of(good(*ONE), limits)
     assert overhang.verdict == "warn"
     assert overhang.remedy == (
@@ -242,7 +250,7 @@ def shares(*good_builds: int) -> Yield:
 def test_the_interfaces_that_lose_most_are_told_first(
     found: Yield, says: str, place: Place, good: Good
 ) -> None:
-    told = finding_of(found, good(*ONE), Limits(tolerances=Tolerances(0, 0, 0.3, 2)))
+    told = finding_of(found, good(*ONE), PAPER.with_(registration=errors(placement=0.3, turn=2)))
     low, high = found.whole.interval
     share = found.whole.value
     assert told == Finding(
@@ -266,7 +274,7 @@ def test_the_interfaces_that_lose_most_are_told_first(
 def test_a_yields_verdict(count: int, target: float | None, verdict: str, good: Good) -> None:
     # All of 400: 1 - 3.8415 / 403.8415 = 0.9905 at least. Of 348 the interval ends at 0.8995,
     # of 349 at 0.9017 (Wilson): below 0.9 for sure is what warns.
-    told = finding_of(shares(count), good(*ONE), Limits(target_yield=target))
+    told = finding_of(shares(count), good(*ONE), PAPER.with_(rules={"target_yield": target}))
     assert (told.verdict, told.limit) == (verdict, target)
     assert ("; no least share is asked for" in told.message) == (target is None)
     asked = "; the lower end of the interval must be 99.5% at least: `sbafab check --target-yield`"
@@ -278,7 +286,7 @@ def test_a_yields_verdict(count: int, target: float | None, verdict: str, good: 
 )
 def test_tall_stacks_draw_fewer_builds(balloons: int, builds: int, good: Good) -> None:
     laminate = good("1dof-5mm", f"stack.balloons={balloons}")
-    found = simulate(laminate, Limits(tolerances=NONE))
+    found = simulate(laminate, PAPER.with_(registration=NONE))
     assert found.whole == Share(builds, builds)
     assert set(found.interfaces.values()) | set(found.quantities.values()) == {found.whole}
     assert list(found.interfaces) == [interface.index for interface in laminate.interfaces]
@@ -286,8 +294,10 @@ def test_tall_stacks_draw_fewer_builds(balloons: int, builds: int, good: Good) -
 
 def test_builds_are_drawn_in_batches_to_the_last(good: Good) -> None:
     # Two whole batches and a part of one.
-    only_cut = Tolerances(0.1, 0, 0, 0)
-    limits = Limits(tolerances=only_cut, yield_builds=10_007, worst_bond_width=0.75)
+    only_cut = errors(cutting=0.1)
+    limits = PAPER.with_(
+        registration=only_cut, rules={"yield_builds": 10_007, "worst_bond_width": 0.75}
+    )
     found = simulate(good(*ONE), limits)
     assert found.whole.builds == 10_007
     # Each ring between a wall's outline and a neck ring's mask: half of the builds, or fewer.

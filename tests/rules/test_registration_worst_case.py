@@ -13,13 +13,12 @@ from shapely import affinity
 from sbafab.actuators import load_design
 from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.checked import limits
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding
 from sbafab.rules.freedoms import Part
-from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.measures import Measures
 from sbafab.rules.registration_worst_case import check, least_remaining
+from tests.designs import PAPER, errors
 
 Good = Callable[..., Laminate]
 Spoil = Callable[..., Laminate]
@@ -33,25 +32,25 @@ DEGREE = math.radians(1)
 STRIP_END = 2.5 + 0.75 + 5  # pocket, bond and tab
 
 
-def measured(laminate: Laminate, tolerances: Tolerances) -> tuple[float, float]:
-    bond, overhang = check(Measures(laminate, Limits(tolerances=tolerances)))
+def measured(laminate: Laminate, tolerances: dict[str, float]) -> tuple[float, float]:
+    bond, overhang = check(Measures(laminate, PAPER.with_(registration=tolerances)))
     assert bond.measured is not None
     assert overhang.measured is not None
     return bond.measured, overhang.measured
 
 
-def left(laminate: Laminate, interface: int, quantity: str, tolerances: Tolerances) -> float:
+def left(laminate: Laminate, interface: int, quantity: str, tolerances: dict[str, float]) -> float:
     """What is left at an interface (or at one like it)."""
     return next(
         place.worst
-        for place in least_remaining(Measures(laminate, Limits(tolerances=tolerances)))
+        for place in least_remaining(Measures(laminate, PAPER.with_(registration=tolerances)))
         if place.margin.quantity == quantity and interface in {i.index for i in place.interfaces}
     )
 
 
 def test_cutting_and_pins_leave_what_the_papers_errors_say(good: Good) -> None:
     # Two cut edges at 0.1 and two layers on pins at 0.004.
-    bond, overhang = measured(good(*ONE), Tolerances(placement=0, turn=0))
+    bond, overhang = measured(good(*ONE), {"hand_placement": 0, "hand_turn": 0})
     assert bond == pytest.approx(0.75 - 0.2 - 0.008, abs=1e-6)
     assert overhang == pytest.approx(0.5 - 0.2 - 0.008, abs=1e-6)
 
@@ -60,22 +59,22 @@ def test_a_plate_that_is_less_true_leaves_less(good: Good) -> None:
     """Four pins off their places cost twice that; the place of one pin alone costs nothing."""
     for machine, error in (("cnc-mill", 0.025 + 0.008 / 2), ("drill-press", 0.2 + 0.008 / 2)):
         made = f"registration.plate_made_by={machine}"
-        tolerances = replace(limits(load_design("3dof-15mm", [made])).tolerances, turn=0)
-        lobed, usual = good(*LOBED), Tolerances(turn=0)
+        tolerances = {"pin_error": load_design("3dof-15mm", [made]).pin_error, "hand_turn": 0}
+        lobed, usual = good(*LOBED), {"hand_turn": 0}
         # Chamber mask and wall of a balloon in the middle: both hang on pins.
         lost = left(lobed, 3, "bond", usual) - left(lobed, 3, "bond", tolerances)
         assert lost == pytest.approx(2 * (error - 0.004), abs=1e-6)
-        alone = limits(load_design("1dof-5mm", [made])).tolerances
-        assert measured(good(*ONE), alone) == measured(good(*ONE), Tolerances())
+        alone = check(Measures(good(*ONE), load_design("1dof-5mm", [made])))
+        assert tuple(found.measured for found in alone) == measured(good(*ONE), {})
 
 
 def test_without_errors_the_nominal_widths_are_left(good: Good) -> None:
     for design in (ONE, LOBED, (*LOBED, EARS)):
-        assert measured(good(*design), Tolerances(0, 0, 0, 0)) == pytest.approx((0.75, 0.5))
+        assert measured(good(*design), errors()) == pytest.approx((0.75, 0.5))
 
 
 def test_hand_placement_counts_once_for_each_time_a_layer_is_laid_by_hand(good: Good) -> None:
-    only = Tolerances(0, 0, 0.2, 0)
+    only = errors(placement=0.2)
     laminate = good(*ONE)
     # Between walls on the pin a separator mask, which no pin holds, lies by hand.
     assert left(laminate, 4, "bond", only) == pytest.approx(0.55, abs=1e-6)
@@ -96,41 +95,42 @@ def without_tails(laminate: Laminate) -> Laminate:
 
 def test_a_cap_laid_by_hand_lies_with_the_wall_below(good: Good) -> None:
     # Cap and wall against the mask between them: the hand, the wall's pin and the mask's.
-    both = left(good(*ONE), 5, "bond", Tolerances(0, 0.004, 0.2, 0))
+    both = left(good(*ONE), 5, "bond", errors(pin=0.004, placement=0.2))
     assert both == pytest.approx(0.75 - 0.2 - 2 * 0.004)
 
 
 def test_a_turned_strip_costs_its_lever_arm(good: Good) -> None:
     # Only the chamber masks can turn then, about the pin in their bore.
-    bond, _ = measured(without_tails(good(*ONE, EARS)), Tolerances(0, 0, 0, 1))
+    bond, _ = measured(without_tails(good(*ONE, EARS)), errors(turn=1))
     assert bond == pytest.approx(0.75 - STRIP_END * DEGREE, abs=1e-6)
 
 
 def test_discs_that_turn_about_their_centres_lose_nothing(good: Good) -> None:
     laminate = good(*ONE)
     for interface in (3, 4, 5):
-        assert left(laminate, interface, "bond", Tolerances(0, 0, 0, 3)) == pytest.approx(0.75)
+        assert left(laminate, interface, "bond", errors(turn=3)) == pytest.approx(0.75)
 
 
 def test_a_mask_on_the_lumens_pin_turns_about_the_lumen(good: Good) -> None:
     # The neck rings stand 4.25 from the lumen.
-    neck = left(good(*LOBED), 4, "bond", Tolerances(0, 0, 0, 1))
+    neck = left(good(*LOBED), 4, "bond", errors(turn=1))
     assert neck == pytest.approx(0.75 - 4.25 * DEGREE, abs=1e-6)
 
 
 @pytest.mark.parametrize(
-    "more", [{"cutting": 0.15}, {"pin": 0.02}, {"placement": 0.3}, {"turn": 2}]
+    "more",
+    [{"cutting_error": 0.15}, {"pin_error": 0.02}, {"hand_placement": 0.3}, {"hand_turn": 2}],
 )
 @pytest.mark.parametrize("design", [ONE, LOBED, (*LOBED, EARS)])
 def test_larger_errors_never_leave_more(
     more: dict[str, float], design: tuple[str, ...], good: Good
 ) -> None:
-    small = Tolerances(0.01, 0.001, 0.02, 0.1)
+    small = errors(cutting=0.01, pin=0.001, placement=0.02, turn=0.1)
     before = measured(good(*design), small)
-    after = measured(good(*design), Tolerances(**{**vars(small), **more}))
+    after = measured(good(*design), {**small, **more})
     assert after[0] <= before[0] + 1e-9
     assert after[1] <= before[1] + 1e-9
-    by_hand = {"placement", "turn"}.intersection(more)
+    by_hand = {"hand_placement", "hand_turn"}.intersection(more)
     assert after != before or (EARS in design and by_hand)
 
 
@@ -145,7 +145,7 @@ def test_shapely_finds_the_same_ring_left_of_moved_and_miscut_layers(good: Good)
     wall = shape(laminate.layer(5).profile).buffer(-0.1, quad_segs=64)
     mask = affinity.translate(shape(laminate.layer(6).profile).buffer(0.1, quad_segs=64), 0.008)
     ring = wall.exterior.distance(mask)
-    predicted = left(laminate, 3, "bond", Tolerances(placement=0, turn=0))
+    predicted = left(laminate, 3, "bond", {"hand_placement": 0, "hand_turn": 0})
     assert ring == pytest.approx(predicted, abs=1e-3)
 
 
@@ -154,7 +154,7 @@ def test_shapely_finds_the_same_beside_a_turned_strip(good: Good) -> None:
     turned = affinity.rotate(shape(laminate.layer(2).profile), 1, origin=AXIS)
     tab_side = shapely.LineString([(4.5, 1.55), (STRIP_END, 1.55)])
     inside = turned.intersection(shapely.box(-5, -5, STRIP_END, 5))
-    predicted = left(laminate, 1, "bond", Tolerances(0, 0, 0, 1))
+    predicted = left(laminate, 1, "bond", errors(turn=1))
     # To first order in the turn: 0.8 (1 - cos 1) and 8.25 (1 - sinc) are left out.
     assert tab_side.distance(inside) == pytest.approx(predicted, abs=3e-3)
 
@@ -164,7 +164,7 @@ def by_rule(findings: tuple[Finding, ...], verdict: str) -> set[str]:
 
 
 def test_a_coarse_laser_is_caught_by_this_rule_alone(good: Good) -> None:
-    coarse = Limits(tolerances=Tolerances(cutting=0.2), pin_stretch=1.0)
+    coarse = PAPER.with_("registration.cutting_error=0.2", "registration.pin_stretch=1.0")
     findings = run_deck(good(*ONE, "inlet.tube_outer_diameter=0.6"), coarse)
     assert by_rule(findings, "fail") == {"registration-worst-case"}
     # 0.75 - 2 x 0.2 - 2 x 0.004 is short of 0.5 even where pins hold everything.
@@ -175,7 +175,7 @@ def test_a_neck_ring_that_just_holds_as_drawn_is_caught_by_this_rule_alone(
     good: Good, spoil: Spoil
 ) -> None:
     narrow = spoil(good(*ONE), 8, disc(AXIS, 3.75) - disc(AXIS, 1.2))
-    findings = run_deck(narrow, Limits(bond_width=0.7))
+    findings = run_deck(narrow, PAPER.with_("rules.bond_width=0.7"))
     assert by_rule(findings, "fail") == {"registration-worst-case"}
     (found,) = [f for f in findings if f.verdict == "fail"]
     # 0.7 - 0.2 - 0.008, and at least 0.08 less by hand.
@@ -185,20 +185,24 @@ def test_a_neck_ring_that_just_holds_as_drawn_is_caught_by_this_rule_alone(
 
 def test_what_is_short_as_drawn_only_warns_here(good: Good, spoil: Spoil) -> None:
     narrow = spoil(good(*ONE), 4, disc(AXIS, 3.75) - disc(AXIS, 1.2))
-    findings = run_deck(narrow, Limits())
+    findings = run_deck(narrow, PAPER)
     assert by_rule(findings, "fail") == {"bond-width"}
     assert "registration-worst-case" in by_rule(findings, "warn")
 
 
 @pytest.mark.parametrize("template", ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"])
 def test_templates_are_short_by_the_hand_only(template: str, good: Good) -> None:
-    bond, overhang = check(Measures(good(template), Limits()))
+    bond, overhang = check(Measures(good(template), PAPER))
     assert {bond.verdict, overhang.verdict} == {"warn"}
     assert "hand placement of" in bond.message
     assert "in step" in bond.message
     assert 'set registration.method = "ears"' in bond.remedy
     assert bond.message.startswith(f"{bond.remedy}: at worst")
-    steady = check(Measures(good(template), Limits(tolerances=Tolerances(placement=0, turn=0))))
+    steady = check(
+        Measures(
+            good(template), PAPER.with_("registration.hand_placement=0", "registration.hand_turn=0")
+        )
+    )
     assert {finding.verdict for finding in steady} == {"pass"}
 
 
@@ -216,14 +220,16 @@ def test_templates_are_short_by_the_hand_only(template: str, good: Good) -> None
 )
 def test_ears_leave_nothing_to_the_hand(design: tuple[str, ...], good: Good) -> None:
     laminate = good(*design, EARS)
-    held = check(Measures(laminate, Limits()))
+    held = check(Measures(laminate, PAPER))
     assert {finding.verdict for finding in held} == {"pass"}
-    clumsy = check(Measures(laminate, Limits(tolerances=Tolerances(placement=5, turn=3))))
+    clumsy = check(
+        Measures(laminate, PAPER.with_("registration.hand_placement=5", "registration.hand_turn=3"))
+    )
     assert [f.measured for f in clumsy] == pytest.approx([f.measured for f in held])
 
 
 def test_without_its_tails_pin_the_strip_turns(good: Good) -> None:
-    bond, overhang = check(Measures(without_tails(good("3dof-15mm", EARS)), Limits()))
+    bond, overhang = check(Measures(without_tails(good("3dof-15mm", EARS)), PAPER))
     assert (bond.verdict, overhang.verdict) == ("warn", "pass")
     assert "turn about the only pin of layer 2 in step 1" in bond.message
     assert "at 1 interface," in bond.message
@@ -232,12 +238,12 @@ def test_without_its_tails_pin_the_strip_turns(good: Good) -> None:
 
 def test_an_oblong_mask_turns_about_its_only_pin(good: Good) -> None:
     # Above the bottom balloon no strip leads out; the ends' centres stand 4.25 from the bore.
-    bond, _ = measured(good("radial-15mm", "stack.balloons=2", EARS), Tolerances(0, 0, 0, 1))
+    bond, _ = measured(good("radial-15mm", "stack.balloons=2", EARS), errors(turn=1))
     assert bond == pytest.approx(0.75 - 4.25 * DEGREE, abs=1e-6)
 
 
 def test_a_place_is_where_the_worst_is(good: Good) -> None:
-    bond, _ = check(Measures(without_tails(good(*ONE, EARS)), Limits()))
+    bond, _ = check(Measures(without_tails(good(*ONE, EARS)), PAPER))
     assert bond.where.interface == 1
     assert bond.where.layers == (1, 2, 3)
     # Half way between the strip's edge and the tab's, at the tab's end.
@@ -246,7 +252,7 @@ def test_a_place_is_where_the_worst_is(good: Good) -> None:
 
 
 def test_pieces_of_a_layer_move_by_themselves(good: Good) -> None:
-    moves = Measures(good(*LOBED), Limits()).moves
+    moves = Measures(good(*LOBED), PAPER).moves
     turns = [
         next(f for f in moves[Part(2, piece)] if f.step == 1 and f.centre is not None)
         for piece in range(3)
@@ -258,7 +264,7 @@ def test_pieces_of_a_layer_move_by_themselves(good: Good) -> None:
 
 
 def test_more_balloons_cost_no_more_patterns(good: Good) -> None:
-    few = least_remaining(Measures(good("1dof-5mm", "stack.balloons=6"), Limits()))
-    many = least_remaining(Measures(good("1dof-5mm", "stack.balloons=60"), Limits()))
+    few = least_remaining(Measures(good("1dof-5mm", "stack.balloons=6"), PAPER))
+    many = least_remaining(Measures(good("1dof-5mm", "stack.balloons=60"), PAPER))
     assert [place.worst for place in many] == pytest.approx([place.worst for place in few])
     assert sum(len(p.interfaces) for p in many if p.margin.quantity == "bond") == 119

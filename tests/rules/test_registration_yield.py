@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sbafab.design.records import Design
 from sbafab.geometry.region import disc, rectangle
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.freedoms import Freedom, Freedoms
-from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
+from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.margins import linear_forms, pushes
 from sbafab.rules.measures import Measures
 from sbafab.rules.registration_yield import (
@@ -26,6 +27,7 @@ from sbafab.rules.registration_yield import (
     short_builds,
     simulate,
 )
+from tests.designs import PAPER, errors
 
 Good = Callable[..., Laminate]
 Spoil = Callable[..., Laminate]
@@ -35,12 +37,13 @@ EARS = "registration.method=ears"
 BUILDS = 20_000
 # Four standard errors of a share of a half.
 ROOM = 4 * 0.5 / BUILDS**0.5
-CUT_ONLY = Tolerances(cutting=0.1, pin=0, placement=0, turn=0)
+CUT_ONLY = errors(cutting=0.1)
 
 
-def limits(bond: float, tolerances: Tolerances) -> Limits:
-    return Limits(
-        worst_bond_width=bond, worst_mask_overhang=0.0, tolerances=tolerances, yield_builds=BUILDS
+def limits(bond: float, tolerances: dict[str, float]) -> Design:
+    return PAPER.with_(
+        rules={"worst_bond_width": bond, "worst_mask_overhang": 0.0, "yield_builds": BUILDS},
+        registration=tolerances,
     )
 
 
@@ -63,7 +66,7 @@ def test_two_outlines_over_one_mask(missing: float, good: Good) -> None:
 
 
 def test_a_disc_laid_by_hand_keeps_a_ring_within_a_smaller_disc(good: Good) -> None:
-    by_hand = Tolerances(cutting=0, pin=0, placement=0.2, turn=0)
+    by_hand = errors(placement=0.2)
     found = simulate(good(*ONE), limits(0.65, by_hand))
     # The cap may lie anywhere within 0.2; within 0.1 of its place it is good.
     assert found.interfaces[5].value == pytest.approx(0.25, abs=ROOM + 0.01)
@@ -81,7 +84,7 @@ def test_a_disc_laid_by_hand_keeps_a_straight_bond_beyond_a_chord(
     laminate = good(*ONE)
     for layer, profile in ((9, wall), (10, pocket), (11, cap)):
         laminate = spoil(laminate, layer, profile.turned(turn))
-    by_hand = Tolerances(cutting=0, pin=0, placement=0.2, turn=0)
+    by_hand = errors(placement=0.2)
     found = simulate(laminate, limits(0.6, by_hand))
     # Bad where it lies more than 0.1 towards the pocket: a segment of the disc of 0.2.
     segment = (math.acos(0.5) - 0.5 * math.sqrt(0.75)) / math.pi
@@ -89,7 +92,7 @@ def test_a_disc_laid_by_hand_keeps_a_straight_bond_beyond_a_chord(
 
 
 def test_the_whole_is_good_where_every_interface_is(good: Good) -> None:
-    by_hand = Tolerances(cutting=0, pin=0, placement=0.2, turn=0)
+    by_hand = errors(placement=0.2)
     found = simulate(good(*ONE), limits(0.65, by_hand))
     # Cap, the separator in the middle, and the first separator are laid by hand, each by itself.
     product = 1.0
@@ -101,8 +104,10 @@ def test_the_whole_is_good_where_every_interface_is(good: Good) -> None:
 
 @pytest.mark.parametrize("cut", [0.0, 0.06, 0.15])
 def test_builds_are_drawn_until_the_share_is_within_a_point(cut: float, good: Good) -> None:
-    errors = Tolerances(cutting=0.1, pin=0, placement=0, turn=0)
-    asked = Limits(worst_bond_width=0.75 - cut, worst_mask_overhang=0.0, tolerances=errors)
+    asked = PAPER.with_(
+        rules={"worst_bond_width": 0.75 - cut, "worst_mask_overhang": 0.0},
+        registration=errors(cutting=0.1),
+    )
     share = simulate(good(*ONE), asked).whole
     low, high = share.interval
     assert high - low <= 0.0101
@@ -112,7 +117,7 @@ def test_builds_are_drawn_until_the_share_is_within_a_point(cut: float, good: Go
 
 
 def test_middle_first_takes_a_placement_by_hand_less(good: Good) -> None:
-    by_hand = Tolerances(cutting=0, pin=0, placement=0.2, turn=0)
+    by_hand = errors(placement=0.2)
     two = ("1dof-5mm", "stack.balloons=2")
     shares = [
         simulate(good(*two, f"registration.sequence={word}"), limits(0.6, by_hand)).whole.value
@@ -125,19 +130,19 @@ def test_middle_first_takes_a_placement_by_hand_less(good: Good) -> None:
 
 
 def test_without_errors_every_build_is_good(good: Good) -> None:
-    found = simulate(good(*ONE), limits(0.75, Tolerances(0, 0, 0, 0)))
+    found = simulate(good(*ONE), limits(0.75, errors()))
     assert found.whole.value == 1.0
 
 
 def test_a_seed_gives_the_same_builds_again(good: Good) -> None:
     laminate = good(*ONE)
-    assert simulate(laminate, Limits()) == simulate(laminate, Limits())
-    assert simulate(laminate, Limits(), 1).whole != simulate(laminate, Limits(), 2).whole
+    assert simulate(laminate, PAPER) == simulate(laminate, PAPER)
+    assert simulate(laminate, PAPER, 1).whole != simulate(laminate, PAPER, 2).whole
 
 
 def test_smaller_errors_give_more_good_builds(good: Good) -> None:
     shares = [
-        simulate(good(*ONE), Limits(tolerances=Tolerances(placement=p))).whole.value
+        simulate(good(*ONE), PAPER.with_(registration={"hand_placement": p})).whole.value
         for p in (0.3, 0.2, 0.1, 0.0)
     ]
     assert shares == sorted(shares)
@@ -166,19 +171,23 @@ def with_a_free_strip(laminate: Laminate) -> Laminate:
 
 def test_a_target_decides_by_the_intervals_lower_end(good: Good) -> None:
     laminate = with_a_free_strip(good(*ONE, EARS))
-    whole = simulate(laminate, Limits()).whole
+    whole = simulate(laminate, PAPER).whole
     low, _ = whole.interval
     assert low < whole.value < 1
-    (reached,) = check(Measures(laminate, Limits(target_yield=low)))
-    (missed,) = check(Measures(laminate, Limits(target_yield=whole.value)))
+    (reached,) = check(Measures(laminate, PAPER.with_(rules={"target_yield": low})))
+    (missed,) = check(Measures(laminate, PAPER.with_(rules={"target_yield": whole.value})))
     assert (reached.verdict, missed.verdict) == ("pass", "fail")
     assert missed.limit == missed.measured == whole.value
     assert missed.where.interface == 1
 
 
 def test_without_a_target_less_than_the_papers_success_warns(good: Good) -> None:
-    (many,) = check(Measures(with_a_free_strip(good(*ONE, EARS)), Limits()))
-    (few,) = check(Measures(good(*ONE), Limits(tolerances=Tolerances(placement=0.2, turn=1.0))))
+    (many,) = check(Measures(with_a_free_strip(good(*ONE, EARS)), PAPER))
+    (few,) = check(
+        Measures(
+            good(*ONE), PAPER.with_("registration.hand_placement=0.2", "registration.hand_turn=1.0")
+        )
+    )
     assert (many.verdict, few.verdict) == ("pass", "warn")
     assert many.measured is not None
     assert few.measured is not None
@@ -188,7 +197,7 @@ def test_without_a_target_less_than_the_papers_success_warns(good: Good) -> None
 
 def test_with_ears_every_build_is_good(good: Good) -> None:
     # No sum of the errors exceeds what bond and overhang have to spare.
-    assert simulate(good(*ONE, EARS), Limits()).whole.value == 1
+    assert simulate(good(*ONE, EARS), PAPER).whole.value == 1
 
 
 # Builds that come short, against plain sums of their errors.
@@ -259,7 +268,7 @@ def test_builds_that_come_short_are_those_of_plain_sums(number: int, least: floa
 
 def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
     laminate = good("3dof-15mm", "stack.balloons=2")
-    measures = Measures(laminate, Limits())
+    measures = Measures(laminate, PAPER)
     forms = linear_forms(measures.margins, measures.moves)
     assert len(forms.loss) == sum(len(group) for group in measures.margins)
     for number, (whole, pinned) in enumerate(zip(forms.loss, forms.pinned_loss, strict=True)):
@@ -275,5 +284,5 @@ def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
 
 def test_a_laminate_without_margins_has_neither_forms_nor_rows() -> None:
     forms = linear_forms([], Freedoms({}))
-    asked = rows_of(forms, [], Limits())
+    asked = rows_of(forms, [], PAPER)
     assert (forms.loss.shape, asked.room.shape, len(asked.kinds)) == ((0,), (0,), 0)

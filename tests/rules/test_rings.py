@@ -10,10 +10,9 @@ from itertools import product
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.design.records import Design
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.checked import limits
 from sbafab.rules.deck import run_deck
-from sbafab.rules.limits import Limits
 from tests.quick import few
 
 
@@ -22,11 +21,11 @@ from tests.quick import few
     few(product(("1dof-5mm", "3dof-15mm", "radial-15mm"), ("channel-pin", "ears")), 3, names=2),
 )
 def test_a_deck_leaves_no_rings(template: str, method: str) -> None:
-    def asked(overhang: float) -> tuple[Laminate, Limits]:
+    def asked(overhang: float) -> tuple[Laminate, Design]:
         made = load_design(
             template, [f'registration.method="{method}"', f"mask.overhang={overhang}"]
         )
-        return build(made), limits(made)
+        return build(made), made
 
     # Once before, for what is loaded and compiled at the first time.
     run_deck(*asked(0.53))

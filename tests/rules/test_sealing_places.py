@@ -11,10 +11,10 @@ import pytest
 from sbafab.geometry.region import disc, polygon, strip, union
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
 from sbafab.rules.sealing import check
 from sbafab.rules.voids import _gap
+from tests.designs import PAPER
 
 AXIS = (0.0, 0.0)
 ONE = ("1dof-5mm", "stack.balloons=3")
@@ -27,7 +27,7 @@ Spoil = Callable[..., Laminate]
 
 
 def found_in(laminate: Laminate) -> Finding:
-    (finding,) = check(Measures(laminate, Limits()))
+    (finding,) = check(Measures(laminate, PAPER))
     return finding
 
 

@@ -16,7 +16,6 @@ from shapely import affinity
 
 from sbafab.actuators import build, load_design, records
 from sbafab.design.records import validated
-from sbafab.output.checked import limits
 from sbafab.rules.deck import run_rule
 from sbafab.rules.finding import Finding
 from sbafab.rules.measures import Measures
@@ -32,7 +31,7 @@ STEADY = {"registration.hand_placement": 0, "registration.hand_turn": 0}
 def findings(rule: object, **settings: object) -> list[Finding]:
     named = {key.replace("__", "."): value for key, value in settings.items()}
     design = load_design("folded").with_({**STEADY, **named})
-    return run_rule(rule, Measures(build(design), limits(design)))  # type: ignore[arg-type]
+    return run_rule(rule, Measures(build(design), design))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("error", [0.0, 0.5, 1.2])
@@ -107,7 +106,7 @@ def worst(
         "registration": {"hand_placement": 0, "hand_turn": 0, "seam_error": error},
     }
     design = validated(tables, records(), Path())
-    return run_rule(rule, Measures(build(design), limits(design)))[0]
+    return run_rule(rule, Measures(build(design), design))[0]
 
 
 def end_on_end(overlap: float) -> dict[str, Points]:

@@ -12,7 +12,6 @@ import shapely
 
 from sbafab.actuators import build, load_design, records
 from sbafab.design.records import Design, validated
-from sbafab.output.checked import limits
 from sbafab.rules.deck import run_rule
 from sbafab.rules.finding import Finding
 from sbafab.rules.measures import Measures
@@ -71,9 +70,7 @@ def welded(seams: dict[str, tuple[list[list[float]], str]], **sections: Any) -> 
 
 
 def opening(design: Design) -> Finding:
-    (finding,) = [
-        f for f in run_rule(NETS, Measures(build(design), limits(design))) if f.unit == "kPa"
-    ]
+    (finding,) = [f for f in run_rule(NETS, Measures(build(design), design)) if f.unit == "kPa"]
     return finding
 
 
@@ -160,7 +157,7 @@ def test_a_chamber_is_parted_where_seams_close_a_channel(gap: float, verdict: st
     }
     both = [{"name": "a", "centres": [[0, 5], [0, -7]], "mouth": [0, 20], "angle": 90, "width": 3}]
     design = welded(walls, chambers=both, nets=None, ports=None)
-    (found,) = run_rule(SEALING, Measures(build(design), limits(design)))
+    (found,) = run_rule(SEALING, Measures(build(design), design))
     assert found.verdict == verdict
     if verdict == "fail":
         assert "a may be parted at chamber interface 1" in found.message
@@ -174,7 +171,7 @@ def test_a_narrow_end_of_a_pocket_parts_nothing() -> None:
         "lower": ([[15, -2.0], [5, -2.0]], "hot-tip"),
     }
     design = welded(walls, nets=None, ports=None)
-    (found,) = run_rule(SEALING, Measures(build(design), limits(design)))
+    (found,) = run_rule(SEALING, Measures(build(design), design))
     assert found.verdict == "pass"
 
 
@@ -190,6 +187,6 @@ def test_a_mouth_between_two_seams_is_narrower_by_their_errors(width: float, ver
     seams = [{**seam, "path": paths[seam["name"]]} for seam in design.model_dump()["seams"]]
     (pouch,) = design.model_dump()["chambers"]
     design = design.with_({"seams": seams, "chambers": [{**pouch, "width": width}]})
-    found = run_rule(TUBE_FIT, Measures(build(design), limits(design)))[0]
+    found = run_rule(TUBE_FIT, Measures(build(design), design))[0]
     assert (found.verdict, found.limit) == (verdict, pytest.approx(math.pi * 1.016 / 2))
     assert found.measured == pytest.approx(width - 0.6)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 import sbafab
 from sbafab.actuators import build
 from sbafab.errors import DesignError
-from sbafab.output.checked import limits
 from sbafab.rules.registration_yield import simulate
 
 ROUGH = {
@@ -34,7 +31,7 @@ def test_the_changed_design_reaches_the_share_and_costs_what_its_ears_do() -> No
     assert not outline.differs
     assert overall.differs
     # Builds drawn by a third seed.
-    share = simulate(build(design), replace(limits(design), yield_builds=1000), 91).whole
+    share = simulate(build(design), design.with_("rules.yield_builds=1000"), 91).whole
     assert share.interval[1] >= 0.9
 
 

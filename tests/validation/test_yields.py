@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.output.checked import limits
 from sbafab.rules.registration_yield import simulate
 from sbafab.runs.run import RunRequest, generate
 from tests.judge.yields import judged_yield
@@ -36,7 +35,7 @@ def folder_of(name: str, out: Path) -> tuple[float, Path]:
     """The predicted share of good builds, and a written folder."""
     source, keys = DESIGNS[name]
     design = load_design(source, keys)
-    share = simulate(build(design), limits(design)).whole.value
+    share = simulate(build(design), design).whole.value
     quick = design.with_({"rules.yield_builds": 100})
     return share, generate(RunRequest(quick, out, ("cut", "press"))).folder
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
+from sbafab.design.records import Design
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports.html_templates import environment
 from sbafab.reports.nets_svg import nets_svg
 from sbafab.reports.traveller.job import HERE, frame
 from sbafab.rules.finding import Finding
-from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
 from sbafab.rules.nets import connectivity
 from sbafab.rules.registration_yield import simulate
@@ -33,36 +33,42 @@ class Hand(NamedTuple):
     share: float
 
 
-def at_roughest(laminate: Laminate, limits: Limits) -> Measures:
+def at_roughest(laminate: Laminate, design: Design) -> Measures:
     """Return the margins that the largest placement error can violate; smaller errors use them
     too.
     """
-    return Measures(laminate, _rougher(limits, ROUGHER[-1]))
+    return Measures(laminate, _rougher(design, ROUGHER[-1]))
 
 
-def rougher_hands(places: Measures, limits: Limits) -> tuple[Hand, ...]:
+def rougher_hands(places: Measures, design: Design) -> tuple[Hand, ...]:
     """Return the yields at smaller and larger placement errors; empty if the largest loses no
     build.
     """
-    roughest = _hand(places, places.limits)
+    roughest = _hand(places, places.design)
     if roughest.share == 1:
         return ()
-    hands = (_hand(places, _rougher(limits, factor)) for factor in ROUGHER[:-1])
+    hands = (_hand(places, _rougher(design, factor)) for factor in ROUGHER[:-1])
     return (*hands, roughest)
 
 
-def _rougher(limits: Limits, factor: float) -> Limits:
-    tolerances = limits.tolerances
-    scaled = replace(
-        tolerances, placement=factor * tolerances.placement, turn=factor * tolerances.turn
-    )
-    return replace(limits, tolerances=scaled)
+def _rougher(design: Design, factor: float) -> Design:
+    errors = design.registration
+    hand = {
+        "hand_placement": factor * errors.hand_placement,
+        "hand_turn": factor * errors.hand_turn,
+    }
+    return design.model_copy(update={"registration": errors.model_copy(update=hand)})
 
 
-def _hand(places: Measures, limits: Limits) -> Hand:
-    counted = replace(limits, yield_builds=BUILDS)
+def _hand(places: Measures, design: Design) -> Hand:
+    rules = design.rules.model_copy(update={"yield_builds": BUILDS})
+    counted = design.model_copy(update={"rules": rules})
     builds = simulate(places.laminate, counted, measures=places.by_hand(counted))
-    return Hand(limits.tolerances.placement, limits.tolerances.turn, builds.whole.value)
+    return _hand_of(design, builds.whole.value)
+
+
+def _hand_of(design: Design, share: float) -> Hand:
+    return Hand(design.registration.hand_placement, design.registration.hand_turn, share)
 
 
 TEMPLATE = "findings.html.j2"
@@ -76,7 +82,7 @@ class Inspected:
     name: str
     findings: Sequence[Finding]
     laminate: Laminate | None = None
-    limits: Limits | None = None
+    design: Design | None = None
 
 
 class _Chapter(NamedTuple):
@@ -110,27 +116,26 @@ def _chapter(inspected: Inspected) -> _Chapter:
 
 
 def _nets(inspected: Inspected) -> str:
-    laminate, limits = inspected.laminate, inspected.limits
-    if laminate is None or limits is None or not laminate.nets:
+    laminate, design = inspected.laminate, inspected.design
+    if laminate is None or design is None or not laminate.nets:
         return ""
-    drawing = nets_svg(laminate, connectivity(laminate, limits))
+    drawing = nets_svg(laminate, connectivity(laminate, design))
     return drawing[drawing.index("<svg") :]
 
 
 def _design_hand(inspected: Inspected) -> Hand | None:
     finding = next((f for f in inspected.findings if f.rule == YIELD), None)
-    if finding is None or finding.measured is None or inspected.limits is None:
+    if finding is None or finding.measured is None or inspected.design is None:
         return None
-    tolerances = inspected.limits.tolerances
-    return Hand(tolerances.placement, tolerances.turn, finding.measured)
+    return _hand_of(inspected.design, finding.measured)
 
 
 def _hands(inspected: Inspected) -> tuple[Sequence[Hand], Sequence[str]]:
     """Return larger placement errors and remedies; empty if the builds could not be counted."""
-    if inspected.laminate is None or inspected.limits is None or _design_hand(inspected) is None:
+    if inspected.laminate is None or inspected.design is None or _design_hand(inspected) is None:
         return (), ()
-    places = at_roughest(inspected.laminate, inspected.limits)
-    hands = rougher_hands(places, inspected.limits)
+    places = at_roughest(inspected.laminate, inspected.design)
+    hands = rougher_hands(places, inspected.design)
     return hands, tuple(_remedies(places)) if hands else ()
 
 
@@ -145,7 +150,7 @@ def _remedies(places: Measures) -> Iterator[str]:
         "sbafab check design.toml --target-yield 0.99 computes the wider bonds and overhangs that "
         "reach 99 % with this hand."
     )
-    if places.limits.plate == "jig-borer" and len(places.laminate.pins) > 1:
+    if places.design.plate_machine == "jig-borer" and len(places.laminate.pins) > 1:
         yield (
             f"No jig borer for the base plate? {for_a_cnc_mill('design.toml')} makes bonds and "
             "overhangs wide enough for one from a CNC mill."
