@@ -1,16 +1,16 @@
 """A round balloon as an elastic membrane of revolution: inflated free, or between plates.
 
-Two films, bonded round the pocket and, where there are neighbours, at the neck. Of equal films one
-is computed, and the other mirrors it; unlike ones are computed together. A film stretches (plane
-stress; Saint Venant and Kirchhoff's law, or Hencky's) and bends. Where its hoop is compressed it
-wrinkles, and the wrinkles of least energy carry
+Two films, bonded round the pocket and, between neighbours, at the neck. If the films are equal, one
+is computed and the other mirrors it; different films are computed together. A film stretches (plane
+stress; Saint Venant and Kirchhoff's law, or Hencky's) and bends. It wrinkles under hoop
+compression, and the wrinkles of least energy carry
 
     N = 2 sqrt(B K)    K = T (pi / L)^2 + E t c^2      (after Cerda and Mahadevan, 2003)
 
 with the bending stiffness B, the tension T along the meridian, the length L of the compressed zone
-and the curvature c of the meridian. The rim, two films thick, ripples. Shapes are those of least
-energy, found by Newton's method for many pressures and heights at once. Lengths mm, pressures kPa,
-volumes ul, forces mN.
+and the curvature c of the meridian. The rim, two films thick, ripples. Shapes minimise the energy,
+by Newton's method for many pressures and heights at once. Lengths mm, pressures kPa, volumes ul,
+forces mN.
 """
 
 from __future__ import annotations
@@ -48,24 +48,25 @@ NECK_ELEMENTS = 2
 RESIDUAL = 1e-9
 """Residual force, as a share of pressure times pocket area, that counts as equilibrium."""
 LEAST_PRESSURE = 0.01
-"""Pressure in kPa from which the tolerance of the residual is taken where there is less."""
+"""Least pressure in kPa for the tolerance of the residual."""
 PLATE_STIFFNESS = 20_000.0
 """Penalty of a plate: the pressure on the film presses it in by 1 / PLATE_STIFFNESS mm."""
 FEW = 4
-"""Balloons up to which their systems are solved by blocks: quicker than all rows in step."""
+"""Number of balloons up to which solving by blocks is faster than all rows together."""
 WRINKLE_ROUNDS = 3
-"""Iterations between the wrinkles' stress, which follows the tension, and the shape."""
+"""Iterations between the shape and the wrinkles' stress, which depends on the tension."""
 
 
 @dataclass(frozen=True)
 class Balloon:
     """A balloon and its film: radii, width of the ring and thickness in mm, modulus in kPa.
 
-    ``neck`` is the radius bonded to the next balloon, ``bore`` that of the hole in it; both 0 for a
-    lone balloon. Without ``wrinkles`` films stay as smooth as an axisymmetric mesh keeps them.
-    ``inextensible`` is the limit of a film that neither bends nor carries any compression, its rim
-    included: the modulus has then to be large. ``order`` is that of the film's law (``FlatFilm``):
-    2 for Saint Venant's and Kirchhoff's, which programs for linear films take; 0 for Hencky's.
+    ``neck`` is the radius bonded to the next balloon, ``bore`` the radius of its hole; both are 0
+    for a lone balloon. Without ``wrinkles`` films stay as smooth as in an axisymmetric mesh.
+    ``inextensible`` is the limit of a film, rim included, that neither bends nor carries
+    compression: the modulus must then be large. ``order`` is the order of the film's law
+    (``FlatFilm``): 2 for Saint Venant's and Kirchhoff's, as in programs for linear films; 0 for
+    Hencky's.
     """
 
     pocket: float = 2.5
@@ -79,7 +80,7 @@ class Balloon:
     inextensible: bool = False
     order: int = 2
     mate: Balloon | None = None
-    """The second film where the two differ: of the same sizes, and without a mate itself."""
+    """The second film if the two differ: of the same sizes, and without a mate itself."""
 
     def stiffened(self, ratio: float) -> Balloon:
         """Return the balloon whose films have ``ratio`` times the modulus."""
@@ -159,18 +160,18 @@ class Balloon:
 
     @cached_property
     def may_wrinkle(self) -> NDArray[np.bool_]:
-        """True for the elements that may wrinkle: those of the film, not of neck and rim."""
+        """True for the elements that may wrinkle: in the film, not in neck and rim."""
         number = np.arange(len(self.nodes) - 1)
         free = (number >= self.neck_edge) & (number < self.edge) & self.wrinkles
         return free | ((number >= self.edge) & self.inextensible)
 
 
 class Shapes(NamedTuple):
-    """Balloons in equilibrium, a row each.
+    """Balloons in equilibrium, one row each.
 
-    ``pressure`` in kPa; ``height`` that the whole balloon has risen by, its stroke, in mm;
-    ``volume`` of its air in ul; ``force`` on the plate at either end in mN; ``energy`` stored in
-    its films in uJ; ``r`` and ``z`` of the nodes of one film, above those of a flat one, in mm.
+    ``pressure`` in kPa; ``height``, the rise (stroke) of the whole balloon, in mm; ``volume`` of
+    its air in ul; ``force`` on the plate at either end in mN; ``energy`` stored in its films in uJ;
+    ``r`` and ``z`` of the nodes of one film, relative to a flat one, in mm.
     """
 
     pressure: Array
@@ -186,9 +187,9 @@ class Shapes(NamedTuple):
 
 
 def distinct(states: Array) -> tuple[Array, NDArray[np.int_]]:
-    """Return the distinct rows of states (n, values), and which of these each row is: (n,).
+    """Return the distinct rows of states (n, values), and the index of each row in them: (n,).
 
-    As np.unique does, which takes as long to load as to compute some balloons.
+    Replaces np.unique, whose import takes as long as computing some balloons.
     """
     rows = list(map(tuple, states.tolist()))
     numbers = {row: number for number, row in enumerate(dict.fromkeys(rows))}
@@ -217,10 +218,10 @@ def inflate(
 ) -> Shapes:
     """Return the equilibrium shapes at pressures (kPa), free or between plates at heights (mm).
 
-    A free balloon with a bore is pulled on by the air in it, as one in a stack is. With ``tied``
-    the plates hold its necks, and pull where they stand higher than it would rise; the force is
-    then below 0. Raises DesignError for pressures or heights that are not above 0 (a tied one may
-    have no pressure), or where Newton's method finds no equilibrium.
+    The air in the bore of a free balloon pulls on it, as in a stack. With ``tied`` the plates hold
+    its necks, and pull if they stand higher than it would rise; the force is then below 0. Raises
+    DesignError for pressures or heights that are not above 0 (a tied one may have no pressure), or
+    if Newton's method finds no equilibrium.
     """
     p = np.atleast_1d(np.asarray(pressure, dtype=float))
     high = math.inf if height is None else np.asarray(height, dtype=float)
@@ -233,7 +234,7 @@ def inflate(
     load = BalloonLoad(p, high / 2, cap, tied, no_ripples(balloon, len(p)))
     if balloon.mate is not None:
         return inflate_two_films((replace(balloon, mate=None), balloon.mate), load)
-    # Short of an equilibrium elements may shrink to nothing; that raises in the end.
+    # Elements may collapse before equilibrium; that raises an error in the end.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         x = _equilibrium(balloon, load, coordinates(*initial_shape(balloon, load)))
         if balloon.wrinkles and not balloon.inextensible:
@@ -253,11 +254,11 @@ def inflate(
 
 
 def initial_shape(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
-    """Return bulged films to start from, as high as their pressure may lift them: r and z."""
+    """Return bulged films to start from, as high as their pressure could lift them: r and z."""
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
     if balloon.bending_stiffness > 0:
-        # A thick film rises as a plate that is clamped all round: by less.
+        # A thick film rises less, like a plate clamped all round.
         plate = (
             load.pressure * free**4 / ((384 if balloon.neck else 64) * balloon.bending_stiffness)
         )
@@ -275,8 +276,8 @@ class TotalEnergy(NamedTuple):
     """Potential energy (rows,) of a film, its air and the plates, with its derivatives.
 
     ``gradient`` by coordinate (coordinates, rows), the residual; ``matrix``, the tangent stiffness
-    as a band (coordinates, 6, rows), without what ripples couple: that is ``rim``, by the radii of
-    the rim's nodes (nodes, nodes, rows). ``force`` is that of the plates, (rows,).
+    as a band (coordinates, 6, rows), without the ripples' coupling: this is ``rim``, by the radii
+    of the rim's nodes (nodes, nodes, rows). ``force`` is the plates' force, (rows,).
     """
 
     energy: Array
@@ -292,7 +293,7 @@ def coordinates(r: Array, z: Array) -> Array:
 
 
 def node_positions(x: Array) -> tuple[Array, Array]:
-    """Return the radii and heights of the nodes, a row a film."""
+    """Return the radii and heights of the nodes, one row per film."""
     return x[0::2].T, x[1::2].T
 
 
@@ -374,7 +375,7 @@ class BalloonEnergy:
 
 
 def tolerances(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
-    """Return an energy of each balloon's size, uJ, and the residual in mN that counts as none."""
+    """Return an energy scale of each balloon, uJ, and the tolerance of its residual, mN."""
     force = RESIDUAL * np.maximum(load.pressure, LEAST_PRESSURE) * math.pi * balloon.pocket**2
     return load.pressure * balloon.pocket**3, force
 
@@ -386,7 +387,7 @@ def relative_change(x: Array, ahead: Array) -> Array:
 
 
 def _equilibrium(balloon: Balloon, load: BalloonLoad, x: Array) -> Array:
-    """Return the equilibrium downhill of coordinates. Raises DesignError where there is none."""
+    """Return the equilibrium downhill of coordinates. Raises DesignError if it finds none."""
     try:
         return equilibrium(BalloonEnergy(balloon, load), x)
     except NoEquilibrium:
@@ -408,7 +409,7 @@ def wrinkle_stress(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
     """Return the hoop stress in kPa that wrinkles over a zone carry, by each element's tension."""
     film = balloon.film
     tension = balloon.membrane_stiffness * strain(film, r, z).meridian
-    # A wrinkle of a curved film stretches the meridian: many short ones cost least.
+    # A wrinkle in a curved film stretches the meridian, so many short ones cost least.
     support = np.maximum(tension, 0.0) * (math.pi / zone[:, None]) ** 2
     support = support + balloon.membrane_stiffness * curvature(film, r, z) ** 2
     force = 2 * np.sqrt(balloon.bending_stiffness * support)
@@ -418,7 +419,7 @@ def wrinkle_stress(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
 
 
 def ripples_at(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) -> list[Ripple]:
-    """Return the rim's ripples at shapes of one film, which the other mirrors, or of both."""
+    """Return the rim's ripples at shapes of one film, mirrored by the other, or of both."""
     strains = [strain(film.film, *shape) for film, shape in zip(films, shapes, strict=True)]
     pulls = [
         film.membrane_stiffness * strains_of.meridian[:, film.edge - 1]
@@ -459,11 +460,11 @@ GAUSS_WEIGHTS = np.array(
 
 
 class Ripple(NamedTuple):
-    """Ripple of one film's rim, a row a balloon.
+    """Ripple of one film's rim, one row per balloon.
 
     ``waves`` round the rim; ``cost`` is K / 2, infinite for a smooth rim; ``relief`` the rho of the
-    rim's elements, ``pull`` each one's volume times modulus times rho, and ``stiff`` the integral
-    of E rho^2.
+    rim's elements, ``pull`` each element's volume times modulus times rho, and ``stiff`` the
+    integral of E rho^2.
     """
 
     waves: Array
@@ -484,10 +485,10 @@ def no_ripples(balloon: Balloon, count: int) -> Ripple:
 
 
 def rim_ripples(films: Sequence[Balloon], hoop: Array, tensions: Sequence[Array]) -> list[Ripple]:
-    """Return the ripples of least energy at the rim's hoop strains (rows, elements), a share for
-    each film; ``tensions`` in N/m are those of the films at the pocket's edge, one row each.
+    """Return the ripples of least energy at the rim's hoop strains (rows, elements), one part per
+    film; ``tensions`` in N/m are the films' tensions at the pocket's edge, one row per film.
 
-    One film stands for two equal ones.
+    One film represents two equal ones.
     """
     pair = films[0], films[-1]
     pulls = tensions if len(films) == 2 else (tensions[0], tensions[0])
@@ -547,7 +548,7 @@ def bonded_bending_stiffness(pair: Sequence[Balloon]) -> float:
 
 
 def squared_tilt(flat: FlatFilm, edge: int, ripple: Ripple, r: Array) -> Array:
-    """Return the squared tilt a^2 of least energy, a row a balloon."""
+    """Return the squared tilt a^2 of least energy, one row per balloon."""
     return np.asarray(_ripple_drive(_rim_hoop(flat, edge, r), ripple) / ripple.stiff)
 
 
@@ -560,11 +561,11 @@ class RippleEnergy(NamedTuple):
 
 
 def ripple_energy(flat: FlatFilm, edge: int, ripple: Ripple, r: Array) -> RippleEnergy:
-    """Return the energy that ripples take off that of a smooth rim: below 0, or 0."""
+    """Return the energy of a rippled rim less that of a smooth one: at most 0."""
     drive = _ripple_drive(_rim_hoop(flat, edge, r), ripple)
     middles = flat.middles[edge:]
     wide = (r[:, edge + 1 :] + r[:, edge:-1]) / (2 * middles)
-    # Slopes of the hoop strain by the radius of either node, and what they change by.
+    # Slopes of the hoop strain by the radius of either node, and their derivatives.
     first = wide ** (flat.order - 1) / (2 * middles)
     second = (flat.order - 1) * wide ** (flat.order - 2) / (2 * middles) ** 2
     tilt = drive / ripple.stiff
@@ -586,28 +587,28 @@ def _rim_hoop(flat: FlatFilm, edge: int, r: Array) -> Array:
 
 
 def _ripple_drive(hoop: Array, ripple: Ripple) -> Array:
-    """Return the excess of the hoop's compression over the ripples' cost; 0 where there is none."""
+    """Return the excess of the hoop's compression over the ripples' cost, at least 0."""
     return np.asarray(np.maximum(-(ripple.cost + (hoop * ripple.pull).sum(-1)), 0.0))
 
 
-# A balloon of two unlike films: each with its thickness and modulus, bonded at one rim.
+# A balloon of two different films, each with its thickness and modulus, bonded at one rim.
 #
-# Both films are solved at once. They share the rim, which moves to where their pulls are equal and
-# tilts as they twist it: as a ring whose section turns.
+# Both films are solved at once. They share the rim, which moves until their pulls balance and tilts
+# as they twist it, like a ring whose section turns.
 
 
 COUPLED = 5
-"""Number of coordinates further on to which one is coupled."""
+"""Number of following coordinates to which a coordinate is coupled."""
 TwoFilms = tuple["Balloon", "Balloon"]
 Loads = tuple["BalloonLoad", "BalloonLoad"]
 
 
 @one_blas_thread
 def inflate_two_films(films: TwoFilms, load: BalloonLoad) -> Shapes:
-    """Return the shapes under a load; ``r`` and ``z`` are those of the film that stretches more
+    """Return the shapes under a load; ``r`` and ``z`` belong to the film that stretches more
     easily.
 
-    Raises DesignError where Newton's method finds no equilibrium.
+    Raises DesignError if Newton's method finds no equilibrium.
     """
     loads = (load, load)
     basis = _basis(films[0], is_free=bool(np.isinf(load.half).any()))
@@ -664,8 +665,8 @@ def _rim_twist(films: TwoFilms) -> Array:
 def _basis(balloon: Balloon, is_free: bool) -> Array:
     """Return the motion of a unit of each degree of freedom: (coordinates of both films, freedoms).
 
-    First come those of each film alone, then the shared ones: the rim's radii, its tilt, and its
-    height. A free balloon's rim stays in its plane: its height as a whole is no freedom.
+    Each film's own freedoms come first, then the shared ones: the rim's radii, its tilt, and its
+    height. A free balloon's rim stays in its plane: its overall height is fixed.
     """
     count, inner = len(balloon.nodes), _inner_freedoms(balloon)
     basis = np.zeros((4 * count, 2 * len(inner) + count - balloon.edge + 1 + (not is_free)))
@@ -683,7 +684,7 @@ def _basis(balloon: Balloon, is_free: bool) -> Array:
 
 
 def _inner_freedoms(film: Balloon) -> NDArray[np.int_]:
-    """Return the coordinates that only one film has: those inside the pocket's edge."""
+    """Return the coordinates that belong to only one film, inside the pocket's edge."""
     return film.freedoms[film.freedoms < 2 * film.edge]
 
 
@@ -703,7 +704,7 @@ class _TangentBlocks(NamedTuple):
 
     ``inner`` are bands of each film's inner freedoms (freedoms, 6, 2 rows), the first film's rows
     before the second's; ``between`` couples the last of them with the shared ones (``COUPLED``,
-    shared, 2 rows), all others are 0; ``shared`` (rows, shared, shared).
+    shared, 2 rows), other couplings are 0; ``shared`` (rows, shared, shared).
     """
 
     inner: Array
@@ -736,7 +737,7 @@ class _TwoFilmEnergy:
             slopes += basis.T @ state.gradient
             neck_tied(film, state)
             inner.append(least_energy.packed(state.matrix, self.packing))
-            # The rim, and what is near enough to be joined with it.
+            # The rim, and the nodes near enough to be coupled with it.
             edge = 2 * film.edge
             end, moved = least_energy.dense(state.matrix[edge - COUPLED :]), basis[edge:, first:]
             rim = np.arange(COUPLED, end.shape[1], 2)
@@ -773,7 +774,7 @@ class _TwoFilmEnergy:
 def _regularisation(diagonal: Array, damping: Array) -> Array:
     """Return the addition to a diagonal (n, rows): damping, and a share of the order of rounding.
 
-    The second is for slack films without pressure, which nothing may hold.
+    The share is for slack films without pressure, which may be unsupported.
     """
     size = np.abs(diagonal)
     return np.asarray(damping * size + 1e-15 * size.max(0))

@@ -37,21 +37,21 @@ SCALE_STRAIN = 3e-4
 ratio.
 """
 RISES = 8
-"""Pressures at which free balloons are computed to see how high they rise."""
+"""Number of pressures at which the rise of free balloons is computed."""
 RISE_POINTS = 65
 """Pressures at which free heights are tabulated, to start from."""
 COLLAPSE_SUCTION = 0.1
-"""Suction in kPa at which a slack film collapses: about what brings one taut, not measured."""
+"""Suction in kPa at which a slack film collapses: about the pressure that tightens it; assumed."""
 HEADROOM = 1.15
-"""Height of the map over that of the highest free balloon."""
+"""Height of the map as a multiple of the highest free balloon's."""
 LEAST_HEIGHT, LEAST_SHARE = 0.01, 0.01
-"""Least height in mm that is computed, and its largest share of the map's height; below it the map
+"""Least computed height in mm, and its largest share of the map's height; below it the map
 extrapolates.
 """
 FREE_WEIGHT = 2.0
 """Weight of free balloons."""
 FLAT_WEIGHT = 0.1
-"""Weight of balloons that are pressed flat and hold nothing."""
+"""Weight of balloons pressed flat, without volume."""
 LOW_PRESSURE = 0.1
 """Pressure in kPa below which force errors are weighted absolutely, above relatively."""
 VOLUME_WEIGHT = 0.6
@@ -59,25 +59,25 @@ VOLUME_WEIGHT = 0.6
 LOW_HEIGHT = 0.2
 """Height in mm below which volume errors are weighted absolutely, above relatively."""
 PRESSURE_PARTS, HEIGHT_PARTS = 4, 1
-"""Parts of each piece, each way, over which volumes must rise with pressure and forces fall with
-height. A polynomial whose Bernstein coefficients on a part are above 0 is above 0 all over it.
+"""Parts of each piece, by pressure and height, on which volumes must rise with pressure and forces
+fall with height. A polynomial with positive Bernstein coefficients on a part is positive on it.
 """
 LOW_PARTS = np.array([0.005, 0.02])
-"""Further ends of parts near the flat, as shares of the map's height."""
+"""Additional part boundaries near the flat state, as shares of the map's height."""
 HELD_MARGIN = 0.01
-"""Share by which volumes may be above the largest one computed at a pressure."""
+"""Share by which volumes may exceed the largest one computed at a pressure."""
 LEAST_CHECK = 0.005
 """Share of the map's height by which limits are scaled below it."""
 MARGIN = 5e-5
-"""Share by which the limits are met, far above what sums in floating point lose."""
+"""Share by which the limits are met, far above floating-point rounding of sums."""
 ACTIVE_SET_ROUNDS = 12
-"""Rounds in which limits that are violated join the active set."""
+"""Rounds in which violated limits join the active set."""
 MOST_STRETCH = 0.15
-"""Share by which films may stretch; one modulus is unlikely to hold beyond."""
+"""Share by which films may stretch; a single modulus is unlikely to hold beyond it."""
 
 
 def _spline_pieces() -> Array:
-    """Polynomials of the uniform B-spline: row j is that of coefficient j, in powers of u."""
+    """Polynomials of the uniform B-spline: row j belongs to coefficient j, in powers of u."""
     rows = np.ones((1, 1))
     for degree in range(1, DEGREE + 1):
         wider = np.zeros((degree + 1, degree + 1))
@@ -100,7 +100,7 @@ BERNSTEIN = np.linalg.inv(
         for u in np.linspace(0, 1, DEGREE + 1)
     ]
 )
-"""From values at even places from 0 to 1 to Bernstein coefficients."""
+"""Matrix from values at evenly spaced places from 0 to 1 to Bernstein coefficients."""
 SLOPES = np.stack([PIECES[:, k] * k for k in range(1, DEGREE + 1)], -1)
 WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
 """The coefficients of each piece by height."""
@@ -112,7 +112,7 @@ CURVES = np.stack([SLOPES[:, k] * k for k in range(1, DEGREE)], -1)
 def _near_pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
     """Return the pairs (first, second) of ``count`` coefficients that share a piece of the spline,
     and, for each element of a matrix by products of coefficients (pressure x height, twice), its
-    place in a matrix by pairs (pressure, height); the last of these, one further, is of no pair.
+    place in a matrix by pairs (pressure, height); one place past the end stands for no pair.
     """
     first, second = np.nonzero(np.triu(np.tri(count, k=DEGREE)))
     pair = np.full((count, count), len(first))
@@ -126,8 +126,8 @@ def _near_pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray
 
 
 def basis(x: Array, order: int = 0) -> tuple[NDArray[np.int_], Array]:
-    """Return the first coefficient of the piece at ``x`` (in pieces), and the weights there of it
-    and the next ones: for the value, or for the first or second derivative.
+    """Return the first coefficient of the piece at ``x`` (in pieces), and the weights of it and the
+    next ones there: for the value, or for the first or second derivative.
     """
     first = x.astype(np.int_)
     table = (PIECES, SLOPES, CURVES)[order]
@@ -152,7 +152,7 @@ ENDS = _taylor_shift(-1.0, 3), _taylor_shift(1.0, DEGREE + 1)
 @dataclass(frozen=True, eq=False)
 class BalloonMap:
     """The map of one balloon from no pressure to ``most_pressure`` kPa and from flat to
-    ``most_height`` mm; ``coefficients`` are those of the potential, in height and in
+    ``most_height`` mm; ``coefficients`` are the potential's, in height and in
     asinh(p / ``scale_pressure``). ``base`` is the map that this one was ``stiffened`` from.
     """
 
@@ -173,7 +173,7 @@ class BalloonMap:
 
     @cached_property
     def spans(self) -> float:
-        """Pieces of the spline a mm of height."""
+        """Pieces of the spline per mm of height."""
         return HEIGHT_SPANS / self.most_height
 
     @cached_property
@@ -187,9 +187,9 @@ class BalloonMap:
         """Polynomials by height, of W and of -dW/dp (the volume), at pressures: (..., 2, pieces,
         powers).
 
-        With ``sucked`` pressures may be below 0, as in a chamber that is shut and pulled open:
-        slack films cave in, their volume falls by exp(p / CAVES_IN). Raises DesignError for a
-        pressure outside the map.
+        With ``sucked`` pressures may be below 0, as in a shut chamber that is pulled open: slack
+        films cave in, their volume falls by exp(p / CAVES_IN). Raises DesignError for a pressure
+        outside the map.
         """
         below = np.asarray(pressure, dtype=float)
         p = np.maximum(below, 0.0) if sucked else below
@@ -282,7 +282,7 @@ class BalloonMap:
 def refuse_outside(pressures: Array, most_pressure: float) -> None:
     """Raise DesignError for pressures in kPa below 0 or above the most, which itself is inside.
 
-    It stays inside where asinh and sinh, or a film's modulus, round it up.
+    It stays inside even if asinh and sinh, or a film's modulus, round it up.
     """
     if pressures.min() >= 0 and pressures.max() <= most_pressure * (1 + 1e-12):
         return
@@ -295,7 +295,7 @@ def refuse_outside(pressures: Array, most_pressure: float) -> None:
 
 @lru_cache(maxsize=64)
 def _stiffened(made: BalloonMap, ratio: float) -> BalloonMap:
-    """Return ``made.stiffened(ratio)``, the same one each time: it keeps its range."""
+    """Return ``made.stiffened(ratio)``, cached so that it keeps its range."""
     return BalloonMap(
         made.balloon.stiffened(ratio),
         ratio * made.most_pressure,
@@ -317,7 +317,7 @@ class Along(NamedTuple):
 def pieces(coefficients: Array) -> Array:
     """Polynomials of splines by height: (..., coefficients) become (..., PIECES_IN_ALL, powers).
 
-    The first goes on below the spline and the last above it, with the second derivative there.
+    The first extends below the spline and the last above it, with the second derivative there.
     """
     inner = coefficients[..., WINDOWS] @ PIECES
     polynomials = np.zeros((*inner.shape[:-2], PIECES_IN_ALL, DEGREE + 1))
@@ -365,13 +365,13 @@ def horner(table: Array, which: NDArray[np.int_], y: Array) -> Array:
 @lru_cache(maxsize=64)
 @one_blas_thread
 def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
-    """The map of a balloon from 0 to a pressure in kPa, and somewhat higher than it may rise."""
+    """The map of a balloon from 0 to a pressure in kPa, to somewhat above its free height."""
     scale = scale_pressure_of(balloon)
     p = scale * np.sinh(_spread(PRESSURE_POINTS) * math.asinh(most_pressure / scale))
     rises = np.linspace(most_pressure / RISES, most_pressure, RISES)
     smooth = inflate(balloon, np.concatenate([rises, p[1:]]))
     top = HEADROOM * highest(balloon, smooth.rows(slice(RISES)))
-    # A film that is slack comes taut at a pressure that is the lower the flatter it lies.
+    # The flatter a slack film lies, the lower the pressure that makes it taut.
     even = _spread(HEIGHT_POINTS)
     least = min(LEAST_HEIGHT, LEAST_SHARE * top)
     h = least + (top - least) * (even + even**2) / 2
@@ -391,8 +391,8 @@ def scale_pressure_of(balloon: Balloon) -> float:
 
 
 def highest(balloon: Balloon, rising: Shapes) -> float:
-    """Height in mm to which it may rise freely: at the last of pressures, or where its films
-    stretch most; ``rising`` are those by ``inflate``.
+    """Height in mm to which it may rise freely: at the last pressure, or at the largest allowed
+    stretch of its films; ``rising`` are shapes from ``inflate``.
     """
     free = with_waves(balloon, rising)
     longer = stretch(balloon, free)
@@ -427,8 +427,8 @@ def _fitted(frame: BalloonMap, p: Array, h: Array, shapes: Shapes, free: _Free) 
         rows = by_h[j] if by_height is None else by_height
         return np.asarray((by_p[i][:, :, None] * rows[:, None, :]).reshape(len(p), -1) * scale)
 
-    # ``inflate`` keeps what wrinkles carry while it looks for balance, so that its forces and its
-    # volumes are not quite slopes of one potential. Heights and bends hang on the forces.
+    # ``inflate`` fixes the wrinkles' stress while it seeks equilibrium, so its forces and volumes
+    # are not exactly slopes of one potential. Heights and bends depend on the forces.
     area = shapes.r[:, -1].max() ** 2 * math.pi
     stand, lift = _free_rows(frame, free, area)
     push = 1 / (area * (p + LOW_PRESSURE) + 3 * np.abs(shapes.force))
@@ -440,7 +440,7 @@ def _fitted(frame: BalloonMap, p: Array, h: Array, shapes: Shapes, free: _Free) 
             equations(0, 0, scale[:, None]),
             equations(0, 1, (-push * HEIGHT_SPANS / top)[:, None]),
             equations(1, 0, (-rate * room)[:, None]),
-            # Pressed flat, it holds nothing.
+            # A balloon pressed flat has no volume.
             equations(1, 0, (-FLAT_WEIGHT * rate * room)[:, None], flat)[lowest],
             stand,
             lift[0],
@@ -486,9 +486,9 @@ def _free_rows(frame: BalloonMap, free: _Free, area: float) -> tuple[Array, tupl
 
 @dataclass(frozen=True, eq=False)
 class MapLimits:
-    """Functions of a spline's coefficients that must be above 0, and are to be MARGIN: the matrices
-    by pressure and by height (Bernstein coefficients, coefficients) of each kind, and a constant
-    for each row by pressure, to which these are added.
+    """Functions of a spline's coefficients that must be above 0, with MARGIN as target: the
+    matrices by pressure and by height (Bernstein coefficients, coefficients) of each kind, and a
+    constant for each row by pressure, added to the result.
     """
 
     kinds: tuple[tuple[Array, Array, Array], ...]
@@ -520,12 +520,12 @@ def _squares(rows: Array) -> Array:
 
 
 def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> MapLimits:
-    """Return the limits on W: volumes that rise with pressure, are above 0 without any, and at the
-    end of each piece within the largest that a balloon ``held`` at the next of ``pressures`` at any
-    height, as shares of area times height; forces that fall with height, as shares of pressure
-    times area.
+    """Return the limits on W. Volumes rise with pressure, are above 0 without pressure, and at the
+    end of each piece at most the largest volume ``held`` at the next of ``pressures`` at any
+    height, as shares of area times height. Forces fall with height, as shares of pressure times
+    area.
 
-    The limits are on Bernstein coefficients, so that they hold between places as well.
+    The limits apply to Bernstein coefficients, so that they also hold between places.
     """
     top, scale_pressure = frame.most_height, frame.scale_pressure
     each = PRESSURE_SPANS / math.asinh(frame.most_pressure / scale_pressure)
@@ -534,8 +534,8 @@ def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> Ma
     y = HEIGHT_SPANS * np.sort(np.concatenate([even, LOW_PARTS]))
     value, slope, curve = (_parts(x, order, PRESSURE_SPANS + DEGREE) for order in (0, 1, 2))
     slope, curve = each * slope, each**2 * curve
-    # With p = p0 sinh s the volume is -W_s / (p0 cosh s). It rises where tanh(s) W_s - W_ss > 0.
-    # W_s < 0, and no tangent of tanh lies below it: that at a part's middle takes its place.
+    # With p = p0 sinh s the volume is -W_s / (p0 cosh s). It rises if tanh(s) W_s - W_ss > 0.
+    # W_s < 0, and tangents of tanh lie above it: the tangent at a part's middle replaces it.
     low, high = x[:-1] / each, x[1:] / each
     middle = (low + high) / 2
     bend = (high - low) / 2 / np.cosh(middle) ** 2
@@ -549,7 +549,7 @@ def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> Ma
     by_height /= share
     along, none = _joined(by_height), -slope[0, :1] / (scale_pressure * area * top)
     every = rises.reshape(-1, rises.shape[-1])
-    # Volumes rise with pressure: in a piece they are within what they are at its end.
+    # Volumes rise with pressure, so in a piece they are bounded by the value at its end.
     ends = slice(PRESSURE_PARTS - 1, None, PRESSURE_PARTS)
     at = scale_pressure * np.sinh(high[ends])
     content = slope[ends, -1] / (np.hypot(at, scale_pressure) * area * top)[:, None]
@@ -567,7 +567,7 @@ def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> Ma
 
 
 def _joined(parts: Array) -> Array:
-    """List the coefficients of all parts, those that two parts share once."""
+    """List the coefficients of all parts; coefficients shared by two parts appear once."""
     return np.concatenate([parts[:, :-1].reshape(-1, parts.shape[-1]), parts[-1, -1:]])
 
 
@@ -599,12 +599,12 @@ def _times_line(parts: Array, line: Array) -> Array:
 
 
 def _admissible(matrix: Array, right_side: Array, limits: MapLimits) -> Array | None:
-    """Return the least-squares coefficients within the limits; None where there are none.
+    """Return the least-squares coefficients within the limits; None if none exist.
 
     An active-set method: violated limits are added until all are met.
     """
-    # In units that make all columns equally long the normal equations are well-conditioned
-    # (2e6; 1e17 without), and need no orthogonal factor.
+    # With columns scaled to equal length the normal equations are well-conditioned (2e6; 1e17
+    # without scaling), and need no orthogonal factorisation.
     units = 1 / np.sqrt((matrix * matrix).sum(0))
     columns = matrix * units
     normal = columns.T @ columns
@@ -643,17 +643,17 @@ def stretch(kind: Balloon, shape: Shapes) -> Array:
 
 QP_STEPS = 80
 CLOSE, SMALL = 1e-7, 1e-10
-"""Residual that counts as none; violation, and slack times its multiplier, that count as none."""
+"""Tolerance of the residual; tolerance of a violation, and of slack times its multiplier."""
 STEP_SHARE = 0.99
-"""Share of the way to the next limit that a step may go."""
+"""Maximum step as a share of the distance to the next limit."""
 
 
 class ChosenLimits(NamedTuple):
     """Limits ``rows @ x >= least`` on x, where ``units * x`` are the coefficients of a spline: the
     values ``chosen`` of each kind, divided by the lengths ``size`` of their gradients.
 
-    A row is the product of one by pressure and one by height, of six coefficients each. All
-    products with ``rows``, (values, coefficients), are made of these.
+    A row is the product of one row by pressure and one by height, of six coefficients each. All
+    products with ``rows``, (values, coefficients), are computed from these.
     """
 
     limits: MapLimits
@@ -705,7 +705,7 @@ class ChosenLimits(NamedTuple):
 
 def nearest_admissible(point: Array, metric: Array, limits: ChosenLimits) -> Array | None:
     """Return the x within the limits that is nearest to ``point`` (n,), by the squared distance
-    d @ ``metric`` @ d; None where there is none.
+    d @ ``metric`` @ d; None if no such x is found.
 
     Mehrotra's predictor and corrector (Nocedal and Wright, Numerical Optimization, Sec. 16.6).
     """
@@ -738,6 +738,6 @@ def nearest_admissible(point: Array, metric: Array, limits: ChosenLimits) -> Arr
 
 
 def _share(values: Array, by: Array) -> float:
-    """Return the share of a step after which the first value is 0; inf where none ever is."""
+    """Return the share of a step after which the first value is 0; inf if none reaches 0."""
     falls = by < 0
     return float((values[falls] / -by[falls]).min(initial=np.inf))

@@ -29,11 +29,11 @@ def balloons_of(
     factors: Factors | None = None,
     form: Form | None = None,
 ) -> list[Balloon]:
-    """Return the balloons of one chamber, bottom to top, all taken for inner ones.
+    """Return the balloons of one chamber, bottom to top, all treated as inner ones.
 
-    ``form`` replaces the design's own. ``factors`` may make the pockets smaller than drawn, and
-    give another modulus than the film's. Raises DesignError where pockets are not round, or for
-    films whose modulus is not known.
+    ``form`` replaces the design's. ``factors`` may make the pockets smaller than drawn, and replace
+    the film's modulus. Raises DesignError if pockets are not round, or for films of unknown
+    modulus.
     """
     form = form or design.form
     if not has_balloons(form) or not isinstance(form.pockets, Discs):

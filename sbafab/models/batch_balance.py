@@ -1,7 +1,7 @@
 """Equilibrium of many states of a stack at once: springs, loads, and Newton's steps.
 
-The same energy as of ``stack_loads``, with a state a column: numpy is the faster the longer its
-last axis. Without a load a state has a row a kind of balloon; under one it has a row a level,
+The same energy as in ``stack_loads``, with one column per state: numpy is faster with a longer last
+axis. Without a load a state has one row per kind of balloon; under a load it has one row per level,
 bottom to top. Lengths mm, pressures kPa, volumes ul, forces mN.
 """
 
@@ -47,17 +47,17 @@ if TYPE_CHECKING:
     from sbafab.models.stack_poses import PosedStack
 
 POSE_STEPS = 40
-"""Most of Newton's steps of a pose before a state is solved alone."""
+"""Maximum Newton steps for a pose before a state is solved alone."""
 RESIDUAL = 1e-7
-"""Residual in mN (or mN mm) that counts as none."""
+"""Tolerance of the residual, mN or mN mm."""
 POSE_ERROR, LOADED_STEP = 1e-9, 1e-7
-"""Error (mm, rad) at which a pose ends; the last step under a load, whose tangent stiffness leaves
-out as much as ``LoadedEnergy.turned`` does, so that the error falls linearly."""
+"""Error (mm, rad) at which a pose ends; the last step under a load, whose tangent stiffness omits
+the same terms as ``LoadedEnergy.turned``, so that the error falls linearly."""
 HALVINGS = 12
 SPRING_COLUMNS = 2048
-"""States times levels whose springs are evaluated together: more leave the cache."""
+"""States times levels whose springs are evaluated together: more would overflow the cache."""
 FEW = 6
-"""States under a load that are solved alone sooner than together."""
+"""Number of states under a load below which solving each alone is faster."""
 BY_PRESSURE = np.zeros((3, DEGREE + 1, DEGREE + 1))
 BY_PRESSURE[0], BY_PRESSURE[1, :, :-1], BY_PRESSURE[2, :, :-2] = PIECES, SLOPES, CURVES
 """Splines' weights by pressure: of values, first and second derivatives."""
@@ -82,8 +82,8 @@ class TouchingAt(NamedTuple):
     filling: Array
 
     def condensed(self, right: Array) -> Condensed:
-        """Return the solutions by right sides (levels, 3, k, n), the first of which is made the
-        equilibrium with the contacts as they are, and by units of forces on the top.
+        """Return the solutions by right sides (levels, 3, k, n) and by unit forces on the top; the
+        first right side becomes the equilibrium with the current contacts.
         """
         k, count = right.shape[2:]
         stiff, gradient = self.contact.held(self.contact.touches, self.forces)
@@ -149,7 +149,7 @@ class LevelsAt(NamedTuple):
     coupling: Coupling | None
 
     def put(self, where: NDArray[np.int_], other: LevelsAt) -> None:
-        """Replace some of the states by those of another."""
+        """Replace some of the states by another's."""
         pairs = [*zip(self[:-1], other[:-1], strict=True)]
         if self.coupling is not None and other.coupling is not None:
             pairs += zip(self.coupling, other.coupling, strict=True)
@@ -158,7 +158,7 @@ class LevelsAt(NamedTuple):
 
     def solved(self, right: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return the solutions (rows, 3, k, n) of the tangent stiffness by right sides (rows, 3, k,
-        n), and True (n) where it is positive definite.
+        n), and a mask (n), True if it is positive definite.
         """
         if self.coupling is not None:
             return chain_solved(self.blocks, self.coupling, right)
@@ -181,7 +181,7 @@ class Levels:
 
     @classmethod
     def of(cls, stack: PosedStack, load: Load | None) -> Levels:
-        """Return a row a kind of balloon, or a row a level under a load."""
+        """Return one row per kind of balloon, or one row per level under a load."""
         springs = tuple(BatchSprings.of(stack, kind) for kind in range(len(stack.maps)))
         kinds, counts = np.arange(len(springs)), np.bincount(stack.levels, minlength=len(springs))
         if load is not None:
@@ -262,7 +262,7 @@ class Levels:
         )
 
     def _spring_rows(self, weights: Array, freedoms: Array) -> SpringBatch:
-        """Return the springs with an axis of rows before all others."""
+        """Return the springs with a leading axis of rows."""
         rows, _, count = freedoms.shape
         if rows == len(self.springs) == 1 or self.load is None:
             each = [
@@ -286,8 +286,8 @@ class Levels:
         return SpringBatch(*parts)
 
     def fits(self, centres: Array, freedoms: Array) -> NDArray[np.bool_]:
-        """Return True (n) where no balloon, its gap by rise and tilt ``centres`` (3, chambers), is
-        higher than its map.
+        """Return True (n) if every balloon, its gap by rise and tilt ``centres`` (3, chambers), is
+        within the height of its map.
         """
         most = np.array([self.springs[kind].kind.most_height for kind in self.kinds])
         gaps = np.einsum("ic,rin->rcn", centres, freedoms)
@@ -309,11 +309,10 @@ def step_share(moves: Array) -> Array:
 
 
 def descended(levels: Levels, weights: Array, start: Array, end: Array) -> NDArray[np.bool_]:
-    """Write the freedoms (rows, 3, n) of least energy; return True (n) where they are found.
+    """Write the freedoms (rows, 3, n) of least energy; return True (n) for the states solved.
 
-    Newton's method with a line search, of which finished states take no further part: the energy
-    of a level alone is convex. Under a load a state whose tangent stiffness is indefinite on the
-    way is not found.
+    Newton's method with a line search, which finished states leave: the energy of a level alone is
+    convex. Under a load a state fails if its tangent stiffness becomes indefinite.
     """
     count = start.shape[-1]
     is_solved = np.zeros(count, dtype=bool)
@@ -355,7 +354,7 @@ def descended(levels: Levels, weights: Array, start: Array, end: Array) -> NDArr
     return is_solved
 
 
-# Springs, a state a column.
+# Springs, one column per state.
 
 
 class SpringBatch(NamedTuple):
@@ -374,9 +373,9 @@ class SpringBatch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BatchSprings:
-    """Springs of one kind of balloon for many states at once, by pressures of their own.
+    """Springs of one kind of balloon for many states at once, each with its pressures.
 
-    As ``stack_loads.Springs`` with a state a column: numpy is the faster the longer its last axis.
+    Like ``stack_loads.Springs`` with one column per state: numpy is faster with a longer last axis.
 
     ``table`` (powers, pieces, coefficients by pressure) are the pieces of its potential, a ring's
     point's share of it; ``meet`` (points, 3), ``squares`` (9, points), ``shut`` (9, points) as of

@@ -1,10 +1,10 @@
 """Plates of many states of a stack at once, the forces on them, and the equations by which levels
 act on each other.
 
-As ``stack_loads`` with a state a column: numpy is the faster the longer its last axis. Levels act
-on each other through the turns of the plates between them alone, and through the top where an outer
-plate holds it: so the tangent stiffness is eliminated from the top down in blocks of 3 x 3 (a
-Riccati recursion), at a cost in proportion to the levels. Lengths mm, forces mN.
+Like ``stack_loads`` with one column per state: numpy is faster with a longer last axis. Levels act
+on each other only through the turns of the plates between them, and through the top if an outer
+plate holds it. The tangent stiffness is therefore eliminated from the top down in blocks of 3 x 3
+(a Riccati recursion), at a cost proportional to the levels. Lengths mm, forces mN.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from sbafab.models.film_elements import Array
 from sbafab.models.stack_loads import SMALL, WALL_POINTS, Load, base_side
 
 STRAIGHT = 1e-24
-"""Square of a tilt in rad that is taken for 0."""
+"""Square of a tilt in rad that counts as 0."""
 LEAST_PIVOT = 1e-12
 """Pivot, as a share of the largest, below which a matrix counts as indefinite."""
 
 
 class Coupling(NamedTuple):
-    """What couples the levels under a load, by each level's freedoms: the ``turn`` of all plates
-    beyond it (levels, 3, 3, n), and the moments by which the forces on these answer to their
+    """Coupling of the levels under a load, by each level's freedoms: the ``turn`` of all plates
+    beyond it (levels, 3, 3, n), and the moments from the forces on these plates due to their
     ``motion`` (levels, 3, 3, n).
     """
 
@@ -60,7 +60,7 @@ def chain_of(freedoms: Array, pitch: float) -> ChainBatch:
     square = np.maximum(xx + yy, STRAIGHT)
     angle = np.sqrt(square)
     sine = np.sin(angle) / angle
-    # 1 - cos is lost to rounding where it is small.
+    # Small values of 1 - cos are lost to rounding.
     less = 2 * (np.sin(angle / 2) / angle) ** 2
     # The matrix of half a level's tilt (Rodrigues' formula).
     half = np.empty((levels, 3, 3, count))
@@ -74,7 +74,7 @@ def chain_of(freedoms: Array, pitch: float) -> ChainBatch:
     axes[1:] = product(half, half)
     reach = 1
     while reach < levels:
-        # Each is already the product of ``reach`` levels up to its own.
+        # Each entry is already the product of ``reach`` levels up to its level.
         axes[reach + 1 :] = product(axes[1:-reach], axes[reach + 1 :])
         reach *= 2
     middle = product(axes[:-1], half)
@@ -173,7 +173,7 @@ class ContactBatch(NamedTuple):
         return np.asarray(self.deep > self.least)
 
     def resists(self, deep: Array) -> Array:
-        """Return the forces (points, n) in mN at points so deep (mm)."""
+        """Return the forces (points, n) in mN at depths in mm."""
         return np.asarray(self.stiff * np.maximum(deep, self.least))
 
     def at(self, where: Any) -> ContactBatch:
@@ -182,8 +182,8 @@ class ContactBatch(NamedTuple):
         return ContactBatch(deep, lines, stiff, self.least)
 
     def held(self, touches: NDArray[np.bool_], forces: Array) -> tuple[Array, Array]:
-        """Return what points in contact (points, n) add to the top: stiffness (6, 6, n) by its
-        turns and moves, and the gradient (6, n) beyond that of ``forces`` (points, n) in mN.
+        """Return the top's stiffness (6, 6, n) by its turns and moves from points in contact
+        (points, n), and the gradient (6, n) beyond that from ``forces`` (points, n) in mN.
         """
         stiff = self.stiff * touches
         gradient = np.einsum("pxn,pn->xn", self.lines, stiff * self.deep - forces)
@@ -208,8 +208,8 @@ def contact_of(load: Load, plates: ChainBatch, stiffness: Array) -> tuple[Contac
 
 
 def tilt_works(freedoms: Array, plates: ChainBatch, acts: ActingBatch, pitch: float) -> Array:
-    """Return what the coupling leaves out of the work of the forces by the two tilts of one level
-    (levels, 2, 2, n), as ``derivatives.hessian`` has it.
+    """Return the work of the forces by the two tilts of one level (levels, 2, 2, n) that the
+    coupling omits, as in ``derivatives.hessian``.
     """
     half = freedoms[:, 1:] / 2
     safe = np.maximum((half * half).sum(1), SMALL)
@@ -241,7 +241,7 @@ def chain_solved(
     """Return the solutions (levels, 3, k, n) under a load by right sides (levels, 3, k, n), and
     True (n) where the tangent stiffness is positive definite.
 
-    Of levels i below j it has the block -turn_i motion_j^T. With r the turn of all below a level,
+    For levels i below j it has the block -turn_i motion_j^T. With r the turn of all below a level,
     and s the moment of all above, s = P r + c: both P and c follow from the top down.
     """
     levels, _, k, count = right.shape
@@ -257,7 +257,7 @@ def chain_solved(
         rates = held + motion
         both = np.concatenate([right[level] + product(turn, free), rates], axis=1)
         answers[level], fits = solved(matrix, both)
-        # An indefinite block has no solution, and must not grow from level to level.
+        # An indefinite block has no solution; keep it from growing from level to level.
         answers[level][..., np.logical_not(fits)] = 0.0
         is_firm &= fits
         more = product(rates.transpose(1, 0, 2), answers[level])
@@ -286,8 +286,8 @@ class HeldChain(NamedTuple):
         the top ``pulls`` (6, k, n), the top's turns and moves (6, k, n), and True (n) where the
         matrix is positive definite.
 
-        As ``chain_solved``: with r the turns and moves of all below a level, the energy of all
-        above at its least is r P r / 2 + c r, and both P and c follow from the top down.
+        Like ``chain_solved``: with r the turns and moves of all below a level, the least energy of
+        all above is r P r / 2 + c r, and both P and c follow from the top down.
         """
         levels, _, k, count = right.shape
         is_firm = np.ones(count, dtype=bool)
@@ -345,7 +345,7 @@ def product(first: Array, second: Array) -> Array:
 
 def solved(matrices: Array, right: Array) -> tuple[Array, Array]:
     """Return the solutions (size, k, n) of symmetric matrices (size, size, n) by right sides (size,
-    k, n), and True (n) where a matrix is positive definite: others have none where a pivot is 0.
+    k, n), and True (n) if a matrix is positive definite: others have no solution if a pivot is 0.
     """
     size = len(matrices)
     a, b = matrices.copy(), right.copy()

@@ -1,8 +1,8 @@
 """Inverse kinematics of many places of a stack's tip at once.
 
-The same steps as of ``reach`` from the same starts, for all places together: so pressures are those
-that are found one by one. Places that these steps do not meet are left to ``reach``. A state a
-column. Lengths mm, pressures kPa, forces mN.
+The same steps as in ``reach`` from the same starts, for all places together, so the pressures are
+the same as one by one. Places that these steps do not meet are left to ``reach``. One column per
+state. Lengths mm, pressures kPa, forces mN.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from sbafab.models.stack_poses import PosedStack
 
 FEW = 6
-"""Places that are met alone sooner than together."""
+"""Number of places below which solving each alone is faster."""
 CHUNK, TOGETHER = 1024, 384
-"""Places met together, and runs against a plate that go on together: more are no faster."""
+"""Places solved together, and simultaneous runs against a plate: larger batches bring no speed."""
 GROUP_ENDS = (1, 3, 6, 18)
-"""Attempts at a place that begin together where those before have failed: up to each."""
+"""Ends of the groups of attempts at a place; each group starts after the previous one failed."""
 
 
 class States(NamedTuple):
@@ -91,7 +91,7 @@ class AttemptTable(NamedTuple):
 
     @classmethod
     def of(cls, wall: OuterPlate, stiffness: float, starts: int) -> AttemptTable:
-        """Return the attempts from so many starts until one begins at an equilibrium."""
+        """Return the attempts from ``starts`` starts, until one begins at an equilibrium."""
         each = [(start, way) for start in range(starts) for way in reach.ways_to(wall)]
         each = list(takewhile(lambda one: not one[1].is_posed, each))
         last = np.array([len(way.soft) for _, way in each])
@@ -104,9 +104,9 @@ class AttemptTable(NamedTuple):
 
 
 class PlateRuns(NamedTuple):
-    """Runs of n attempts (``attempt``) at places (``place``): the ``stage`` that each is at, the
-    ``steps`` made in it, the last one of pressures, ``before`` (chambers, n), and whether it was
-    small enough for an equilibrium, ``is_close``.
+    """Runs of n attempts (``attempt``) at places (``place``): the current ``stage`` of each, the
+    ``steps`` made in it, the last step of pressures, ``before`` (chambers, n), and ``is_close``,
+    True if that was small enough for an equilibrium.
     """
 
     place: NDArray[np.int_]
@@ -313,8 +313,8 @@ class BatchReach:
     def _against_plate(self, places: Array, guess: Array, found: Reached) -> None:
         """Note the states that are met.
 
-        Runs of many places and attempts go on side by side, each against the plate that it has come
-        to; of a place's attempts the first one counts that meets it.
+        Runs of many places and attempts proceed together, each against its current plate; the first
+        attempt that meets a place counts.
         """
         if places.shape[1] <= FEW:
             return
@@ -395,7 +395,7 @@ class BatchReach:
         found: Reached,
         best: NDArray[np.int_],
     ) -> None:
-        # The last of those of one place remains: the earliest attempt.
+        # The last entry of each place remains: the earliest attempt.
         which = which[np.argsort(-runs.attempt[which])]
         which = which[runs.attempt[which] < best[runs.place[which]]]
         place = runs.place[which]
@@ -440,8 +440,8 @@ class BatchReach:
         return ReachStep(move, ahead, deeper), solutions.is_firm
 
     def _ahead(self, states: States, tips: Array, sums: Array) -> tuple[Array, Array]:
-        """Return the steps of asinh(p / P0) (chambers, n) by the top's turns and moves (6, k, n) to
-        equilibrium and by each pressure, and those of the top then (6, n).
+        """Return the steps of asinh(p / P0) (chambers, n) from the top's turns and moves (6, k, n)
+        to equilibrium and by each pressure, and the resulting steps of the top (6, n).
         """
         motion = sums[3:] + crossed(sums[:3].transpose(1, 0, 2), tips).transpose(1, 0, 2)
         rates, away = motion[:, 1:], states.places - tips
@@ -453,7 +453,7 @@ class BatchReach:
 
 
 def bounded_steps(rates: Array, missing: Array, damping: Array, room: tuple[Array, Array]) -> Array:
-    """Return the steps (chambers, n) of rates (3, chambers, n) by what is missing (3, n), as
+    """Return the steps (chambers, n) for rates (3, chambers, n) and missing distances (3, n), as in
     ``reach.bounded_step``.
     """
     chambers = rates.shape[1]

@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 
 SCHEMA = "sbafab/calibration@2"
 NONE: Literal["none"] = "none"
-"""The name of no calibration: the films as drawn and bought, and no intervals."""
+"""The name for using no calibration: films as drawn and bought, without intervals."""
 FILE = "calibration.toml"
 """A calibration's copy in the output folder of a design."""
 GROUPS = ("force", "motion", "flat height", "time", "work", "stiffness", "loss")
-"""Groups of quantities, each with a discrepancy of its own."""
+"""Groups of quantities, each with its discrepancy."""
 SHARE = 0.9
 """Probability that an interval holds the measured value."""
 DESIGN_UNKNOWNS = 3
@@ -71,8 +71,8 @@ class ModelCalibration:
     ``discrepancy``, the relative standard deviation that the models miss, by group.
 
     ``film`` is the product of the evidence, ``evidence`` the sources that it was fitted to,
-    ``sizes`` those of its actuators by group of quantities; ``inside`` of ``points`` left-out
-    points lay in their intervals. ``sentences`` say what the evidence cannot tell apart.
+    ``sizes`` the sizes of its actuators by group of quantities; ``inside`` of ``points`` left-out
+    points lay in their intervals. ``sentences`` state what the evidence cannot distinguish.
     """
 
     name: str
@@ -141,7 +141,7 @@ class ModelCalibration:
     ) -> tuple[float, float]:
         """Return the interval that holds the measured value with a probability of ``share``.
 
-        ``slopes`` are those of the logarithm of the value (``is_log``) or of the value, by
+        ``slopes`` are the slopes of the logarithm of the value (``is_log``) or of the value, by
         coordinate; ``farther`` is the relative standard deviation assumed off the evidence.
         """
         missed = math.hypot(self.discrepancy[group], farther) * (1.0 if is_log else abs(value))
@@ -192,7 +192,7 @@ def load_calibration(
     name: object, folder: Path | None = None, key: str = "models.calibration"
 ) -> ModelCalibration | None:
     """Return the calibration of a name, or of a file in ``folder``; None for "none". ``key`` is
-    what gives the name.
+    the key that gives the name.
 
     Raises DesignError with one sentence for an unknown name or a faulty file.
     """

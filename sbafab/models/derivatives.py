@@ -1,10 +1,9 @@
 """Derivatives of a stack in equilibrium by pressures, forces and moments on the tip, and an outer
 plate.
 
-The equilibrium makes the gradient g(q, x) of the energy 0, so that freedoms q follow what x is
-changed by dq/dx = -H^-1 dg/dx, H the second derivatives of the energy with the contacts that are
-closed (implicit function theorem). Where a contact just closes or opens, derivatives are those of
-the side that the pose is on.
+In equilibrium the gradient g(q, x) of the energy is 0, so the freedoms q follow a change of x by
+dq/dx = -H^-1 dg/dx, with H the second derivatives of the energy with the closed contacts (implicit
+function theorem). If a contact is just closing or opening, derivatives apply to the pose's side.
 """
 
 from __future__ import annotations
@@ -37,9 +36,9 @@ RIGID = 1e-9
 """Share of the largest compliance below which a motion of the tip counts as impossible."""
 
 RESIDUAL = 1e-7
-"""Residual in mN (or mN mm) that counts as none: poses are in equilibrium to about 1e-6 mm."""
+"""Tolerance of the residual, mN or mN mm: poses are in equilibrium to about 1e-6 mm."""
 CORRECTIONS = 6
-"""Most of Newton's steps to that, one of which suffices unless contacts open or close."""
+"""Maximum Newton steps to reach it; one suffices unless contacts open or close."""
 UNIT, QUARTER_TURN = np.eye(2), np.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
@@ -246,13 +245,13 @@ def hessian(now: LoadedEnergy, freedoms: Array, pitch: float) -> Array:
 
 
 def _tilt_works(now: LoadedEnergy, freedoms: Array, pitch: float) -> Array:
-    """Return what ``LoadedEnergy.turned`` leaves out of the work of the forces by the two tilts of
-    one level: (levels, 2, 2).
+    """Return the work of the forces by the two tilts of one level that ``LoadedEnergy.turned``
+    omits: (levels, 2, 2).
 
     A point y from the level's middle moves by a x y with the turn a of a tilt. The second tilt,
-    with the turn b, changes that to second order by da/db x y + a x (b x y - c x s / 2), of which
-    ``turned`` has the mean of a x (b x y) and b x (a x y): s goes from plate to plate, c is the
-    turn of the level's first half, so that the middle shifts by c x s / 2.
+    with the turn b, changes that to second order by da/db x y + a x (b x y - c x s / 2);
+    ``turned`` includes the mean of a x (b x y) and b x (a x y). s goes from plate to plate, c is
+    the turn of the level's first half, so that the middle shifts by c x s / 2.
     """
     plates, acting = now.plates, now.acting
     half = freedoms[:, 1:] / 2

@@ -1,9 +1,9 @@
 """Drawn pockets: discs in place of one that is nearly round, and bounds that hold for any outline.
 
-A pocket contains every disc within it and lies in every disc round it: its films are bonded where
-the outer disc's are free, and free where the inner disc's are bonded. So the figures of both
-discs, round the chamber's axis, bound its own, where a wider pocket rises more and pushes
-harder.
+A pocket contains every disc within it and lies in every disc round it: part of its films is bonded
+where the outer disc's are free, and free where the inner disc's are bonded. The figures of both
+discs, round the chamber's axis, therefore bound the pocket's, because a wider pocket rises more and
+pushes harder.
 """
 
 from __future__ import annotations

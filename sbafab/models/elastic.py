@@ -113,7 +113,7 @@ def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Infl
 
 @lru_cache(maxsize=64)
 def _free_shapes(kind: Balloon, pressures: tuple[float, ...]) -> Shapes:
-    """Return ``free_shapes``; factors that move no balloon ask for the same again."""
+    """Return ``free_shapes``, cached for factors that do not change the balloon."""
     return free_shapes(kind, pressures)
 
 
@@ -128,8 +128,8 @@ class Rise(NamedTuple):
 
 
 def free_rise(kinds: Counter[Balloon], pressure: float, shapes: Inflated | None = None) -> Rise:
-    """Return the rise of so many balloons of each kind at a pressure in kPa; ``shapes`` are theirs
-    where they are known. Raises BeyondError where a film would be stretched too far.
+    """Return the rise of the counted balloons of each kind at a pressure in kPa; ``shapes`` are
+    their shapes if known. Raises BeyondError if a film would be stretched too far.
     """
     stroke = volume = energy = 0.0
     for kind, count in kinds.items():
@@ -169,7 +169,7 @@ def refuse_stretched(longer: float) -> None:
 SAMPLES = 21
 ANGLES = (30.0, 60.0, 90.0)
 NO_FURTHER = 1e-7
-"""Share of a pressure within which that of a bend is not looked for any more closely."""
+"""Relative tolerance of the pressure of a bend."""
 PROBE_FORCE = 1e-5
 """Lateral force in N on the tip with which its stiffness is probed."""
 SOURCE = "membrane of revolution between plates, the film's modulus"
@@ -215,12 +215,12 @@ OUTSIDE = (
     "outside the checked part of the balloons' map, which misses a balloon computed there by more "
     "than 3 %"
 )
-"""What is said of a figure whose pose has balloons where a map does not hold."""
+"""Flag of a figure whose pose has balloons outside the valid range of a map."""
 BUCKLES = (
     "that of a straight column, which is unstable here and buckles: it may push harder, or give "
     "way to a tenth or less"
 )
-"""What is said of the force of a column that would buckle (docs/measured/candidates.csv)."""
+"""Flag of the force of a column that would buckle (docs/measured/candidates.csv)."""
 
 
 def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | LeftOut | None:
@@ -237,8 +237,8 @@ def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | Lef
 def moved_stack(
     together: Stack, laminate: Laminate, factors: Factors, moved: Factors
 ) -> Stack | None:
-    """Return a laminate's stack of ``factors`` at other ones without new maps; None where it needs
-    them.
+    """Return a laminate's stack of ``factors`` at other ones without new maps; None if it needs
+    new ones.
     """
     if (moved.pocket_loss, moved.modulus_mpa) != (factors.pocket_loss, factors.modulus_mpa):
         return None
@@ -261,9 +261,9 @@ def stack_figures(
     checks_films: bool = True,
     checks_maps: bool = False,
 ) -> Iterator[Figure | LeftOut]:
-    """Yield forces, bending, times and stiffness of the stack; with ``checks_films`` those by films
-    that would be stretched too far are left out, with ``checks_maps`` those whose balloons stand
-    where a map does not hold say so.
+    """Yield forces, bending, times and stiffness of the stack. With ``checks_films`` figures with
+    films stretched too far are left out; with ``checks_maps`` figures are flagged if their balloons
+    are outside the valid range of a map.
     """
     rows = list(_posed_figures(actuator, request, stack, checks_films))
     poses = list({id(pose): pose for _, pose in rows if pose and checks_maps}.values())
@@ -358,7 +358,7 @@ def _bends(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
 
 def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
     """Return the pose bent by an angle in degrees with some chambers pressurised and the others
-    empty; None where no pressure gives it.
+    empty; None if no pressure gives it.
 
     Bisection until both ends have poses, then false position by the pressure's logarithm, with the
     end that stays halved (Illinois).
@@ -421,7 +421,7 @@ def time_to_fill(
     """Return the seconds of water at a flow, shared by all chambers through tubes of a ``length``
     in mm, until the pump shows a pressure in kPa; and the pose by then.
 
-    Raises DesignError where the pressure drop of the tubes alone is as large.
+    Raises DesignError if the pressure drop of the tubes alone is as large.
     """
     flow = flow_ml_min * 1000 / 60 / stack.chambers
     tube = Line(WATER, length).source_pressure(flow, 0.0)
@@ -548,9 +548,9 @@ def _poses(
 
 # Clearances of an inflated stack.
 #
-# Balloons on each other meet at the plate between them, which the elastic balloon has; levels that
-# lean meet at their rims, which the stack has. Balloons side by side do not touch where the
-# clearance below is more than 0. Lengths mm.
+# The elastic balloon covers contact between balloons on each other, at the plate between them; the
+# stack covers contact between leaning levels, at their rims. Balloons side by side do not touch if
+# the clearance below is positive. Lengths mm.
 
 
 LEAST_GAP = 0.02
@@ -560,7 +560,7 @@ LEAST_GAP = 0.02
 def rim_gap(stack: Stack, pose: Pose) -> float:
     """Return the smallest gap in mm between rims of neighbouring levels.
 
-    0 for flat levels, and where levels lean so far that their rims touch.
+    0 for flat levels, and if levels lean so far that their rims touch.
     """
     gaps = stack.rims[stack.levels] @ pose.freedoms[..., None]
     return max(float(gaps.min()), 0.0)
@@ -569,9 +569,9 @@ def rim_gap(stack: Stack, pose: Pose) -> float:
 def chamber_clearances(stack: Stack, poses: Sequence[Pose]) -> Array:
     """Return the smallest clearance in mm between the films of balloons side by side, by pose.
 
-    Below 0 they would pass through each other. Both stand in the frame of their level, and those of
-    other levels lie beyond a plate, so that axes and largest radii suffice. Raises DesignError for
-    a balloon without an equilibrium.
+    Below 0 they would pass through each other. Both are in the frame of their level, and balloons
+    of other levels lie beyond a plate, so that axes and largest radii suffice. Raises DesignError
+    for a balloon without an equilibrium.
     """
     widest = _radii(stack, poses)
     nearest = np.full(len(poses), math.inf)
@@ -608,8 +608,8 @@ def blocked_force(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
     """Return the force in N of one straight chamber blocked at strokes in mm; 0 beyond its free
     stroke.
 
-    At most the force of its weakest balloon when flat. Below the stroke at which that one shuts,
-    its solid films may carry more; they are not counted.
+    At most the force of its weakest balloon when flat. Below the stroke at which this balloon
+    shuts, its solid films may carry more; that is not counted.
     """
     curves = [_curve(balloon, pressure) for balloon in stack.maps]
     counts = np.bincount(stack.levels, minlength=len(stack.maps))

@@ -23,14 +23,15 @@ from sbafab.models.stack_batch import StackBatch
 class ReachEnvironment(gymnasium.Env[Any, Any]):
     """Task of moving the tip of a stack to a point that it can reach.
 
-    An action has a number a chamber from -1 (vented) to 1 (``most_pressure`` kPa at its valve).
+    An action has one number per chamber, from -1 (vented) to 1 (``most_pressure`` kPa at its
+    valve).
     Observations: positions of tip and target and the vector between them in mm, pressures in the
     chambers in kPa. The reward is the negative distance in mm. An episode ends within ``near`` mm,
     and is cut off after ``steps`` of ``dt`` s. ``load`` are keyword arguments of ``Stack.pose``
     beside pressures.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (as Gymnasium has it)
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (as in Gymnasium)
 
     def __init__(
         self,
@@ -64,7 +65,7 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
         return self._observation(self._motion), {}
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Return the observation ``dt`` s later, the reward, if it arrived, and if time is up."""
+        """Return the observation ``dt`` s later, the reward, if it arrived, and if time is over."""
         if self._motion is None:
             raise DesignError("the environment is at no place yet; call reset first")
         valves = _valves(action, self.most_pressure)
@@ -86,7 +87,7 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
     starts the next one. Slow against an outer plate.
     """
 
-    metadata: dict[str, Any] = {  # noqa: RUF012 (as Gymnasium has it)
+    metadata: dict[str, Any] = {  # noqa: RUF012 (as in Gymnasium)
         "render_modes": [],
         "autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP,
     }

@@ -378,7 +378,7 @@ class Prediction:
         """Return the figure of a quantity at conditions (fields of ``Conditions``, those that tell
         figures apart), by a model (its id), or by the one to design with.
 
-        Raises DesignError where there is none, or several.
+        Raises DesignError if there is none, or several.
         """
         sought = Quantity.of(quantity) if isinstance(quantity, str) else quantity
         named = [figure for figure in self.figures if figure.is_of(sought, Conditions(**at))]

@@ -1,10 +1,10 @@
 """Energy of a film of revolution by element: membrane stretch, wrinkling, bending, and its air.
 
-A film is a chain of nodes r, z (mm), many films at once: arrays have a row a film. Each function
-returns an energy (uJ: kPa mm3) a film with its first and second derivatives, by what an element
-feels of its two nodes: how far apart they are in r and in z, and their middle radius. Kinks couple
-neighbours. ``assembled_gradient`` and ``assembled_tangent`` turn these into derivatives by the
-coordinates of nodes.
+A film is a chain of nodes r, z (mm). Many films are computed at once: arrays have one row per film.
+Each function returns an energy (uJ: kPa mm3) per film with its first and second derivatives by the
+coordinates of an element: the differences of its two nodes in r and z, and their mean radius. Kinks
+couple neighbours. ``assembled_gradient`` and ``assembled_tangent`` turn these into derivatives by
+the coordinates of nodes.
 """
 
 from __future__ import annotations
@@ -222,8 +222,8 @@ def bending(flat: FlatFilm, rigidity: float, bent: slice, at: Elements) -> Bendi
 def air_volume(flat: FlatFilm, edge: int, at: Elements) -> EnergyTerm:
     """Return the air (ul) between the inner face of a film and the plane of its edge.
 
-    The film's middle starts half a thickness above that plane, and its inner face is smaller: what
-    the volume of a thick film is by Steiner's formula.
+    The film's middle starts half a thickness above that plane, and its inner face is smaller, by
+    Steiner's formula for the volume of a thick film.
     """
     dr, dz, middle = at.dr, at.dz, at.middle
     half = np.where(np.arange(dr.shape[1]) < edge, math.pi * flat.thickness, 0.0)
@@ -268,8 +268,8 @@ def assembled_gradient(slopes: Slopes) -> Array:
 
 
 def assembled_tangent(curves: SecondSlopes, joined: list[Array]) -> Array:
-    """Return the second derivatives by coordinates, as a band: (coordinates, 6, rows), of which
-    ``[i, k]`` is that by coordinates i and i + k.
+    """Return the second derivatives by coordinates, as a band: (coordinates, 6, rows), in which
+    ``[i, k]`` is the derivative by coordinates i and i + k.
     """
     rr, rz, zz, rm, zm, mm = (curve.T for curve in curves)
     count, rows = rr.shape
@@ -285,7 +285,7 @@ def assembled_tangent(curves: SecondSlopes, joined: list[Array]) -> Array:
     z[1:, 0] += zz
     r[:-1, 2], r[:-1, 3] = quarter - rr, half - rz
     z[:-1, 1], z[:-1, 2] = -rz - half, -zz
-    # A kink joins three nodes: of those before and after it, and of its own with each of them.
+    # A kink couples three nodes: the ones before and after it, and its node with each of them.
     c_rr, c_rz, c_zr, c_zz = (each.T for each in joined)
     before, centre = slice(0, len(c_rr)), slice(1, len(c_rr) + 1)
     for node in (before, centre):

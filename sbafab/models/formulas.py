@@ -205,7 +205,7 @@ def sizes(design: Design, laminate: Laminate, factors: Factors | None = None) ->
     Width, length and overall diameter include masks, inlet tabs and ears. The outline diameter is
     that of the films without tabs and ears. The thickness is the sum of the films as bought, the
     folded height that after the press, which is in diameters round the tube twice; ``factors`` are
-    by default those of the design's calibration. Raises DesignError where there is none such.
+    by default those of the design's calibration. Raises DesignError if there is none such.
     """
     height = (factors or factors_of(design)).folded(laminate).height
     low_x, low_y, high_x, high_y = laminate.bounds

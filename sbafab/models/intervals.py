@@ -37,7 +37,7 @@ MODULUS_RATIO, LOSS = (
 
 
 def calibration_of(design: Design) -> ModelCalibration | None:
-    """Return the calibration of a design, as it holds ``for_film``. Raises DesignError where there
+    """Return the calibration of a design, as it holds ``for_film``. Raises DesignError if there
     is no such calibration.
     """
     calibration = load_calibration(design.models.calibration, design.folder)
@@ -359,7 +359,7 @@ def uncertainty_of(
 def factors_of(design: Design, overrides: Mapping[str, float | None] | None = None) -> Factors:
     """Return the factors of a design's calibration, with the user's own values in place of its own.
 
-    Raises DesignError where there is no such calibration, or for values out of range.
+    Raises DesignError if there is no such calibration, or for values out of range.
     """
     uncertainty = uncertainty_of(design, overrides)
     if uncertainty is None:

@@ -229,7 +229,7 @@ class Actuator:
 
     @property
     def known_stroke(self) -> float:
-        """The reference stroke. Raises DesignError where it is not known."""
+        """The reference stroke. Raises DesignError if it is not known."""
         if not self.kinematics:
             raise DesignError(NO_OUTLINE)
         if not self.has_reference:

@@ -63,7 +63,7 @@ class Potential(Protocol):
 def equilibrium(problem: Potential, x: Array) -> Array:
     """Return the coordinates (coordinates, rows) of least energy downhill of these.
 
-    Raises NoEquilibrium where Newton's method does not converge.
+    Raises NoEquilibrium if Newton's method does not converge.
     """
     minimum, live = x.copy(), np.arange(x.shape[1])
     step_taken, share = np.zeros_like(x), np.ones(len(live))

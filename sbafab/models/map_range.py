@@ -86,7 +86,7 @@ def _is_near(made: BalloonMap, pressures: Array, heights: Array) -> NDArray[np.b
 
 def relative_errors(made: BalloonMap, pressure: Array, height: Array) -> Array:
     """Return the larger share by which a map misses force and volume of the balloons between plates
-    computed at its places (n,), heights above 0. Raises DesignError where there is no equilibrium.
+    computed at its places (n,), heights above 0. Raises DesignError if there is no equilibrium.
 
     Forces are compared as shares of pressure (and 0.1 kPa) times pocket, and the force; volumes as
     shares of the volume and of what a pocket holds at the least height computed.
@@ -104,7 +104,7 @@ def holds_at(made: BalloonMap, pressure: Array, height: Array) -> NDArray[np.boo
     one lies outside the map.
 
     Suction counts as no pressure, and heights below FLAT as that. Balloons are those of the map
-    that this one was stiffened from. Raises DesignError where there is no equilibrium.
+    that this one was stiffened from. Raises DesignError if there is no equilibrium.
     """
     base, ratio = _base(made)
     places = np.stack([np.maximum(pressure / ratio, 0.0), np.maximum(height, FLAT)], -1)

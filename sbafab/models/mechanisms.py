@@ -435,7 +435,7 @@ def mechanism_value(
     """Return a quantity of ``ASKED`` at a pressure, of several chambers the least: the figure that
     ``predict`` has.
 
-    Raises DesignError where the mechanism is another one, or its model does not hold.
+    Raises DesignError if the mechanism is another one, or its model does not hold.
     """
     asked = ASKED[quantity]
     if mechanism is None or mechanism.kind != asked.kind:

@@ -494,7 +494,7 @@ def predict(
     elastic stack. With the factors given no intervals are computed, and no figure says whether it
     lies outside the checked part of a balloon's map.
 
-    Raises DesignError where the design cannot be built, or for pressures, a flow or volumes that
+    Raises DesignError if the design cannot be built, or for pressures, a flow or volumes that
     are out of range.
     """
     wish = request or PredictionRequest()

@@ -427,7 +427,7 @@ def _continued(of: Waving, x: Array, low: float, high: float, halvings: int = HA
 
 
 def _equilibrium(problem: Waves, x: Array) -> Array:
-    """Return the equilibria downhill. Raises DesignError where there are none."""
+    """Return the equilibria downhill. Raises DesignError if there are none."""
     try:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return equilibrium(problem, x)

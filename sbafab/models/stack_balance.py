@@ -106,7 +106,7 @@ def loaded_equilibrium(
     and True for a stable equilibrium.
 
     An outer plate that is not met soon is stiffened by and by, for steps without contact would
-    run far into it; ``is_near`` marks a start that may be in contact. Raises DesignError where no
+    run far into it; ``is_near`` marks a start that may be in contact. Raises DesignError if no
     equilibrium is found.
     """
     wall = load.wall

@@ -226,7 +226,7 @@ class StackBatch:
         return np.asarray(freedoms.transpose(2, 0, 1)[:, self.stack.levels])
 
     def table(self, pressures: ArrayLike, rows: int | None = None) -> Array:
-        """Return pressures (rows, chambers) in kPa. Raises DesignError where they are no such."""
+        """Return pressures (rows, chambers) in kPa. Raises DesignError if they are no such."""
         try:
             table = np.asarray(pressures, dtype=float)
         except (TypeError, ValueError):
@@ -305,7 +305,7 @@ def batch_of(pressures: Array, poses: Sequence[Pose]) -> BatchPoses:
 
 
 def _places(tips: ArrayLike) -> Array:
-    """Return places (N, 3) in mm. Raises DesignError where they are no such."""
+    """Return places (N, 3) in mm. Raises DesignError if they are no such."""
     try:
         places = np.asarray(tips, dtype=float)
     except (TypeError, ValueError):

@@ -302,7 +302,7 @@ WALL_RIM = np.stack([np.cos(WALL_TURNS), np.sin(WALL_TURNS), 0 * WALL_TURNS], -1
 
 
 def vector_of(values: Sequence[float], quantity: str) -> Array:
-    """Return three numbers (3,). Raises DesignError where they are not three, or not finite."""
+    """Return three numbers (3,). Raises DesignError if they are not three, or not finite."""
     try:
         vector = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
@@ -313,7 +313,7 @@ def vector_of(values: Sequence[float], quantity: str) -> Array:
 
 
 def direction_of(values: Sequence[float], quantity: str) -> Array:
-    """Return the direction (3,) of three numbers. Raises DesignError where they have none."""
+    """Return the direction (3,) of three numbers. Raises DesignError if they have none."""
     vector = vector_of(values, quantity)
     length = float(np.linalg.norm(vector))
     if not length:

@@ -316,7 +316,7 @@ class PosedStack:
 
     @property
     def level_weight(self) -> float:
-        """Weight of a level in mN. Raises DesignError where it is not known."""
+        """Weight of a level in mN. Raises DesignError if it is not known."""
         if self.weight is None:
             raise DesignError(
                 "gravity needs the density of every film; add films.<name>.density, in kg/m3"
