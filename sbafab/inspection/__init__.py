@@ -1,1 +1,1 @@
-"""A picture of a cut sheet measured against the cut file."""
+"""Measure a picture of a cut sheet against its cut file."""

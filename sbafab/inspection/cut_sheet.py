@@ -1,4 +1,4 @@
-"""The cut file that a picture is held against: its pieces, each with the names of its patterns."""
+"""The cut file that a picture is compared with: its pieces, each with the names of its patterns."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from sbafab.nesting.records import TURNS
 from sbafab.output.manifest import JobManifest, Manifest
 
 SPACING = 1.0
-"""mm between cuts, of a file that states none."""
+"""Default distance between cuts, for a file without one, mm."""
 SAME_SIZE = 1e-4
-"""mm or mm2: pieces whose areas and lengths differ by more are not congruent."""
+"""Largest difference in area (mm2) and length (mm) between congruent pieces."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class SheetShape:
 class DrawnSheet:
     """Contours of a cut file as the beam runs, mm.
 
-    ``places``: the pieces where they are cut, named by their patterns. ``shapes``: every piece
-    that the folder knows, any of which may lie in a place. ``pins``: x, y and diameter of the
-    pins of a sheet. ``kerf`` is what the file says it is compensated for.
+    ``places``: the pieces at their cut positions, named by their patterns. ``shapes``: every piece
+    of the folder, any of them may lie in a place. ``pins``: x, y and diameter of the pins of a
+    sheet. ``kerf`` is the file's kerf compensation.
     """
 
     name: str
@@ -54,7 +54,7 @@ class DrawnSheet:
 def read_cut_sheet(source: Path, name: str | None) -> DrawnSheet:
     """Return the sheet or layer ``name`` of an output folder, or a cut file given by its path.
 
-    Raises DesignError where the folder has no such file, OutputError where a file is unsound.
+    Raises DesignError if the folder has no such file, OutputError if a file is corrupt.
     """
     if source.suffix.lower() == ".dxf":
         return _sheet(source.stem, source, (), SPACING, ())
@@ -163,7 +163,7 @@ def _marks(region: Region) -> list[Point]:
 
 
 def _agree(points: Sequence[Point], others: Sequence[Point]) -> bool:
-    """Return True if each point has one of the others within 2 um."""
+    """Return True if each point is within 2 um of one of the others."""
     if len(points) != len(others):
         return False
     return all(min(abs(x - u) + abs(y - v) for u, v in others) < 2e-3 for x, y in points)

@@ -1,13 +1,12 @@
 """Edges of film in a picture, measured along the normals of the cut file's edges.
 
-Along each normal the grey level falls from film to paper; where it passes half way between both,
-as they are just there, lies the film's edge. Symmetric blur leaves that place where it is on a
-straight edge; on a circle of radius r a blur of deviation s moves it by s^2 / 2r towards the
-centre, which is corrected.
+Along each normal the grey level falls from film to paper; the film's edge is where it passes midway
+between their local values. Symmetric blur does not move that point on a straight edge; on a circle
+of radius r a blur of deviation s moves it by s^2 / 2r towards the centre, which is corrected.
 
-All edges together give, by robust least squares, the map from the cut file to the picture, how far
-the film's edge lies outside the drawn one (half the kerf, negative) and how far each piece lies off
-its place.
+All edges together give, by robust least squares, the map from the cut file to the picture, the
+offset of the film's edge outside the drawn one (half the kerf, negative) and the displacement of
+each piece.
 """
 
 from __future__ import annotations
@@ -28,38 +27,38 @@ from sbafab.inspection.picture import ScanPicture
 from sbafab.inspection.registration import SMALLEST, Location, PointArray, Warp
 
 STEP = 0.2
-"""mm between measured places."""
+"""Spacing of samples, mm."""
 MOST_SAMPLES = 60_000
 CORNER = 0.35
-"""mm that measured places keep from corners, which the beam and blur round off."""
+"""Distance of samples from corners, which the beam and blur round off, mm."""
 TURN = 0.1
-"""Radians: less is no corner."""
+"""Smaller angles are not corners, rad."""
 SHARPEST = 0.3
-"""mm: arcs of a smaller radius are no edge but a corner."""
+"""Arcs of a smaller radius are corners, not edges, mm."""
 REACHES = (0.9, 0.45, 0.45, 0.45)
-"""mm to both sides of the drawn edge, round by round."""
+"""Search range on both sides of the drawn edge, round by round, mm."""
 SMOOTH = 1.4
-"""Steps, of half a pixel, over which a profile is smoothed."""
+"""Smoothing length of a profile, in steps of half a pixel."""
 LEAST_CONTRAST = 0.4
-"""Of the usual difference between film and paper."""
+"""Least contrast, as a share of the usual difference between film and paper."""
 TOLERANCE = 0.1
-"""mm: an edge farther off, where its piece lies, is not that of the piece."""
+"""Largest distance of an edge that belongs to its piece, after displacement, mm."""
 NEIGHBOURS = 10
-"""Samples along an edge that err alike: they count as one."""
+"""Samples along an edge with correlated errors: they count as one."""
 ROUNDS = 8
-"""Rounds of weights."""
+"""Rounds of reweighting."""
 FEW = 4
-"""Pieces whose scatter tells no uncertainty."""
+"""Fewer pieces give no uncertainty from their scatter."""
 LOOSE, TIGHT = 0.3, 0.004
-"""mm: how far pieces lie off their places, at the first guess and at least."""
+"""Displacement of pieces, at the first guess and at least, mm."""
 
 
 @dataclass(frozen=True)
 class Samples:
     """Places on the drawn edges: ``points`` and outward ``normals`` of the film (n, 2), mm.
 
-    ``curvatures``, 1/mm: positive where the film's edge bulges outward. ``contours`` and
-    ``pieces`` number what each lies on.
+    ``curvatures``, 1/mm: positive where the film's edge bulges outward. ``contours`` and ``pieces``
+    are the numbers of each sample's contour and piece.
     """
 
     points: PointArray
@@ -73,7 +72,7 @@ class Samples:
 
 
 def samples_of(regions: Sequence[Region], is_skeleton: bool) -> Samples:
-    """Return places on the edges of pieces; of a skeleton, the film lies outside the outlines."""
+    """Return samples on the edges of pieces; in a skeleton, the film is outside the outlines."""
     step = max(STEP, sum(c.length for r in regions for c in r.contours) / MOST_SAMPLES)
     rows: list[tuple[float, ...]] = []
     number = 0
@@ -95,7 +94,9 @@ def samples_of(regions: Sequence[Region], is_skeleton: bool) -> Samples:
 
 
 def _along(contour: Contour, step: float) -> list[tuple[float, ...]]:
-    """Return x, y, outward normal and curvature of places along a contour, off its corners."""
+    """Return x, y, outward normal and curvature of samples along a contour, away from its
+    corners.
+    """
     rows: list[tuple[float, ...]] = []
     edges = contour.edges
     for before, edge, after in zip(
@@ -122,7 +123,7 @@ def _is_corner(before: Edge, after: Edge) -> bool:
 
 
 class Crossings(NamedTuple):
-    """By sample: how far outside the drawn edge the film ends, mm; NaN where no edge is seen.
+    """By sample: distance of the film's edge outside the drawn edge, mm; NaN if no edge is visible.
 
     ``blur``: the deviation of the picture's blur, mm. ``contrast``: film less paper, grey levels.
     """
@@ -139,7 +140,7 @@ def crossings(
     reach: float,
     expected: NDArray[np.float64] | float = 0.0,
 ) -> Crossings:
-    """Return where the film ends along each normal, nearest to ``expected`` mm outside."""
+    """Return the film's edge along each normal, nearest to ``expected`` mm outside."""
     from scipy.ndimage import gaussian_filter1d, map_coordinates, median_filter
 
     step = 0.5 / max(warp.pixels_per_mm(np.array(warp.centre)))
@@ -151,7 +152,7 @@ def crossings(
         picture.pixels, [pixels[..., 1], pixels[..., 0]], order=1, mode="constant", cval=np.nan
     )
     levels = gaussian_filter1d(levels, SMOOTH, axis=1, mode="nearest")
-    # Neighbours along the edge agree on film and paper; dust lies on a few of them.
+    # Neighbours along the edge agree on film and paper; dust affects only a few.
     plateau = max(3, half // 2)
     film = median_filter(np.median(levels[:, :plateau], axis=1), 9, mode="nearest")
     paper = median_filter(np.median(levels[:, -plateau:], axis=1), 9, mode="nearest")
@@ -165,7 +166,7 @@ def crossings(
     width = _passing(share, 0.1587, offsets, outside) - _passing(share, 0.8413, offsets, outside)
     outside[~is_seen] = np.nan
     known = width[is_seen & np.isfinite(width)]
-    # The profiles were smoothed across the edge alone, which moves no curved edge.
+    # Smoothing is only across the edge, which does not move a curved edge.
     blur = float(np.median(known)) / 2 if len(known) else 0.0
     blur = math.sqrt(max(blur**2 - (SMOOTH * step) ** 2, 0.0))
     outside += blur**2 / 2 * samples.curvatures
@@ -178,7 +179,9 @@ def _passing(
     offsets: NDArray[np.float64],
     expected: NDArray[np.float64] | float,
 ) -> NDArray[np.float64]:
-    """Return the offset where each row falls through a level, nearest to ``expected``, or NaN."""
+    """Return the offset at which each row falls through a level, nearest to ``expected``, or
+    NaN.
+    """
     above = share >= level
     falls = above[:, :-1] & (share[:, 1:] < level)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -195,10 +198,10 @@ def _passing(
 class EdgeFit:
     """Edges of a picture fitted to the cut file.
 
-    ``outside`` by sample, mm, NaN where no edge is seen: what the film extends beyond the drawn
-    edge, laid where its piece lies. Its common part is ``offset``; ``displacements`` (pieces, 3)
-    are how far pieces lie off their places, mm along x and y and radians about their middle.
-    ``weights`` are 0 where an edge is no edge of the piece. ``uncertainty``: the standard
+    ``outside`` by sample, mm, NaN if no edge is visible: distance of the film's edge beyond the
+    drawn edge, at the displaced piece. Its common part is ``offset``; ``displacements`` (pieces, 3)
+    are the displacements of pieces, mm along x and y and radians about their middle. A weight of 0
+    in ``weights`` marks an outlier, not an edge of the piece. ``uncertainty``: the standard
     uncertainty of ``offset`` from the scatter between pieces, with ``degrees`` of freedom.
     """
 
@@ -215,12 +218,12 @@ class EdgeFit:
 
     @property
     def residuals(self) -> NDArray[np.float64]:
-        """What is left of the edges after the common offset, mm."""
+        """Residuals of the edges after the common offset, mm."""
         return self.outside - self.offset
 
 
 def fitted(picture: ScanPicture, sheet: DrawnSheet, location: Location, is_camera: bool) -> EdgeFit:
-    """Return the fit of the edges in a picture, of which the location is known roughly."""
+    """Return the fit of the edges in a picture with a roughly known location."""
     is_skeleton = location.content == "skeleton"
     samples = samples_of([place.region for place in sheet.places], is_skeleton)
     degree = 3 if is_camera and len(sheet.places) >= 6 else 1
@@ -240,7 +243,7 @@ def fitted(picture: ScanPicture, sheet: DrawnSheet, location: Location, is_camer
 
 
 def moved(samples: Samples, displacements: NDArray[np.float64]) -> Samples:
-    """Return the places where the displaced pieces have them."""
+    """Return the samples at the displaced pieces."""
     shifts, turns = displacements[samples.pieces, :2], displacements[samples.pieces, 2]
     middles = _middles(samples, len(displacements))[samples.pieces]
     cosine, sine = np.cos(turns), np.sin(turns)
@@ -260,7 +263,7 @@ def _middles(samples: Samples, count: int) -> PointArray:
 
 
 def _rigid(samples: Samples, count: int) -> NDArray[np.float64]:
-    """Return the outward motion (n, 3) of each place by x, y and turn of its piece."""
+    """Return the outward motion (n, 3) of each sample by x, y and turn of its piece."""
     arm = samples.points - _middles(samples, count)[samples.pieces]
     turn = arm[:, 0] * samples.normals[:, 1] - arm[:, 1] * samples.normals[:, 0]
     return np.column_stack([samples.normals, turn])
@@ -309,8 +312,8 @@ def _solved(
 
 
 def _matrix(laid: Samples, warp: Warp, count: int) -> tuple[NDArray[np.float64], int]:
-    """Return the outward motion of each place by offset, map and displacements, and the map's
-    number of terms along an axis.
+    """Return the outward motion of each sample by offset, map and displacements, and the map's
+    number of terms per axis.
     """
     monomials = warp.monomials(laid.points)
     terms = monomials.shape[1]
@@ -327,9 +330,9 @@ def _matrix(laid: Samples, warp: Warp, count: int) -> tuple[NDArray[np.float64],
 def _strength(
     matrix: NDArray[np.float64], laid: Samples, displacements: NDArray[np.float64], terms: int
 ) -> NDArray[np.float64]:
-    """Return how firmly each unknown is held: pieces lie near their places, as near as others do.
+    """Return the prior weight of each unknown: displacements are as small as those of other pieces.
 
-    A turn counts by what it moves the edge.
+    A turn counts by the motion of the edge.
     """
     count = len(displacements)
     number = np.maximum(np.bincount(laid.pieces, minlength=count), 1)
@@ -348,8 +351,8 @@ def _of_offset(
 ) -> tuple[float, int]:
     """Return the offset's standard uncertainty from the scatter between pieces, and its degrees.
 
-    Samples of a piece err alike and its displacement is one draw, so that pieces count, of a few
-    pieces contours (the sandwich estimate of clusters).
+    Errors within a piece are correlated and its displacement is one draw, so pieces are the
+    clusters, or contours if pieces are few (cluster-robust sandwich estimate).
     """
     towards = np.linalg.solve(normal, np.eye(len(normal))[0])
     count = int(laid.pieces.max()) + 1

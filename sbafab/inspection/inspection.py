@@ -1,7 +1,7 @@
-"""An inspection: a picture of a cut sheet against its cut file, with what was found.
+"""Inspect a picture of a cut sheet against its cut file.
 
-``inspect_picture`` reads, registers, measures and names; the record goes out as JSON, as a table of
-sizes that ``sbafab kerf`` reads, and as a picture with the deviations drawn into it.
+``inspect_picture`` reads, registers, measures and names; the result is written as JSON, as a table
+of sizes that ``sbafab kerf`` reads, and as a picture with the deviations.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from sbafab.inspection.scale import Reference, Scale, scale_of
 from sbafab.spreadsheet import csv_text
 
 FEWEST = 100
-"""Places on edges from which kerf is measured."""
+"""Least number of samples for a kerf."""
 FINEST = 0.02
-"""Of a pixel: standard uncertainty of an edge that grey levels and their rounding leave."""
+"""Standard uncertainty of an edge from grey levels and their rounding, in pixels."""
 LARGEST_KERF = 1.0
-"""mm."""
+"""Shown in mm."""
 HARMLESS = ("sound", "moved", "turned")
 
 
 @dataclass(frozen=True)
 class Inspection:
-    """What a picture says of a cut sheet.
+    """Measurements of a cut sheet from a picture.
 
-    ``kerf`` mm, twice what the film's edge lies inside the beam's path. ``rms`` and ``within_95``
-    mm: deviations of edges from the drawn ones apart from kerf, scale and the pieces' own places.
-    ``pixel`` and ``blur`` mm in the picture.
+    ``kerf`` mm, twice the distance of the film's edge inside the beam's path. ``rms`` and
+    ``within_95`` mm: deviations of edges from the drawn ones apart from kerf, scale and the pieces'
+    displacements. ``pixel`` and ``blur`` mm in the picture.
     """
 
     sheet: DrawnSheet
@@ -63,12 +63,12 @@ class Inspection:
 
     @property
     def failed(self) -> bool:
-        """True if a piece is missing, wrong, or not seen well enough to tell."""
+        """True if a piece is missing, wrong, or too poorly visible to tell."""
         return any(piece.verdict not in HARMLESS for piece in self.pieces)
 
     @property
     def edges(self) -> int:
-        """Number of places on edges that were measured."""
+        """Number of measured samples on edges."""
         return int((self.fit.weights > 0).sum())
 
 
@@ -100,10 +100,10 @@ def inspect_picture(
     is_camera: bool = False,
     is_light: bool = True,
 ) -> Inspection:
-    """Return what a picture says of a sheet.
+    """Return the inspection of a sheet in a picture.
 
-    ``is_camera``: taken with perspective. ``is_light``: film is lighter than what it lies on.
-    Raises DesignError where the picture does not show the sheet, or too little of it.
+    ``is_camera``: taken with perspective. ``is_light``: film is lighter than its background. Raises
+    DesignError if the picture does not show the sheet, or too little of it.
     """
     measured = outlines(picture)
     size = picture.pixels.shape[0], picture.pixels.shape[1]
@@ -147,7 +147,7 @@ def _kerf(picture: ScanPicture, fit: EdgeFit, pixel: float) -> Value:
 
 
 MOST_NOTE = 400
-"""Characters of a note in a lab's file."""
+"""Most characters of a note in a lab's file."""
 
 
 def history(inspection: Inspection) -> dict[str, Any]:
@@ -168,7 +168,7 @@ def history(inspection: Inspection) -> dict[str, Any]:
     return {"entry": [entry]}
 
 
-# The table of sizes that ``sbafab kerf`` reads.
+# The table of sizes for ``sbafab kerf``.
 
 
 FACING = 0.985
@@ -200,7 +200,7 @@ def _sizes(inspection: Inspection) -> Iterator[tuple[str, str, str, str, str]]:
 
 
 def _gain(fit: EdgeFit, contour: int, axis: int, ends: tuple[float, float]) -> float | None:
-    """Return how far film extends beyond both ends of a contour along an axis, mm together."""
+    """Return the total extent of film beyond both ends of a contour along an axis, mm."""
     mine = (fit.samples.contours == contour) & (fit.weights > 0)
     room = 0.05 + 0.02 * (ends[1] - ends[0])
     places, faces = fit.samples.points[:, axis], np.abs(fit.samples.normals[:, axis]) > FACING
@@ -212,16 +212,16 @@ def _gain(fit: EdgeFit, contour: int, axis: int, ends: tuple[float, float]) -> f
 
 
 SHOWN_SIDE = 1600
-"""Pixels of the longer side of the picture in the drawing."""
+"""Longer side of the picture in the drawing, pixels."""
 STEPS = (-0.05, -0.02, -0.01, 0.01, 0.02, 0.05)
-"""mm between the colours."""
+"""Step between the colours, mm."""
 COLOURS = ("#2166ac", "#67a9cf", "#b9d9ea", "#4daf4a", "#fdcf9c", "#ef8a62", "#b2182b")
-"""Film too small to film too large, told apart by the colour blind too."""
+"""From film too small to film too large, distinct for the colour blind too."""
 UNSEEN = "#ff00ff"
 
 
 def drawing(inspection: Inspection) -> str:
-    """Return an SVG: the picture, its edges coloured by deviation, pieces amiss named."""
+    """Return an SVG: the picture, its edges coloured by deviation, faulty pieces named."""
     rows, columns = inspection.picture.pixels.shape
     factor = SHOWN_SIDE / max(rows, columns)
     width, height = columns * factor, rows * factor
@@ -252,7 +252,7 @@ def _embedded(picture: ScanPicture) -> str:
 
 
 def _coloured(inspection: Inspection, factor: float) -> Iterator[str]:
-    """Yield lines along the edges as seen, each of one colour."""
+    """Yield lines along the measured edges, each of one colour."""
     fit = inspection.fit
     measured = np.isfinite(fit.outside) & (fit.weights > 0)
     kinds = np.where(measured, np.digitize(fit.residuals, STEPS), len(COLOURS))
@@ -261,7 +261,7 @@ def _coloured(inspection: Inspection, factor: float) -> Iterator[str]:
     cuts = np.nonzero((np.diff(contours) != 0) | (np.diff(kinds) != 0))[0] + 1
     for run in np.split(np.arange(len(at)), cuts):
         last = run[-1] + 1
-        # On to the next place, so that colours meet.
+        # Up to the next sample, so that colours are continuous.
         ends = [*run, last] if last < len(at) and contours[last] == contours[run[0]] else list(run)
         colour = (*COLOURS, UNSEEN)[kinds[run[0]]]
         points = " ".join(f"{x:.1f},{y:.1f}" for x, y in at[ends])

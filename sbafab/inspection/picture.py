@@ -1,4 +1,4 @@
-"""A picture of film on paper: its grey levels, and the outlines that are seen in it at once."""
+"""A picture of film on paper: its grey levels, and the outlines visible in it."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ MOST_BYTES = 2_000_000_000
 MOST_PIXELS = 400_000_000
 LEAST_SIDE = 100
 COARSE = 1600
-"""Pixels of the longer side of the reduced picture."""
+"""Longer side of the reduced picture, pixels."""
 SPARSE = 4
-"""Step in reduced pixels at which the light is told."""
+"""Step at which the local light is sampled, reduced pixels."""
 ROUNDS = 3
-"""Rounds in which the threshold follows uneven light."""
+"""Iterations in which the threshold follows uneven light."""
 LEAST_CONTRAST = 12.0
-"""Grey levels between film and paper."""
+"""Least difference in grey levels between film and paper."""
 FLATBED_DPI = range(150, 9601)
-"""Resolutions that a file may state in earnest: cameras write 72 or 96."""
+"""Least credible resolution stated by a file: cameras write 72 or 96."""
 
 
 @dataclass(frozen=True)
 class ScanPicture:
-    """``pixels`` of a file with its hash; ``dpi`` along x and y as the file states it, or None."""
+    """``pixels`` of a file with its hash; ``dpi`` along x and y as stated in the file, or None."""
 
     path: Path
     pixels: Pixels
@@ -47,7 +47,7 @@ class ScanPicture:
 
 
 def read_picture(path: Path) -> ScanPicture:
-    """Return the picture of a file that Pillow reads. Raises DesignError where it is none."""
+    """Return the picture of a file that Pillow reads. Raises DesignError for other files."""
     from PIL import Image, ImageOps, UnidentifiedImageError
 
     try:
@@ -79,7 +79,7 @@ def read_picture(path: Path) -> ScanPicture:
 
 
 def _grey(image: Any) -> Pixels:
-    """Return grey levels of 0 to 255, of a picture of 16 bits too."""
+    """Return grey levels of 0 to 255, also for a picture of 16 bits."""
     if image.mode.startswith(("I", "F")):
         levels = np.asarray(image, dtype=np.float32)
         return levels / max(float(levels.max()), 1.0) * 255
@@ -91,14 +91,14 @@ def _resolution(stated: Any) -> tuple[float, float] | None:
         x, y = float(stated[0]), float(stated[1])
     except (TypeError, ValueError, IndexError, ZeroDivisionError):
         return None
-    # JPEG and PNG keep whole dots a centimetre or metre.
+    # JPEG and PNG store whole dots per centimetre or metre.
     return (x, y) if round(x) in FLATBED_DPI and round(y) in FLATBED_DPI else None
 
 
 class PictureOutline(NamedTuple):
     """A closed outline: its points (n, 2) as x and y in pixels, centroid, area in square pixels.
 
-    ``is_light``: True if what it encloses is lighter than what lies round it.
+    ``is_light``: True if its inside is lighter than its surroundings.
     """
 
     points: NDArray[np.float64]
@@ -108,10 +108,10 @@ class PictureOutline(NamedTuple):
 
 
 def outlines(picture: ScanPicture) -> list[PictureOutline]:
-    """Return what is lighter or darker than its surroundings, largest first.
+    """Return regions that are lighter or darker than their surroundings, largest first.
 
-    Read in the picture reduced to COARSE pixels: within a pixel of that. Raises DesignError where
-    nothing stands out.
+    They are found in the picture reduced to COARSE pixels, within a pixel of that. Raises
+    DesignError if nothing stands out.
     """
     from skimage import measure
 
@@ -139,12 +139,12 @@ def _reduced(pixels: Pixels, factor: int) -> Pixels:
 
 
 def _level(reduced: Pixels, path: Path) -> NDArray[np.float32]:
-    """Return half way between film and paper, which follows uneven light."""
+    """Return the threshold midway between film and paper, following uneven light."""
     from scipy.ndimage import gaussian_filter, map_coordinates
     from skimage import filters
 
     smooth = gaussian_filter(reduced, 1.0)
-    # Light changes slowly: every few pixels tell it.
+    # Light changes slowly: a sample every few pixels suffices.
     sparse = smooth[::SPARSE, ::SPARSE]
     threshold_otsu: Any = filters.threshold_otsu
     level: Any = threshold_otsu(smooth)
@@ -171,13 +171,13 @@ def _contrast(smooth: Pixels, is_light: NDArray[np.bool_]) -> float:
 
 
 def _local_mean(values: Pixels, mask: NDArray[np.bool_], width: float) -> NDArray[np.float32]:
-    """Return the mean of the values in a mask, weighted by distance; far off, that of all."""
+    """Return the mean of the values in a mask, weighted by distance; far away, the overall mean."""
     from scipy.ndimage import binary_erosion, gaussian_filter
 
     inner = binary_erosion(mask)
     weights = (inner if inner.any() else mask).astype(np.float32)
     mean = float(values[weights > 0].mean())
-    # What lies far from the mask tends to the mean of all of it.
+    # Far from the mask values tend to its overall mean.
     total = gaussian_filter(values * weights, width) + 1e-3 * mean
     return np.asarray(total / (gaussian_filter(weights, width) + 1e-3))
 

@@ -1,4 +1,6 @@
-"""What lies in each place of a cut sheet: its piece, another, the piece turned over, or none."""
+"""Identify the content of each place of a cut sheet: its piece, another, a flipped piece, or
+none.
+"""
 
 from __future__ import annotations
 
@@ -27,34 +29,34 @@ PieceVerdict = Literal[
     "unknown",
     "not in picture",
 ]
-"""Of a place; "covered": another piece lies on it or touches it."""
+"""States of a place; "covered": another piece lies on it or touches it."""
 
 SOUND_SHARE = 0.9
-"""Of the places on a contour that lie within TOLERANCE."""
+"""Least share of samples on a contour that are within TOLERANCE."""
 SAME_AREA = 0.08
-"""Share by which a piece's area may differ from that of its shape; the kerf comes on top."""
+"""Largest relative difference in area between a piece and its shape, in addition to the kerf."""
 SAME_SHAPE = 0.2
-"""mm: the 95th percentile of the distance between an outline and its shape."""
+"""Largest 95th percentile of the distance between an outline and its shape, mm."""
 AS_GOOD = 0.02
-"""mm: between shapes that fit as well as this, the expected is taken."""
+"""Difference in fit below which the expected shape is chosen, mm."""
 ANGLE_STEP = 5
 TURNED = 5.0
-"""Degrees from which a piece is turned, no longer askew."""
+"""Angle from which a piece counts as turned, not askew, degrees."""
 COVERED_SHARE = 0.6
-"""Of a piece's edges that show where others cover the rest."""
+"""Least share of a piece's edges that must be visible if others cover the rest."""
 REACH = 40.0
-"""mm round a place in which edges are looked at."""
+"""Search range for edges around a place, mm."""
 STRAY = 0.5
-"""mm off its place that is worth a word."""
+"""Displacement that is reported, mm."""
 HOLE_PLACE = 0.6
-"""mm between a hole and its place."""
+"""Largest distance between a hole and its place, mm."""
 
 
 @dataclass(frozen=True)
 class PieceFinding:
-    """What lies in a place, x and y mm of the sheet: ``name`` is the piece that is drawn there.
+    """The finding for a place, x and y mm of the sheet: ``name`` is the piece drawn there.
 
-    ``message`` says it in words; ``shift`` mm and ``turn`` degrees off the place, None where no
+    ``message`` is the finding as text; ``shift`` mm and ``turn`` degrees from the place, None if no
     piece was recognised; ``rms`` and ``largest`` mm: deviations of its edges from the drawn ones,
     apart from shift, turn and the common offset.
     """
@@ -71,7 +73,7 @@ class PieceFinding:
 
 
 class Blob(NamedTuple):
-    """A piece or window as it is seen: outline and holes, points in mm of the sheet."""
+    """A visible piece or window: outline and holes, points in mm of the sheet."""
 
     outline: PointArray
     holes: tuple[PointArray, ...]
@@ -80,8 +82,8 @@ class Blob(NamedTuple):
 
 
 class Match(NamedTuple):
-    """A shape laid on a blob: degrees counter-clockwise and mm from its own place, after it was
-    mirrored or not; ``misfit`` mm is the 95th percentile of distances.
+    """A shape fitted to a blob: degrees counter-clockwise and mm from its own place, after
+    mirroring if it is mirrored; ``misfit`` mm is the 95th percentile of distances.
     """
 
     name: str
@@ -117,7 +119,7 @@ def piece_findings(
 
 
 def _is_alone(sheet: DrawnSheet, number: int, blob: Blob) -> bool:
-    """Return True if a blob reaches into no other place's middle."""
+    """Return True if a blob covers no other place's middle."""
     middles = [_middle(place.region) for other, place in enumerate(sheet.places) if other != number]
     return not any(_is_in(blob.outline, middle) for middle in middles)
 
@@ -158,7 +160,7 @@ def _is_in(polygon: PointArray, point: PointArray) -> bool:
 
 
 def _holders(sheet: DrawnSheet, blobs: Sequence[Blob]) -> dict[int, Blob]:
-    """Return the blob in each place, the nearest pairs first."""
+    """Return the blob in each place, assigned by the nearest pairs first."""
     pairs = []
     for number, place in enumerate(sheet.places):
         low_x, low_y, high_x, high_y = place.region.bounds
@@ -167,7 +169,7 @@ def _holders(sheet: DrawnSheet, blobs: Sequence[Blob]) -> dict[int, Blob]:
         outer = abs(sum(c.area for c in place.region.outers))
         for k, blob in enumerate(blobs):
             off = np.abs((blob.outline.min(axis=0) + blob.outline.max(axis=0)) / 2 - middle)
-            # Dust is no piece.
+            # Dust is not a piece.
             if (off < half).all() and blob.area > 0.1 * outer:
                 pairs.append((float(np.hypot(*off)), number, k))
     holders: dict[int, Blob] = {}
@@ -180,7 +182,7 @@ def _holders(sheet: DrawnSheet, blobs: Sequence[Blob]) -> dict[int, Blob]:
 
 
 def _is_sound(fit: EdgeFit, piece: int) -> bool:
-    """Return True if every contour of a piece is seen where it is drawn."""
+    """Return True if every contour of a piece is visible at its drawn position."""
     mine = fit.samples.pieces == piece
     within = np.abs(fit.residuals[mine]) <= TOLERANCE
     contours = fit.samples.contours[mine]
@@ -188,14 +190,14 @@ def _is_sound(fit: EdgeFit, piece: int) -> bool:
 
 
 def _strange_holes(piece: Region, blob: Blob) -> list[PointArray]:
-    """Return the holes of a blob that its piece does not have, as their middles."""
+    """Return the middles of a blob's holes that its piece does not have."""
     drawn = [polyline(hole, 0.2).mean(axis=0) for hole in piece.holes]
     middles = [hole.mean(axis=0) for hole in blob.holes]
     return [m for m in middles if all(math.dist(m, d) > HOLE_PLACE for d in drawn)]
 
 
 def _shut_holes(piece: Region, blob: Blob) -> list[PointArray]:
-    """Return the middles of a piece's holes that a blob does not show."""
+    """Return the middles of a piece's holes that are missing in a blob."""
     measured = [hole.mean(axis=0) for hole in blob.holes]
     drawn = [polyline(hole, 0.2).mean(axis=0) for hole in piece.holes if -hole.area > SMALLEST]
     return [d for d in drawn if all(math.dist(m, d) > HOLE_PLACE for m in measured)]
@@ -234,9 +236,7 @@ def _crowded(
     blobs: Sequence[Blob],
     is_skeleton: bool,
 ) -> PieceFinding:
-    """Return what lies in a place without a piece of its own outline: none, or one that others
-    cover or touch.
-    """
+    """Return the finding for a place without a blob: no piece, or others cover or touch it."""
     place = sheet.places[number]
     if _reaches_out(picture, fit, place.region):
         return _finding(place, "not in picture", "reaches out of the picture; scan all of it")
@@ -278,7 +278,7 @@ def _reaches_out(picture: ScanPicture, fit: EdgeFit, piece: Region) -> bool:
 
 
 class PartialMatch(NamedTuple):
-    """A shape laid on edges of which others cover some; ``share`` of its own edges that show."""
+    """A shape fitted to edges that others partly cover; ``share`` of its edges is visible."""
 
     name: str
     is_mirrored: bool
@@ -290,7 +290,7 @@ class PartialMatch(NamedTuple):
 def _partial_matches(
     shape: SheetShape, place: SheetShape, near: Sequence[PointArray]
 ) -> Iterator[PartialMatch]:
-    """Yield the shape, unmirrored and mirrored, laid on the edges round a place."""
+    """Yield the shape, unmirrored and mirrored, fitted to the edges around a place."""
     from scipy.spatial import cKDTree
 
     measured = np.vstack([_dense(points) for points in near])
@@ -318,14 +318,14 @@ def _partial_matches(
 
 
 def _dense(points: PointArray) -> PointArray:
-    """Return points of a closed outline with those half way between."""
+    """Return the points of a closed outline and the midpoints between them."""
     return np.vstack([points, (points + np.roll(points, -1, axis=0)) / 2])
 
 
 def _identified(
     sheet: DrawnSheet, place: SheetShape, blob: Blob, is_skeleton: bool
 ) -> PieceFinding:
-    """Return what a blob is that is not the piece in its place as drawn."""
+    """Return the finding for a blob that is not the piece in its place as drawn."""
     match = best_match(sheet, place, blob, is_skeleton)
     if match is None:
         return _finding(place, "unknown", _unknown(place, blob, is_skeleton))
@@ -362,7 +362,7 @@ def _unknown(place: SheetShape, blob: Blob, is_skeleton: bool) -> str:
 
 
 def best_match(sheet: DrawnSheet, place: SheetShape, blob: Blob, is_skeleton: bool) -> Match | None:
-    """Return the shape that a blob is, mirrored or not, or None; the expected where in doubt."""
+    """Return the shape of a blob, mirrored or not, or None; the expected one if in doubt."""
     matches = [
         match
         for shape in (place, *_others(sheet, place))
@@ -382,7 +382,7 @@ def _others(sheet: DrawnSheet, place: SheetShape) -> Iterator[SheetShape]:
 
 
 def _matches(shape: SheetShape, blob: Blob, is_skeleton: bool) -> Iterator[Match]:
-    """Yield the shape laid on a blob, unmirrored and mirrored, if sizes and holes agree."""
+    """Yield the shape fitted to a blob, unmirrored and mirrored, if sizes and holes agree."""
     holes = [] if is_skeleton else [h for h in shape.region.holes if -h.area > SMALLEST]
     outer = sum(contour.area for contour in shape.region.outers)
     room = SAME_AREA * outer + 0.15 * sum(c.length for c in shape.region.outers)
@@ -404,16 +404,16 @@ def _sparse(points: PointArray) -> PointArray:
 def laid_on(
     drawn: PointArray, measured: PointArray, outline: PointArray
 ) -> tuple[float, float, float]:
-    """Return degrees and mm of the rigid motion that lays drawn points on seen, and the misfit.
+    """Return degrees and mm of the rigid motion from drawn to measured points, and the misfit.
 
-    The shift is that of the middle of the drawn points.
+    The shift is that of the drawn points' middle.
     """
     from scipy.spatial import cKDTree
 
     tree = cKDTree(measured)
     _, middle = moments(outline)
     start = drawn.mean(axis=0)
-    # Centroids of outlines agree whatever the turn.
+    # Centroids of outlines agree at any turn.
     _, centre = moments(drawn[: max(3, len(drawn))])
     arms = drawn - centre
 
@@ -421,7 +421,7 @@ def laid_on(
     angles = np.deg2rad(np.arange(-180, 180, ANGLE_STEP))
     angles = angles[np.argsort(np.abs(angles), kind="stable")]
     costs = [float(tree.query(sparse @ _spun(a).T + middle)[0].mean()) for a in angles]
-    # Of turns that fit as well, the least.
+    # Of equally good turns, the smallest.
     best = next(a for a, c in zip(angles, costs, strict=True) if c <= min(costs) + AS_GOOD)
     matrix, shift = _aligned(tree, measured, arms, (_spun(float(best)), middle), math.inf)
     laid = arms @ matrix.T + shift
@@ -443,7 +443,9 @@ def _aligned(
     guess: tuple[NDArray[np.float64], PointArray],
     reach: float,
 ) -> tuple[NDArray[np.float64], PointArray]:
-    """Return turn and shift that lay points on the nearest seen within ``reach`` mm, by turns."""
+    """Return turn and shift from points to their nearest measured ones within ``reach`` mm, by
+    turns.
+    """
     matrix, shift = guess
     for _ in range(12):
         distance, nearest = tree.query(arms @ matrix.T + shift)

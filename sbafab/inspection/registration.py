@@ -1,7 +1,7 @@
-"""The place of a cut sheet in a picture: from millimetres of the cut file to pixels.
+"""Locate a cut sheet in a picture: the map from millimetres of the cut file to pixels.
 
-Outlines are matched by place and area: pairs of them give a similarity each, the one that most
-outlines agree with is refined to an affine map (scanner) or a homography (camera).
+Outlines are matched by position and area: each pair gives a similarity; the one with the most
+matching outlines is refined to an affine map (scanner) or a homography (camera).
 """
 
 from __future__ import annotations
@@ -23,35 +23,35 @@ from sbafab.inspection.picture import PictureOutline, moments
 PointArray = NDArray[np.float64]
 """x and y, (n, 2)."""
 SheetSide = Literal["film", "void"]
-"""What a contour encloses."""
+"""The inside of a contour."""
 Content = Literal["pieces", "skeleton"]
-"""What lies in the picture: pieces without the waste, or the sheet that they fell out of."""
+"""The content of the picture: pieces without the waste, or the sheet that they fell out of."""
 
 ANCHORS = 8
-"""Pairs of contours that are looked for."""
+"""Most pairs of contours to search."""
 FEW = 6
-"""Contours of which all pairs are looked for."""
+"""Up to this many contours all pairs are searched."""
 MOST_POSES = 6000
 SAME_AREA = 0.25
-"""Share by which matching areas may differ, kerf included; a camera's, twice as much."""
+"""Largest relative difference of matching areas, kerf included; twice as much for a camera."""
 LEAST_SHARE = 0.5
-"""Of the outlines that a picture of the sheet must show."""
+"""Least share of outlines that a picture of the sheet must show."""
 ENOUGH = 0.97
-"""Share of outlines from which no better pose is looked for."""
+"""Share of matched outlines at which the search for a better pose ends."""
 SCALE_STEP = 0.01
-"""Steps of the scale by which one pose is likelier than another."""
+"""Scale steps in which poses are ranked."""
 CORNER_STEPS = np.array([(0.0, 0.0), (1e-3, 0.0), (0.0, 1e-3)])
-"""mm: from a point along x and along y."""
+"""Step along x and along y for derivatives, mm."""
 SMALLEST = 0.2
-"""mm2 of a hole that is looked for."""
+"""Least area of a hole to search, mm2."""
 
 
 @dataclass(frozen=True)
 class Warp:
     """A map from mm of the cut file to pixels: a homography after a small polynomial one.
 
-    ``base`` (3, 3); ``coefficients`` (k, 2) in mm of the monomials up to ``degree`` of the place
-    from ``centre`` in units of ``size``, mm.
+    ``base`` (3, 3); ``coefficients`` (k, 2) in mm are of the monomials up to ``degree`` of the
+    position relative to ``centre``, in units of ``size``, mm.
     """
 
     base: NDArray[np.float64]
@@ -71,7 +71,7 @@ class Warp:
         return np.column_stack([x**i * y**j for i, j in powers])
 
     def pixels_per_mm(self, point: PointArray) -> tuple[float, float]:
-        """Return the pixels that a millimetre along x, and along y, takes at a point."""
+        """Return the size in pixels of a millimetre along x, and along y, at a point."""
         steps = point + CORNER_STEPS
         at, beside, above = self(steps)
         return float(np.hypot(*(beside - at)) * 1e3), float(np.hypot(*(above - at)) * 1e3)
@@ -87,13 +87,13 @@ class Warp:
 
 
 def projected(matrix: NDArray[np.float64], points: PointArray) -> PointArray:
-    """Return points under a homography."""
+    """Return the images of points under a homography."""
     after = points @ matrix[:, :2].T + matrix[:, 2]
     return after[:, :2] / after[:, 2:]
 
 
 class Target(NamedTuple):
-    """A contour that is looked for: its centroid in mm, area in mm2 and what it encloses."""
+    """A contour to search: its centroid in mm, area in mm2 and its inside."""
 
     centroid: tuple[float, float]
     area: float
@@ -102,9 +102,9 @@ class Target(NamedTuple):
 
 @dataclass(frozen=True)
 class Location:
-    """``warp`` from the sheet to the picture, what the picture shows, and the matched outlines.
+    """``warp`` from the sheet to the picture, the picture's content, and the matched outlines.
 
-    ``from_below``: True if the sheet is seen mirrored. ``is_light``: True if film is lighter than
+    ``from_below``: True if the sheet appears mirrored. ``is_light``: True if film is lighter than
     paper.
     """
 
@@ -117,7 +117,7 @@ class Location:
 
 
 def targets_of(sheet: DrawnSheet, content: Content) -> list[Target]:
-    """Return what a picture of a sheet shows: a skeleton shows no holes of pieces."""
+    """Return the contours visible in a picture of a sheet: a skeleton shows no holes of pieces."""
     contours = [contour for place in sheet.places for contour in place.region.contours]
     side: SheetSide = "film" if content == "pieces" else "void"
     shown = [c for c in contours if not c.is_hole or (content == "pieces" and -c.area > SMALLEST)]
@@ -135,7 +135,7 @@ def centroid_of(contour: Contour) -> tuple[float, float]:
 
 
 def polyline(contour: Contour, step: float) -> PointArray:
-    """Return points along a contour, ``step`` mm apart at most."""
+    """Return points along a contour, at most ``step`` mm apart."""
     return np.array(
         [
             edge.at(k / count)
@@ -150,7 +150,7 @@ def polyline(contour: Contour, step: float) -> PointArray:
 class _Pose:
     """A similarity as complex numbers: pixel = scale_turn * (z or its conjugate) + shift.
 
-    Pixels run downward, so that a sheet seen from above takes the conjugate.
+    Pixels count downward, so a sheet seen from above uses the conjugate.
     """
 
     scale_turn: complex
@@ -177,10 +177,10 @@ def locate(
     is_light: bool,
     is_camera: bool,
 ) -> Location:
-    """Return where the sheet lies in a picture of ``size``, rows and columns.
+    """Return the sheet's location in a picture of ``size``, rows and columns.
 
-    ``is_light``: film is lighter than paper. ``is_camera``: with perspective. Raises DesignError
-    where the picture does not show the sheet.
+    ``is_light``: film is lighter than paper. ``is_camera``: with perspective. Raises DesignError if
+    the picture does not show the sheet.
     """
     best: tuple[float, Location] | None = None
     contents: tuple[Content, ...] = ("pieces", "skeleton")
@@ -229,7 +229,7 @@ class _Finder:
         self.measured_areas = np.array([outline.area for outline in measured])
         self.measured_film = np.array([outline.is_light == is_light for outline in measured])
         spread = np.abs(self.places - self.places.mean()).max()
-        # What a similarity leaves of perspective, or of tilt and unequal scales.
+        # Residual of a similarity due to perspective, or tilt and unequal scales.
         self.reach = max(0.5, (0.035 if is_camera else 0.006) * float(spread))
         self.same_area = SAME_AREA * (2 if is_camera else 1)
 
@@ -241,7 +241,7 @@ class _Finder:
             pixels = pose(self.places)
             matched = int((self._matches(self.reach, pixels, pose.scale_turn) >= 0).sum())
             upright = pose.scale_turn if not pose.from_below else -pose.scale_turn
-            # A row of equal pieces fits one place further on as well, but for the picture's border.
+            # A row of equal pieces also fits one place further, except for the picture's border.
             angle = abs(float(np.angle(upright)))
             off = 0.0 if self.scale is None else abs(abs(pose.scale_turn) / self.scale - 1)
             unlike = -self._outside(pixels), not pose.from_below, -round(off / SCALE_STEP)
@@ -253,7 +253,7 @@ class _Finder:
         return None if best is None else best[1]
 
     def _outside(self, pixels: NDArray[np.complex128]) -> int:
-        """Return the number of places that lie out of the picture."""
+        """Return the number of places outside the picture."""
         x, y = pixels.real, pixels.imag
         return int(((x < 0) | (y < 0) | (x > self.columns) | (y > self.rows)).sum())
 
@@ -266,7 +266,7 @@ class _Finder:
         yield from poses[:MOST_POSES]
 
     def _pairs(self) -> list[tuple[int, int]]:
-        """Return pairs of large targets far from each other, each target at most twice."""
+        """Return pairs of large targets far apart, each target at most twice."""
         large = np.argsort(-self.areas)[: 3 * ANCHORS]
         if len(large) <= FEW:
             return [(int(i), int(j)) for i, j in combinations(large, 2)]
@@ -280,7 +280,7 @@ class _Finder:
         return pairs[::step][:ANCHORS]
 
     def _poses_of(self, first: int, other: int) -> Iterator[_Pose]:
-        """Yield the similarities that lay two targets on two outlines of their areas."""
+        """Yield the similarities that map two targets to two outlines of matching areas."""
         across = self.places[other] - self.places[first]
         apart = self.measured_places[None, :] - self.measured_places[:, None]
         stretch = np.abs(apart) / abs(across)
@@ -304,7 +304,7 @@ class _Finder:
                 yield _Pose(scale_turn, shift, from_below)
 
     def _single_poses(self) -> Iterator[_Pose]:
-        """Yield upright poses of a sheet of a single outline, on outlines of that tone."""
+        """Yield upright poses of a sheet with a single outline, on outlines of that tone."""
         largest = int(self.areas.argmax())
         for k in np.nonzero(self.measured_film == self.is_film[largest])[0][:20]:
             scale = math.sqrt(self.measured_areas[k] / self.areas[largest])
@@ -322,7 +322,7 @@ class _Finder:
         per_mm = abs(scale)
         distance = np.abs(pixels[:, None] - self.measured_places[None, :])
         ratio = self.measured_areas[None, :] / (self.areas[:, None] * per_mm**2)
-        # A small hole is enlarged by the kerf by a larger share.
+        # The kerf enlarges a small hole by a larger share.
         room = self.same_area + 1.2 / np.sqrt(self.areas[:, None])
         misfit = (np.abs(ratio - 1) > room) | (self.measured_film[None, :] != self.is_film[:, None])
         distance[misfit] = np.inf

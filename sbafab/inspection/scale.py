@@ -1,7 +1,7 @@
-"""What a picture's scale is held against: the scanner's resolution, a bar, or the sheet's pins.
+"""References for a picture's scale: the scanner's resolution, a bar, or the sheet's pins.
 
-The fit lays the cut file on the film, so that a millimetre of the file is one of the film. A length
-that is known otherwise tells how long that millimetre truly is.
+The fit maps the cut file to the film, so a millimetre of the file is one of the film. An
+independent length gives the true length of that millimetre.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from sbafab.inspection.picture import PictureOutline, ScanPicture, moments
 from sbafab.inspection.registration import CORNER_STEPS, PointArray
 
 MILLIMETRES = 25.4
-"""An inch."""
+"""An inch, mm."""
 NEAR_LENGTH = 0.05
-"""Share by which a bar may differ from its length before it is measured."""
+"""Largest relative error of a bar's length before it is measured."""
 BAR_FILL = 0.9
-"""Share of its box that a bar fills."""
+"""Least share of its box that a bar fills."""
 LEAST_PINS = 2
 SEARCH = 0.45
-"""mm round a drawn edge in which it is looked for."""
+"""Search range around a drawn edge, mm."""
 
 
 @dataclass(frozen=True)
 class Scale:
-    """True over drawn lengths along x and y, and what tells it."""
+    """True over drawn lengths along x and y, and the reference."""
 
     x: float
     y: float
@@ -43,7 +43,7 @@ class Scale:
 class Reference:
     """``dpi`` along the picture's rows and columns; a ``bar`` of this length, mm; the ``pins``.
 
-    The first of bar, pins and dpi that is given counts; without any, a scale of 1 is taken.
+    The first of bar, pins and dpi that is given is used; without any, the scale is 1.
     """
 
     dpi: tuple[float, float] | None = None
@@ -62,7 +62,7 @@ def scale_of(
     measured: Sequence[PictureOutline],
     reference: Reference,
 ) -> Scale:
-    """Return the film's scale by the reference. Raises DesignError where that is not seen."""
+    """Return the film's scale by the reference. Raises DesignError if that is not visible."""
     if reference.bar is not None:
         scale = _by_bar(picture, sheet, fit, measured, reference.bar)
         return Scale(scale, scale, f"the bar of {reference.bar:g} mm")

@@ -1,8 +1,8 @@
-"""Assembly steps: the stacks laid on each other in each closing of the press, its pins; what the
-press leaves of the films.
+"""Assembly steps: the stacks laid on each other in each closing of the press, and its pins; the
+height of the films after the press.
 
-The paper's four steps (Sec. 2) without those that have nothing to press. Ears register layers in
-the full bonds too: a flash bond on the pins comes first, and the full bond after it without them.
+The paper's four steps (Sec. 2), except those with nothing to press. Ears also register layers in
+full bonds: a flash bond on the pins comes first, then the full bond without pins.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ StepName = Literal[
     "flash_bottom", "tack_bottom", "bond_bottom", "flash_middle", "tack_all", "bond_all"
 ]
 PLATE_MARGIN = 6.0
-"""mm of base plate round everything that lies on it."""
+"""Margin of the base plate around the lay-up, mm."""
 
 
 @dataclass(frozen=True)
 class AssemblyStep:
     """One closing of the press, or a seam, steps counted from 1.
 
-    ``stacks`` lie on each other, lowest first, and ``adds`` are those of their layers that join in
-    this step, both by layer index; ``pins`` are the dowel pins that are in. ``joining`` is what
-    the step belongs to, where films are not joined in the press alone.
+    ``stacks`` lie on each other, lowest first, and ``adds`` are their layers that are new in this
+    step, both by layer index; ``pins`` are the dowel pins that are in. ``joining`` is the act of
+    joining that the step belongs to, if films are also joined outside the press.
     """
 
     number: int
@@ -50,11 +50,11 @@ class AssemblyStep:
 def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     """Return the steps of a laminate, bottom balloon first.
 
-    Flash bonds hold layers in place on their pins. With channel pins full bonds are pressed
-    without any: base and cap have no bore for one, and a lumen pin, though it would pass, stays
-    out as in the paper. ``laminate.middle_first`` tacks all layers between base and cap in one
-    step, and presses no balloon by itself. With ears base and cap are tacked on the pins by a flash
-    bond, and the full bond after it has no pins either, unless ``laminate.pins_in_full_bonds``.
+    Flash bonds hold layers in place on their pins. With channel pins full bonds are pressed without
+    any: base and cap have no bore for one, and a lumen pin would fit but stays out, as in the
+    paper. ``laminate.middle_first`` tacks all layers between base and cap in one step, and presses
+    no balloon by itself. With ears base and cap are tacked on the pins by a flash bond, and the
+    full bond after it has no pins either, unless ``laminate.pins_in_full_bonds``.
     """
     return stored(laminate, "_steps", _steps)
 
@@ -62,7 +62,7 @@ def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
 def laying(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     """Return all steps in which layers are laid on each other: presses, seams and folds, in order.
 
-    A seam or fold has no pins, and is named as a flash bond.
+    A seam or fold has no pins, and is labelled as a flash bond.
     """
     return stored(laminate, "_laying", _laying)
 
@@ -110,7 +110,7 @@ class _Plan(NamedTuple):
 
 
 def _plans(laminate: Laminate, indices: Sequence[int]) -> Iterator[_Plan]:
-    """Yield the steps of a press of these layers that add any."""
+    """Yield the press steps of these layers that add any."""
     return (plan for plan in _all_plans(laminate, tuple(indices)) if plan.adds)
 
 
@@ -147,7 +147,7 @@ def _all_plans(laminate: Laminate, indices: tuple[int, ...]) -> tuple[_Plan, ...
 
 
 def _tacked(plan: _Plan) -> tuple[_Plan, ...]:
-    """A full bond as two steps: the same stacks flash bonded, then the full bond of them."""
+    """A full bond as two steps: a flash bond of the same stacks, then their full bond."""
     if plan.bond == "flash":
         return (plan,)
     tack: StepName = "tack_bottom" if plan.name == "bond_bottom" else "tack_all"
@@ -180,7 +180,7 @@ def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Pin, ...]:
 
 
 def pressed_layers(laminate: Laminate) -> list[Layer]:
-    """Return the layers that lie in the press in some step."""
+    """Return the layers that are pressed in some step."""
     pressed = {index for step in assembly(laminate) for index in step.layers}
     return [layer for layer in laminate.layers if layer.index in pressed]
 
@@ -188,8 +188,8 @@ def pressed_layers(laminate: Laminate) -> list[Layer]:
 def films_without_minutes(
     laminate: Laminate, stated: Iterable[tuple[str, float]]
 ) -> tuple[Film, ...]:
-    """Return the structural films in the press, each once, that are none of the products and
-    thicknesses (mm) for which press minutes are stated.
+    """Return the structural films in the press, each once, whose product and thickness (mm) have no
+    stated press minutes.
     """
     pairs = tuple(stated)
     films = dict.fromkeys(layer.film for layer in pressed_layers(laminate) if not layer.is_mask)
@@ -198,9 +198,9 @@ def films_without_minutes(
 
 @dataclass(frozen=True)
 class FoldedHeight:
-    """Height of a flat laminate after the press: ``solid`` mm of masks, of films that do not melt
-    in a press step and of the ``unmeasured`` ones, of whose flow nothing is known; ``factor`` is
-    what the press leaves of the others, ``molten`` mm as bought.
+    """Height of a flat laminate after the press: ``solid`` mm of masks, films that do not melt in a
+    press step and the ``unmeasured`` ones, whose flow is unknown; ``factor`` is the press factor on
+    the others, ``molten`` mm as bought.
     """
 
     solid: float
@@ -220,16 +220,17 @@ class FoldedHeight:
 
     @property
     def remark(self) -> str:
-        """What is not known of the flow of its films, in words; else empty."""
+        """Which of its films have an unknown flow, as text; else empty."""
         names = sorted({film.product for film in self.unmeasured})
         return f"{' and '.join(names)} as bought: no press factor is known" if names else ""
 
 
 def folded_height(laminate: Laminate, factor: float, product: str) -> FoldedHeight:
-    """Return the folded height of a laminate: the only one, of all commands, pages and files.
+    """Return the folded height of a laminate, the only definition for all commands, pages and
+    files.
 
-    ``factor`` is what the press leaves of the thickness of films that melt in it, of one
-    ``product``, or of all where that is empty; 1 where nobody says.
+    ``factor`` is the press factor on the thickness of melting films of one ``product``, or of all
+    if that is empty; 1 if not stated.
     """
     melts = [layer.film for layer in pressed_layers(laminate) if layer.film.melts]
     known = [film for film in melts if product in ("", film.product)]
@@ -239,9 +240,9 @@ def folded_height(laminate: Laminate, factor: float, product: str) -> FoldedHeig
 
 
 def is_laid_by_hand(laminate: Laminate, step: AssemblyStep) -> bool:
-    """Return True if a layer, or an earlier stack, is placed by hand, without a pin that holds it.
+    """Return True if a layer, or an earlier stack, is placed by hand, without a pin.
 
-    One whole stack that is laid down again is aligned with nothing.
+    A whole stack that is laid down again needs no alignment.
     """
     pins = set(step.pins)
     for stack in step.stacks if step.adds else ():
@@ -270,7 +271,7 @@ def pins_when_added(laminate: Laminate) -> dict[int, tuple[Pin, ...]]:
 
 
 def stack_count(laminate: Laminate, layers: Sequence[int]) -> int:
-    """Return the number of stacks beside each other: the least number of pieces of any layer."""
+    """Return the number of stacks side by side: the least number of pieces of any layer."""
     return min(len(layer.profile.pieces) for layer in distinct_layers(laminate, layers))
 
 

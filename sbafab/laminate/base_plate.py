@@ -1,7 +1,7 @@
 """The base plate's holes: their fit with dowel pins, and the machines' position errors.
 
-Deviations are those of ISO 286-2 in mm (the standard was not opened; two suppliers' tables agree on
-m6, and H7 is grade IT7 above the nominal size).
+Deviations are from ISO 286-2 in mm (the standard was not opened; two suppliers' tables agree on m6,
+and H7 is grade IT7 above the nominal size).
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ LAPPED_PLAY = 0.002
 
 
 class HoleProcess(NamedTuple):
-    """A machine's way of making the plate's holes.
+    """A machine for the plate's holes.
 
-    ``position`` is the greatest distance of a hole from its place, mm, in any direction;
-    ``is_lapped``: each hole is lapped to its own pin, else reamed H7.
+    ``position`` is the largest position error of a hole, mm, in any direction; ``is_lapped``: each
+    hole is lapped to its own pin, else reamed H7.
     """
 
     words: str
@@ -37,46 +37,46 @@ HOLE_PROCESSES: Mapping[PlateMachine, HoleProcess] = {
     "drill-press": HoleProcess("a drill press, marked out by hand", 0.2, False),
 }
 """Positions: a jig borer 0.003 and a hole marked out by hand 0.2 (a maker's guide to drilled and
-reamed holes, fobproto.com, cnc-drilling-reaming-tolerances); a CNC mill 0.001 in, what two shops
-promise of precise work (makerstage.com, cnc-tolerances-guide; olympusmachining.com)."""
+reamed holes, fobproto.com, cnc-drilling-reaming-tolerances); a CNC mill 0.001 in, as two shops
+promise for precise work (makerstage.com, cnc-tolerances-guide; olympusmachining.com)."""
 
 
 def for_a_cnc_mill(design: str) -> str:
-    """Return the command that makes bonds and overhangs of a design wide enough for a plate from a
-    CNC mill: for nine good builds in ten, as the paper had.
+    """Return the command that widens a design's bonds and overhangs for a plate from a CNC mill: to
+    nine good builds in ten, as in the paper.
     """
     return f"sbafab generate {design} --set registration.plate_made_by=cnc-mill --target-yield 0.9"
 
 
 def pin_deviations(diameter: float) -> tuple[float, float]:
-    """Return the least and the most by which a dowel pin is thicker than its diameter, mm: m6."""
+    """Return the lower and upper deviation of a dowel pin's diameter, mm: m6."""
     return next(((low, high) for d, low, high in M6 if diameter <= d), M6[-1][1:])
 
 
 def hole_deviation(diameter: float) -> float:
-    """Return the most by which a hole reamed H7 is wider than its diameter, mm."""
+    """Return the upper deviation of a hole reamed H7, mm."""
     return next((high for d, high in H7 if diameter <= d), H7[-1][1])
 
 
 def most_play(diameter: float, machine: PlateMachine) -> float:
-    """Return the most by which a plate's hole is wider than its pin, mm in diameter."""
+    """Return the largest play of a pin in its hole of the plate, mm in diameter."""
     if HOLE_PROCESSES[machine].is_lapped:
         return LAPPED_PLAY
     return round(hole_deviation(diameter) - pin_deviations(diameter)[0], 6)
 
 
 def pin_error(diameter: float, machine: PlateMachine) -> float:
-    """Return the greatest position error of a pin, mm: that of its hole and half the play.
+    """Return the largest position error of a pin, mm: its hole's, plus half the play.
 
-    A jig borer's 0.003 + 0.002 / 2 is the 0.004 that the paper gives for its dowel pins (Sec. 2).
+    For a jig borer 0.003 + 0.002 / 2 is the paper's 0.004 for its dowel pins (Sec. 2).
     """
     return round(HOLE_PROCESSES[machine].position + most_play(diameter, machine) / 2, 6)
 
 
 def lone_pin_error(diameter: float, machine: PlateMachine) -> float:
-    """Return the greatest position error of a plate's only pin, mm, which moves all layers alike.
+    """Return the largest position error of a plate's only pin, mm, which moves all layers equally.
 
-    It is the play of a hole reamed H7: for pins up to 6 mm the paper's 0.004 once more.
+    It is the play of a hole reamed H7: for pins up to 6 mm the paper's 0.004 again.
     """
     reamed = round((hole_deviation(diameter) - pin_deviations(diameter)[0]) / 2, 6)
     return min(pin_error(diameter, machine), reamed)

@@ -1,10 +1,10 @@
-"""Burst pressure of a laminate, scaled from the actuators that the paper burst: a proof test's
-limit, and what a working pressure must stay well below.
+"""Burst pressure of a laminate, scaled from the burst tests of the paper: the limit for a proof
+test, and a bound that working pressures must stay well below.
 
-The paper burst three actuators with pockets of 5 mm in its film of 0.038 mm, at 367 +- 18 kPa
-(Sec. 4, 7). A thin film of radius r and thickness t under p carries p r / 2 t where it is a
-sphere's and p r / t where it is a cylinder's: a long pocket of width w becomes one of radius
-w / pi. Film stress is taken in proportion, and nothing else is known; lengths mm, pressures kPa.
+The paper burst three actuators with pockets of 5 mm in its film of 0.038 mm, at 367 +- 18 kPa (Sec.
+4, 7). A thin film of radius r and thickness t under p has a stress of p r / 2 t in a sphere and p r
+/ t in a cylinder: a long pocket of width w becomes a cylinder of radius w / pi. Burst is scaled by
+film stress, as nothing else is known; lengths in mm, pressures in kPa.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from sbafab.laminate.films import PAPER_BURST, PAPER_PRODUCT, PAPER_THICKNESS
 from sbafab.laminate.laminate import Interface, Laminate
 
 RADIUS = 2.5
-"""mm, of the pockets that burst."""
+"""Pocket diameter in the burst tests, mm."""
 NOT_BURST = "nobody has burst such a film; burst one actuator"
 ROUND = 1.05
-"""Most area of a round pocket, its strips taken away, over that of its largest disc; ours. Others
-are taken for cylinders, as if they were as long as can be."""
+"""Largest area of a round pocket without its strips, relative to its largest disc; ours. Others
+count as infinitely long cylinders."""
 
 
 class Burst(NamedTuple):
     """An estimate of the pressure in kPa at which the weakest pocket bursts.
 
-    ``radius`` mm is that of a sphere whose film carries as much, ``thickness`` mm the thinner of
-    the pocket's films, ``centre`` the middle of its widest place, in the ``interface``.
+    ``radius`` mm is the radius of a sphere with the same film stress, ``thickness`` mm the thinner
+    of the pocket's films, ``centre`` the middle of its widest place, in the ``interface``.
     """
 
     kpa: float
@@ -45,8 +45,8 @@ class Burst(NamedTuple):
 
 
 def burst(laminate: Laminate) -> Burst | None:
-    """Return the burst estimate of a laminate, read from its profiles; None without a pocket, and
-    where a film is of another product than the one that was burst.
+    """Return the burst estimate of a laminate, from its profiles; None without a pocket, or if a
+    film is of another product than the burst film.
     """
     return stored(laminate, "_burst", _burst)
 
@@ -60,7 +60,7 @@ def _burst(laminate: Laminate) -> Burst | None:
 
 
 def _pocket(interface: Interface) -> Burst | None:
-    """Return the estimate of an interface's widest pocket; None without one."""
+    """Return the estimate for an interface's widest pocket; None without one."""
     open_film = _spanned(interface)
     if open_film.is_empty:
         return None
@@ -73,8 +73,8 @@ def _pocket(interface: Interface) -> Burst | None:
 
 
 def _spanned(interface: Interface) -> Region:
-    """Return the unbonded film, its openings for bores and vias counted as film: the other film
-    spans them.
+    """Return the unbonded film; openings for bores and vias count as film: the other film spans
+    them.
     """
     kept = [c for c in interface.unbonded.contours if not c.is_hole or _holds(c, interface.bond)]
     return Region(tuple(kept))

@@ -13,7 +13,7 @@ Material = str
 FilmKind = Literal["structural", "mask"]
 """A structural film bonds where it touches another; nothing bonds to a mask."""
 FIRST: tuple[Material, ...] = ("TPE", "PTFE")
-"""The films of every design; lists begin with them."""
+"""The films of every design; they come first in lists."""
 PTFE_WARNING = (
     "Extract the fumes: hot PTFE gives off toxic COF2 and HF. Cut it with a laser only on a "
     "machine whose owner permits PTFE, or use a drag knife."
@@ -25,9 +25,9 @@ PAPER_TPE = (10.0, 0.2)
 PAPER_PRODUCT, PAPER_THICKNESS = "Stretchlon 200", 0.038
 """The film that the paper bonded, and its thickness in mm (Sec. 2)."""
 PAPER_BURST = (367.0, 18.0)
-"""kPa at which pockets of 5 mm in that film burst, and its error (Sec. 4)."""
+"""Burst pressure of pockets of 5 mm in that film, kPa, and its error (Sec. 4)."""
 GAUGE = 0.1
-"""Tolerance of a film's thickness, as a share: our estimate of what is sold."""
+"""Tolerance of a film's thickness, as a share: our estimate for commercial film."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Film:
     the press and bonds to a film that melts on it. ``limit`` is the highest temperature allowed, C.
     ``shade`` counts the films of a kind, for colours; ``warning`` is written into its cut files;
     ``elastic`` are Young's modulus in MPa and Poisson's ratio, None if one of them is unknown.
-    ``faces`` are what the upper and the lower face are of; None where both have the film's name.
+    ``faces`` are the materials of the upper and the lower face; None if both have the film's name.
     """
 
     material: Material
@@ -57,7 +57,7 @@ class Film:
 
     @property
     def table(self) -> str:
-        """The table of a design or kit that describes it: "films.tpe"."""
+        """The table of a design or kit that defines it: "films.tpe"."""
         return f"films.{self.material.lower()}"
 
     @property
@@ -67,8 +67,8 @@ class Film:
 
     @property
     def written(self) -> str:
-        """The material as it is written where a film is taken in hand: "TPE", with the product in
-        parentheses where that is not the paper's.
+        """The material as the bench reads it: "TPE", with the product in parentheses if it is not
+        the paper's.
         """
         is_another = self.material == FIRST[0] and self.product != PAPER_PRODUCT
         return f"{self.material} ({self.product})" if is_another else self.material
@@ -79,13 +79,13 @@ class Film:
 
     @property
     def is_the_papers(self) -> bool:
-        """True for the film of the actuators that the paper measured, as thick and as stiff."""
+        """True for the film of the paper's measured actuators, with its thickness and stiffness."""
         return self.is_a(PAPER_PRODUCT, PAPER_THICKNESS) and self.elastic == PAPER_TPE
 
     @property
     def melts(self) -> bool:
-        """True if it melts through where a press bonds it: no mask, no sheet that stays solid, and
-        no sheet with a coating, whose faces are of two materials.
+        """True if it melts through when a press bonds it; False for masks, for films that stay
+        solid, and for coated films, whose faces are of two materials.
         """
         is_coated = self.faces is not None and self.faces[0] != self.faces[1]
         return not (self.is_mask or self.stays_solid or is_coated)
@@ -97,7 +97,7 @@ class Film:
 
 
 def density_of(film: Film, purpose: str = "the mass") -> float:
-    """A film's density in kg/m3. Raises DesignError, which names the purpose, if it is unknown."""
+    """A film's density in kg/m3. Raises DesignError with the purpose if it is unknown."""
     if film.density is None:
         raise DesignError(
             f"{purpose} needs the density of {film.material}, {film.product}; add "
@@ -143,6 +143,6 @@ MASKS = (
 
 
 def ink(film: Film) -> Ink:
-    """The colours of a film; the fifth of a kind begins again with the first one's."""
+    """The colours of a film; the fifth of a kind repeats the first one's."""
     inks = MASKS if film.is_mask else STRUCTURAL
     return inks[film.shade % len(inks)]

@@ -1,6 +1,6 @@
-"""Folded films: the flat part that two or more layers are cut as, and its halves read back.
+"""Folded films: the flat part for two or more layers, and its halves read back.
 
-The part lies as its lowest layer does; each further layer is turned over about its fold line.
+The part is oriented like its lowest layer; each further layer is turned over about its fold line.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from sbafab.geometry.region import Region, polygon, union
 from sbafab.laminate.joints import Fold
 
 ON_LINE = 1e-5
-"""mm within which an edge lies on a fold line."""
+"""Tolerance for an edge on a fold line, mm."""
 FAR = 1e4
-"""mm: farther than any part reaches from a fold."""
+"""Distance beyond any part from a fold, mm."""
 
 
 def fold_roots(folds: Iterable[Fold]) -> dict[int, int]:
-    """Return, by index, the layer that each folded one is cut with, the lowest of its film."""
+    """Return, by index, the layer that each folded one is cut with: the lowest of its film."""
     roots: dict[int, int] = {}
     for fold in sorted(folds, key=lambda fold: fold.lower):
         roots[fold.upper] = roots.get(fold.lower, fold.lower)
@@ -28,9 +28,10 @@ def fold_roots(folds: Iterable[Fold]) -> dict[int, int]:
 
 
 def flat_part(layer: int, folds: Sequence[Fold], profiles: Sequence[Region]) -> Region:
-    """Return the part that a layer is cut as: its profile, and those of all that fold onto it.
+    """Return the part that a layer is cut from: its profile, and the profiles of all layers that
+    fold onto it.
 
-    ``profiles`` are those of all layers, bottom to top.
+    ``profiles`` are of all layers, bottom to top.
     """
     return union(
         unfolded(profiles[index - 1], lines) for index, lines in _members(layer, folds).items()
@@ -38,7 +39,7 @@ def flat_part(layer: int, folds: Sequence[Fold], profiles: Sequence[Region]) -> 
 
 
 def halves(layer: int, folds: Sequence[Fold], part: Region) -> dict[int, Region]:
-    """Return the layers that a flat part folds into, by index, each as it lies when folded.
+    """Return the layers that a flat part folds into, by index, each in its folded position.
 
     Folded layers lie on the left of their fold lines (``toward``).
     """
@@ -51,7 +52,7 @@ def halves(layer: int, folds: Sequence[Fold], part: Region) -> dict[int, Region]
             (fold for fold in folds if fold.lower == index and fold.upper in members), None
         )
         if upper is not None:
-            # What lies beyond the next fold line belongs to the layers above.
+            # The part beyond the next fold line belongs to the layers above.
             side = _side(upper.line, lines)
             rest, mine = rest - side, rest & side
         regions[index] = unfolded(mine, lines[::-1])
@@ -59,7 +60,7 @@ def halves(layer: int, folds: Sequence[Fold], part: Region) -> dict[int, Region]
 
 
 def _members(layer: int, folds: Sequence[Fold]) -> dict[int, list[tuple[Point, Point]]]:
-    """The layers of a part, lowest first, with the lines that each is unfolded about in turn."""
+    """The layers of a part, lowest first, with the lines about which each is unfolded, in order."""
     members: dict[int, list[tuple[Point, Point]]] = {layer: []}
     for fold in sorted(folds, key=lambda fold: fold.lower):
         if fold.lower in members:
@@ -87,7 +88,7 @@ def _reflection(line: tuple[Point, Point]) -> Similarity:
 
 
 def _side(line: tuple[Point, Point], lines: Iterable[tuple[Point, Point]]) -> Region:
-    """The half of the plane to the left of a line, as far as parts reach, unfolded."""
+    """The half plane to the left of a line, as far as unfolded parts reach."""
     (x0, y0), (x1, y1) = line
     length = math.dist(*line)
     ux, uy = (x1 - x0) / length * FAR, (y1 - y0) / length * FAR
@@ -104,7 +105,7 @@ def lies_on(edge: Edge, lines: Iterable[tuple[Point, Point]]) -> bool:
 
 
 def distance_from(line: tuple[Point, Point], p: Point) -> float:
-    """Return the distance of a point from a line through two points, more than 0 on its left."""
+    """Return the distance of a point from a line through two points, positive on its left."""
     (x0, y0), (x1, y1) = line
     return ((x1 - x0) * (p[1] - y0) - (y1 - y0) * (p[0] - x0)) / math.dist(*line)
 

@@ -1,7 +1,7 @@
-"""The order in which films are joined: presses, seams and folds, each with its reason.
+"""The order of joining films: presses, seams and folds, each with its reason.
 
 A press bonds all films in it at once; a tool heats every film under its path. So both are possible
-only while nothing lies in the hand that they would weld by mistake.
+only while the work has no faces that they would weld by mistake.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from sbafab.laminate.joints import PRESS, BondProcess, FaceBond, Fold, Seam
 from sbafab.laminate.laminate import Interface, Laminate, Layer
 
 MOST_TRIED = 300
-"""Beginnings that may lead nowhere before the search for an order is given up."""
+"""Dead ends after which the search for an order is given up."""
 LEAST_WELD = 1e-3
-"""mm2: what two films share beyond that is a weld, and no rounding."""
+"""Area shared by two films above which it is a weld, not rounding, mm2."""
 
 
 @dataclass(frozen=True)
 class Joining:
-    """One act of joining, counted from 1: a press, a seam or a fold.
+    """An act of joining, counted from 1: a press, a seam or a fold.
 
-    ``layers`` are those in hand, by index, and ``bodies`` the same as they come, lowest first: what
-    was joined before, and single layers. ``from_below``: a film above the seam would melt under the
-    tool, so that the work is turned over and the path mirrored.
+    ``layers`` are the layers involved, by index, and ``bodies`` the same grouped as they arrive,
+    lowest first: earlier joined bodies, and single layers. ``from_below``: a film above the seam
+    would melt under the tool, so the work is turned over and the path mirrored.
     """
 
     number: int
@@ -43,7 +43,7 @@ class Joining:
 
 
 class _Task(NamedTuple):
-    """What is to be joined: interfaces by index, ``first`` to ``last``, in the press or a seam."""
+    """A task: interfaces by index, ``first`` to ``last``, to join in the press or by a seam."""
 
     first: int
     last: int
@@ -55,16 +55,15 @@ class _Task(NamedTuple):
 
 
 def is_only_pressed(laminate: Laminate) -> bool:
-    """Return True for films that are joined in the press alone, and not folded."""
+    """Return True for films that are only joined in the press, and not folded."""
     return not laminate.seams and not laminate.folds
 
 
 def joinings(laminate: Laminate) -> tuple[Joining, ...]:
     """Return all acts of joining, in order.
 
-    Presses come before seams, seams as they are listed, unless ``bonds`` say otherwise, or one of
-    them is only possible earlier. Raises DesignError, which names the conflict, where there is no
-    order.
+    Presses come before seams, and seams in the listed order, unless ``bonds`` say otherwise or one
+    of them is only possible earlier. Raises DesignError with the conflict if there is no order.
     """
     return stored(laminate, "_joinings", _joinings)
 
@@ -92,7 +91,9 @@ def _ordered(
     done: Sequence[_Task],
     failed: set[frozenset[_Task]],
 ) -> list[_Task] | None:
-    """Return the first order without a conflict, or None; ``failed`` are sets that lead nowhere."""
+    """Return the first order without a conflict, or None; ``failed`` are sets that are dead
+    ends.
+    """
     if not waiting:
         return []
     key = frozenset(done)
@@ -109,7 +110,7 @@ def _ordered(
 
 
 def _first_conflict(laminate: Laminate, tasks: Sequence[_Task]) -> str:
-    """Return the conflict that is met when all is made as it is listed."""
+    """Return the conflict in the listed order."""
     waiting, done = [*tasks], [*tasks[:0]]
     while True:
         conflicts = [_conflict(laminate, task, waiting, done) for task in waiting]
@@ -119,7 +120,7 @@ def _first_conflict(laminate: Laminate, tasks: Sequence[_Task]) -> str:
 
 
 def _refuse_strangers(laminate: Laminate) -> None:
-    """Raises DesignError for neighbours that nothing joins, though their faces meet."""
+    """Raises DesignError for neighbours that nothing joins, although their faces meet."""
     folded = {(fold.lower, fold.upper) for fold in laminate.folds}
     for gap in laminate.interfaces if laminate.bonds else ():
         pair = gap.below.index, gap.above.index
@@ -162,13 +163,15 @@ def _seams(laminate: Laminate) -> Iterator[_Task]:
 
 
 def _bond(laminate: Laminate, task: _Task) -> FaceBond | None:
-    """What ``bonds`` say of a task's faces."""
+    """The entry of ``bonds`` for a task's faces."""
     gap = laminate.interfaces[task.first - 1]
     return laminate.bond_of(gap.below, gap.above, task.process)
 
 
 def _in_hand(laminate: Laminate, task: _Task, done: Sequence[_Task]) -> tuple[int, int]:
-    """The first and last interface of what is in hand in a task, with all joined to it before."""
+    """The first and last interface of the body that a task works on, with everything joined to
+    it.
+    """
     first, last = task.first, task.last
     joined = {index for past in done for index in range(past.first, past.last + 1)}
     while first - 1 in joined:
@@ -181,7 +184,7 @@ def _in_hand(laminate: Laminate, task: _Task, done: Sequence[_Task]) -> tuple[in
 def _conflict(
     laminate: Laminate, task: _Task, waiting: Sequence[_Task], done: Sequence[_Task]
 ) -> _Conflict | None:
-    """Return why a task cannot come now, or None if it can."""
+    """Return why a task is not possible yet, or None if it is."""
     bond = _bond(laminate, task)
     if bond is not None and bond.after is not None:
         others = [other for other in waiting if other is not task]
@@ -210,7 +213,7 @@ def _what(task: _Task) -> str:
 
 
 class _Conflict(NamedTuple):
-    """Why films cannot be joined yet: what would go wrong, where, and what would prevent it."""
+    """Reasons why films cannot be joined yet: the fault, its place, and a remedy."""
 
     subject: str
     harm: str
@@ -219,12 +222,12 @@ class _Conflict(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What goes wrong and where."""
+        """The fault and its place."""
         return f"{self.subject} {self.harm}{self.where}"
 
     @property
     def sentence(self) -> str:
-        """All of it."""
+        """The whole sentence."""
         return f"{self.words}; {self.remedy}"
 
 
@@ -236,7 +239,7 @@ def _pressed_by_mistake(
     laminate: Laminate, task: _Task, gaps: Sequence[Interface]
 ) -> _Conflict | None:
     if laminate.bonds:
-        # Faces that do not bond in the press are safe in it; its temperature is looked at later.
+        # Faces that do not bond in the press are safe in it; its temperature is checked later.
         return None
     for gap in gaps:
         if task.first <= gap.index <= task.last:
@@ -256,9 +259,9 @@ def _pressed_by_mistake(
 
 
 def _open(laminate: Laminate, gap: Interface) -> Region:
-    """Where films touch that are not meant to bond, and no mask keeps them apart.
+    """Contact of films that are not meant to bond, without a mask between them.
 
-    Beside the seams of a chamber films may weld: there they are a flap that holds no pressure.
+    Films may weld outside a chamber's seams: there they are a flap that holds no pressure.
     """
     bare = gap.unbonded - gap.mask if gap.masks else gap.unbonded
     if gap.kind != "chamber":
@@ -266,7 +269,7 @@ def _open(laminate: Laminate, gap: Interface) -> Region:
     places = [centre for chamber in laminate.chambers for centre in chamber.centres]
     places += [port.at for port in laminate.ports]
     pieces = sorted(bare.pieces, key=lambda piece: Region(piece.outers).area)
-    # A flap goes round the pocket; the innermost piece about a place is the one that holds it.
+    # A flap surrounds the pocket; the innermost piece around a place holds it.
     inner = [
         next((piece for piece in pieces if any(o.winding(place) for o in piece.outers)), None)
         for place in places
@@ -308,7 +311,7 @@ def _bonds_by(laminate: Laminate, gap: Interface, seam: Seam) -> bool:
 
 
 def _is_covered(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> _Conflict | None:
-    """Return the conflict of a seam that films which melt cover from above and from below."""
+    """Return the conflict of a seam covered by melting films both from above and from below."""
     below = [gap.below for gap in gaps if gap.index < task.first]
     covers = [_cover(seam, task, gaps), _melting(below, seam)]
     if None in covers:
@@ -323,12 +326,12 @@ def _is_covered(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> _Conflict
 
 
 def _cover(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> Layer | None:
-    """Return the film above a seam that a tool from above would melt first, if any."""
+    """Return the film above a seam that would melt first under a tool from above, if any."""
     return _melting([gap.above for gap in gaps if gap.index > task.first], seam)
 
 
 def _melting(films: Sequence[Layer], seam: Seam) -> Layer | None:
-    """The first film over a seam that melts before what lies under it is warm."""
+    """The first film over a seam that melts before the films under it are warm."""
     return next(
         (
             film
@@ -350,8 +353,8 @@ def _steps(
     before: Sequence[_Conflict | None],
     count: int,
 ) -> Iterator[Joining]:
-    """Yield a task's joining, and the folds that come before it. ``before``: why earlier ones in
-    the list have to wait.
+    """Yield a task's joining, after its folds. ``before``: why earlier ones in the list have to
+    wait.
     """
     first, last = _in_hand(laminate, task, done)
     gaps = laminate.interfaces[first - 1 : last]
@@ -381,7 +384,7 @@ def _layers(laminate: Laminate, task: _Task) -> range:
 def _bodies(
     laminate: Laminate, layers: Sequence[int], done: Sequence[_Task], folded: Sequence[Fold]
 ) -> Iterator[tuple[int, ...]]:
-    """Yield what was joined before and single layers, lowest first."""
+    """Yield earlier joined bodies and single layers, lowest first."""
     joined = {index for past in done for index in range(past.first, past.last + 1)}
     inside = {
         index
@@ -418,7 +421,7 @@ def _reason(laminate: Laminate, task: _Task, before: Sequence[_Conflict | None])
 
 
 def _later(laminate: Laminate, task: _Task) -> str | None:
-    """Return why a task could not come when all else is joined, or None if it could."""
+    """Return why a task is not possible after all others, or None if it is."""
     gaps = laminate.interfaces
     if len(gaps) == task.last - task.first + 1:
         return None

@@ -1,7 +1,7 @@
-"""Joints of a laminate beside pressed bonds: seams of a moving tool, folds, and the nets of ports.
+"""Joints of a laminate other than pressed bonds: seams of a moving tool, folds, and nets of ports.
 
-Lengths are mm, in the frame of the laminate as it lies when it is finished. Layers are named by
-their index, counted from 1 at the bottom.
+Lengths are mm, in the frame of the finished laminate. Layers are named by their index, counted from
+1 at the bottom.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ SeamTool = Literal["laser", "hot-tip", "ultrasonic", "roller"]
 SeamKind = Literal["lap", "fin"]
 """A lap seam bonds films that lie flat on each other; a fin seam bonds edges that stand out."""
 BondProcess = Literal["press", "laser", "hot-tip", "ultrasonic", "roller"]
-"""What bonds two faces: the heat press, or the tool of a seam."""
+"""The process that bonds two faces: the heat press, or the tool of a seam."""
 PRESS: BondProcess = "press"
 
 
 @dataclass(frozen=True)
 class FaceBond:
-    """Two face materials that bond to each other, in either order, and what bonds them.
+    """Two face materials that bond to each other, in either order, and the process.
 
-    ``temperature_c`` is that at which they bond, C, None if nobody stated it; ``after`` names the
-    bond that must be made before.
+    ``temperature_c`` is the bonding temperature, C, None if not stated; ``after`` names the bond
+    that must be made first.
     """
 
     name: str
@@ -40,7 +40,7 @@ class FaceBond:
     after: str | None = None
 
     def joins(self, a: str, b: str) -> bool:
-        """Return True for these two faces."""
+        """Return True if these are the two faces."""
         return {a, b} == set(self.faces)
 
 
@@ -49,10 +49,10 @@ PortKind = Literal["place", "hole"]
 
 @dataclass(frozen=True)
 class Seam:
-    """A bond that a tool makes along a path, between the structural layers ``below`` and ``above``.
+    """A bond made by a tool along a path, between the structural layers ``below`` and ``above``.
 
     ``path`` holds chains of edges, each open or closed; the bond reaches half of ``width`` to both
-    sides of it. ``order`` counts the seams in the order in which they are made, from 1.
+    sides of it. ``order`` counts the seams in order of making, from 1.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Seam:
 
     @cached_attribute
     def region(self) -> Region:
-        """What the tool covers: half of the width on both sides of the path."""
+        """Region covered by the tool: half of the width on both sides of the path."""
         is_round = self.tool != "roller"
         return union([swept(chain, self.width, is_round) for chain in self.path])
 
@@ -80,8 +80,8 @@ class Seam:
 class Fold:
     """A film folded along a straight line: layers ``lower`` and ``upper`` are halves of one part.
 
-    ``line`` are two points of the fold. Film goes on from one half to the other there, so that
-    nothing leaks through a fold. The part is cut flat: the upper half mirrored about the line.
+    ``line`` are two points of the fold. The film is continuous from one half to the other there, so
+    a fold does not leak. The part is cut flat: the upper half mirrored about the line.
     """
 
     lower: int
@@ -90,7 +90,7 @@ class Fold:
 
 
 class GapJoints(NamedTuple):
-    """What joins two films but masks: seams, the press or not, and folds."""
+    """Joints between two films other than masks: seams, whether they are pressed, and folds."""
 
     seams: tuple[Seam, ...] = ()
     pressed: bool = True
@@ -101,9 +101,9 @@ class GapJoints(NamedTuple):
 class Port:
     """A named place at ``at`` in the gap between the structural layers ``below`` and ``above``.
 
-    Nets are declared between ports: the mouth of an inlet, a pocket, the end of a channel. A
-    "hole" is an opening of the top or bottom film beside that gap; a tube of ``tube_diameter`` mm
-    outside (None: not known) is glued on the film round it.
+    Nets are declared between ports: the mouth of an inlet, a pocket, the end of a channel. A "hole"
+    is an opening of the top or bottom film beside that gap; a tube of ``tube_diameter`` mm outside
+    (None: not known) is glued to the film around it.
     """
 
     name: str
@@ -116,7 +116,7 @@ class Port:
 
 @dataclass(frozen=True)
 class Net:
-    """Ports that are meant to be joined by voids, and to no other port nor to the outside."""
+    """Ports that should be joined by voids, and to no other port or the outside."""
 
     name: str
     ports: tuple[str, ...]
@@ -128,7 +128,7 @@ class Net:
 def chamber_gaps(
     roles: Sequence[str], seams: Collection[tuple[int, int]]
 ) -> dict[tuple[int, int], bool]:
-    """Return the gaps between structural layers, by their layers' indices: True if a chamber.
+    """Return the gaps between structural layers, by their layers' indices: True for a chamber.
 
     A chamber mask makes a chamber, and so do seams without any mask, unless one of the layers is a
     sheet, or a cap lies below or a base above: these end balloons. ``seams`` are pairs of layers.
@@ -149,8 +149,8 @@ def balloon_numbers(
 ) -> list[int | None]:
     """Return the balloon of every layer, counted from 1 at the bottom.
 
-    A film belongs to the chamber above it, or else to the one below. A sheet belongs to none, and
-    neither does a mask beside it.
+    A film belongs to the chamber above it, or else to the one below. A sheet and a mask beside it
+    belong to none.
     """
     numbers: list[int | None] = [None] * len(roles)
     count = 0

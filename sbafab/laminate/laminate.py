@@ -1,7 +1,7 @@
 """The laminate: layers bottom to top, and the interfaces between its TPE layers.
 
-The one model that rules, cut files, press schedule, meshes and pictures read. Lengths are mm,
-the origin lies on the actuator's axis, z points up from the press plate.
+The single model behind rules, cut files, press schedule, meshes and pictures. Lengths are mm, the
+origin lies on the actuator's axis, z points up from the press plate.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ ROLES: tuple[Role, ...] = get_args(Role)
 NOTHING = Region()
 PLAINLY_PRESSED = GapJoints()
 LOOSE = 0.2
-"""Tolerance in mm of place and diameter within which a hole belongs to a pin."""
+"""Tolerance on place and diameter for a hole to belong to a pin, mm."""
 IN_MOUTH = 0.1
-"""mm inward of its mouth at which a channel is looked for."""
+"""Distance inward of its mouth at which a channel is searched, mm."""
 
 
 @dataclass(frozen=True, repr=False)
 class Layer:
     """One film cut to one profile.
 
-    ``index`` counts from 1 at the bottom; ``balloon`` likewise (None for a sheet and its mask);
-    ``z`` is the height of the layer's lower face with every film at its nominal thickness.
+    ``index`` and ``balloon`` count from 1 at the bottom (``balloon`` is None for a sheet and its
+    mask); ``z`` is the height of the layer's lower face with every film at its nominal thickness.
     ``pieces`` is the number of separate parts of its role. ``pattern`` names the shape: equal
     profiles of one material share it. A layer that is ``turned`` lies with its upper face down.
     """
@@ -67,7 +67,7 @@ class Layer:
 
     @property
     def faces(self) -> tuple[str, str]:
-        """What its faces are of as it lies, the upper one first."""
+        """The materials of its faces as laid, the upper one first."""
         plain = self.film.material.lower()
         upper, lower = self.film.faces or (plain, plain)
         return (lower, upper) if self.turned else (upper, lower)
@@ -93,8 +93,8 @@ class Chamber:
     """A chamber: balloons that share one inlet.
 
     ``centres`` holds a point (x, y) in mm inside the pocket of every stack the chamber feeds: one,
-    or several where pockets are joined by a manifold. ``balloons`` are those with pockets of it,
-    counted from 1 at the bottom; all if empty.
+    or several where pockets are joined by a manifold. ``balloons`` are the balloons with its
+    pockets, counted from 1 at the bottom; all if empty.
     """
 
     name: str
@@ -108,7 +108,7 @@ class Chamber:
 
 @dataclass(frozen=True)
 class Inlet:
-    """The mouth of a chamber's inlet strip at the tab's end, where its tube goes in.
+    """The mouth of a chamber's inlet strip at the tab's end, where its tube is inserted.
 
     ``mouth`` is the middle of the tab's end, ``direction`` the unit vector outward, ``length``
     the straight run of the strip inward from the mouth, ``width`` the strip's, ``tube_diameter``
@@ -123,12 +123,14 @@ class Inlet:
     tube_diameter: float
 
     def depth(self, p: Point) -> float:
-        """Return how far a point lies inside the mouth's line, mm."""
+        """Return the distance of a point inside the mouth's line, mm."""
         (x, y), (dx, dy) = self.mouth, self.direction
         return (x - p[0]) * dx + (y - p[1]) * dy
 
     def offset(self, p: Point) -> float:
-        """Return how far a point lies beside the mouth's middle, mm, positive to the right."""
+        """Return the lateral distance of a point from the mouth's middle, mm, positive to the
+        right.
+        """
         (x, y), (dx, dy) = self.mouth, self.direction
         return (p[0] - x) * dy - (p[1] - y) * dx
 
@@ -137,8 +139,8 @@ class Inlet:
 class Pin:
     """A dowel pin of the press fixture; it holds every layer with an opening at its place.
 
-    ``centre`` (x, y) and ``diameter`` are mm, like ``clearance``, by how much the layers' hole for
-    it is wider than the pin.
+    ``centre`` (x, y) and ``diameter`` are mm, like ``clearance``, the excess diameter of the
+    layers' hole over the pin.
     """
 
     name: str
@@ -156,14 +158,14 @@ class Pin:
 class Laminate:
     """A stack of layers, bottom to top, with its chambers, inlets and pins.
 
-    ``outline`` is the union of the films of all balloons, without inlet tabs and ears; empty where
+    ``outline`` is the union of the films of all balloons, without inlet tabs and ears; empty if
     only the layers are known. ``pins_in_full_bonds``: the pins of ears stay in while TPE melts.
     ``middle_first``: all layers between base and cap are tacked on the pins before any other bond.
-    ``tube``: outer diameter in mm of the tube that its sheet is wrapped round, if any; ``lumen``
-    that of the channel through all layers, mm. ``seams`` are bonds of a moving tool, ``folds`` join
-    halves of one film, and ``nets`` say which ``ports`` are meant to be joined. ``bonds`` say which
-    faces bond, and by what; without any all structural faces bond in the press, but where seams
-    bond them.
+    ``tube``: outer diameter in mm of the tube that its sheet is wrapped round, if any; ``lumen`` is
+    the diameter of the channel through all layers, mm. ``seams`` are bonds of a moving tool,
+    ``folds`` join halves of one film, and ``nets`` say which ``ports`` are meant to be joined.
+    ``bonds`` say which faces bond, and by what; without any, all structural faces bond in the press
+    except those bonded by seams.
     """
 
     name: str
@@ -222,20 +224,20 @@ class Laminate:
         return GapJoints(self.seams_between(below, above), self.presses(below, above), folds)
 
     def seams_between(self, below: Layer, above: Layer) -> tuple[Seam, ...]:
-        """The seams that bond two structural layers, in the order in which they are made."""
+        """The seams that bond two structural layers, in order of making."""
         pair = below.index, above.index
         seams = (seam for seam in self.seams if (seam.below, seam.above) == pair)
         return tuple(sorted(seams, key=lambda seam: seam.order))
 
     def bond_of(self, below: Layer, above: Layer, by: str) -> FaceBond | None:
-        """Return what ``bonds`` say of the faces of two layers and a process, if anything."""
+        """Return the entry of ``bonds`` for the faces of two layers and a process, if any."""
         faces = below.faces[0], above.faces[1]
         return next((b for b in self.bonds if b.by == by and b.joins(*faces)), None)
 
     def presses(self, below: Layer, above: Layer) -> bool:
         """Return True if the facing faces of two structural layers bond in the press.
 
-        Where ``bonds`` say nothing, all do, but faces that seams bond.
+        Without an entry in ``bonds`` all do, except faces bonded by seams.
         """
         if self.bonds:
             return self.bond_of(below, above, PRESS) is not None
@@ -243,7 +245,7 @@ class Laminate:
 
     @property
     def tube_holes(self) -> tuple[Port, ...]:
-        """Ports that are holes of an outer film, on each of which a tube is glued."""
+        """Ports that are holes of an outer film, each with a tube glued on."""
         return tuple(port for port in self.ports if port.kind == "hole")
 
     @property
@@ -259,7 +261,7 @@ class Laminate:
 
     @property
     def glued_films(self) -> tuple[Film, ...]:
-        """The structural films that tubes are glued to: at mouths, and round holes."""
+        """The structural films that tubes are glued to: at mouths, and around holes."""
         outer = self.tpe_layers[0], self.tpe_layers[-1]
         layers = [
             layer
@@ -279,12 +281,12 @@ class Laminate:
 
     @property
     def bonded_materials(self) -> str:
-        """The materials of the films that bond, in words."""
+        """The materials of the bonding films, as text."""
         return ", ".join(in_order(layer.film.material for layer in self.tpe_layers))
 
     @cached_attribute
     def patterns(self) -> dict[str, tuple[Layer, ...]]:
-        """The layers of every distinct pattern, in stacking order."""
+        """One layer of every distinct pattern, in stacking order."""
         groups: dict[str, list[Layer]] = {}
         for layer in self.layers:
             groups.setdefault(layer.pattern, []).append(layer)
@@ -310,8 +312,8 @@ class Laminate:
     def as_cut(self, layer: Layer) -> Region:
         """Return the region in a layer's cut file.
 
-        Layers of a folded film are cut as one flat part, that of the lowest of them. All films are
-        cut upper face up, so that what is turned as it is laid is drawn turned over.
+        Layers of a folded film are cut as one flat part, in the file of the lowest of them. All
+        films are cut upper face up, so a layer laid turned over is drawn turned over.
         """
         flat, lowest = layer.profile, layer
         if self.folds:
@@ -353,7 +355,7 @@ class Laminate:
 
 
 InterfaceKind = Literal["chamber", "separator", "bond"]
-"""``bond`` is an interface that is pressed without a mask: the films bond all over."""
+"""``bond`` means pressed without a mask: the films bond all over."""
 
 
 @dataclass(frozen=True)
@@ -361,8 +363,8 @@ class Interface:
     """Two TPE layers, below and above, and the masks between them.
 
     contact: where both layers are; bond: contact without mask; unbonded: contact under mask.
-    ``seams`` bond within their regions alone; an interface that is not ``pressed`` bonds in them
-    and nowhere else. At ``folds`` one film goes on from below to above.
+    ``seams`` bond only within their regions; an interface that is not ``pressed`` bonds only in
+    them. At ``folds`` one film continues from below to above.
     """
 
     index: int
@@ -397,25 +399,25 @@ class Interface:
 
     @property
     def fold_lines(self) -> tuple[tuple[Point, Point], ...]:
-        """Lines on which one film goes on from below to above."""
+        """Lines at which one film continues from below to above."""
         return tuple(fold.line for fold in self.folds)
 
     @cached_attribute
     def whole_bond(self) -> Region:
-        """The bond, and that of the unfolded film beyond each fold, where it has no edge."""
+        """The bond, and the bond of the unfolded film beyond each fold, where it has no edge."""
         beyond = [unfolded(self.bond, [line]) for line in self.fold_lines]
         return union([self.bond, *beyond]) if beyond else self.bond
 
     @property
     def masked(self) -> Region:
-        """Contact that the press would weld, were it not for the masks."""
+        """Contact that the press would weld if there were no masks."""
         return (
             (self.contact & self.mask if self.seams else self.unbonded) if self.pressed else NOTHING
         )
 
     @property
     def gap(self) -> float:
-        """Height in mm between the two layers: the thickness of the masks, or as they are laid."""
+        """Height in mm between the two layers: the thickness of the masks, or their laid height."""
         if not self.masks:
             return round(self.above.z - self.z, 9)
         return sum(mask.film.thickness for mask in self.masks)
@@ -431,7 +433,7 @@ class Interface:
 
     @cached_attribute
     def pattern(self) -> tuple[str, ...]:
-        """Equal for interfaces made of equal profiles and bonded by equal seams."""
+        """Equal for interfaces of equal profiles, bonded by equal seams."""
         return (
             self.below.pattern,
             *(mask.pattern for mask in self.masks),
@@ -454,7 +456,7 @@ def interface_regions(
 def joined_regions(
     regions: tuple[Region, Region, Region, Region], joints: GapJoints
 ) -> tuple[Region, Region, Region, Region]:
-    """The regions of an interface, bonded by seams alone if it is not pressed.
+    """The regions of an interface; bonded only by seams if it is not pressed.
 
     No seam bonds through a mask.
     """
@@ -471,17 +473,17 @@ def joined_regions(
 
 
 def outline_diameter(laminate: Laminate) -> float:
-    """Return the diameter of the circle round the axis that holds all films without tabs and ears.
+    """Return the diameter of the circle round the axis around all films without tabs and ears.
 
-    The paper's 3-DoF actuator fits 15 (Sec. 2). Measured on each film's part within the laminate's
-    outline.
+    The paper's 3-DoF actuator fits 15 (Sec. 2). It is measured on each film's part within the
+    laminate's outline.
     """
     films = {layer.pattern: layer.profile for layer in laminate.tpe_layers}
     return _round_axis(Region(film.outers) & laminate.outline for film in films.values())
 
 
 def overall_diameter(laminate: Laminate) -> float:
-    """Diameter of the circle round the axis that holds every layer, with tabs, tails and ears."""
+    """Diameter of the circle around the axis that holds every layer, with tabs, tails and ears."""
     return _round_axis(layers[0].profile for layers in laminate.patterns.values())
 
 
@@ -493,9 +495,9 @@ def beyond_the_outline(laminate: Laminate) -> str:
 
 
 def film_mass(laminate: Laminate) -> float:
-    """Mass in g of all films, tabs and ears included; without tubing, glue and fluid.
+    """Mass in g of all films, including tabs and ears; without tubing, glue and fluid.
 
-    Raises DesignError where the density of a film is not known.
+    Raises DesignError if the density of a film is unknown.
     """
     return sum(
         layer.profile.area * layer.film.thickness * density_of(layer.film) * 1e-6
@@ -532,7 +534,7 @@ def layer_html(layer: Layer) -> str:
 
 
 def _numbers(layers: Sequence[Layer]) -> str:
-    """Layer indices, many of them as first, second ... last."""
+    """Layer indices as text; many of them as first, second ... last."""
     indices = [str(layer.index) for layer in layers]
     return ", ".join(indices if len(indices) < 6 else [*indices[:2], "...", indices[-1]])
 

@@ -1,4 +1,4 @@
-"""Netlists: what is meant to be joined, by name, compared with what the voids of a laminate join.
+"""Netlists: the intended connections, by name, compared with the connections by a laminate's voids.
 
 Read from JSON: this program's own form (``sbafab/nets@1``), or the connections of a ParchMint file
 (3DuF's and the benchmarks' exchange format).
@@ -18,11 +18,11 @@ from sbafab.laminate.joints import Port, PortKind
 
 SCHEMA = "sbafab/nets@1"
 OTHER_LETTERS = re.compile("[^A-Za-z0-9._-]+")
-"""What no name of a port may have."""
+"""Characters not allowed in the name of a port."""
 VIA = "VIA"
-"""Component that joins the layers it lies on."""
+"""Component that joins its layers."""
 NO_MASK = "INTEGRATION"
-"""Type of layers that hold electrodes and the like, and no channels."""
+"""Type of layers without channels, such as electrodes."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class Netlist:
 
 @dataclass(frozen=True)
 class NetlistComparison:
-    """Nets that match, nets that are open, pairs of nets that are joined, names that are missing.
+    """Nets that match, nets that are open, pairs of nets that are shorted, names that are missing.
 
-    A net of which a name is missing is neither open nor matched.
+    A net with a missing name is neither open nor matched.
     """
 
     matched: tuple[str, ...]
@@ -54,9 +54,9 @@ class NetlistComparison:
 def compare(
     groups: Iterable[frozenset[str]], nets: Mapping[str, Sequence[str]]
 ) -> NetlistComparison:
-    """Compare nets with the ports that are joined; every port of a laminate is in a group.
+    """Compare nets with groups of joined ports; every port of a laminate is in a group.
 
-    Ports that no net names count as a net of their own, by their name. A port that lies in two
+    Ports not named by any net count as a net of one port, by its name. A port that lies in two
     groups, as the inlet and the pocket of a chamber may, makes its net open.
     """
     parts = [*groups]
@@ -93,7 +93,7 @@ def compare(
 
 
 def read_netlist(path: Path) -> Netlist:
-    """Return the netlist of a JSON file. Raises DesignError, which names file and place."""
+    """Return the netlist of a JSON file. Raises DesignError with file and place."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
@@ -142,7 +142,7 @@ def _netlist(path: Path, document: dict[str, Any]) -> Netlist:
 
 
 def _member(place: str, row: Any) -> tuple[str, Port | None]:
-    """Return the name of a row, and its port where it states a place."""
+    """Return the name of a row, and its port if it states a place."""
     if isinstance(row, str):
         return row, None
     if not isinstance(row, dict) or not isinstance(row.get("name"), str):
@@ -170,10 +170,10 @@ def _is_pair(values: Any, *kinds: type) -> bool:
 def parchmint_nets(document: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     """Return the nets of a ParchMint document, as ``sbafab import`` names them.
 
-    A component is a port by its id on every layer, with the layer's name where it is on several.
-    Connections join the components at their ends, on their layer; a VIA joins its layers. What lies
-    on no such layer is not joined there. A component without a size, such as a NODE where channels
-    meet, joins them and is no port itself.
+    A component is a port by its id on every layer, with the layer's name if it is on several.
+    Connections join the components at their ends, on their layer; a VIA joins its layers.
+    Components on no such layer are not joined there. A component without a size, such as a NODE
+    where channels meet, joins them and is not a port itself.
     """
     labels = dict(parchmint_labels(document))
     titles, components = _titles(document), document.get("components", ())
@@ -195,7 +195,7 @@ def parchmint_nets(document: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 
 
 def parchmint_labels(document: Mapping[str, Any]) -> dict[Spot, str]:
-    """Return the name of the port that every component with a size is on each of its layers."""
+    """Return the port name of every component with a size, on each of its layers."""
     titles = _titles(document)
     labels: dict[Spot, str] = {}
     for row in document.get("components", ()):
