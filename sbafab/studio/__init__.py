@@ -1,5 +1,5 @@
-"""The studio: a page in the browser, served on this machine, that edits a design and shows it.
+"""The studio: a page in the browser, served on this machine, that edits and shows a design.
 
-``app.py`` starts it and has the routes and the guard, ``workers.py`` runs ``jobs.py`` in processes
-of their own; ``static/`` is the page.
+``app.py`` starts it and has the routes and the guard, ``workers.py`` runs ``jobs.py`` in separate
+processes; ``static/`` is the page.
 """

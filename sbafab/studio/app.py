@@ -1,9 +1,9 @@
 """The studio's web server: guard, routes, links with designs, and its start.
 
-It listens on this machine only; at another address of it, where one is asked for, it answers a
-phone the record page alone. A page of another site cannot read its answers: Host must be this
-machine by number or name (so a name that is rebound to it is refused), Origin must be its own, and
-all that knows of designs takes the token of the link in a header, which no form or image can send.
+It listens on this machine only; at another address of it, if requested, it serves only the record
+page to a phone. A page of another site cannot read its answers: Host must be this machine by number
+or name (so a rebound name is refused), Origin must be its own, and every route on designs needs the
+link's token in a header, which no form or image can send.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ MADE_POLICY = (
     "data:; sandbox allow-scripts allow-modals; frame-ancestors 'self'; base-uri 'none'; "
     "form-action 'none'"
 )
-"""For pages that a run wrote: alone in a box, with no way to the studio or to any host."""
+"""For pages written by a run: sandboxed, without access to the studio or any host."""
 
 
 class Guard:
@@ -113,7 +113,7 @@ MOST = 1_000_000
 
 
 def design_in(link: str) -> str:
-    """The design's text in a link. Raises DesignError where there is none."""
+    """The design's text in a link. Raises DesignError if there is none."""
     packed = parse_qs(link.partition("#")[2]).get("design", [""])[0]
     try:
         raw = base64.b64decode(packed + "=" * (-len(packed) % 4), b"-_", validate=True)
@@ -141,9 +141,9 @@ def packed(text: str) -> str:
 STATIC = Path(__file__).parent / "static"
 LIVE_SECONDS, MAKE_SECONDS = 60.0, 900.0
 LOOK_EVERY = 0.4
-"""Seconds between two looks at the file on disk."""
+"""Polling interval for the file on disk, s."""
 MOST_MADE = 6
-"""Folders of runs that are kept; the oldest goes first."""
+"""Number of run folders kept; the oldest is deleted first."""
 
 
 @dataclass
@@ -154,15 +154,15 @@ class Studio:
     token: str
     opened: str | None = None
     text: str | None = None
-    """A design from a link, in place of a file."""
+    """A design from a link instead of a file."""
     template: str | None = None
     address: str = HERE[0]
-    """Where it listens; at another address than this a phone is answered the record page alone."""
+    """Address to listen on; at another than this a phone gets only the record page."""
     live: WorkerPool = field(default_factory=lambda: WorkerPool(LIVE_SECONDS, _processes()))
     mover: WorkerPool = field(
         default_factory=lambda: WorkerPool(LIVE_SECONDS, _processes(), warm=False)
     )
-    # A run that is given up ends at its next step, where it tidies up.
+    # A cancelled run ends at its next step, where it cleans up.
     maker: WorkerPool = field(
         default_factory=lambda: WorkerPool(MAKE_SECONDS, _processes(), False, MAKE_SECONDS)
     )
@@ -182,7 +182,7 @@ class Studio:
 
 
 def _processes() -> int:
-    """Processes of a pool; two at least, so that a slow design of one tab never holds another."""
+    """Processes of a pool; at least two, so that a slow design in one tab never blocks another."""
     return max(2, processors())
 
 
@@ -216,7 +216,7 @@ def app(studio: Studio) -> Starlette:
 
 
 def record_routes() -> list[Route]:
-    """Routes of the record page, all that a phone is answered."""
+    """Routes of the record page, the only ones for a phone."""
     return [
         Route("/record", record_page),
         Route("/api/record", record_choices),
@@ -264,7 +264,7 @@ async def save(request: Request) -> Response:
 
 
 async def watch(request: Request) -> Response:
-    """A line whenever the file's content changes, until the page goes away."""
+    """Sends a line whenever the file's content changes, until the page disconnects."""
     path = places.design_file(_studio(request).folder, request.path_params["name"])
 
     async def changes() -> AsyncIterator[bytes]:
@@ -367,7 +367,7 @@ async def _answered(request: Request, pool: WorkerPool, do: str) -> Response:
 
 
 class _Lines(StreamingResponse):
-    """A job's answers, each as a line of JSON; the job is given up where the reader goes away."""
+    """A job's answers, each as a line of JSON; the job is cancelled if the reader disconnects."""
 
     media_type = "application/x-ndjson"
 
@@ -384,7 +384,7 @@ class _Lines(StreamingResponse):
         try:
             await super().__call__(scope, receive, send)
         finally:
-            # Also where the reader was gone before the first line was asked for.
+            # Also if the reader left before the first line was requested.
             if self.pool is not None and self.job is not None:
                 self.pool.forget(self.job)
 
@@ -398,11 +398,11 @@ async def _request_table(request: Request) -> dict[str, Any]:
 
 ADDRESS = "127.0.0.1"
 PORT = 8417
-"""Tried first, so that a link that was kept finds the studio again."""
+"""Tried first, so that a saved link finds the studio again."""
 
 
 class StudioStart(NamedTuple):
-    """The folder that the studio is for, and the design that it opens with, if one was named."""
+    """The studio's folder, and its initial design, if one was named."""
 
     folder: Path
     file: str | None = None
@@ -437,10 +437,10 @@ def opened(source: str | None) -> StudioStart:
 
 
 def listening(port: int | None, address: str = ADDRESS) -> socket.socket:
-    """A socket at an address of this machine, at the port or, if none is asked for, a free one."""
+    """A socket at an address of this machine, at the given port or, by default, a free one."""
     for number in (PORT, 0) if port is None else (port,):
-        # Only of a socket whose protocol is named does asyncio send small answers at once; others
-        # wait 40 ms for the browser to acknowledge what came before.
+        # asyncio sends small answers at once only for sockets with a named protocol; others wait 40
+        # ms for the browser to acknowledge the previous data.
         sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -467,7 +467,7 @@ def serve(
 ) -> None:
     """Serves the studio until Ctrl-C; ``announce`` gets the link.
 
-    At another ``address`` of this machine it serves the record page alone. Raises DesignError,
+    At another ``address`` of this machine it serves only the record page. Raises DesignError,
     OutputError, and Stopped at the end.
     """
     try:
@@ -491,7 +491,7 @@ def serve(
         timeout_graceful_shutdown=1,
     )
     try:
-        # It ends in order at a signal and then raises it once more.
+        # It ends in order at a signal and then raises it again.
         uvicorn.Server(config).run(sockets=[sock])
     except KeyboardInterrupt as stop:
         raise Stopped("the studio has stopped", *stop.args) from None

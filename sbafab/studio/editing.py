@@ -1,4 +1,4 @@
-"""Keys of a design's text changed one by one, with comments and order kept."""
+"""Change keys of a design's text one by one; comments and order are kept."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from tomlkit.exceptions import TOMLKitError
 from sbafab.errors import DesignError
 
 Edit = tuple[str, str | None]
-"""A dotted key and its value as TOML writes it; None takes the key out.
+"""A dotted key and its value as TOML writes it; None removes the key.
 
-A whole number in a key counts the rows of a list, from 0: ``layers.2.shape``.
+An integer in a key is the index of a list's row, from 0: ``layers.2.shape``.
 """
 MOST_EDITS = 200
 
 
 def edited(text: str, edits: Iterable[Edit]) -> str:
-    """The text with every key changed. Raises DesignError where text or value is no TOML."""
+    """The text with every key changed. Raises DesignError if text or value is not TOML."""
     try:
         document = tomlkit.parse(text)
     except (TOMLKitError, ValueError, RecursionError) as error:
@@ -37,7 +37,7 @@ def edited(text: str, edits: Iterable[Edit]) -> str:
         before = tomlkit.dumps(document)
         _put(document, parts, _value(key, value))
         if not _holds(document, parts):
-            # A table of dotted keys takes no header within it; it takes another dotted key.
+            # A table of dotted keys cannot contain a header; it gets another dotted key.
             document = tomlkit.parse(before)
             _put(document, parts, _value(key, value), dotted=True)
             if not _holds(document, parts):
@@ -53,7 +53,7 @@ def _has_table(table: Any, parts: list[str]) -> bool:
 
 
 def _inner(table: Any, part: str) -> Any:
-    """Return what a table has under a name, or a list at a number; None where it has nothing."""
+    """Return a table's value by name, or a list's by index; None if there is none."""
     if isinstance(table, MutableMapping):
         return table.get(part)
     is_row = isinstance(table, MutableSequence) and part.isdecimal() and int(part) < len(table)

@@ -1,4 +1,4 @@
-"""The form of each family from the JSON schema, and the requests of the page."""
+"""The form of each family, from the JSON schema, and the requests of the page."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from sbafab.errors import SbafabError
 from sbafab.studio import places
 
 PLACING = ("on", "at", "angle", "turn", "along", "offset", "glue", "note")
-"""Keys of a part that say where it sits; its form ends with them."""
+"""Keys of a part's position; its form ends with them."""
 JsonSchema = Mapping[str, Any]
 Field = dict[str, Any]
-# key: least, most, step of the slider that spares typing; what it cannot reach is typed.
+# key: least, most, step of its slider; values beyond it are typed.
 SLIDERS: dict[str, tuple[float, float, float]] = {
     "stack.balloons": (1, 24, 1),
     "chamber.diameter": (2, 15, 0.1),
@@ -56,7 +56,7 @@ def families(schema: JsonSchema) -> dict[str, list[Field]]:
 
 
 def cards(schema: JsonSchema) -> dict[str, dict[str, str]]:
-    """The words and the drawing by which each family is chosen, as its record gives them."""
+    """The words and the drawing for choosing each family, from its record."""
     return {
         name: {
             "title": table["title"] if "symbol" in table else name,
@@ -77,7 +77,7 @@ def _family_tables(schema: JsonSchema) -> Iterator[tuple[str, JsonSchema]]:
 
 
 def summaries() -> dict[str, str]:
-    """The templates, each with the sentence that its file begins with."""
+    """The templates, each with the first sentence of its file."""
     return {name: _first_comment(api.template(name)) for name in api.templates()}
 
 
@@ -87,7 +87,7 @@ def _first_comment(text: str) -> str:
 
 
 def assembly(schema: JsonSchema) -> dict[str, Any]:
-    """The fields of an assembly, and by kind those of a part, whose keys start at its table."""
+    """The fields of an assembly, and of a part by kind, whose keys start at its table."""
     table = _named("Assembly", schema)
     assembly_fields = sorted(_fields(table, schema, ""), key=_rank)
     (parts,) = table["properties"]["parts"]["patternProperties"].values()
@@ -105,7 +105,7 @@ def assembly(schema: JsonSchema) -> dict[str, Any]:
 
 
 def keys(schema: JsonSchema) -> set[str]:
-    """Every dotted key of any family, and those of an assembly itself."""
+    """Every dotted key of any family, and of an assembly itself."""
     fields = [field for group in families(schema).values() for field in group]
     return {field["key"] for field in [*fields, *assembly(schema)["fields"]]}
 
@@ -176,13 +176,13 @@ def _unit(key: str) -> str:
 
 
 def _single(rule: JsonSchema) -> str | None:
-    """The reference of a key that is one table, whatever stands beside it."""
+    """The reference of a key that is a single table, whatever else is allowed."""
     ways = rule.get("allOf") or []
     return ways[0].get("$ref") if len(ways) == 1 else None
 
 
 def _optional(rule: JsonSchema) -> str | None:
-    """The reference of a table that may be left out whole."""
+    """The reference of a table that may be omitted as a whole."""
     ways = [way for way in rule.get("anyOf") or [] if way.get("type") != "null"]
     return ways[0].get("$ref") if len(ways) == 1 else None
 
@@ -222,7 +222,7 @@ def started(
 
 
 def table(body: bytes) -> dict[str, Any]:
-    """The table that a request holds. Raises SbafabError where it is none."""
+    """The table of a request. Raises SbafabError if there is none."""
     try:
         parsed = json.loads(body)
     except (ValueError, RecursionError):
@@ -233,7 +233,7 @@ def table(body: bytes) -> dict[str, Any]:
 
 
 def job(folder: Path, request: dict[str, Any]) -> dict[str, Any]:
-    """Return the job of a request: design text, edits, and places that the page cannot choose.
+    """Return the job of a request: design text, edits, and paths that the page cannot choose.
 
     Raises SbafabError.
     """

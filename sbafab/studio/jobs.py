@@ -1,7 +1,7 @@
 """The jobs of the page: each yields its answers.
 
-A job is a table with ``do`` and the text of a design; ``pause`` raises where the answer is no
-longer needed. Files are looked for in ``folder`` alone.
+A job is a table with ``do`` and the text of a design; ``pause`` raises if the answer is no longer
+needed. Files are only searched in ``folder``.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ StudioJob = dict[str, Any]
 Answer = dict[str, Any]
 _FILLINGS: dict[str, Filling] = {}
 MOST_FILLINGS = 8
-"""Tabs whose actuators fill at the same time."""
+"""Number of tabs whose actuators can inflate at the same time."""
 
 
 def live(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
-    """Text after the edits and design, then what is seen, in the order in which it is known.
+    """The edited text and design, then the displayed results, in the order in which they are known.
 
     Laminate and prediction come before the rules; the yield is the last of those.
     """
@@ -80,7 +80,7 @@ def live(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
             "findings": [finding_model(finding) for finding in findings],
         }
         pause()
-    # After the rules, which a person waits for.
+    # After the rules, which the user waits for.
     yield nets_model(laminate, api.nets_of(design), has)
     yield {"kind": "checked"}
 
@@ -97,7 +97,7 @@ def _assembly(source: _Source, job: StudioJob, pause: CancelCheck) -> Iterator[A
     assembled = _assembled(source)
     yield parts_model(assembled, frozenset(job.get("has", ())))
     pause()
-    # What the whole does takes seconds, and is asked for when the hand rests.
+    # The checks of the whole take seconds, and run when the user pauses.
     yield {"kind": "prediction", "quick": True, "figures": [], "left_out": []}
     checked = api.check(assembly, progress=lambda *_: pause())
     findings = [finding_model(finding) for finding in checked]
@@ -106,7 +106,7 @@ def _assembly(source: _Source, job: StudioJob, pause: CancelCheck) -> Iterator[A
 
 
 def _prediction(design: Design, laminate: Laminate) -> Answer:
-    """Figures by closed formulas; why there are none, where that is so."""
+    """Figures by closed formulas; the reason if there are none."""
     try:
         prediction = api.predict(design, quick=True, laminate=laminate)
     except SbafabError as error:
@@ -115,7 +115,7 @@ def _prediction(design: Design, laminate: Laminate) -> Answer:
 
 
 def elastic(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
-    """All figures, with those of the elastic stack, which take seconds."""
+    """All figures, including the elastic stack's, which take seconds."""
     source = _source(_text(job), job)
     design = _read(source)
     pause()
@@ -147,10 +147,10 @@ def generate(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
 
 
 def motion(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
-    """The actuator as fast stack, and its poses as its pressures grow together.
+    """The actuator as a fast stack, and its poses as its pressures rise together.
 
-    The pose asks for ``pressures``, or has none for the data that the page needs beforehand; of an
-    assembly for ``parts``, the pressures of each.
+    The pose is at ``pressures``, absent for the data that the page needs beforehand; for an
+    assembly at the pressures of each of its ``parts``.
     """
     source, pose = _source(_text(job), job), job.get("pose", {})
     design = _read(source)
@@ -176,7 +176,7 @@ def motion(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
 
 
 def _text(job: StudioJob) -> str:
-    """The design's text with the edits made. Raises DesignError."""
+    """The edited text of the design. Raises DesignError."""
     edits = job.get("edits", ())
     if len(edits) > MOST_EDITS:
         raise DesignError(f"{len(edits)} keys are changed at once; change at most {MOST_EDITS}")
@@ -222,15 +222,15 @@ JOBS: dict[str, Callable[[StudioJob, CancelCheck], Iterator[Answer]]] = {
 
 # The answers of a job, run by a worker process.
 #
-# Errors are answers too: bad input in the command line's words, anything else as a defect.
+# Errors are answers too: bad input with the command line's message, anything else as a defect.
 
 
 class SupersededError(Exception):
-    """Nobody waits for this answer any more."""
+    """Nothing waits for this answer any more."""
 
 
 def answers(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
-    """Yield the job's answers; where it fails, the last one says why."""
+    """Yield the job's answers; if it fails, the last one gives the reason."""
     try:
         for answer in JOBS[job["do"]](job, pause):
             yield answer
@@ -247,7 +247,7 @@ def answers(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
 
 
 def refusal(sentence: str) -> Answer:
-    """The answer that refuses, with the key of a design file that the sentence names first."""
+    """The refusing answer, with the first key of a design file named in its sentence."""
     words = (word.strip(",;:()[]'\"") for word in sentence.split())
     field = next((word for word in words if _is_key(word)), None)
     return {"kind": "error", "message": sentence, **({"field": field} if field else {})}

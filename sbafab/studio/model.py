@@ -1,7 +1,7 @@
-"""Laminates, findings and assemblies as the page draws them: numbers and words, no pictures.
+"""Laminates, findings and assemblies as data for the page: numbers and text, no pictures.
 
 A contour is a flat list of x, y and bulge (mm; the DXF convention), so arcs stay arcs on screen. A
-shape is sent under its key once, and not again to a page that says it has it.
+shape is sent once under its key, and not again to a page that already has it.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from sbafab.rules.finding import Finding
 
 CancelCheck = Callable[[], None]
-"""Called between steps of work; raises where the answer is no longer needed."""
+"""Called between steps of work; raises if the answer is not needed any longer."""
 
 
 @dataclass
 class AnswerShapes:
-    """The shapes of one answer; those the page ``has`` are named only."""
+    """The shapes of one answer; shapes that the page ``has`` are only named."""
 
     has: Collection[str]
     new: dict[str, list[list[float]]] = field(default_factory=dict)
@@ -45,13 +45,15 @@ class AnswerShapes:
 
 
 def flat(vertices: Iterable[tuple[float, float, float]]) -> list[float]:
-    """A contour as the page reads it; its bulges so exact that arcs may go back into a design."""
+    """A contour as the page reads it; its bulges are exact enough to write arcs back to a
+    design.
+    """
     rounded = ((round(x, 6), round(y, 6), round(bulge, 12)) for x, y, bulge in vertices)
     return [number for vertex in rounded for number in vertex]
 
 
 def laminate_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:
-    """Layers, patterns and what lies at which place; plan, section and solid are drawn from it."""
+    """Layers, patterns and their positions; plan, section and solid are drawn from it."""
     shapes = AnswerShapes(has)
     layers = [_layer(layer) for layer in laminate.layers]
     patterns = {
@@ -103,7 +105,7 @@ def _pattern(laminate: Laminate, layers: tuple[Layer, ...], shapes: AnswerShapes
 
 
 def shapes_model(drawn: Mapping[str, Region | None], has: Collection[str]) -> dict[str, Any]:
-    """The shapes that a design file names, each the key of its region or None."""
+    """The shapes that a design file names, each with the key of its region or None."""
     shapes = AnswerShapes(has)
     named = {name: region and shapes.key(region) for name, region in drawn.items()}
     return {"kind": "shapes", "named": named, "shapes": shapes.new}
@@ -143,7 +145,7 @@ def nets_model(laminate: Laminate, nets: NetMap, has: Collection[str]) -> dict[s
 
 
 def finding_model(finding: Finding) -> dict[str, Any]:
-    """A finding as ``checks.json`` has it; of a part's design without that name in its message."""
+    """A finding as in ``checks.json``; for a part's design, its message omits the design's name."""
     model = {**FindingEntry.of(finding), "by_user": finding.by_user}
     if finding.design:
         message = finding.message.removeprefix(f"{finding.design}: ")
@@ -153,16 +155,16 @@ def finding_model(finding: Finding) -> dict[str, Any]:
 
 # Assemblies: the surface of each part once, and its place.
 #
-# A surface is sent under its key once, in the part's own frame, and not again to a page that says
-# it has it: a part that is moved costs nothing but its place.
+# A surface is sent once under its key, in the part's own frame, and not again to a page that
+# already has it: for a moved part only its place is sent.
 
 
 PLACED_BY = {"on", "at", "angle", "along", "offset", "glue", "note", "design", "set"}
-"""Keys of a part that do not change its own surface; of an actuator its laminate does."""
+"""Keys of a part that do not change its own surface; an actuator's depends on its laminate."""
 
 
 def parts_model(assembled: Assembled, has: Collection[str]) -> dict[str, Any]:
-    """Parts with their places, each after what it is fixed on, and surfaces the page lacks."""
+    """Parts with their places, in order of support, and surfaces that the page lacks."""
     surfaces: dict[str, dict[str, str]] = {}
     parts = []
     for placed in assembled.parts:
@@ -194,7 +196,7 @@ def _part(placed: PlacedPart) -> dict[str, Any]:
 
 
 def _key(placed: PlacedPart) -> str:
-    """Names a surface by all that decides it."""
+    """Names a surface by everything that determines it."""
     decisive: list[Any] = [placed.turn, placed.radius]
     if placed.made is None:
         decisive.append(placed.part.model_dump(mode="json", exclude=PLACED_BY))

@@ -21,15 +21,15 @@ if TYPE_CHECKING:
 CURVE = 25
 """Points of the curves beside the view."""
 LONGEST_STEP = 0.2
-"""Seconds that one step of a motion spans at most."""
+"""Longest time spanned by one step of a motion, s."""
 MOST_STACKS = 6
 _STACKS: dict[str, Stack] = {}
 MOST_LOAD = 0.5
-"""N that a hand may put on the tip."""
+"""Largest force of the user's pull on the tip, N."""
 
 
 def stack_of(design: Design) -> Stack:
-    """The stack of a design, kept for the next pose. Raises DesignError where there is none."""
+    """The stack of a design, cached for the next pose. Raises DesignError if there is none."""
     resolved = {**api.resolved(design), "name": None, "order": None}
     key = json.dumps(resolved, sort_keys=True, default=str)
     if key not in _STACKS:
@@ -64,10 +64,10 @@ def stack_model(name: str, stack: Stack) -> dict[str, Any]:
 
 
 def poses(stack: Stack, request: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The pose asked for; with ``curves``, also those on the way to it, as lists of figures, and
-    whether the balloons' maps hold for it.
+    """The requested pose; with ``curves``, also the poses on the way to it, as lists of figures,
+    and whether the balloons' maps are valid for it.
 
-    Raises DesignError for what is out of the model's range.
+    Raises DesignError beyond the model's range.
     """
     pressures = finite_numbers(request.get("pressures"), stack.chambers, "pressures")
     final = stack.pose(pressures, **_loads(request))
@@ -97,9 +97,9 @@ class Filling:
         self.motion: Motion | None = None
 
     def step(self, stack: Stack, request: dict[str, Any]) -> dict[str, Any]:
-        """The pose ``dt`` s on, with pressures in kPa at the valves. Raises DesignError.
+        """The pose after ``dt`` s, with pressures in kPa at the valves. Raises DesignError.
 
-        It starts anew, vented, with another stack, tube or load, and where ``restart`` is asked.
+        It restarts, vented, with another stack, tube or load, or on ``restart``.
         """
         tube = request["tube"] if isinstance(request.get("tube"), dict) else {}
         pressures = finite_numbers(request.get("pressures"), stack.chambers, "pressures")
@@ -161,17 +161,17 @@ def numbers(values: Any) -> Any:
 
 # Assemblies: poses of the actuators, and the prediction of the whole.
 #
-# Each actuator is a fast stack by itself; the page carries along what stands on its top. Where
-# parts meet, and what hangs on tips, is the prediction's.
+# Each actuator is a separate fast stack; the page moves the parts on its top. Contacts between
+# parts, and loads on tips, come from the prediction.
 
 
 PRESSURE_KPA, LOAD_G = 10.0, 1.2
-"""What the prediction is asked for, unless the page says otherwise: the command's own defaults."""
+"""Defaults of the prediction's request, as in the command."""
 MOST_PRESSURE, MOST_LOAD_G = 110.0, 1000.0
 
 
 def moving_parts(assembled: Assembled) -> dict[str, Any]:
-    """Return the stack or the grip of each actuator, or the reason why it stays still."""
+    """Return the stack or the grip of each actuator, or the reason why it does not move."""
     return {"kind": "movers", "movers": list(_movers(assembled))}
 
 
@@ -210,7 +210,7 @@ def _movers(assembled: Assembled) -> Iterator[dict[str, Any]]:
 
 
 def part_poses(assembled: Assembled, request: dict[str, Any]) -> dict[str, Any]:
-    """The pose of each actuator whose pressures in kPa are asked for. Raises DesignError."""
+    """The pose of each actuator with requested pressures in kPa. Raises DesignError."""
     pressures_of = request["parts"] if isinstance(request["parts"], dict) else {}
     poses_of = {}
     for placed in assembled.parts:
@@ -225,7 +225,7 @@ def part_poses(assembled: Assembled, request: dict[str, Any]) -> dict[str, Any]:
 def whole_prediction(
     assembled: Assembled, request: dict[str, Any], pause: Callable[[], None]
 ) -> dict[str, Any]:
-    """The figures of ``sbafab predict`` for an assembly, in the words of a design's prediction."""
+    """The figures of ``sbafab predict`` for an assembly, in the form of a design's prediction."""
     pressure = _within(request.get("pressure_kpa", PRESSURE_KPA), MOST_PRESSURE, "pressure", "kPa")
     load = _within(request.get("load_g", LOAD_G), MOST_LOAD_G, "mass at the tips", "g")
     if pressure == 0:
@@ -262,6 +262,6 @@ def _within(value: Any, most: float, name: str, unit: str) -> float:
 
 
 def _frame(placed: PlacedPart) -> Any:
-    """Rows (3, 4) that take a part's own frame to the assembly's."""
+    """Rows (3, 4) that map a part's own frame to the assembly's."""
     corners = placed.upright(np.concatenate([np.zeros((1, 3)), np.eye(3)]))
     return np.column_stack([*(corners[1:] - corners[0]), corners[0]])

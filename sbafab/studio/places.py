@@ -1,4 +1,4 @@
-"""Design files in the chosen folder with the files they name, and folders of runs."""
+"""Design files in the chosen folder, the files that they name, and folders of runs."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from sbafab.errors import DesignError, OutputError
 
 MOST_LISTED = 200
 MOST_BYTES = 2_000_000
-"""Bytes of a design file."""
+"""Largest design file, bytes."""
 MOST_NAME = 240
-"""Bytes of a design file's name: systems take 255, and it is saved under a longer one first."""
+"""Longest name of a design file, bytes: systems allow 255, and saving uses a longer name first."""
 REFERRING = ("outline", "kit", "design", "file", "calibration")
 """Keys whose values may be paths of files."""
 
@@ -46,7 +46,7 @@ def design_file(folder: Path, name: str) -> Path:
 
 
 def listed(folder: Path) -> list[str]:
-    """Names of the design files right in the folder."""
+    """Names of the design files directly in the folder."""
     names = sorted(path.name for path in folder.glob("*.toml") if _is_listed(path, folder))
     return names[:MOST_LISTED]
 
@@ -56,7 +56,7 @@ def _is_listed(path: Path, folder: Path) -> bool:
 
 
 def read(path: Path) -> tuple[str, str]:
-    """Text and hash of a design file. Raises DesignError where it cannot be read."""
+    """Text and hash of a design file. Raises DesignError if it cannot be read."""
     try:
         content = content_of(path, MOST_BYTES)
         return content.decode("utf-8-sig"), _hash(content)
@@ -69,10 +69,9 @@ def read(path: Path) -> tuple[str, str]:
 def content_of(path: Path, most: int | None = None) -> bytes:
     """Return the bytes of a file.
 
-    Raises DesignError for what is not a regular file or holds more than ``most`` bytes, and
-    OSError.
+    Raises DesignError for other than regular files and for more than ``most`` bytes, and OSError.
     """
-    # A pipe that nobody writes to would hold whoever opens it, and with it the whole server.
+    # A pipe without a writer would block whoever opens it, and with it the whole server.
     about = path.stat()
     if not stat.S_ISREG(about.st_mode):
         raise DesignError(f"{path.name} is not a regular file; choose another one")
@@ -84,7 +83,7 @@ def content_of(path: Path, most: int | None = None) -> bytes:
 
 
 def state(path: Path) -> str:
-    """Hash of what lies on disk; empty where nothing does that can be read."""
+    """Hash of the file on disk; empty if there is no readable file."""
     try:
         return _hash(content_of(path))
     except (OSError, DesignError):
@@ -92,7 +91,7 @@ def state(path: Path) -> str:
 
 
 def _mode(path: Path) -> int:
-    """The mode of what lies at a place; 0 where nothing does, or can for the length of its name."""
+    """The mode of the file at a path; 0 if there is none, or its name is too long."""
     try:
         return path.stat().st_mode
     except OSError:
@@ -102,8 +101,8 @@ def _mode(path: Path) -> int:
 def save(path: Path, text: str, expected: str | None) -> str:
     """Writes the file whole and returns its hash.
 
-    ``expected``: the hash of what the page has read; where another lies there now, raises
-    ChangedError. Raises OutputError for what cannot be written.
+    ``expected``: the hash that the page has read; if the file has another now, raises ChangedError.
+    Raises OutputError if it cannot be written.
     """
     mode = _mode(path)
     if mode and not stat.S_ISREG(mode):
@@ -128,10 +127,10 @@ def save(path: Path, text: str, expected: str | None) -> str:
 
 
 def named_files(text: str, folder: Path, above: frozenset[Path] = frozenset()) -> tuple[str, ...]:
-    """The states of the files that a design's text names, so that a change in them is seen.
+    """The states of the files that a design's text names, to detect changes in them.
 
-    Raises DesignError for one outside the folder. What is no TOML, or holds a value of another type
-    there, is left to who reads it.
+    Raises DesignError for one outside the folder. Text that is not TOML, and values of another
+    type, are left to the reader.
     """
     try:
         tables = tomllib.loads(text)
@@ -148,7 +147,7 @@ def named_files(text: str, folder: Path, above: frozenset[Path] = frozenset()) -
         if mode and not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
             raise DesignError(f"{key} = {value[:60]!r} is not a regular file; name another one")
         named.append(state(path))
-        # One that names itself is refused by who reads it.
+        # A link to itself is refused by the reader.
         if path.suffix == ".toml" and stat.S_ISREG(mode) and path not in above:
             named += named_files(read(path)[0], path.parent, above | {path})
     return tuple(named)
@@ -175,7 +174,7 @@ def _hash(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-# Folders that runs wrote, as the page shows them and hands them out.
+# Folders written by runs, as the page shows and serves them.
 
 
 DAY_ONE = (1980, 1, 1, 0, 0, 0)
@@ -184,23 +183,23 @@ DAY_ONE = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True)
 class RunFolder:
-    """The folder of a run and the name that it goes by."""
+    """The folder of a run and its name."""
 
     folder: Path
     name: str
 
     def file(self, path: str) -> Path | None:
-        """A file of the run, None for any other place."""
+        """A file of the run; None for any other path."""
         try:
             resolved = (self.folder / path).resolve()
             inside = resolved.is_relative_to(self.folder.resolve())
             return resolved if inside and resolved.is_file() else None
-        except (OSError, ValueError):  # a name too long for any file, or one with a NUL
+        except (OSError, ValueError):  # a name too long for any file, or with a NUL
             return None
 
 
 def zipped(run: RunFolder) -> bytes:
-    """The run's folder as a zip, its files byte for byte, in the order of their names."""
+    """The run's folder as a zip, its files byte for byte, in order of their names."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in sorted(path for path in run.folder.rglob("*") if path.is_file()):

@@ -1,4 +1,4 @@
-"""The record page: lines of a device's history from a form that a phone shows."""
+"""The record page: entries of a device's history from a form on a phone."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sbafab.studio import places
 
 
 def lab_file(folder: Path) -> Path:
-    """Return the lab's file: that of SBAFAB_LAB, or lab.sqlite in the chosen folder."""
+    """Return the lab's file: SBAFAB_LAB, or lab.sqlite in the chosen folder."""
     return folder / os.environ.get("SBAFAB_LAB", "lab.sqlite")
 
 
@@ -47,7 +47,7 @@ def sheet(folder: Path, request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def stored(folder: Path, request: Mapping[str, Any]) -> dict[str, Any]:
-    """Store the filled lines, all or none, and return their numbers and warnings."""
+    """Store the filled entries, all or none, and return their numbers and warnings."""
     lines = request.get("entries")
     if not isinstance(lines, list) or not lines or not all(isinstance(x, dict) for x in lines):
         raise DesignError("no line is filled in; fill in a reading, a lot, a decision or a note")
@@ -79,7 +79,7 @@ def _source(folder: Path, request: Mapping[str, Any]) -> str | Path:
 
 
 def _line(line: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a line with its photograph as bytes: a page names no file of this machine."""
+    """Return an entry with its photograph as bytes: a page cannot name files of this machine."""
     values = {str(name): value for name, value in line.items() if name != "photograph"}
     packed = line.get("photograph")
     if packed:

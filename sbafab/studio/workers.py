@@ -1,7 +1,7 @@
-"""Worker processes: the newest job of a tab is worked on, the one it replaces is cancelled.
+"""Worker processes: they run the newest job of a tab and cancel the one that it replaces.
 
-A pool starts a second process only where a job waits and none is idle, up to the number of
-processors. A process that dies or takes too long is replaced, and the request gets an error.
+A pool starts another process only if a job waits and none is idle, up to the number of processors.
+A process that dies or takes too long is replaced, and the request gets an error.
 """
 
 from __future__ import annotations
@@ -24,36 +24,36 @@ from sbafab.errors import SbafabError
 END = b""
 """The last message of a job."""
 READY = 0
-"""The number that says that the process takes jobs; those count from 1."""
+"""The number that means the process accepts jobs; jobs count from 1."""
 MOST_WAITING = 24
-"""Jobs of a pool that wait for a process."""
+"""Most waiting jobs of a pool."""
 MOST_HOMES = 64
-"""Keys whose last process is remembered."""
+"""Number of keys whose last process is remembered."""
 PATIENCE = 2.0
-"""Seconds that a job nobody waits for has until its next step; then its process is replaced."""
+"""Time for a cancelled job to reach its next step, s; then its process is replaced."""
 Key = tuple[str, str]
 """A tab and its kind of job; a newer job with the same key replaces the older one."""
 
 
 class BusyError(Exception):
-    """Too many jobs wait already."""
+    """Too many jobs are waiting already."""
 
 
 @dataclass(eq=False)
 class WaitingJob:
-    """A job that somebody waits for, and its answers as they come."""
+    """A job with a waiting client, and its answers as they come."""
 
     key: Key
     job: dict[str, Any]
     answers: asyncio.Queue[bytes] = field(default_factory=asyncio.Queue)
 
     def end(self, kind: str, message: str = "") -> None:
-        """Puts a last answer of this kind."""
+        """Adds a last answer of this kind."""
         self.answers.put_nowait(json.dumps({"kind": kind, "message": message}).encode())
         self.answers.put_nowait(END)
 
     async def lines(self) -> AsyncIterator[bytes]:
-        """Each answer as a line of JSON; they end early where a newer job replaces this one."""
+        """Each answer as a line of JSON; they end early if a newer job replaces this one."""
         while (answer := await self.answers.get()) != END:
             yield answer
 
@@ -61,8 +61,8 @@ class WaitingJob:
 class WorkerPool:
     """Processes and the jobs that wait for them. All methods belong to the event loop.
 
-    ``seconds`` is what a job may take, ``processes`` how many run at most, and ``patience`` the
-    seconds that a job has to end once it is cancelled.
+    ``seconds`` is the time limit of a job, ``processes`` the most that run at once, and
+    ``patience`` the seconds for a cancelled job to end.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class WorkerPool:
         self.closed = False
 
     def start(self) -> None:
-        """Start one more process; jobs are given to it once it is ready."""
+        """Start one more process; it gets jobs once it is ready."""
         self.workers.append(Worker(self))
 
     def stop(self) -> None:
@@ -86,9 +86,9 @@ class WorkerPool:
             worker.kill()
 
     def ask(self, key: Key, job: dict[str, Any]) -> WaitingJob:
-        """Return the job as one that is worked on in its turn; an older one of the key is given up.
+        """Return the queued job; an older one of the same key is cancelled.
 
-        Whoever asked calls :meth:`forget` at the end. Raises BusyError where too many wait.
+        The caller calls :meth:`forget` at the end. Raises BusyError if too many wait.
         """
         self._give_up(key)
         if len(self.waiting) >= MOST_WAITING:
@@ -98,7 +98,7 @@ class WorkerPool:
         return waiting
 
     def forget(self, waiting: WaitingJob) -> None:
-        """Gives a job up that nobody waits for any more; nothing happens to one that has ended."""
+        """Cancels a job without a waiting client; does nothing if it has ended."""
         if self.waiting.get(waiting.key) is waiting:
             del self.waiting[waiting.key]
         for worker in self.workers:
@@ -114,7 +114,7 @@ class WorkerPool:
                 worker.cancel()
 
     def assign(self) -> None:
-        """Give every idle process the next job it may take; start one where none is idle."""
+        """Give every idle process the next job it may take; start one if none is idle."""
         if self.closed:
             return
         for waiting in list(self.waiting.values()):
@@ -132,7 +132,7 @@ class WorkerPool:
             self.start()
 
     def _idle(self, key: Key) -> Worker | None:
-        """Return an idle process, first the one that worked for the key and knows its motion."""
+        """Return an idle process, preferably the last one for this key, which has its motion."""
         if self._ends_soon(key):
             return None
         idle = [worker for worker in self.workers if worker.ready and worker.current is None]
@@ -140,11 +140,11 @@ class WorkerPool:
         return home if home in idle else next(iter(idle), None)
 
     def _ends_soon(self, key: Key) -> bool:
-        """Return True if a process works on a cancelled job of the key."""
+        """Return True if a process is running a cancelled job of the key."""
         return any(worker.current and worker.current.key == key for worker in self.workers)
 
     def remove(self, worker: Worker, message: str) -> None:
-        """Takes a process out that has ended, and tells who waited for it; others go on."""
+        """Removes a process that has ended, and informs its client; others go on."""
         if worker not in self.workers:
             return
         self.workers.remove(worker)
@@ -153,14 +153,14 @@ class WorkerPool:
         if worker.current is not None:
             worker.current.end("superseded" if worker.cancelled else "crashed", message)
         elif not worker.ready and self.waiting:
-            # Else a process that cannot start would be started for ever.
+            # Otherwise a process that cannot start would be restarted endlessly.
             self.waiting.pop(next(iter(self.waiting))).end("crashed", message)
         worker.done()
         self.assign()
 
 
 class Worker:
-    """A process and the job that it works on."""
+    """A process and its current job."""
 
     def __init__(self, pool: WorkerPool) -> None:
         self.pool = pool
@@ -192,11 +192,13 @@ class Worker:
         self._after(
             self.pool.seconds, f"this took more than {self.pool.seconds:g} s and was stopped"
         )
-        with contextlib.suppress(OSError):  # a process that just died is seen by who listens
+        with contextlib.suppress(OSError):  # the listener notices a process that just died
             self.pipe.send((self.number, waiting.job))
 
     def cancel(self) -> None:
-        """Has the current job end at its next step, or its process where that is far."""
+        """Makes the current job end at its next step, or kills its process if that takes too
+        long.
+        """
         if not self.cancelled:
             self.given_up.value = self.number
             self._after(self.pool.patience, "")
@@ -222,13 +224,13 @@ class Worker:
             self.timers.pop().cancel()
 
     def kill(self) -> None:
-        """Ends the process, whatever it does."""
+        """Kills the process, whatever it is doing."""
         if self.process.is_alive():
             self.process.kill()
 
 
 def _listen(pipe: Any, loop: asyncio.AbstractEventLoop, worker: Worker) -> None:
-    """Hands what comes through the pipe to the event loop, in a thread of its own."""
+    """Passes messages from the pipe to the event loop, in a separate thread."""
     with contextlib.suppress(RuntimeError):  # the loop has closed
         try:
             while True:
@@ -249,12 +251,12 @@ def serve(pipe: Connection, cancelled: Any, warm: bool) -> None:
     """Answers (number, job) with (number, JSON) until the pipe closes."""
     with contextlib.suppress(ValueError):
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # In the worker alone: the server need not load what its jobs use.
+    # In the worker only: the server need not load the modules for its jobs.
     from sbafab.studio.jobs import SupersededError, answers
 
     if warm:
         _warm_up()
-    # What is imported stays; the collector need not look through it again at every change.
+    # Imported modules stay; the collector need not look through it again at every change.
     gc.collect()
     gc.freeze()
     with contextlib.suppress(EOFError, OSError):
