@@ -51,7 +51,7 @@ that may raise DesignError.
 
 
 class _Records(Mapping[str, type[Design]]):
-    """The design record of every family, likewise."""
+    """The design record of every family, loaded lazily."""
 
     def __getitem__(self, name: str) -> type[Design]:
         return FAMILIES[name].record
@@ -64,7 +64,7 @@ class _Records(Mapping[str, type[Design]]):
 
 
 def records() -> Mapping[str, type[Design]]:
-    """Return the design record of every family, likewise."""
+    """Return the design record of every family, loaded lazily."""
     return _Records()
 
 
@@ -74,7 +74,7 @@ def load_design(
     """Return a design from a template's name or a TOML file, with changes made to its keys.
 
     ``waivers`` are rule names added to those that the file waives. Raises DesignError with one
-    sentence where it cannot be built.
+    sentence if it cannot be built.
     """
     path = design_path(source)
     changes = list(changes)
@@ -86,9 +86,9 @@ def load_design(
 
 
 def build(design: Design) -> Laminate:
-    """Return the laminate of a design of any family. Raises DesignError where parts do not fit.
+    """Return the laminate of a design of any family. Raises DesignError if parts do not fit.
 
-    Its notes state the size of a drawn outline, and that the actuator fits ``fits``.
+    Its notes state the size of a drawn outline, and that the actuator meets ``fits``.
     """
     laminate = FAMILIES[design.family].build(design)
     fits = getattr(design, FITS, None)

@@ -59,28 +59,28 @@ class DrawnLayer(DrawnRow):
     """A layer: what it is for, its shape by name, and how many parts it is meant to have."""
 
     role: Role
-    """What the layer is for: base, wall, cap or sheet of a structural film, or a mask."""
+    """Role of the layer: base, wall, cap or sheet of a structural film, or a mask."""
     shape: str
     """The name of its shape."""
     film: str | None = None
-    """The film that it is cut from, as in ``layup``; by default that of its role there."""
+    """The film that it is cut from, as in ``layup``; by default the film of its role there."""
     pieces: int = Field(default=1, ge=1, le=1000)
     """Separate parts that it is meant to have (rule piece-count)."""
     turned: bool | None = None
-    """Whether it lies with its upper face down; the upper half of a fold does, by itself."""
+    """True if it lies with its upper face down; the upper half of a fold does so by itself."""
 
 
 class DrawnChamber(DrawnRow):
     """A chamber, and the inlet strip through which it is filled."""
 
     name: str = Field(pattern=NAME_PATTERN)
-    """How findings and pages call it."""
+    """Its name in findings and on pages."""
     centres: Annotated[tuple[Coordinates, ...], Field(strict=False, min_length=1, max_length=100)]
-    """A point inside each of its pockets; where there are several balloons, that of its bore."""
+    """A point inside each of its pockets; with several balloons, the point of its bore."""
     mouth: Coordinates
     """The middle of the end of its inlet tab."""
     angle: Angle
-    """Which way the mouth faces: degrees from x, counter-clockwise."""
+    """Direction of the mouth: degrees from x, counter-clockwise."""
     width: Length | None = None
     """Width of its inlet strip as drawn; by default what the tube needs."""
     length: Length | None = None
@@ -93,13 +93,13 @@ class DrawnPin(DrawnRow):
     """A dowel pin of the press fixture; it holds every layer with a hole that fits."""
 
     name: str = Field(pattern=NAME_PATTERN)
-    """How the fixture and the pages call it."""
+    """Its name in the fixture and on pages."""
     at: Coordinates
     """Its place."""
     diameter: Length
     """Diameter of the pin."""
     clearance: LengthOrZero = 0.0
-    """By how much the layers' holes for it are wider."""
+    """Excess of the layers' holes for it over its diameter."""
 
 
 class DrawnTube(DrawnRow):
@@ -112,14 +112,14 @@ class DrawnTube(DrawnRow):
     overlap: LengthOrZero = 0.0
     """Width by which the ends of the wrapped sheet overlap."""
     glue: str = Field(min_length=1, max_length=120)
-    """What holds the sheet round the tube."""
+    """Adhesive or tape that holds the sheet round the tube."""
 
 
 class DrawnSeam(DrawnRow):
     """A seam: two films bonded by a moving tool along a path."""
 
     name: str = Field(pattern=NAME_PATTERN)
-    """How findings, pages and files call it."""
+    """Its name in findings, pages and files."""
     layers: LayerPair
     """The two films, by their numbers in ``layers``; only masks may lie between them."""
     shape: str | None = None
@@ -128,14 +128,14 @@ class DrawnSeam(DrawnRow):
     """Or the corners of the path, in order; a third number bulges the edge to the next into an
     arc."""
     closed: bool = False
-    """Whether the path goes back to its first corner."""
+    """True if the path goes back to its first corner."""
     width: Length
     """Width of the bond, half of it on either side of the path."""
     tool: SeamTool
-    """What makes it: laser, hot-tip, ultrasonic or roller; a roller's ends are square."""
+    """Tool that makes it: laser, hot-tip, ultrasonic or roller; a roller's ends are square."""
     kind: SeamKind = "lap"
-    """How the films lie: lap, flat on each other; fin, with their edges standing out together. It
-    changes the instruction to the bench alone: shapes and rules take both as a lap."""
+    """Position of the films: lap, flat on each other; fin, with their edges standing out together.
+    It changes only the instruction to the bench: shapes and rules treat both as a lap."""
 
     @model_validator(mode="after")
     def _has_one_path(self) -> Self:
@@ -164,7 +164,9 @@ class DrawnFold(DrawnRow):
 
 
 class DrawnMechanism(DrawnRow):
-    """What the pockets do when they fill, for the closed forms of ``predict``; none by default."""
+    """Action of the pockets when they fill, for the closed forms of ``predict``; none by
+    default.
+    """
 
     kind: MechanismKind
     """"pouch-motor" pulls, "hinge" bends two plates, "beam" bears a load at its end, "jamming"
@@ -187,7 +189,7 @@ class DrawnPort(DrawnRow):
     """A place in a gap that nets name: a pocket, the end of a channel, or a hole for a tube."""
 
     name: str = Field(pattern=NAME_PATTERN)
-    """How nets and findings call it."""
+    """Its name in nets and findings."""
     layers: LayerPair
     """The two films that it lies between, by their numbers in ``layers``."""
     at: Coordinates
@@ -208,12 +210,12 @@ class NamedNets(Section):
 
 
 DRAWN = "drawn"
-"""The family's name, for what writes design files of it."""
+"""The family's name, for writers of its design files."""
 
 
 class DrawnDesign(Design):
-    """Layers whose shapes are drawn, bottom to top. Never built: rules read them as any laminate's,
-    and what has no model is left out of predictions. ``bore.diameter`` moves no shape: rules and
+    """Layers whose shapes are drawn, bottom to top. Never built: rules read them like any
+    laminate's, and predictions omit what has no model. ``bore.diameter`` moves no shape: rules and
     pins read it.
     """
 
@@ -231,14 +233,14 @@ class DrawnDesign(Design):
     )
 
     family: Literal["drawn"]
-    """Which kind of actuator this is."""
+    """Kind of actuator."""
     layers: Annotated[tuple[DrawnLayer, ...], Field(strict=False, max_length=MOST_LAYERS)] = ()
     """The layers, bottom to top."""
     shapes: NamedShapes = NamedShapes.model_construct()
     chambers: Annotated[tuple[DrawnChamber, ...], Field(strict=False, max_length=100)] = ()
     """The chambers, each with its inlet."""
     seams: Annotated[tuple[DrawnSeam, ...], Field(strict=False, max_length=200)] | None = None
-    """The seams, in the order in which they are made; none by default."""
+    """The seams, in order of making; none by default."""
     folds: Annotated[tuple[DrawnFold, ...], Field(strict=False, max_length=100)] | None = None
     """The folds; none by default."""
     ports: Annotated[tuple[DrawnPort, ...], Field(strict=False, max_length=500)] | None = None
@@ -256,12 +258,12 @@ class DrawnDesign(Design):
     notes: Annotated[tuple[NoteText, ...], Field(strict=False, max_length=20)] | None = None
     """Sentences that pictures and pages print; none by default."""
     mechanism: DrawnMechanism | None = None
-    """What its pockets do, such as {kind = "pouch-motor", direction = 90}."""
+    """Action of its pockets, such as {kind = "pouch-motor", direction = 90}."""
 
     @model_validator(mode="before")
     @classmethod
     def _balloons_are_counted(cls, data: Any) -> Any:
-        """One balloon for each gap with a chamber, unless the file says how many there are."""
+        """One balloon for each gap with a chamber, unless the file gives their number."""
         rows, stack = data.get("layers"), data.get("stack", {})
         if not isinstance(rows, list | tuple) or not is_table(stack) or "balloons" in stack:
             return data
@@ -357,7 +359,7 @@ class DrawnDesign(Design):
 def build(design: DrawnDesign) -> Laminate:
     """Return the laminate of drawn layers.
 
-    Raises DesignError, which names the key at fault, or what keeps its films from being joined.
+    Raises DesignError with the key at fault, or with the reason why its films cannot be joined.
     """
     _check(design)
     shapes = ShapeRegions(design.shapes.by_name, design.drawings)
@@ -381,7 +383,7 @@ def build(design: DrawnDesign) -> Laminate:
         chambers=chambers,
         bores=bores,
         inlets=tuple(_inlet(chamber, design) for chamber in design.chambers),
-        # With nets a bore is a hole like others: masks go on over it, and no pin stands in it.
+        # With nets a bore is an ordinary hole: masks continue over it, and no pin is in it.
         pins=_pins(design, () if _nets(design) else bores),
         lumen=design.lumen,
         balloons=balloons,
@@ -428,7 +430,7 @@ def _nets(design: DrawnDesign) -> Mapping[str, tuple[str, ...]]:
 
 
 def _check(design: DrawnDesign) -> None:
-    """Raises DesignError for what no laminate can be made of."""
+    """Raises DesignError for parts that make no laminate."""
     roles = [layer.role for layer in design.layers]
     if not roles:
         raise DesignError('layers is missing; add a list of {role = "...", shape = "..."}')
@@ -483,7 +485,7 @@ def _check_centres(design: DrawnDesign) -> None:
 
 
 def _check_order(roles: Sequence[str]) -> None:
-    """Raises DesignError for layers that no stack can be made of."""
+    """Raises DesignError for layers that make no stack."""
     masks = [role.endswith("-mask") for role in roles]
     if masks.count(False) < 2:
         raise DesignError(
@@ -550,7 +552,7 @@ def _check_ports(design: DrawnDesign) -> None:
 
 
 def _check_nets(design: DrawnDesign) -> None:
-    """Raises DesignError for members of nets that are not there, or of two nets."""
+    """Raises DesignError for members of nets that do not exist, or are in two nets."""
     names = [chamber.name for chamber in design.chambers]
     names += [port.name for port in design.ports or ()]
     home: dict[str, str] = {}
@@ -575,11 +577,11 @@ def _check_nets(design: DrawnDesign) -> None:
 
 
 LEAST_OVERLAP = 1e-4
-"""mm2: more than that is no rounding."""
+"""Largest area that counts as rounding, mm2."""
 
 
 def _turned(stack: tuple[Layer, ...], design: DrawnDesign) -> tuple[Layer, ...]:
-    """The layers, those turned that lie face down, and folded ones with patterns of their own."""
+    """The layers, with face-down ones turned over, and folded ones with separate patterns."""
     turned = {number: bool(row.turned) for number, row in enumerate(design.layers, start=1)}
     for fold in design.stated_folds:
         # A film that is folded over lies with its other face up.
@@ -598,7 +600,7 @@ def _turned(stack: tuple[Layer, ...], design: DrawnDesign) -> tuple[Layer, ...]:
 
 
 def _check_folds(laminate: Laminate, design: DrawnDesign) -> None:
-    """Raises DesignError for folds that no film can be folded at."""
+    """Raises DesignError for folds at which no film can be folded."""
     halves = [index for fold in laminate.folds for index in (fold.lower, fold.upper)]
     for fold, stated in zip(laminate.folds, design.stated_folds, strict=True):
         lower, upper = laminate.layer(fold.lower), laminate.layer(fold.upper)

@@ -1,9 +1,9 @@
 """Ears and tails: tooling holes outside the outline that register a layer in every press step.
 
-TPE layers and separator masks have ears of their own, on pins of their own: at a mask flush with a
-film's tooling hole, film would melt round the pin. Beyond its root a TPE ear is therefore free of
-mask, and bonds; all ears are snipped off after pressing. The two ears of a part stand at unequal
-distances, so that it goes on its pins in one position only.
+TPE layers and separator masks have separate ears, on separate pins: if a mask were flush with a
+film's tooling hole, film would melt around the pin. Beyond its root a TPE ear is therefore free of
+mask, and bonds; all ears are cut off after pressing. The two ears of a part are at unequal
+distances, so that it fits on its pins in one position only.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from sbafab.laminate.laminate import Inlet, Pin
 
 Holder = Literal["film", "mask", "sheet"]
 Named = tuple[str, Region]
-"""A part, and what to call it in a message."""
+"""A part, and its name in messages."""
 NOTE = (
     "ears are cut, pressed and meshed with the actuator: snip them off along the outline, and the "
     "tails of the inlet strips at the tab's end"
 )
 LONGER = {"film": (0.0, 2.0), "mask": (1.0, 3.0), "sheet": (0.0, 2.0)}
-"""mm by which the first and second ear of a part stand off, all different, so that a film that is
-turned or flipped does not go on the masks' pins either."""
+"""Offsets of the first and second ear of a part, mm, all different, so that a turned or flipped
+film does not fit on the masks' pins either."""
 FAR = 500.0
 ROUNDING = 1e-6
 
@@ -82,7 +82,7 @@ class Ear:
 
 
 def film_setback(design: Design) -> float:
-    """Return the setback of the TPE's bores and lumen from those of the masks, mm.
+    """Return the setback of the TPE's bores and lumen from the masks', mm.
 
     With channel pins all share the pin's edge; without, every mask overhangs.
     """
@@ -90,11 +90,11 @@ def film_setback(design: Design) -> float:
 
 
 def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) -> tuple[Ear, ...]:
-    """Return ears on their rays, their roots clear of ``body``: all that is cut, without ears.
+    """Return ears on their rays, with roots clear of ``body``: everything cut, without ears.
 
     ``plates`` are the films that masks separate; their fillets beside the ears end at the root too.
-    Raises DesignError where a film ear starts outside the films, where two ears come nearer to each
-    other than one overhang, or where fillets fill all the room beside an ear.
+    Raises DesignError if a film ear starts outside the films, if two ears are nearer to each other
+    than one overhang, or if fillets fill all the room beside an ear.
     """
     overhang, radius = design.mask.overhang, design.fillet.radius
     for ray in rays:
@@ -106,7 +106,7 @@ def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) ->
             )
     roots = [_reach(ray, body, design) + radius + overhang + _longer(ray) for ray in rays]
     ears = [_ear(ray, root, design) for ray, root in zip(rays, roots, strict=True)]
-    # Between an ear and what stands at a sharp angle to it a fillet reaches farther out.
+    # At a sharp angle to its neighbour, an ear's fillet reaches farther out.
     spread = filleted(plates, ears, radius)
     ears = [
         _ear(ear.ray, max(ear.root, _reach(ear.ray, spread, design) + overhang), design)
@@ -138,7 +138,7 @@ def _longer(ray: Ray) -> float:
 
 
 def _reach(ray: Ray, body: Region, design: Design) -> float:
-    """Reach of the body along a ray, in the way of an ear and the mask round it, mm."""
+    """Reach of the body along a ray, in the way of an ear and its surrounding mask, mm."""
     width = design.registration.hole_diameter + 2 * design.bond.width
     band = strip(ray.start, ray.at(FAR), width + 4 * design.mask.overhang) & body
     return max((edge.farthest_along(ray.start, ray.direction) for edge in band.edges), default=0.0)
@@ -183,7 +183,7 @@ def with_mask_ears(mask: Region, ears: Sequence[Ear], overhang: float) -> Region
     bars = [strip(e.ray.joint, e.ray.start, e.width) for e in mask_ears if e.ray.joint]
     eared = union([mask - union(beyond), *(ear.strip for ear in mask_ears), *bars])
     if bars:
-        # No slot is left between a bar and the mask.
+        # No slot remains between a bar and the mask.
         eared = fillet(eared, overhang) - union(beyond)
     return eared - _holes(ears, "mask")
 
@@ -195,7 +195,7 @@ def with_sheet_ears(sheet: Region, ears: Sequence[Ear], radius: float) -> Region
 
 
 def check_apart(pairs: Iterable[tuple[Named, Named]], overhang: float) -> None:
-    """Raises DesignError where two parts come nearer to each other than one overhang."""
+    """Raises DesignError if two parts are nearer to each other than one overhang."""
     for (name, part), (name_b, neighbour) in pairs:
         if not (grow(part, overhang) & neighbour).is_empty:
             raise DesignError(
@@ -209,20 +209,20 @@ def _outer(ear: Ear) -> Region:
     return strip(ear.ray.at(ear.root), ear.ray.at(ear.end), ear.width)
 
 
-# Tails: inlet strips run on past the tabs' ends to tooling holes, where ears register the layers.
+# Tails: inlet strips continue past the tabs' ends to tooling holes, if ears register the layers.
 #
 # With its channel pin the tail's one pin holds the bottom balloon's mask; a single balloon has no
-# bores, and its tail two holes. They stand off the strip's axis, so that no mask goes on its pins
-# flipped. The tails are snipped off after pressing; the masks stay in their pockets.
+# bores, and its tail two holes. They are off the strip's axis, so that no flipped mask fits on its
+# pins. The tails are cut off after pressing; the masks stay in their pockets.
 
 
 ASIDE = 0.3
-"""Share of the pin's diameter by which holes stand off the axis: flipped, they miss by 0.6."""
+"""Offset of holes from the axis, as a share of the pin's diameter: flipped, they miss by 0.6."""
 
 
 @dataclass(frozen=True)
 class Tail:
-    """The end of an inlet strip: it widens to a ``head``, which lies clear of all film."""
+    """The end of an inlet strip: it widens to a ``head``, which is clear of all film."""
 
     name: str
     strip: Region
@@ -239,8 +239,8 @@ def tails(
 ) -> tuple[Tail, ...]:
     """Return a tail for every inlet; none without ears.
 
-    ``outline`` is that of all plates together, ``under`` other cut parts. Raises DesignError where
-    a tail comes nearer than one overhang to an ear or to another tail.
+    ``outline`` is the union of all plates, ``under`` other cut parts. Raises DesignError if a tail
+    is nearer than one overhang to an ear or another tail.
     """
     if not ears:
         return ()
@@ -255,7 +255,7 @@ def tails(
 
 
 def head_reach(design: Design) -> float:
-    """Return the reach of a tail's head to the side from its strip's axis, mm."""
+    """Return the lateral reach of a tail's head from its strip's axis, mm."""
     return (ASIDE + 0.5) * design.registration.hole_diameter + design.bond.width
 
 
@@ -273,7 +273,7 @@ def _tail(number: int, inlet: Inlet, body: Region, design: Design) -> Tail:
     reach = max((edge.farthest_along(at(0.0), (dx, dy)) for edge in ahead.edges), default=0.0)
     root = reach + overhang
     first = root + bond + pin / 2
-    # Two holes in line stand apart, so that what play they have turns the mask little.
+    # Two holes in line are far apart, so that their play turns the mask little.
     places = [first] if design.stack.balloons > 1 else [first, first + 2 * width]
     end = places[-1] + pin / 2 + bond
     aside = ASIDE * pin

@@ -1,4 +1,4 @@
-"""Round actuators by their envelope: the largest chamber that fits it."""
+"""Size round actuators by their envelope: the largest chamber that fits it."""
 
 from __future__ import annotations
 
@@ -18,27 +18,29 @@ from sbafab.laminate.laminate import (
 )
 
 STEP = 0.01
-"""mm: chambers are solved in whole steps."""
+"""Chambers are solved in whole steps, mm."""
 STARTS = (500, 800, 1200, 300, 2000, 3000)
-"""Steps of diameters from which to look, until one of them can be built."""
+"""Steps of diameters at which to start, until one of them can be built."""
 ROUNDING = 1e-6
 
 
 class Fits(Section):
-    """What the actuator must fit; without ``chamber.diameter`` the largest that does is taken."""
+    """Envelope that the actuator must fit; without ``chamber.diameter`` the largest chamber is
+    chosen.
+    """
 
     diameter: Length | None = None
-    """All of it, inlet tabs, tails and ears counted, lies in a circle of this diameter round the
-    axis."""
+    """The whole actuator with inlet tabs, tails and ears lies in a circle of this diameter round
+    the axis."""
     outline: Length | None = None
-    """Its films, with tabs and ears taken off, lie in a circle of this diameter round the axis; the
-    paper's 3-DoF actuator fits 15."""
+    """Its films without tabs and ears lie in a circle of this diameter round the axis; the paper's
+    3-DoF actuator fits 15."""
 
 
 def fitted(design: AnyDesign, fits: Fits, build: Callable[[AnyDesign], Laminate]) -> AnyDesign:
-    """Return the design with the largest chamber that fits, unless it names its chamber.
+    """Return the design with the largest chamber that fits, unless its chamber is given.
 
-    Raises DesignError where no chamber fits.
+    Raises DesignError if no chamber fits.
     """
     chamber = design.chamber
     if fits == Fits() or chamber.outline or "diameter" in chamber.model_fields_set:
@@ -48,7 +50,7 @@ def fitted(design: AnyDesign, fits: Fits, build: Callable[[AnyDesign], Laminate]
 
 
 def refuse_unfit(design: Design, fits: Fits, laminate: Laminate) -> str | None:
-    """A note on the size of a laminate that fits, None without limits. Raises DesignError."""
+    """A note on the size of a laminate that fits; None without limits. Raises DesignError."""
     over = beyond_the_outline(laminate)
     sizes = []
     for key, limit, measure, scope in (
@@ -103,7 +105,7 @@ class _Search:
         return max(measured(laminate) - most for most, measured in limits if most is not None)
 
     def largest(self) -> int:
-        """The most steps that fit. Raises DesignError where none do."""
+        """The most steps that fit. Raises DesignError if none do."""
         start = next((n for n in STARTS if self.over(n) is not None), None)
         if start is None:
             raise DesignError(self._why)
@@ -124,7 +126,7 @@ class _Search:
         return over is not None and over <= ROUNDING
 
     def _guess(self, steps: int) -> int:
-        """Steps by which the chamber could change if all were as much wider as it is, and one."""
+        """Steps by which the chamber could grow if the excess scaled with it, and one."""
         over = self.over(steps)
         return 1 + int(abs(over or 0.0) / STEP)
 
@@ -147,7 +149,7 @@ class _Search:
         )
 
     def _room(self, steps: int) -> str:
-        """Remedies that make room for a chamber; tabs are no part of ``fits.outline``."""
+        """Remedies that make room for a chamber; ``fits.outline`` does not include tabs."""
         laminate, remedies = self._laminate(steps), []
         for key, most, measure, also in (
             ("diameter", self._fits.diameter, overall_diameter, " (or shorten inlet.tab_length)"),
@@ -160,12 +162,12 @@ class _Search:
         return f"make {' and '.join(remedies)}"
 
     def _laminate(self, steps: int) -> Laminate:
-        # Balloons above the second change nothing seen from above.
+        # Balloons above the second do not change the plan view.
         few = min(2, self._design.stack.balloons)
         return self._build(_with_chamber(self._design, steps * STEP, few))
 
     def _between(self, good: int, bad: int) -> int:
-        """The most steps that fit, from some that do and more that do not."""
+        """The most steps that fit, between a number that fits and a larger one that does not."""
         while bad - good > 1:
             middle = self._straight_between(good, bad)
             if self._fit(middle):
@@ -175,7 +177,7 @@ class _Search:
         return good
 
     def _straight_between(self, good: int, bad: int) -> int:
-        """Secant estimate of the largest fit between two sizes; else the middle."""
+        """Secant estimate of the largest fit between two sizes; else the midpoint."""
         low, high = self.over(good), self.over(bad)
         if low is None or high is None or high <= low:
             return (good + bad) // 2

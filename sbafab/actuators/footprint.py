@@ -1,4 +1,4 @@
-"""The footprint that a family returns, and the laminate that is built from it."""
+"""The footprint returned by a family, and the laminate built from it."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ EARS: tuple[tuple[str, Holder], ...] = (
 class Footprint:
     """Balloons in one piece seen from above, mm.
 
-    ``pockets`` holds one pocket a chamber for each distinct balloon, and ``shape_of`` the index of
-    each balloon's own, bottom to top. Chambers have ``axes``, and inlets that run from these along
-    unit ``directions``; without its tab the film ends ``edge`` mm from the axis. ``hub`` joins the
-    lobes of several chambers. ``lumen`` and ``lumen_pin`` are diameters. ``ears`` are start and
-    angle (degrees) of two film ears and two mask ears.
+    ``pockets`` holds one pocket per chamber for each distinct balloon, and ``shape_of`` the index
+    of each balloon's own, bottom to top. Chambers have ``axes``, and inlets that run from these
+    along unit ``directions``; without its tab the film ends ``edge`` mm from the axis. ``hub``
+    joins the lobes of several chambers. ``lumen`` and ``lumen_pin`` are diameters. ``ears`` are
+    start and angle (degrees) of two film ears and two mask ears.
     """
 
     pockets: Sequence[Sequence[Region]]
@@ -53,7 +53,7 @@ class Footprint:
 
 
 def build_footprint(design: Design, footprint: Footprint) -> Laminate:
-    """Return the laminate of a footprint. Raises DesignError where parts do not fit."""
+    """Return the laminate of a footprint. Raises DesignError if parts do not fit."""
     chambers = [Chamber(f"chamber{n}", (axis,)) for n, axis in enumerate(footprint.axes, start=1)]
     shapes = tuple(_plate(design, footprint.hub, pockets) for pockets in footprint.pockets)
     first = footprint.pockets[footprint.shape_of[0]]
@@ -114,7 +114,7 @@ def _rays(footprint: Footprint, design: Design) -> list[Ray]:
 def _check_tabs(
     design: Design, outlines: Sequence[Region], feeds: Sequence[tuple[Region, Region, Inlet]]
 ) -> None:
-    """Raises DesignError where a tab comes nearer than one overhang to another lobe or tab."""
+    """Raises DesignError if a tab is nearer than one overhang to another lobe or tab."""
     room = design.mask.overhang
     for i, (tab, _, inlet) in enumerate(feeds):
         aside = [
@@ -136,7 +136,7 @@ def _check_tabs(
 
 
 def _lies_ahead(tab: Region, part: Region, inlet: Inlet, room: float) -> bool:
-    """True if all of a tab lies farther out along its inlet than another part, by some room."""
+    """True if all of a tab is farther out along its inlet than another part, by a margin."""
     (x, y), centre = inlet.direction, (0.0, 0.0)
     nearest = -max(edge.farthest_along(centre, (-x, -y)) for edge in tab.edges)
     return nearest - max(edge.farthest_along(centre, (x, y)) for edge in part.edges) > room

@@ -36,7 +36,7 @@ class LobedChamber(RoundChamber):
     count: int = Field(default=3, ge=2, le=8)
     """Chambers round the lumen."""
     axis_radius: Length | None = None
-    """Distance of the chamber axes from the lumen's; by default as near as the bonds allow."""
+    """Distance of the chamber axes from the lumen's; by default the least that the bonds allow."""
 
 
 class Lumen(Section):
@@ -64,7 +64,7 @@ class LobedDesign(Design):
     )
 
     family: Literal["lobed"]
-    """Which kind of actuator this is."""
+    """Kind of actuator."""
     chamber: LobedChamber = LobedChamber.model_construct()
     fits: Fits = Fits.model_construct()
     lumen: Lumen = Lumen.model_construct()
@@ -92,8 +92,8 @@ class LobedDesign(Design):
 def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str | None]:
     """Return the distance of the chamber axes from the lumen's axis, and a note if it was raised.
 
-    One bond width lies between lumen and pockets, and between neighbouring pockets, each of which
-    is kept within its own sector. Raises DesignError if the given radius is too small.
+    One bond width lies between lumen and pockets, and between neighbouring pockets; each pocket is
+    kept within its own sector. Raises DesignError if the given radius is too small.
     """
     half = math.pi / design.chamber.count
     bond = design.bond.width
@@ -148,12 +148,12 @@ def footprint(design: LobedDesign) -> Footprint:
 
 
 def build(design: LobedDesign) -> Laminate:
-    """Return the laminate of a lobed design. Raises DesignError where parts do not fit."""
+    """Return the laminate of a lobed design. Raises DesignError if parts do not fit."""
     return build_footprint(design, footprint(design))
 
 
 def _hub_radius(design: LobedDesign, pockets: list[Region], axis: float) -> float:
-    """One bond round the lumen; more where the chambers stand farther out, to stay one piece.
+    """One bond round the lumen; more if the chambers are farther out, to stay one piece.
 
     The hub then reaches every pocket's inner edge, and the middle between two neighbours.
     """
@@ -168,8 +168,8 @@ def _hub_radius(design: LobedDesign, pockets: list[Region], axis: float) -> floa
 def _ears(axes: Sequence[Point]) -> list[tuple[Point, float]]:
     """Start and angle of two film and two mask ears between the inlet tabs.
 
-    Up to four lobes have them on their flanks, 60 degrees off the tab; more lobes leave too
-    little room there, and the ears stand in the middle between two lobes.
+    Up to four lobes have them on their flanks, 60 degrees off the tab; more lobes leave too little
+    room there, so the ears are midway between two lobes.
     """
     step = 360 / len(axes)
     if len(axes) > 4:

@@ -29,7 +29,7 @@ class OneDofDesign(Design):
     )
 
     family: Literal["1dof"]
-    """Which kind of actuator this is."""
+    """Kind of actuator."""
     chamber: RoundChamber = RoundChamber.model_construct()
     fits: Fits = Fits.model_construct()
 
@@ -46,7 +46,7 @@ class OneDofDesign(Design):
 
 
 def footprint(design: OneDofDesign) -> Footprint:
-    """Return pockets on one axis, with ears in the sector that the tab leaves free."""
+    """Return pockets on one axis, with ears in the sector left free by the tab."""
     pockets, shape_of = pocket_shapes(design, design.chamber)
     return Footprint(
         pockets=[[pocket] for pocket in pockets],
@@ -59,7 +59,7 @@ def footprint(design: OneDofDesign) -> Footprint:
 
 
 def build(design: OneDofDesign) -> Laminate:
-    """Return the laminate of a 1-DoF design. Raises DesignError where parts do not fit."""
+    """Return the laminate of a 1-DoF design. Raises DesignError if parts do not fit."""
     return build_footprint(design, footprint(design))
 
 

@@ -57,13 +57,13 @@ class OblongChamber(ChamberSection):
 
 
 class Tube(Section):
-    """What the sheet is wrapped round."""
+    """Tube inside the wrapped sheet."""
 
     outer_diameter: Length = 15.0
     """The tube that the sheet is wrapped round."""
     glue: str = Field(default="3M 1587", min_length=1, max_length=120)
-    """What holds the sheet round its tube. The paper does not say; this is the adhesive that it
-    takes between actuators and silicone tubes."""
+    """Adhesive that holds the sheet round its tube. The paper does not say; this is its adhesive
+    between actuators and silicone tubes."""
 
 
 class SheetSection(Section):
@@ -81,7 +81,8 @@ class Window(Section):
     width: Length | None = None
     """Bond between sheet and SBA, round the tube; by default two bond widths."""
     length: Length | None = None
-    """The same along the tube; by default the pocket's straight run plus two bond widths."""
+    """Bond between sheet and SBA, along the tube; by default the pocket's straight run plus two
+    bond widths."""
 
 
 class RadialInlet(Inlet):
@@ -92,7 +93,7 @@ class RadialInlet(Inlet):
 
 
 class RadialStack(Stack):
-    """How high each SBA is."""
+    """Number of balloons in each SBA."""
 
     balloons: int = Field(default=1, ge=1, le=1000)
     """Balloons in each SBA."""
@@ -110,7 +111,7 @@ class RadialDesign(Design):
     )
 
     family: Literal["radial"]
-    """Which kind of actuator this is."""
+    """Kind of actuator."""
     stack: RadialStack = RadialStack.model_construct()
     inlet: RadialInlet = RadialInlet.model_construct()
     chamber: OblongChamber = OblongChamber.model_construct()
@@ -151,7 +152,7 @@ class RadialDesign(Design):
 
 
 def build(design: RadialDesign) -> Laminate:
-    """Return the flat laminate of a radial design. Raises DesignError where parts do not fit."""
+    """Return the flat laminate of a radial design. Raises DesignError if parts do not fit."""
     bond, overhang = design.bond.width, design.mask.overhang
     pocket = _pocket(design)
     check_neck(design, [pocket])
@@ -267,7 +268,7 @@ def _bottom(
     if manifold:
         bottom = fillet(union([shape.outline, *tabs]), design.fillet.radius)
     else:
-        # One by one: a fillet of all would also fill narrow gaps between neighbours.
+        # One by one: a joint fillet would also fill narrow gaps between neighbours.
         bottom = union(
             fillet(outline.moved(*centre) | tab, design.fillet.radius)
             for centre, tab in zip(centres, tabs, strict=True)
@@ -288,7 +289,7 @@ def _ears(
 ) -> tuple[Ear, ...]:
     """Two film ears at the lower end of each SBA, two mask ears beside its tab, two of the sheet.
 
-    A manifold makes one part of all SBAs in the bottom balloon, but not above it.
+    A manifold joins all SBAs into one part in the bottom balloon, but not above it.
     """
     if design.registration.method != "ears":
         return ()
@@ -312,19 +313,19 @@ def _ears(
     return placed(rays, bottom.outline | sheet, bottom.outline, design)
 
 
-# Starts of ears on an outline of any shape: two below, and two above beside its tab, which stands
-# on the upper side at x = 0.
+# Starts of ears on an outline of any shape: two below, and two above beside its tab, which is on
+# the upper side at x = 0.
 
 
 Side = Literal[-1, 1]
 STEP = 0.25
-"""mm between the places that are tried along an outline."""
+"""Step between positions tried along an outline, mm."""
 
 
 def film_feet(design: Design, outline: Region) -> tuple[Point, Point]:
     """Return starts of two film ears at the lower side, a quarter of the width beside its middle.
 
-    Raises DesignError where the outline has no room for both.
+    Raises DesignError if the outline has no room for both.
     """
     low_x, _, high_x, _ = outline.bounds
     middle, apart = round((low_x + high_x) / 2, 6), _apart(design)
@@ -341,14 +342,15 @@ def mask_feet(
 ) -> tuple[tuple[Point, Point | None], ...]:
     """Starts of two mask ears at the upper side, clear of the tab and the ``head`` of its tail.
 
-    With each the point of the outline that it is joined from, if it starts beside the outline.
+    Each comes with the point of the outline that it is joined from, if it starts beside the
+    outline.
     """
     half, overhang = _half(design), design.mask.overhang
     tab = max(design.strip_width / 2 + design.bond.width, head)
     beside = tab + 2 * overhang + half
     feet: list[tuple[Point, Point | None]] = []
     for x in (-beside, beside):
-        # A mask reaches past the outline: an ear may stand half beside it.
+        # A mask reaches past the outline: an ear may be half beside it.
         inner = x - math.copysign(half - design.bond.width, x)
         start = _foot(outline, x, 1, design) or _foot(outline, inner, 1, design)
         joint = None if start else _nearest(outline, x, 1, design)
@@ -373,12 +375,12 @@ def _half(design: Design) -> float:
 
 
 def _apart(design: Design) -> float:
-    """Half the distance of two film ears: the fillets beside both, and a little more."""
+    """Half the distance of two film ears: the fillets beside both, plus a margin."""
     return _half(design) + design.fillet.radius + design.mask.overhang / 2
 
 
 def _foot(outline: Region, x: float, side: Side, design: Design) -> Point | None:
-    """A point of the outermost stretch of the outline at ``x``; none where that is too short."""
+    """A point of the outermost stretch of the outline at ``x``; None if that is too short."""
     stretches = section(outline, (x, 0.0), (0.0, float(side)))
     if not stretches or stretches[-1][1] - stretches[-1][0] < design.bond.width:
         return None
@@ -389,9 +391,9 @@ def _foot(outline: Region, x: float, side: Side, design: Design) -> Point | None
 def _nearest(
     outline: Region, preferred: float, side: Side, design: Design, clear_of: float | None = None
 ) -> Point | None:
-    """The foot nearest to ``preferred`` from which no other part of the outline lies ahead.
+    """The foot nearest to ``preferred`` with no other part of the outline ahead of it.
 
-    Where it does everywhere: the one with the least ahead. ``clear_of``: the x of another ear.
+    If every foot has some, the one with the least. ``clear_of``: the x of another ear.
     """
     low_x, _, high_x, _ = outline.bounds
     reach = max(high_x, preferred) - min(low_x, preferred)

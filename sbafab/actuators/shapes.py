@@ -1,6 +1,6 @@
 """Named shapes of a design file, and the regions that they enclose.
 
-Shapes are made of others by name: a layer takes one, and so may several layers.
+Shapes may be made of others by name; several layers may use the same one.
 """
 
 from __future__ import annotations
@@ -54,17 +54,17 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
     "difference": (),
     "pattern": ("count",),
 }
-"""Keys of a shape, of which it has just one, and the keys that this one needs beside it."""
+"""Keys of a shape, exactly one per shape, and the keys required beside it."""
 MOST_EDGES = 5000
-"""Edges of one shape; patterns of patterns would have any number."""
+"""Most edges of one shape; patterns of patterns would have any number."""
 PLACING = ("at", "turned")
 PATTERNS = ("round", "step")
 FURTHER: Mapping[str, tuple[str, ...]] = {"pattern": PATTERNS, "file": ("layer",)}
-"""Keys that a shape of this kind may have beside those that it needs."""
+"""Keys optional for a shape of this kind."""
 
 
 class DrawnRow(Section):
-    """A table in a list or under a name of the user's, which names the keys it does not know."""
+    """A table in a list or under a user's name, which reports unknown keys."""
 
     @model_validator(mode="before")
     @classmethod
@@ -95,11 +95,11 @@ class NamedShape(DrawnRow):
     Its bulge is the tangent of a quarter of its angle: 1 for half a circle, less than 0 clockwise.
     """
     file: str | None = Field(default=None, min_length=1, max_length=1000)
-    """A DXF or SVG file, or a ``laminate.json``: all that its closed contours enclose, where they
-    lie in it; a contour within another is a hole."""
+    """A DXF or SVG file, or a ``laminate.json``: the area enclosed by its closed contours, at their
+    place in it; a contour within another is a hole."""
     layer: str | None = Field(default=None, min_length=1, max_length=255)
     """The layer of a DXF file, the group of an SVG file (label or id) or the pattern of a
-    ``laminate.json`` that is the shape; by default all that a drawing shows."""
+    ``laminate.json`` that is the shape; by default everything that a drawing shows."""
     offset: str | None = None
     """A shape that is grown ``by`` a distance; less than 0 shrinks it."""
     fillet: str | None = None
@@ -107,7 +107,7 @@ class NamedShape(DrawnRow):
     union: Names | None = None
     """Shapes that are joined."""
     difference: Names | None = None
-    """A shape, and those that are cut out of it."""
+    """A shape, and the shapes that are cut out of it."""
     pattern: str | None = None
     """A shape repeated ``count`` times, evenly ``round`` a point or in steps of ``step``."""
     width: Length | None = None
@@ -123,13 +123,13 @@ class NamedShape(DrawnRow):
     step: Coordinates | None = None
     """From one copy of a pattern to the next, along x and y."""
     at: Coordinates = (0.0, 0.0)
-    """Where the shape's origin comes to lie."""
+    """Position of the shape's origin."""
     turned: Angle = 0.0
-    """Degrees by which it is turned about its origin first, counter-clockwise."""
+    """Degrees by which it is first turned about its origin, counter-clockwise."""
 
     @property
     def kind(self) -> str:
-        """The key that says what the shape is."""
+        """The key that defines the shape."""
         return next(kind for kind in NEEDS if getattr(self, kind) is not None)
 
     @model_validator(mode="after")
@@ -160,7 +160,7 @@ class NamedShape(DrawnRow):
 
 
 class NamedShapes(Section):
-    """The shapes by name, a table each."""
+    """The shapes by name, a table for each."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, NamedShape] = Field(init=False)
@@ -192,10 +192,10 @@ def _entries(value: object) -> int:
 
 
 class ShapeRegions:
-    """The shapes of a design as regions, each made once."""
+    """The shapes of a design as regions, each computed once."""
 
     def __init__(self, shapes: Mapping[str, NamedShape], files: Mapping[str, Path]) -> None:
-        """Takes the shapes by name, and their drawings by key, such as ``shapes.rim.file``."""
+        """Shapes by name, and their drawings by key, such as ``shapes.rim.file``."""
         self.shapes = shapes
         self.files = files
         self._regions: dict[str, Region] = {}
@@ -300,7 +300,7 @@ def marks_of(vertices: Sequence[tuple[float, ...]]) -> list[Mark]:
     marks = []
     for here, there in pairwise([*vertices, vertices[0]]):
         x, y, bulge = (*here, 0.0)[:3]
-        # An arc that leaves its chord by nothing has a circle beyond all numbers.
+        # A nearly straight arc has a circle beyond all numbers.
         height = abs(bulge) * math.dist((x, y), there[:2]) / 2
         marks.append((x, y, bulge if height > EPSILON else 0.0))
     return marks

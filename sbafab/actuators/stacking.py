@@ -1,4 +1,4 @@
-"""Stacks of balloons as layers, and the pockets, tabs and strips that families share."""
+"""Stacks of balloons as layers, and the pockets, tabs and strips common to all families."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ from sbafab.laminate.laminate import (
 class BalloonShape:
     """One balloon seen from above, before bores and lumen are cut: its outline and pockets.
 
-    The counts are the numbers of separate parts that outline and pockets should have.
+    The counts are the expected numbers of separate parts of outline and pockets.
     """
 
     outline: Region
@@ -58,7 +58,7 @@ class BalloonShape:
 
 @dataclass(frozen=True)
 class BalloonStack:
-    """Balloons bottom to top, what runs through them, and what holds them in register.
+    """Balloons bottom to top, their channels, and their registration.
 
     ``shapes`` holds the distinct balloons and ``shape_of`` the index of each balloon's own;
     ``bottom`` is the first balloon with its inlet tabs and strips. ``axes`` are the channel axes.
@@ -118,9 +118,9 @@ def balloon_cuts(stack: BalloonStack, design: Design) -> list[CutFilm]:
 
     @cache
     def separator_mask(below: frozenset[int], above: int) -> Region:
-        """The mask under a balloon: it reaches as far as any balloon of ``below`` faces that one.
+        """The mask under a balloon: it covers the contact with every balloon of ``below``.
 
-        Past a smaller neighbour a film would meet the next but one, or the inlet tabs.
+        Beyond a smaller neighbour a film would meet the next but one, or the inlet tabs.
         """
         shared = eared(above)
         # The bottom balloon covers a plain one of its size.
@@ -158,7 +158,7 @@ def channel_pin(name: str, centre: Point, bore: BoreSection) -> Pin:
 
 
 def film_of(design: Design, role: Role, index: int = 0) -> Film:
-    """Return the film that a design gives to the layers of a role, or to the one of this index.
+    """Return the film of a role in a design, or of the layer with this index.
 
     Raises DesignError if it names none, or one of the wrong kind.
     """
@@ -254,25 +254,25 @@ def stacked(
 
 
 MOST_SIZES = 40
-"""Different pockets in a stack: twice the balloons that have been built (paper Sec. 6)."""
+"""Most different pockets in a stack: twice the balloons built so far (paper Sec. 6)."""
 
 
 class RoundChamber(ChamberSection):
     """The chamber of a family whose pockets are discs, or one drawn outline."""
 
     diameter: Length | Annotated[tuple[Length, ...], Field(strict=False, min_length=1)] = 5.0
-    """Pocket diameter; a list gives one a balloon, bottom to top (a tapered stack)."""
+    """Pocket diameter; a list gives one per balloon, bottom to top (a tapered stack)."""
 
 
 def free_diameter(chamber: RoundChamber) -> tuple[Free, ...]:
-    """Return the diameter as a search variable: that of all balloons, or the largest of a list."""
+    """Return the diameter as a search variable: of all balloons, or the largest of a list."""
     if chamber.outline is not None:
         return ()
     return (Free("chamber.diameter", 2.6, 16.0, 0.1, widens=True),)
 
 
 def free_of_round(chamber: RoundChamber, further: tuple[Free, ...]) -> tuple[Free, ...]:
-    """Return the search variables of a round chamber and ``further`` ones.
+    """Return the search variables of a round chamber, followed by ``further`` ones.
 
     A list of diameters fixes the number of balloons.
     """
@@ -309,7 +309,7 @@ def drawn_pocket(design: Design) -> Region | None:
 def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], tuple[int, ...]]:
     """Return the distinct pockets round (0, 0), and the index of each balloon's.
 
-    Raises DesignError where a pocket has no room for bore and neck ring.
+    Raises DesignError if a pocket has no room for bore and neck ring.
     """
     if chamber.outline is not None and not isinstance(chamber.diameter, float):
         raise DesignError(
@@ -360,8 +360,8 @@ def tab_and_strip(
     """Return inlet tab, mask strip and inlet of a chamber.
 
     The strip starts at ``start`` inside the pocket and runs along ``direction``; the outline ends
-    ``edge`` mm from there. The strip reaches one overhang past the tab's end. Raises DesignError
-    where the strip is wider than the pocket.
+    ``edge`` mm from there. The strip reaches one overhang past the tab's end. Raises DesignError if
+    the strip is wider than the pocket.
     """
     width = design.strip_width
     for side in (1, -1):
