@@ -45,7 +45,10 @@ class Document(BaseModel):
 
 def json_schema(record: type, identity: str) -> dict[str, Any]:
     """Return the JSON schema of a record or document that is written below its id."""
-    body = TypeAdapter(record).json_schema(mode="serialization")
+    if issubclass(record, BaseModel):
+        body = record.model_json_schema(mode="serialization")
+    else:
+        body = TypeAdapter(record).json_schema(mode="serialization")
     body["properties"] = {"schema": {"const": identity}, **body["properties"]}
     return {**body, "required": ["schema", *body["required"]]}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -29,14 +29,17 @@ from sbafab.cli.printing import (
 )
 from sbafab.cli.progress import shown_progress
 from sbafab.design.files import changed_keys, name_of, template_names
+from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError
-from sbafab.models.figures import FLAGS
+from sbafab.models.figures import FLAGS, FlagList
 from sbafab.models.formulas import MOST_PRESSURE, is_near_burst
-from sbafab.output.schema_ids import FIND_SCHEMA
+from sbafab.models.paper import CounterpartEntry
 from sbafab.search.find import (
     FOUND,
+    Binding,
     FindRequest,
     FoundDesign,
+    Spare,
     found_toml,
     free_keys,
     refuse_existing,
@@ -53,7 +56,6 @@ from sbafab.search.quantities import (
 from sbafab.search.trial import (
     Goal,
     Requirement,
-    Trial,
     figure_text,
     keys_said,
     read_all,
@@ -259,52 +261,87 @@ def _counts_tabs(request: FindRequest) -> bool:
     return "overall_diameter" in names and "inlet.tab_length" not in free
 
 
+class TrialEntry(Document):
+    """A design that was tried."""
+
+    keys: dict[str, Any] = attribute("values")
+    """keys of the design that were found"""
+    figures: dict[str, PlainNumber]
+    """quantities in mm, deg, N, N/mm, s, g or a share"""
+
+
+class RequirementEntry(Document):
+    """A requirement, with the figures of the best design."""
+
+    quantity: str = attribute("quantity.label")
+    unit: str = attribute("quantity.unit")
+    sense: Literal["at least", "at most"]
+    limit: PlainNumber
+    median: PlainNumber
+    """of the best; force below 0 where it rises less"""
+    bound: PlainNumber | None
+    """kept with the probability `sure`, and held against the limit"""
+    holds: bool
+
+
+class RangeEndEntry(Document):
+    """A key that only its range stops."""
+
+    key: str
+    value: Any
+    low: PlainNumber
+    high: PlainNumber
+
+
+class FindDocument(Document, schema="sbafab/find@1"):
+    """What ``find --json`` prints; by quantity where names are keys."""
+
+    holds: bool
+    file: str | None
+    """the design file, null where none holds"""
+    started_from: str
+    tries: int
+    is_cut_short: bool
+    """whether more tries might lead further"""
+    sure: PlainNumber | None = attribute("problem.sure")
+    """probability with which requirements must hold"""
+    best: TrialEntry
+    intervals: dict[str, tuple[float, float]]
+    """90 % intervals of the best, where a calibration says so"""
+    flags: dict[str, FlagList]
+    """what figures of the best are not to be trusted for"""
+    requirements: list[RequirementEntry]
+    measured: dict[str, CounterpartEntry]
+    missed: list[str]
+    binds: list[Binding]
+    range_ends: list[RangeEndEntry] = attribute("ends")
+    without_room: list[Spare]
+    front: list[TrialEntry]
+    on_front: int
+
+
 def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
     """Return a result as JSON."""
-
-    def trial_json(trial: Trial) -> dict[str, Any]:
-        return {"keys": dict(trial.values), "figures": dict(trial.figures)}
-
-    return {
-        "schema": FIND_SCHEMA,
-        "holds": result.holds,
-        "file": str(target) if result.holds else None,
-        "started_from": origin,
-        "tries": result.tries,
-        "is_cut_short": result.is_cut_short,
-        "sure": result.problem.sure,
-        "best": trial_json(result.best),
-        "intervals": {label: list(ends) for label, ends in result.intervals.items()},
-        "flags": {label: list(flags) for label, flags in result.flags.items()},
-        "requirements": [_requirement_json(result, row) for row in result.problem.requirements],
-        "measured": {name: row.as_dict() for name, row in result.measured.items()},
-        "missed": result.missed,
-        "binds": [{"key": b.key, "value": b.value, "breaks": b.breaks} for b in result.binds],
-        "range_ends": [
-            {"key": end.key, "value": end.value, "low": end.low, "high": end.high}
-            for end in result.ends
-        ],
-        "without_room": [
-            {"rule": s.rule, "measured": s.measured, "unit": s.unit, "place": s.place}
-            for s in result.without_room
-        ],
-        "front": [trial_json(trial) for trial in result.front],
-        "on_front": result.on_front,
-    }
+    return FindDocument.of(
+        result,
+        file=str(target) if result.holds else None,
+        started_from=origin,
+        requirements=[_requirement(result, row) for row in result.problem.requirements],
+        measured={name: row.entry() for name, row in result.measured.items()},
+    )
 
 
-def _requirement_json(result: FoundDesign, requirement: Requirement) -> dict[str, Any]:
+def _requirement(result: FoundDesign, requirement: Requirement) -> RequirementEntry:
     """Return a requirement with the figures of the best design; ``bound`` is null without sure."""
-    label, best = requirement.quantity.label, result.best
-    return {
-        "quantity": label,
-        "unit": requirement.quantity.unit,
-        "sense": "at least" if requirement.at_least else "at most",
-        "limit": requirement.limit,
-        "median": best.value(requirement),
-        "bound": best.judged(requirement) if label in best.intervals else None,
-        "holds": requirement.holds(best.judged(requirement)),
-    }
+    best = result.best
+    bound = best.judged(requirement)
+    return RequirementEntry.read(
+        requirement,
+        sense="at least" if requirement.at_least else "at most",
+        median=best.value(requirement),
+        bound=bound if requirement.quantity.label in best.intervals else None,
+        holds=requirement.holds(bound),
+    )
 
 
 def print_result(result: FoundDesign, origin: str, target: Path) -> None:

@@ -14,6 +14,7 @@ from pydantic import Field, TypeAdapter
 from sbafab import actuators
 from sbafab.assemblies.records import Assembly
 from sbafab.cli.explain import DesignKey
+from sbafab.cli.find import FindDocument
 from sbafab.cli.kerf import KerfDocument
 from sbafab.cli.nest import NestedDocument
 from sbafab.cli.run import RunDocument
@@ -25,11 +26,10 @@ from sbafab.errors import ERROR_SCHEMA
 from sbafab.inspection.inspection import InspectionDocument
 from sbafab.laminate.joints import PortKind
 from sbafab.laminate.netlist import SCHEMA as NETS_SCHEMA
-from sbafab.models.figures import FLAGS, Factors, Points, PredictionRequest, VerdictLine
 from sbafab.models.map_files import MapDocument
-from sbafab.models.quantity import ModelId, Quantity
 from sbafab.models.sensitivities import SensitivityRow
 from sbafab.output import schema_ids as ids
+from sbafab.output.artefacts import PredictDocument
 from sbafab.output.checked import Checks
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
@@ -42,7 +42,6 @@ from sbafab.results.records import HistoryEntry, LabRow, Record
 from sbafab.results.report import ReportDocument
 from sbafab.rules.rule import Explanation
 from sbafab.search.compare import CompareDocument
-from sbafab.search.find import Binding, RangeEnd, Spare
 from sbafab.search.quantities import QuantityName
 from sbafab.search.target_yield import YieldEntry
 from sbafab.simulators.simulator import NAMES as SIMULATORS
@@ -90,6 +89,14 @@ class YieldRunDocument(RunDocument, schema=RunDocument.SCHEMA):
     """A folder, and of --target-yield what was changed; figures as given and as changed."""
 
     reached: YieldEntry | None = Field(None, alias="yield")
+
+
+class PrintedPrediction(PredictDocument, schema=PredictDocument.SCHEMA):
+    """The contents of ``predict.json``, and what is printed besides."""
+
+    failed: tuple[str, ...] = ()
+    folder: str = ""
+    sensitivity: tuple[SensitivityRow, ...] = ()
 
 
 UTC = {**TEXT, "description": "UTC"}
@@ -251,151 +258,6 @@ def _batch() -> dict[str, Any]:
     )
 
 
-FLAG_LIST = {
-    **array({"enum": list(FLAGS)}),
-    "description": "; ".join(f"{flag}: {words}" for flag, words in FLAGS.items()),
-}
-
-
-def _predict() -> dict[str, Any]:
-    loss = {**number(), "description": "mm"}
-    factors = of(Factors, "press_film", pocket_loss=loss)["properties"]
-    asked = of(PredictionRequest, "calibration", **factors)
-    design_with = {
-        "type": "boolean",
-        "description": "false where another model gives the same quantity, and that one is to "
-        "design with",
-    }
-    measured = _counterpart()
-    measured["type"] = ["object", "null"]
-    measured["description"] = (
-        "what the paper measured, where validation shows the model to be off by more than a "
-        "quarter of it"
-    )
-    interval = {
-        **array(number()),
-        "type": ["array", "null"],
-        "description": "90 % interval of what would be measured, where a calibration says so",
-    }
-    between = {
-        **array(number()),
-        "type": ["array", "null"],
-        "description": "bounds of a drawn pocket that is taken for a disc",
-    }
-    quantity = {"enum": [quantity.key for quantity in Quantity]}
-    at = {
-        "type": "object",
-        "additionalProperties": {"type": ["number", "string"]},
-        "description": "conditions that it holds at, those that it depends on",
-    }
-    figure = table(
-        quantity=quantity,
-        at=at,
-        group=TEXT,
-        name=TEXT,
-        value=number(),
-        unit=TEXT,
-        model_id={"enum": list(ModelId)},
-        model=TEXT,
-        trust=TEXT,
-        design_with=design_with,
-        measured=measured,
-        between=between,
-        interval=interval,
-        pressure_kpa={**number("null"), "description": "gauge, a vacuum below 0; null at none"},
-        flags=FLAG_LIST,
-    )
-    relation = table(
-        name=TEXT,
-        title=TEXT,
-        x={**TEXT, "description": "label of the axis, with its unit"},
-        y={**TEXT, "description": "label of the axis, with its unit"},
-        lines=array(of(Points, "error", model=TEXT, trust=TEXT)),
-        measured=array(of(Points)),
-        plot={**TEXT, "description": "its file in the folder"},
-    )
-    found = table(
-        schema={"const": ids.PREDICTION_SCHEMA},
-        name=TEXT,
-        family=TEXT,
-        design_sha256=TEXT,
-        generator=TEXT,
-        asked=asked,
-        verdict=array(of(VerdictLine)),
-        figures=array(figure),
-        left_out=array(table(name=TEXT, reason=TEXT, quantities=array(quantity))),
-        relations=array(relation),
-    )
-    moved = of(SensitivityRow)
-    return and_perhaps(found, failed=array(TEXT), folder=TEXT, sensitivity=array(moved))
-
-
-def _counterpart() -> dict[str, Any]:
-    return table(
-        sentence=TEXT,
-        value=number(),
-        error={**number(), "description": "0 where the paper gives none"},
-        unit=TEXT,
-        actuator=TEXT,
-        source=TEXT,
-        model_gave={**number(), "description": "the same model for that actuator, in the unit"},
-    )
-
-
-def _find() -> dict[str, Any]:
-    figures = {"type": "object", "additionalProperties": number()}
-    shown = table(
-        keys={"type": "object", "description": "keys of the design that were found"},
-        figures={**figures, "description": "quantities in mm, deg, N, N/mm, s, g or a share"},
-    )
-    ends = {**array(number()), "minItems": 2, "maxItems": 2}
-    requirement = table(
-        quantity=TEXT,
-        unit=TEXT,
-        sense={"enum": ["at least", "at most"]},
-        limit=number(),
-        median={**number(), "description": "of the best; force below 0 where it rises less"},
-        bound={
-            **number("null"),
-            "description": "kept with the probability `sure`, and held against the limit",
-        },
-        holds={"type": "boolean"},
-    )
-    return table(
-        schema={"const": ids.FIND_SCHEMA},
-        holds={"type": "boolean"},
-        file={"type": ["string", "null"], "description": "the design file, null where none holds"},
-        started_from=TEXT,
-        tries=COUNT,
-        is_cut_short={"type": "boolean", "description": "whether more tries might lead further"},
-        sure={**number("null"), "description": "probability with which requirements must hold"},
-        best=shown,
-        intervals={
-            "type": "object",
-            "description": "90 % intervals of the best, by quantity, where a calibration says so",
-            "additionalProperties": ends,
-        },
-        flags={
-            "type": "object",
-            "description": "what figures of the best are not to be trusted for, by quantity",
-            "additionalProperties": FLAG_LIST,
-        },
-        requirements=array(requirement),
-        measured={
-            "type": "object",
-            "description": "what the paper measured, by quantity, where the model is off by more "
-            "than a quarter of it",
-            "additionalProperties": _counterpart(),
-        },
-        missed=array(TEXT),
-        binds=array(of(Binding)),
-        range_ends=array(of(RangeEnd, "step", "above")),
-        without_room=array(of(Spare)),
-        front=array(shown),
-        on_front=COUNT,
-    )
-
-
 # All formats.
 
 
@@ -429,11 +291,11 @@ FORMATS: Mapping[str, Format] = {
     ),
     "press": Format(PRESS_SCHEMA, "`press.json`, the heat-press schedule", _press),
     "predict": Format(
-        ids.PREDICTION_SCHEMA,
+        PredictDocument.SCHEMA,
         "`predict.json`, and what `predict --json` prints of a design",
-        _predict,
+        PrintedPrediction,
     ),
-    "find": Format(ids.FIND_SCHEMA, "what `find --json` prints", _find),
+    "find": Format(FindDocument.SCHEMA, "what `find --json` prints", FindDocument),
     "compare": Format(CompareDocument.SCHEMA, "what `compare --json` prints", CompareDocument),
     "run": Format(
         RunDocument.SCHEMA,

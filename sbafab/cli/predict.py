@@ -162,7 +162,7 @@ def predict(
     if request.as_json:
         document = prediction_json(design, prediction)
         if sensitivity:
-            document["sensitivity"] = [row._asdict() for row in rows]
+            document["sensitivity"] = [asdict(row) for row in rows]
         print_json({**document, "failed": failed, "folder": str(run.folder)})
     else:
         print_listed("size", size_phrases(design, run.laminate, prediction.asked.factors))

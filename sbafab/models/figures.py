@@ -9,12 +9,16 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from operator import attrgetter
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from pydantic import AfterValidator, Field, PlainSerializer, WithJsonSchema
+
+from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError
 from sbafab.laminate.assembly import folded_height
 from sbafab.models import paper, printed
-from sbafab.models.paper import Counterpart
+from sbafab.models.paper import Counterpart, CounterpartEntry
 from sbafab.models.quantity import (
     ANYWHERE,
     FACTOR_WORDS,
@@ -158,24 +162,20 @@ class Figure:
         parts += [self.counterpart] if self.measured else []
         return " ".join(f"({part})" for part in parts)
 
+    @property
+    def design_with(self) -> bool:
+        """False where another model gives the same quantity, and that one is to design with."""
+        return not self.other
+
+    @property
+    def counterpart_entry(self) -> CounterpartEntry | None:
+        """The measured counterpart for programs."""
+        is_calibrated = bool(self.model.factors)
+        return self.measured.entry(is_calibrated) if self.measured else None
+
     def as_dict(self) -> dict[str, Any]:
-        return {
-            "quantity": self.quantity.key,
-            "at": self.at.as_dict(),
-            "group": self.group,
-            "name": self.name,
-            "value": _rounded(self.value),
-            "unit": self.unit,
-            "model_id": self.model.id,
-            "model": self.model.title,
-            "trust": self.model.trust,
-            "design_with": not self.other,
-            "measured": self.measured and self.measured.as_dict(bool(self.model.factors)),
-            "between": self.between and [_rounded(end) for end in self.between],
-            "interval": self.interval and [_rounded(end) for end in self.interval],
-            "pressure_kpa": self.pressure_kpa,
-            "flags": list(self.flags),
-        }
+        """Return the figure as ``predict.json`` holds it."""
+        return PredictedFigure.of(self)
 
 
 @dataclass(frozen=True)
@@ -189,6 +189,16 @@ class Trace:
     x: Sequence[float]
     y: Sequence[float]
     model: Model | None = None
+
+    @property
+    def title(self) -> str:
+        """The model's title, or that it is measured."""
+        return self.model.title if self.model else MEASURED
+
+    @property
+    def trust(self) -> str:
+        """The model's validity; empty of what is measured."""
+        return self.model.trust if self.model else ""
 
 
 @dataclass(frozen=True)
@@ -226,7 +236,7 @@ class Relation:
                 "x": float(x),
                 "y": float(y),
                 "error": None,
-                "model": line.model.title if line.model else MEASURED,
+                "model": line.title,
             }
             for line in self.lines
             for x, y in zip(line.x, line.y, strict=True)
@@ -251,33 +261,6 @@ class Relation:
         frame.attrs.update(title=self.title, x=self.x_label, y=self.y_label)
         return frame
 
-    def as_dict(self) -> dict[str, Any]:
-        return {
-            "name": self.name,
-            "title": self.title,
-            "x": self.x_label,
-            "y": self.y_label,
-            "lines": [
-                {
-                    "label": line.label,
-                    "model": line.model.title if line.model else MEASURED,
-                    "trust": line.model.trust if line.model else "",
-                    "x": [_rounded(value) for value in line.x],
-                    "y": [_rounded(value) for value in line.y],
-                }
-                for line in self.lines
-            ],
-            "measured": [
-                {
-                    "label": points.label,
-                    "x": [_rounded(value) for value in points.x],
-                    "y": [_rounded(value) for value in points.y],
-                    "error": list(points.error),
-                }
-                for points in self.points
-            ],
-        }
-
 
 @dataclass(frozen=True)
 class LeftOut:
@@ -288,13 +271,6 @@ class LeftOut:
     name: str
     reason: str
     quantities: tuple[Quantity, ...] = ()
-
-    def as_dict(self) -> dict[str, Any]:
-        return {
-            "name": self.name,
-            "reason": self.reason,
-            "quantities": [quantity.key for quantity in self.quantities],
-        }
 
 
 @dataclass(frozen=True)
@@ -363,6 +339,11 @@ class PredictionRequest:
     def factors(self) -> Factors:
         """The factors that predictions are made with; none where they are not resolved yet."""
         return self.calibration or Factors()
+
+    @property
+    def given_overrides(self) -> dict[str, float]:
+        """The overrides that have a value."""
+        return {name: value for name, value in self.overrides.items() if value is not None}
 
 
 @dataclass(frozen=True, repr=False)
@@ -447,31 +428,7 @@ class Prediction:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of ``predict.json``, its schema apart."""
-        return {
-            "asked": {
-                "pressures_kpa": list(self.asked.pressures_kpa),
-                "flow_ml_min": self.asked.flow_ml_min,
-                "volumes_ul": list(self.asked.volumes_ul),
-                "press_factor": _rounded(self.asked.factors.press_factor),
-                "contact_factor": self.asked.factors.contact_factor,
-                "pocket_loss": _rounded(self.asked.factors.pocket_loss),
-                "modulus_mpa": self.asked.factors.modulus_mpa,
-                "modulus_ratio": _rounded(self.asked.factors.modulus_ratio),
-                "water_delay": _rounded(self.asked.factors.water_delay),
-                "air_delay": _rounded(self.asked.factors.air_delay),
-                "loss_share": _rounded(self.asked.factors.loss_share),
-                "calibration": self.asked.factors.calibration,
-                "overrides": {
-                    field: value
-                    for field, value in self.asked.overrides.items()
-                    if value is not None
-                },
-            },
-            "verdict": [line._asdict() for line in self.verdict],
-            "figures": [figure.as_dict() for figure in self.figures],
-            "left_out": [item.as_dict() for item in self.left_out],
-            "relations": [relation.as_dict() for relation in self.relations],
-        }
+        return PredictionDocument.of(self)
 
 
 def _rounded(value: float) -> float:
@@ -510,7 +467,8 @@ SCALED_NOTE = (
 )
 
 
-class VerdictLine(NamedTuple):
+@dataclass(frozen=True)
+class VerdictLine:
     """One line of a verdict: the ``quantity`` ("stroke", "bend", "force", "burst"...), its
     ``figure``, and its validity in ``note``.
     """
@@ -654,3 +612,110 @@ def _is_superseded(
         and not given.union(to_come).isdisjoint(first)
         for group, behind, first in SUPERSEDED
     )
+
+
+# The documents.
+
+
+Rounded = Annotated[float, AfterValidator(_rounded)]
+QuantityKey = Annotated[str, WithJsonSchema({"enum": [quantity.key for quantity in Quantity]})]
+QuantityEntry = Annotated[Quantity, PlainSerializer(attrgetter("key"), return_type=QuantityKey)]
+FlagList = Annotated[
+    tuple[Flag, ...],
+    Field(description="; ".join(f"{flag}: {words}" for flag, words in FLAGS.items())),
+]
+ConditionsEntry = Annotated[
+    Conditions, PlainSerializer(Conditions.as_dict, return_type=dict[str, int | float | str])
+]
+
+
+class AskedEntry(Document):
+    """What a prediction was asked for: kPa, ml/min, ul, mm, MPa, s, and factors."""
+
+    pressures_kpa: list[PlainNumber]
+    flow_ml_min: PlainNumber
+    volumes_ul: list[PlainNumber]
+    press_factor: Rounded = attribute("factors.press_factor")
+    contact_factor: PlainNumber = attribute("factors.contact_factor")
+    pocket_loss: Rounded = attribute("factors.pocket_loss")
+    modulus_mpa: PlainNumber | None = attribute("factors.modulus_mpa")
+    modulus_ratio: Rounded = attribute("factors.modulus_ratio")
+    water_delay: Rounded = attribute("factors.water_delay")
+    air_delay: Rounded = attribute("factors.air_delay")
+    loss_share: Rounded = attribute("factors.loss_share")
+    calibration: str = attribute("factors.calibration")
+    overrides: dict[str, PlainNumber] = attribute("given_overrides")
+
+
+class PredictedFigure(Document):
+    """A figure, at the conditions that it depends on."""
+
+    quantity: QuantityEntry
+    at: ConditionsEntry
+    group: str
+    name: str
+    value: Rounded
+    unit: str
+    model_id: ModelId = attribute("model.id")
+    model: str = attribute("model.title")
+    trust: str = attribute("model.trust")
+    design_with: bool
+    """false where another model gives the same quantity, and that one is to design with"""
+    measured: CounterpartEntry | None = attribute("counterpart_entry")
+    between: tuple[Rounded, Rounded] | None
+    """bounds of a drawn pocket that is taken for a disc"""
+    interval: tuple[Rounded, Rounded] | None
+    """90 % interval of what would be measured, where a calibration says so"""
+    pressure_kpa: PlainNumber | None
+    """gauge, a vacuum below 0; null at none"""
+    flags: FlagList
+
+
+class LeftOutEntry(Document):
+    """What is not given, and why."""
+
+    name: str
+    reason: str
+    quantities: list[QuantityEntry]
+
+
+class TraceEntry(Document):
+    """A predicted curve."""
+
+    label: str
+    model: str = attribute("title")
+    trust: str
+    x: list[Rounded]
+    y: list[Rounded]
+
+
+class PointsEntry(Document):
+    """Measured points, each +- its error (0 where the paper gives none)."""
+
+    label: str
+    x: list[Rounded]
+    y: list[Rounded]
+    error: list[PlainNumber]
+
+
+class RelationEntry(Document):
+    """Curves and points; ``x`` and ``y`` are labels of the axes, with their units."""
+
+    name: str
+    title: str
+    x: str = attribute("x_label")
+    y: str = attribute("y_label")
+    lines: list[TraceEntry]
+    measured: list[PointsEntry] = attribute("points")
+    plot: str = ""
+    """its file in the folder"""
+
+
+class PredictionDocument(Document):
+    """All that is predicted of one design."""
+
+    asked: AskedEntry
+    verdict: list[VerdictLine]
+    figures: list[PredictedFigure]
+    left_out: list[LeftOutEntry]
+    relations: list[RelationEntry]

@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
+from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.laminate.films import PAPER_BURST
 from sbafab.models.quantity import (
     ANYWHERE,
@@ -180,17 +181,23 @@ class Counterpart:
         """The counterpart in parentheses, for a line of sizes."""
         return f"(paper's {self.actuator} {self.measured.value:g}, not {self.gave:.4g})"
 
-    def as_dict(self, is_calibrated: bool = False) -> dict[str, Any]:
+    def entry(self, is_calibrated: bool = False) -> CounterpartEntry:
         """Return the row for programs, its sentence first."""
-        return {
-            "sentence": self.sentence(is_calibrated),
-            "value": self.measured.value,
-            "error": self.measured.error,
-            "unit": self.measured.unit,
-            "actuator": self.actuator,
-            "source": self.measured.where,
-            "model_gave": self.gave,
-        }
+        return CounterpartEntry.read(self, sentence=self.sentence(is_calibrated))
+
+
+class CounterpartEntry(Document):
+    """What the paper measured, where the model is off by more than a quarter of it."""
+
+    sentence: str
+    value: PlainNumber = attribute("measured.value")
+    error: PlainNumber = attribute("measured.error")
+    """0 where the paper gives none"""
+    unit: str = attribute("measured.unit")
+    actuator: str
+    source: str = attribute("measured.where")
+    model_gave: PlainNumber = attribute("gave")
+    """the same model for that actuator, in the unit"""
 
 
 def _forces() -> Iterator[Counterpart]:

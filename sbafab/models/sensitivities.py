@@ -76,7 +76,8 @@ class Sensitivity:
         return float(self.rates.turn[:, 0] @ axis) / length * self.value / float(angle)
 
 
-class SensitivityRow(NamedTuple):
+@dataclass(frozen=True)
+class SensitivityRow:
     """By how many percent 1 % more of a ``key`` moves the free ``stroke``, and the ``bend`` of one
     chamber, None where it does not bend; the ratio of the changes.
     """

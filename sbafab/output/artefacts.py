@@ -32,7 +32,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.mesh_files import MeshFile, write_meshes
 from sbafab.models.calibrated import FILE as CALIBRATION_FILE
 from sbafab.models.calibrated import NONE, load_calibration, shipped_names
-from sbafab.models.figures import Prediction
+from sbafab.models.figures import Prediction, PredictionDocument
 from sbafab.nesting.nest import PLACES, as_dict
 from sbafab.nesting.records import Nest
 from sbafab.output.checked import (
@@ -44,7 +44,7 @@ from sbafab.output.checked import (
     hole_notes,
 )
 from sbafab.output.manifest import as_json
-from sbafab.output.schema_ids import PREDICTION_SCHEMA, SIMULATE_SCHEMA
+from sbafab.output.schema_ids import SIMULATE_SCHEMA
 from sbafab.pressing.cycles import batch_json, design_runs
 from sbafab.pressing.schedule_files import PRESS_SCHEMA, press_csv, press_json
 from sbafab.process import Progress
@@ -293,13 +293,22 @@ def _solid_png(folder: DesignFolder) -> bytes:
 # Predictions and simulations.
 
 
+class PredictDocument(PredictionDocument, schema="sbafab/predict@1"):
+    """The contents of ``predict.json``."""
+
+    name: str
+    family: str
+    design_sha256: str
+    generator: str
+
+
 def prediction_json(design: Design, prediction: Prediction) -> dict[str, Any]:
     """Return the contents of ``predict.json``; ``plot`` of a relation is its file in the folder."""
     table = prediction.as_dict()
     for relation in table["relations"]:
         relation["plot"] = f"{PREDICT}/{relation['name']}.svg"
     return {
-        "schema": PREDICTION_SCHEMA,
+        "schema": PredictDocument.SCHEMA,
         "name": design.name,
         "family": design.family,
         "design_sha256": design_sha256(design),
@@ -490,7 +499,7 @@ ARTEFACTS: tuple[Artefact, ...] = (
         "predict",
         "from `sbafab predict`: every figure with model and trust",
         _predict_json,
-        PREDICTION_SCHEMA,
+        PredictDocument.SCHEMA,
     ),
     Artefact("predict", "predict", "its plots", _write_plots),
     *(
