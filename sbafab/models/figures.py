@@ -47,16 +47,16 @@ FLAGS: Mapping[Flag, str] = {
     EXTRAPOLATION: "an extrapolation: nothing like it was measured",
     NEAR_BURST: "above half of the estimated burst pressure",
 }
-"""What a figure's flags say."""
+"""Texts of a figure's flags."""
 
 
 @dataclass(frozen=True)
 class Model:
     """Origin of a number: ``source`` is an equation or section, ``trust`` the model's validity.
 
-    ``factors`` are those that a user measured, each in the unit of that field of ``Factors``;
-    ``calibration`` is the name of the one that the model is calibrated by. ``by_disc``: a drawn
-    pocket is taken for a disc.
+    ``factors`` are the user's measured ones, each in the unit of that field of ``Factors``;
+    ``calibration`` is the name of the model's calibration. ``by_disc``: a drawn pocket is replaced
+    by a disc.
     """
 
     id: ModelId
@@ -68,7 +68,7 @@ class Model:
 
     @property
     def name(self) -> str:
-        """The name in words, with calibration or factors."""
+        """The display name, with calibration or factors."""
         parts = [self.id.words]
         parts += [f"calibration {self.calibration}"] if self.calibration else []
         parts += [FACTOR_WORDS[factor].format(value) for factor, value in self.factors]
@@ -89,11 +89,11 @@ class Model:
 class Figure:
     """One predicted number: the ``value`` of a ``quantity``, in its unit, ``at`` its conditions.
 
-    ``other``: another model gives the same quantity, and that one is to design with.
-    ``measured``: the paper's measurement, where the model is off by more than a quarter of it.
-    The value lies ``between`` two of the same unit, where a drawn pocket is taken for a disc.
-    What would be measured lies in the ``interval``, in the same unit, with a probability of 90 %,
-    where a calibration says so. ``flags`` say what it is not to be trusted for.
+    ``other``: shown for comparison; design with the other model's figure of the same quantity.
+    ``measured``: the paper's measurement, if the model is off by more than a quarter of it.
+    The value lies ``between`` two of the same unit, if a drawn pocket is replaced by a disc.
+    A measurement would lie in the ``interval``, in the same unit, with a probability of 90 %, if
+    the calibration gives one. ``flags`` are warnings about its validity.
     """
 
     quantity: Quantity
@@ -108,17 +108,17 @@ class Figure:
 
     @property
     def name(self) -> str:
-        """Quantity and conditions in words."""
+        """Display name: quantity and conditions."""
         return self.quantity.named(self.at)
 
     @property
     def key(self) -> FigureKey:
-        """What tells it from all others."""
+        """The key that identifies the figure in its prediction."""
         return FigureKey(self.quantity, self.at, self.model.id)
 
     @property
     def group(self) -> str:
-        """The heading that it stands under."""
+        """The heading of its group."""
         return self.quantity.group
 
     @property
@@ -128,7 +128,7 @@ class Figure:
 
     @property
     def pressure_kpa(self) -> float | None:
-        """The gauge pressure that it is at, if at any; a vacuum is below 0."""
+        """The figure's gauge pressure, if any; a vacuum is below 0."""
         return self.at.kpa
 
     def is_of(self, quantity: Quantity, at: Conditions | None = None) -> bool:
@@ -137,14 +137,14 @@ class Figure:
 
     @property
     def counterpart(self) -> str:
-        """The measured counterpart as a clause; empty where there is none."""
+        """The measured counterpart as a clause; empty without one."""
         if self.measured is None:
             return ""
         return self.measured.sentence(bool(self.model.factors))
 
     @property
     def range(self) -> str:
-        """The 90 % interval without its unit; empty where there is none."""
+        """The 90 % interval without its unit; empty without one."""
         if self.interval is None:
             return ""
         low, high = self.interval
@@ -182,7 +182,7 @@ class Figure:
 class Trace:
     """A predicted curve; a measured one of the paper if it has no model.
 
-    The unit of ``x`` and that of ``y`` stand in the labels of the relation.
+    The labels of the relation contain the unit of ``x`` and the unit of ``y``.
     """
 
     label: str
@@ -205,7 +205,7 @@ class Trace:
 class Points:
     """Measured points of the paper, each +- its error (0 where it gives none).
 
-    The unit of ``x`` and that of ``y`` and its ``error`` stand in the labels of the relation.
+    The labels of the relation contain the unit of ``x``, and the unit of ``y`` and its ``error``.
     """
 
     label: str
@@ -227,7 +227,7 @@ class Relation:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """A flat row a point of each curve, and of each measurement: ``x`` and ``y`` in the units
+        """One flat row per point of each curve, and per measurement: ``x`` and ``y`` in the units
         of ``x_label`` and ``y_label``, ``error`` of y only for measurements.
         """
         rows = [
@@ -264,8 +264,8 @@ class Relation:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What is not given, in words, and the reason; with the ``quantities`` if they are certain
-    ones.
+    """A description of omitted figures, and the reason; with the ``quantities`` if they are
+    specific ones.
     """
 
     name: str
@@ -277,13 +277,13 @@ class LeftOut:
 class Factors:
     """Calibration factors from the user's own measurements; the defaults leave models unchanged.
 
-    ``press_factor`` is the thickness of films that melt in the press after it over that before, of
-    the product ``press_film`` (of all that melt, where it is empty); ``contact_factor`` the
-    measured force over that of the paper's own models. The elastic balloon takes ``pocket_loss``,
-    by how many mm the press leaves pockets smaller in radius than drawn, ``modulus_mpa``, the
-    film's modulus where it is not the one of the design, and ``modulus_ratio``, the modulus of the
-    pressed film over that. ``water_delay`` and ``air_delay`` in s are the lag of pump and valve,
-    ``loss_share`` the share of the input work that inflating and deflating lose; 0 is not known.
+    ``press_factor`` is the ratio of thickness after and before the press for films that melt in it,
+    for the product ``press_film`` (for all melting films if empty); ``contact_factor`` is the ratio
+    of the measured force to that from the paper's models. The elastic balloon uses ``pocket_loss``,
+    the loss of pocket radius in the press in mm, ``modulus_mpa``, the film's modulus if it differs
+    from the design's, and ``modulus_ratio``, the ratio of the pressed film's modulus to it.
+    ``water_delay`` and ``air_delay`` in s are the lag of pump and valve, ``loss_share`` the share
+    of the input work lost in inflating and deflating; 0 means unknown.
     """
 
     press_factor: float = 1.0
@@ -317,7 +317,7 @@ class Factors:
 
 
 USUAL_PRESSURES = (10.0, 100.0)
-"""kPa at which predictions are made unless others are asked for."""
+"""Default pressures of predictions, kPa."""
 
 
 @dataclass(frozen=True)
@@ -325,8 +325,8 @@ class PredictionRequest:
     """Conditions of a prediction: gauge pressures in kPa, flow in ml/min into each chamber or all,
     volumes in ul a balloon, and factors.
 
-    Without ``calibration`` the factors are those of the design's calibration, with the user's own
-    values (``overrides``, by field of ``Factors``) in place of its own.
+    Without ``calibration`` the factors come from the design's calibration, replaced by the user's
+    values (``overrides``, by field of ``Factors``) where given.
     """
 
     pressures_kpa: tuple[float, ...] = USUAL_PRESSURES
@@ -337,7 +337,7 @@ class PredictionRequest:
 
     @property
     def factors(self) -> Factors:
-        """The factors that predictions are made with; none where they are not resolved yet."""
+        """The factors used in predictions; the defaults if they are not resolved yet."""
         return self.calibration or Factors()
 
     @property
@@ -348,7 +348,7 @@ class PredictionRequest:
 
 @dataclass(frozen=True, repr=False)
 class Prediction:
-    """All that is predicted of one design."""
+    """The prediction of one design."""
 
     asked: PredictionRequest
     figures: tuple[Figure, ...]
@@ -359,7 +359,7 @@ class Prediction:
         """Return the figure of a quantity at conditions (fields of ``Conditions``, those that tell
         figures apart), by a model (its id), or by the one to design with.
 
-        Raises DesignError if there is none, or several.
+        Raises DesignError if no figure or several match.
         """
         sought = Quantity.of(quantity) if isinstance(quantity, str) else quantity
         named = [figure for figure in self.figures if figure.is_of(sought, Conditions(**at))]
@@ -392,12 +392,12 @@ class Prediction:
 
     @property
     def verdict(self) -> tuple[VerdictLine, ...]:
-        """Lines that say what it reaches, how valid that is, and what is left out."""
+        """Lines with the main figures, their validity, and the omitted figures."""
         return verdict(self)
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """A flat row a figure; ``measured`` is what the paper measured, in words, or empty."""
+        """One flat row per figure; ``measured`` is the paper's measurement as text, or empty."""
         return [{**figure.as_dict(), "measured": figure.counterpart} for figure in self.figures]
 
     def frame(self) -> DataFrame:
@@ -479,7 +479,7 @@ class VerdictLine:
 
 
 def verdict(prediction: Prediction) -> tuple[VerdictLine, ...]:
-    """Return the lines of a prediction: strokes, a bend, a force, then what is left out and why."""
+    """Return the lines of a prediction: strokes, a bend, a force, then omissions and reasons."""
     lines = [
         VerdictLine(quantity, _shown(figure), _note(figure))
         for quantity, figure in _main_figures(prediction)
@@ -501,7 +501,7 @@ def _main_figures(prediction: Prediction) -> Iterator[tuple[str, Figure]]:
     flat = [item for item in _of(to_design_with, *BLOCKED) if not item.at.share]
     yield from (("force", item) for item in _strongest(flat))
     for quantities in PULLS:
-        # Where the film does not stand the highest pressure, at the most it stands.
+        # If the film does not withstand the highest pressure, use the highest it withstands.
         for item in _strongest(_of(to_design_with, *quantities)):
             yield "moment" if item.quantity is Quantity.MOMENT else "force", item
     yield from (("burst", item) for item in _of(to_design_with, Quantity.BURST)[:1])
@@ -564,7 +564,7 @@ def eq_4_ratios() -> tuple[float, float]:
 SUPERSEDED = (
     # An upper bound: it says 140 degrees where the paper measured 81 and the stack says 69 to 83.
     ("bending", (ModelId.CONSTANT_CURVATURE,), OF_STACK),
-    # The modulus was measured, at a pressure that nobody knows; the stack's is a tenth of it.
+    # The modulus was measured at an unknown pressure; the stack's is a tenth of it.
     ("stiffness", OF_STACK, (ModelId.CANTILEVER,)),
     # No air drives a balloon to the cylinder that its film could be: short ones stay far below it.
     ("size", (ModelId.CYLINDER,), (ModelId.LENS,)),
@@ -577,10 +577,10 @@ def chosen(
 ) -> tuple[Figure, ...]:
     """Return the figures with those marked as ``other`` that are not to be designed with.
 
-    ``to_come`` are models whose figures are left out for now; if calibrated ones, all blocked
-    forces are marked. Of one name the first with an interval is chosen, which comes from a
-    calibrated model. Without a calibration it is the first: the paper's Eq. 4, whose force is
-    nearest to the six that the paper measured at 100 kPa (0.76 to 1.24 times it; 0.74 to 1.65 times
+    ``to_come`` are models whose figures are omitted for now; if calibrated ones, all blocked forces
+    are marked. Among figures of one name the first with an interval is chosen, which comes from a
+    calibrated model. Without a calibration it is the first one: the paper's Eq. 4, whose force is
+    nearest to the paper's six measurements at 100 kPa (0.76 to 1.24 times it; 0.74 to 1.65 times
     Eqs. 1-3, 0.47 to 0.86 times the elastic stack).
     """
     candidates = tuple(figures)

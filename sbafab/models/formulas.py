@@ -41,16 +41,16 @@ class Bend(NamedTuple):
 def bend(lengths: ArrayLike, axes: ArrayLike) -> Bend:
     """Return the bend of chambers with ``lengths`` (..., n) mm at ``axes`` (n, 2) mm, n >= 2.
 
-    Constant curvature: a plane through the chambers' ends, the nearest one where there are more
-    than three, gives the length on the axis and the gradient across it; the axis is then an arc.
-    Valid to about half a turn: past pi the tip would come down through the base.
+    Constant curvature: a plane through the chambers' ends, fitted if there are more than three,
+    gives the length on the axis and the gradient across it; the axis is then an arc. Valid to about
+    half a turn: past pi the tip would come down through the base.
     """
     places = np.asarray(axes, dtype=float)
     to_plane = np.linalg.pinv(np.column_stack([np.ones(len(places)), places]))
     plane = np.asarray(lengths, dtype=float) @ to_plane.T
     length, across = plane[..., 0], plane[..., 1:]
     angle = np.hypot(across[..., 0], across[..., 1])
-    # It leans away from its long side.
+    # It leans away from the long side.
     towards = np.arctan2(-across[..., 1], -across[..., 0])
     safe = np.where(angle > 0, angle, 1.0)
     # 2 sin^2(x/2) is 1 - cos x without its cancellation.
@@ -60,7 +60,7 @@ def bend(lengths: ArrayLike, axes: ArrayLike) -> Bend:
     return Bend(angle, towards, length, tip)
 
 
-# Pressures: those of gauges, in kPa, a vacuum below 0.
+# Pressures: gauge pressures in kPa, a vacuum below 0.
 
 
 MOST_PRESSURE = 1000.0
@@ -70,15 +70,13 @@ ATMOSPHERE = 101.325
 
 
 def usual_pressures(form: Form) -> tuple[float, ...]:
-    """Return the pressures in kPa of a design's prediction; of one that works under a vacuum they
-    are negative.
-    """
+    """Return the pressures in kPa of a design's prediction; negative if it works under a vacuum."""
     return tuple(-kpa if form.works_under_vacuum else kpa for kpa in USUAL_PRESSURES)
 
 
 def refuse_pressure(kpa: ArrayLike, is_vacuum: bool = False) -> None:
     """Raise DesignError for a pressure in kPa that no model takes: pressures of inflated pockets
-    are from 0 up, those of pockets that work under a vacuum from 0 down.
+    are from 0 up, pressures of pockets that work under a vacuum from 0 down.
     """
     low, high = (-ATMOSPHERE, 0.0) if is_vacuum else (0.0, MOST_PRESSURE)
     for each in np.atleast_1d(np.asarray(kpa, dtype=float)).tolist():
@@ -190,7 +188,7 @@ def second_moments(region: Region) -> tuple[float, float]:
 
 
 def is_the_papers_3dof(form: Form, laminate: Laminate) -> bool:
-    """Return True for the actuator of which the paper measured heights and bends."""
+    """Return True for the actuator whose heights and bends the paper measured."""
     return (
         form.wrap is None
         and form.stacks == LOBES
@@ -203,9 +201,9 @@ def sizes(design: Design, laminate: Laminate, factors: Factors | None = None) ->
     """Return sizes in mm by name: of the flat laminate and, for radial designs, round the tube.
 
     Width, length and overall diameter include masks, inlet tabs and ears. The outline diameter is
-    that of the films without tabs and ears. The thickness is the sum of the films as bought, the
-    folded height that after the press, which is in diameters round the tube twice; ``factors`` are
-    by default those of the design's calibration. Raises DesignError if there is none such.
+    measured on the films without tabs and ears. The thickness is the sum of the films as bought,
+    the folded height the sum after the press, which diameters round the tube contain twice. The
+    default ``factors`` come from the design's calibration. Raises DesignError if it is unknown.
     """
     height = (factors or factors_of(design)).folded(laminate).height
     low_x, low_y, high_x, high_y = laminate.bounds
@@ -267,8 +265,8 @@ def size_phrases(
     design: Design, laminate: Laminate, factors: Factors | None = None
 ) -> tuple[str, ...]:
     """Return the size in phrases: overall diameter, outline diameter, flat extent, and height;
-    ``factors`` as in ``sizes``. Beside the sum of the films of the paper's own actuator stands the
-    height that it measured.
+    ``factors`` as in ``sizes``. For the paper's actuator the measured height follows the sum of the
+    films.
     """
     factors = factors or factors_of(design)
     sizes_mm = sizes(design, laminate, factors)

@@ -45,8 +45,8 @@ def calibration_of(design: Design) -> ModelCalibration | None:
 
 
 def for_film(calibration: ModelCalibration, product: str) -> ModelCalibration:
-    """Return a calibration as it holds for a film; for another one than the evidence's the modulus
-    ratio is 1, as uncertain as the prior has it, and the share of work lost is the prior's.
+    """Return a calibration adapted to a film; for a film other than the evidence's the modulus
+    ratio is 1, with the prior's uncertainty, and the share of work lost is the prior's.
     """
     if product == calibration.film:
         return calibration
@@ -81,9 +81,9 @@ OTHER_FILM = 0.2
 OTHER_SHAPE = 0.2
 """For the burst of pockets that are not round."""
 FAR = 0.25
-"""Where a figure becomes an extrapolation: assumptions alone leave a factor of 1.5 either way."""
+"""Limit above which a figure is an extrapolation: a factor of 1.5 either way by assumption."""
 PAPER_3DOF = SizeRange((5.0, 5.0), (PAPER_THICKNESS,) * 2, (BALLOONS,) * 2)
-"""What the reference stroke is scaled from."""
+"""The actuator from which the reference stroke is scaled."""
 
 
 def sizes_of(form: Form, laminate: Laminate) -> SizeRange:
@@ -108,7 +108,7 @@ def farther(sizes: SizeRange, evidence: SizeRange, is_other_film: bool) -> float
 
 
 def flags_at(missed: float) -> tuple[Flag, ...]:
-    """Return the flags of a figure for which so much is assumed."""
+    """Return the flags of a figure with this assumed standard deviation."""
     return (EXTRAPOLATION,) if missed > FAR else ()
 
 
@@ -126,8 +126,8 @@ def burst_uncertainty(estimate: Burst, share: float = SHARE) -> tuple[tuple[floa
 
 @dataclass(frozen=True)
 class ActuatorSizes:
-    """An actuator as intervals take it: its ``sizes``, the ``products`` of its films that bond, and
-    the ends of its folded height, that of all films flown away and that of the films as bought.
+    """The actuator data for intervals: its ``sizes``, the ``products`` of its films that bond, and
+    the bounds of its folded height, with all films flown away and with the films as bought.
     """
 
     sizes: SizeRange
@@ -148,7 +148,7 @@ class ActuatorSizes:
 @dataclass(frozen=True)
 class Uncertainty:
     """A calibration with the user's own values (``overrides``, by field of ``Factors``), which are
-    exact, in place of its own; of a ``subject``, by default like its evidence.
+    exact, in place of its values; for a ``subject``, by default like its evidence.
     """
 
     calibration: ModelCalibration
@@ -211,7 +211,7 @@ class Uncertainty:
     ) -> tuple[float, tuple[float, float]]:
         """Return a value at the median, and the interval that holds what would be measured with a
         probability of ``share``; ``value_at`` gives the value with other factors. ``term`` is the
-        field of an unknown that the value is the sum of with others: the delay of a time.
+        field of an unknown that is one summand of the value, such as the delay of a time.
         """
         value = value_at(self.factors)
         moved = [
@@ -288,7 +288,7 @@ class Uncertainty:
 
     def _term_slopes(self, value: float, term: str) -> list[float]:
         """Return slopes of a value's logarithm by the logarithms of the unknowns that change no
-        design, of which it may have one as a term; 0 without one, or where the user gave it.
+        design; one of them may be a term of it. 0 without one, or if the user gave it.
         """
         return [
             self.calibration.values[unknown.field] / value
@@ -325,7 +325,7 @@ def _by_key(items: Items) -> dict[FigureKey, float]:
 
 
 def discrepancy_group(figure: Figure) -> str | None:
-    """Return the group of a figure's discrepancy; None where no calibrated model gives it."""
+    """Return the group of a figure's discrepancy; None if no calibrated model gives it."""
     if figure.model.id not in CALIBRATED_MODELS:
         return None
     if figure.quantity is Quantity.FOLDED_HEIGHT:
@@ -345,7 +345,7 @@ def uncertainty_of(
     form: Form | None = None,
 ) -> Uncertainty | None:
     """Return the calibration of a design with the user's own values; None without one. Intervals
-    are those of its ``laminate``; ``form`` replaces the design's own.
+    apply to its ``laminate``; ``form`` replaces the design's.
     """
     calibration = calibration_of(design)
     if calibration is None:
@@ -357,9 +357,9 @@ def uncertainty_of(
 
 
 def factors_of(design: Design, overrides: Mapping[str, float | None] | None = None) -> Factors:
-    """Return the factors of a design's calibration, with the user's own values in place of its own.
+    """Return the factors of a design's calibration, replaced by the user's values where given.
 
-    Raises DesignError if there is no such calibration, or for values out of range.
+    Raises DesignError if the calibration is unknown, or for values out of range.
     """
     uncertainty = uncertainty_of(design, overrides)
     if uncertainty is None:

@@ -21,9 +21,9 @@ JOINTS = ("tilt_x", "tilt_y", "rise", "tilt_y_upper", "tilt_x_upper")
 """Joints of a level from its lower plate up; the name of each begins with its level's."""
 AXES = {"x": "1 0 0", "y": "0 1 0", "e": "0 0 1"}
 UPPER = "_upper"
-"""End of the names of the hinges above the rise, each of which follows the one below."""
+"""Suffix of the hinges above the rise; each follows its counterpart below."""
 VELOCITY = 1.0
-"""m/s and rad/s that stand in for limits, which URDF wants and lines and valves set."""
+"""Placeholder velocity limits, m/s and rad/s: URDF requires them, lines and valves set them."""
 
 
 def joint_values(freedoms: Array) -> Array:
@@ -56,7 +56,7 @@ def document(root: ET.Element, note: str) -> str:
 
 
 def plate_mass(stack: Stack) -> float | None:
-    """Return kg of films that move with each plate, None where a density is not known."""
+    """Return the mass in kg of films that move with each plate, None if a density is unknown."""
     return None if stack.weight is None else stack.weight / GRAVITY / 1000
 
 
@@ -77,8 +77,8 @@ class _Limits(NamedTuple):
 
 
 def _limits(stack: Stack, kind: int) -> _Limits:
-    """Return the limits of a level. At the largest tilt that any rise and direction allow, rims
-    just meet on one side and a balloon on the other is as high as its map.
+    """Return the limits of a level. At the largest tilt for any rise and direction, rims just meet
+    on one side, and a balloon on the other side is as high as its map.
     """
     balloon = stack.maps[kind]
     turns = np.radians(np.arange(360))

@@ -63,11 +63,11 @@ class Kinematics:
         return self._rate(self._within(stroke))
 
     def push(self, stroke: ArrayLike) -> NDArray[np.float64]:
-        """Return force over pressure in mm2 of the stack blocked at a stroke: that of every balloon
-        in it.
+        """Return force over pressure in mm2 of the stack blocked at a stroke, the same for every
+        balloon in it.
 
-        Of a tapered stack at most that of its weakest balloon when flat; what solid films of shut
-        balloons may carry beyond is not counted.
+        For a tapered stack at most the value of its weakest balloon when flat; additional force
+        from solid films of shut balloons is not counted.
         """
         return (self._push or self._rate)(self._within(stroke))
 
@@ -119,7 +119,7 @@ def _in_series(radii: Sequence[float], rate: Law, most: float) -> Law:
     ``rate`` is dv/dh of a balloon of radius 1 up to the stroke ``most``.
     """
     share = np.linspace(0.0, most, SAMPLES)
-    # Past its full state a formula may rise again; a balloon does not.
+    # A formula may rise again past the full state; a balloon does not.
     falling = np.minimum.accumulate(rate(share))
     force = np.linspace(0.0, min(radii) ** 2 * falling[0], SAMPLES)
     stroke = sum(r * np.interp(force / r**2, falling[::-1], share[::-1]) for r in radii)
@@ -165,7 +165,7 @@ def _eq_4_trust(radius: float) -> str:
     return f"geometric regime only: {', '.join(limits)} (measured{origin})"
 
 
-# The actuator of a design, as the models take it.
+# The actuator of a design, as input of the models.
 
 
 NOT_MEASURED = (
@@ -179,13 +179,14 @@ NO_OUTLINE = "no model knows the form of a drawn pocket outline; simulate the de
 
 @dataclass(frozen=True)
 class Actuator:
-    """A design as the models take it.
+    """A design as input of the models.
 
-    Stacks work side by side, each of ``balloons``; ``radii`` (mm, bottom to top) are those of round
-    pockets, empty for oblong ones. ``kinematics`` begins with the preferred model; it is empty for
-    drawn outlines. ``reference_stroke`` mm is what shares of a stroke are of, ``reference_height``
-    mm the height then: what the paper measured, scaled, or of oblong pockets that at the largest
-    volume; ``folded`` is the height of the flat laminate after the press.
+    Stacks work side by side, each of ``balloons``; ``radii`` (mm, bottom to top) are the radii of
+    round pockets, empty for oblong ones. ``kinematics`` begins with the preferred model; it is
+    empty for drawn outlines. Shares of a stroke refer to ``reference_stroke`` mm, and
+    ``reference_height`` mm is the height there: the paper's measurement, scaled, or for oblong
+    pockets the state of largest volume; ``folded`` is the height of the flat laminate after the
+    press.
     """
 
     design: Design
@@ -224,12 +225,12 @@ class Actuator:
 
     @property
     def has_reference(self) -> bool:
-        """True if the reference stroke is known: of round pockets it was measured, of one film."""
+        """True if the reference stroke is known: measured for round pockets, with one film."""
         return not self.radii or self.has_the_papers_film
 
     @property
     def known_stroke(self) -> float:
-        """The reference stroke. Raises DesignError if it is not known."""
+        """The reference stroke in mm. Raises DesignError if it is not known."""
         if not self.kinematics:
             raise DesignError(NO_OUTLINE)
         if not self.has_reference:
@@ -237,8 +238,8 @@ class Actuator:
         return self.reference_stroke
 
     def is_like_paper(self, stacks: int, radius: float) -> bool:
-        """Return True if the paper measured so many stacks of such balloons on common plates: its
-        1-DoF actuators have one, its 3-DoF actuator three.
+        """Return True if the paper measured this number of stacks of such balloons on common
+        plates: its 1-DoF actuators have one, its 3-DoF actuator three.
         """
         return (
             self.has_the_papers_film

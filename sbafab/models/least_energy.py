@@ -40,8 +40,7 @@ class Descent(NamedTuple):
 class Potential(Protocol):
     """Energies of a row of shapes.
 
-    ``scale`` (rows,) is an energy of their size, ``close`` (rows,) the residual that counts as
-    none.
+    ``scale`` (rows,) is their energy scale, ``close`` (rows,) the tolerance of the residual.
     """
 
     scale: Array
@@ -81,7 +80,7 @@ def equilibrium(problem: Potential, x: Array) -> Array:
         damping = np.where(good, np.where(lower < 1e-6, 0.0, lower), damping)
         step = problem.newton_step(state, damping)
         falls = (step * state.gradient).sum(0)
-        # Where rounding alone decides whether the energy falls, there is nothing left to gain.
+        # Stop when rounding decides whether the energy falls.
         still = np.abs(state.gradient).max(0) <= problem.close[live]
         still |= (np.abs(falls) <= ROUNDING * (np.abs(energy) + scale)) & (damping == 0.0)
         still &= good
@@ -92,7 +91,7 @@ def equilibrium(problem: Potential, x: Array) -> Array:
         share = np.where(good, np.where(falls <= 0, full, 0.0), less)
         step_taken, slope = np.where(good, step, step_taken), np.where(good, falls, slope)
         if still.any():
-            # The last step is too short to be judged by the energy, and squares what is amiss.
+            # The last step is too short for the energy to judge it, and squares the error.
             last = np.where(problem.change(x, step) < LAST_STEP, x + step, x)
             minimum[:, live[still]] = last[:, still]
             if still.all():
@@ -150,7 +149,7 @@ def solve_positive(band: Array, right_side: Array) -> Array | None:
     """Return the solution of A x = ``right_side`` (n, rows) as ``solve`` does; None unless all A
     are positive definite.
 
-    Block by block as wide as the band: quicker where that is wide and rows are few.
+    Blocks are as wide as the band: faster for a wide band and few rows.
     """
     size, width, rows = band.shape
     count = -(-size // width)
@@ -191,7 +190,7 @@ def solve_positive(band: Array, right_side: Array) -> Array | None:
 
 
 def tie(band: Array, from_: int, to: int) -> None:
-    """Add the row and column of one unknown to those of another that it is equal to."""
+    """Add the row and column of one unknown to another's, to which it is equal."""
     size, width = band.shape[:2]
     for i in range(max(0, from_ - width + 1), min(size, from_ + width)):
         value = band[min(i, from_), abs(i - from_)]
@@ -212,7 +211,7 @@ class Packing(NamedTuple):
 
 
 def packing(freedoms: NDArray[np.int_], size: int, width: int) -> Packing:
-    """Return the map from a band (size, width) to that of the ``freedoms`` alone."""
+    """Return the map from a band (size, width) to the band of the ``freedoms`` alone."""
     number = np.full(size + width, -1)
     number[freedoms] = np.arange(len(freedoms))
     row, off = (part.ravel() for part in np.meshgrid(freedoms, np.arange(width), indexing="ij"))

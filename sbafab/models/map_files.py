@@ -255,7 +255,7 @@ def area(p, h, balloon=0):
 
 
 def _cells(balloon: BalloonMap) -> dict[str, list[float] | list[str]]:
-    """Return cells of pressure and height, and a row a pressure with + where the map holds."""
+    """Return cells of pressure and height, and one row per pressure with + where the map holds."""
     covered = map_range(balloon)
     return {
         "cell_pressures": [_short(p) for p in covered.pressures.tolist()],

@@ -1,4 +1,4 @@
-"""Where a balloon's map holds: within 3 % of balloons computed beside those it was made from.
+"""Valid range of a balloon's map: within 3 % of balloons computed between its support points.
 
 Lengths mm, pressures kPa.
 """
@@ -18,15 +18,15 @@ from sbafab.models.film_elements import Array
 from sbafab.models.rippled import compressed_shapes
 
 MOST_ERROR, CELL_ERROR = 0.03, 0.02
-"""Share by which a map may miss, and that by which it may where a cell is checked, since it may
-miss by more between these places: free heights jump where another wave begins.
+"""Allowed relative error of a map, and the stricter limit where a cell is checked, since errors
+between these places may be larger: free heights jump where another wave begins.
 """
 FLAT = 1e-3
-"""Height in mm that stands for 0."""
+"""Height in mm that represents 0."""
 PRESSURE_CHECKS, HEIGHT_CHECKS = 37, 25
 """Balloons computed by pressure and by height."""
 PLACE_DIGITS = 6
-"""Digits behind the point to which places in kPa and mm are told apart."""
+"""Decimals to which places in kPa and mm are distinguished."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +85,9 @@ def _is_near(made: BalloonMap, pressures: Array, heights: Array) -> NDArray[np.b
 
 
 def relative_errors(made: BalloonMap, pressure: Array, height: Array) -> Array:
-    """Return the larger share by which a map misses force and volume of the balloons between plates
-    computed at its places (n,), heights above 0. Raises DesignError if there is no equilibrium.
+    """Return the larger relative error of a map in force and volume, against balloons between
+    plates computed at its places (n,), heights above 0. Raises DesignError if one has no
+    equilibrium.
 
     Forces are compared as shares of pressure (and 0.1 kPa) times pocket, and the force; volumes as
     shares of the volume and of what a pocket holds at the least height computed.
@@ -103,8 +104,8 @@ def holds_at(made: BalloonMap, pressure: Array, height: Array) -> NDArray[np.boo
     """Return where a map is within MOST_ERROR of the balloons computed at places (n,); not where
     one lies outside the map.
 
-    Suction counts as no pressure, and heights below FLAT as that. Balloons are those of the map
-    that this one was stiffened from. Raises DesignError if there is no equilibrium.
+    Suction counts as no pressure, and heights below FLAT as FLAT. The balloons belong to the map
+    that this one was stiffened from. Raises DesignError if one has no equilibrium.
     """
     base, ratio = _base(made)
     places = np.stack([np.maximum(pressure / ratio, 0.0), np.maximum(height, FLAT)], -1)

@@ -1,9 +1,9 @@
-"""What drawn pockets do, by the closed forms of their mechanism: pouch motor, hinge, inflated beam,
-jammed sheets, or a pouch that pushes.
+"""Figures of drawn pockets by the closed forms of their mechanism: pouch motor, hinge, inflated
+beam, jammed sheets, or a pouch that pushes.
 
-Lengths and widths are measured on the laminate itself: a pocket is what is left of the open region
-round its chamber's centre where inlet strips are taken away. None of these designs is calibrated:
-no figure has an interval. Lengths mm, pressures kPa.
+Lengths and widths are measured on the laminate itself: a pocket is the open region round its
+chamber's centre without the inlet strips. None of these designs is calibrated, so their figures
+have no interval. Lengths mm, pressures kPa.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ SHARES = (0.1, 0.2, 0.3)
 MOST_STRETCH = 0.05
 """Strain of the film up to which it is taken not to stretch; ours."""
 MOST_TURN = 0.1
-"""rad by which pressure may bend a plate that is taken for stiff; ours."""
+"""rad by which pressure may bend a plate that counts as stiff; ours."""
 RECTANGULAR = 0.9
 """Least share of its bounding box that a pocket fills for models of straight seams; ours."""
 LEAST_PLATE_KPA = 1.0
-"""kPa that stiff plates must stand as such; with less a hinge has none. Ours."""
+"""kPa that plates must withstand to count as stiff, as a hinge requires; ours."""
 UNLIKE = 0.05
 """Share by which pockets of one chamber may differ in area, for the mouths of strips; ours."""
 SEPARATE = 1e-3
@@ -94,7 +94,7 @@ class FilledChamber:
 def pockets_of(
     laminate: Laminate, chamber: Chamber, direction: float
 ) -> list[MeasuredPocket] | None:
-    """Return the pockets at a chamber's centres; None where one has no room beside its strips."""
+    """Return the pockets at a chamber's centres; None if one has no room beside its strips."""
     strips = [inlet.width for inlet in laminate.inlets if inlet.chamber == chamber.name]
     back = max(strips, default=0.0) / 2 + SEPARATE
     found = [_pocket(laminate, centre, back, direction) for centre in chamber.centres]
@@ -126,7 +126,7 @@ def _pocket(
 def _chord(region: Region, centre: Point, axis: int, step: float = 0.0) -> float:
     """Return the chord of a region along x (``axis`` 0) or y through its centre.
 
-    With a step the median of that and of those as far off on both sides: past mouths of strips.
+    With a step, the median of it and the chords that far off on both sides, to skip strips' mouths.
     """
     return sorted(_span(region, centre, axis, off) for off in (-step, 0.0, step))[1]
 
@@ -410,7 +410,7 @@ FIGURES: Mapping[MechanismKind, Callable[[FilledChamber], Iterator[Figure | Left
 
 
 class MechanismQuantity(NamedTuple):
-    """A quantity that people ask of a mechanism, and the figure of ``predict`` that it is."""
+    """A quantity that requirements name for a mechanism, and its figure in ``predict``."""
 
     kind: MechanismKind
     figure: Quantity
@@ -426,14 +426,14 @@ ASKED: Mapping[str, MechanismQuantity] = {
     "slip": MechanismQuantity("jamming", Quantity.SLIP_LOAD),
     "push": MechanismQuantity("push", Quantity.FORCE_BOUND),
 }
-"""By the names that requirements use."""
+"""Quantities by their names in requirements."""
 
 
 def mechanism_value(
     mechanism: Mechanism | None, laminate: Laminate, quantity: str, kpa: float
 ) -> float:
-    """Return a quantity of ``ASKED`` at a pressure, of several chambers the least: the figure that
-    ``predict`` has.
+    """Return a quantity of ``ASKED`` at a pressure, the least of several chambers: the figure in
+    ``predict``.
 
     Raises DesignError if the mechanism is another one, or its model does not hold.
     """

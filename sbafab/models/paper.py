@@ -100,9 +100,9 @@ FULL_SHARE = FULL_HEIGHT.value / BALLOONS / 2.5
 
 # Measured counterparts of figures that are off by more than a quarter of them.
 #
-# One table for all who show such figures: predictions, searches, sweeps, pictures, pages and the
-# studio. A row holds for every design whose figure comes from the row's model: the others were not
-# measured, and a model that is off on the paper's actuators is not better on theirs.
+# One table for all users of such figures: predictions, searches, sweeps, pictures, pages and the
+# studio. A row applies to every design whose figure comes from the row's model: other designs were
+# not measured, and a model that is off for the paper's actuators is no better for them.
 
 
 MISFIT = 0.25
@@ -125,8 +125,8 @@ class Counterpart:
     (None). ``template`` and ``recorded`` name the design and the figure from which ``gave`` was
     taken, in the unit of ``measured``; ``where`` is the state in which the model gave it, if that
     is not the one of the measurement. ``calibrated`` is the value with the calibration "paper" in
-    the unit of ``measured``, None where that is near or changes nothing. A row may be far off with
-    that calibration alone. One ``of_papers`` stands beside figures of the paper's own 3-DoF alone.
+    the unit of ``measured``, None if it is close or unchanged. A row may be far off with that
+    calibration only. A row ``of_papers`` stands beside figures of the paper's own 3-DoF only.
     """
 
     quantities: tuple[Quantity, ...]
@@ -346,7 +346,7 @@ def counterpart(
     of_papers: bool = False,
 ) -> Counterpart | None:
     """Return the measured counterpart of a figure of this quantity by this model, for a design
-    of this ``form``, which may be the paper's own 3-DoF (``of_papers``); None where the model is
+    of this ``form``, which may be the paper's own 3-DoF (``of_papers``); None if the model is
     not known to be off by more than MISFIT.
 
     With a ``calibration`` (its name) it has the calibrated value.
@@ -365,20 +365,20 @@ def _counterpart(
 
 
 def _calibrated(row: Counterpart, calibration: str) -> Counterpart | None:
-    """Return a row with the value of a calibration (its name, "" for none); None where that is not
-    known to be off.
+    """Return a row with the value of a calibration (its name, "" for none); None if it is not known
+    to be off.
     """
     if not calibration:
         return row if abs(row.ratio - 1) > MISFIT else None
     if calibration == CALIBRATION and row.calibrated is not None:
         return replace(row, gave=row.calibrated)
-    # A calibration changes these models; its intervals say how far they may be off.
+    # A calibration changes these models, and its intervals give their possible error.
     return None if set(row.models) & set(CALIBRATED_MODELS) else row
 
 
 def counterparts_of_pose(chambers: int, calibration: str = "") -> dict[str, Counterpart]:
     """Return the counterparts of a pose of the elastic stack by quantity: "height", and for several
-    chambers "bend"; none where the stack has a ``calibration``, with which both are near.
+    chambers "bend"; empty if the stack has a ``calibration``, with which both are close.
     """
     if calibration:
         return {}

@@ -15,7 +15,7 @@ AIAA Journal 1 (1963) 1652, doi 10.2514/3.1873). A flat tube of width w opens to
 Sheets in a bag (laminar jamming): until they slip, n sheets of thickness h bend as one of n h, n^2
 times as stiff as loose ones. They first slip where shear is largest, at the middle: 3 F / 2 b n h =
 mu P of a cantilever. Mechanism and measurements: Narang, Vlassak and Howe, Adv. Funct. Mater. 28
-(2018) 1707136; the formulas are those of beams.
+(2018) 1707136; the formulas come from beam theory.
 
 Lengths mm, pressures kPa, moduli MPa, forces N, moments N mm.
 """

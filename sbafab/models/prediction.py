@@ -491,8 +491,8 @@ def predict(
     quick: bool = False,
 ) -> Prediction:
     """Return the figures and curves of a design of any family; ``quick`` leaves out curves and the
-    elastic stack. With the factors given no intervals are computed, and no figure says whether it
-    lies outside the checked part of a balloon's map.
+    elastic stack. If factors are given, intervals are not computed, and figures are not flagged for
+    lying outside the checked part of a balloon's map.
 
     Raises DesignError if the design cannot be built, or for pressures, a flow or volumes that
     are out of range.
@@ -546,8 +546,8 @@ def predict(
 
 
 def _measured(figure: Figure, actuator: Actuator, calibration: str) -> Counterpart | None:
-    """Return the paper's measurement of a figure that is far off; a folded height with a factor has
-    none.
+    """Return the paper's measurement if the figure is far off; None for a folded height with a
+    factor.
     """
     model = figure.model
     if model.id is ModelId.FILMS and model.factors:
@@ -559,8 +559,8 @@ def _measured(figure: Figure, actuator: Actuator, calibration: str) -> Counterpa
 def _within_burst(
     request: PredictionRequest, laminate: Laminate
 ) -> tuple[PredictionRequest, list[LeftOut]]:
-    """Return a request without the pressures past the estimated burst pressure, and what is said of
-    those.
+    """Return a request without the pressures past the estimated burst pressure, and notes on the
+    omitted ones.
     """
     within, past = [], []
     for pressure in request.pressures_kpa:
@@ -573,8 +573,8 @@ def _within_burst(
 
 
 def _flagged(item: Figure | LeftOut, laminate: Laminate) -> Figure | LeftOut:
-    """Return a figure marked where it is at a pressure near the estimated burst, or what is left
-    out past that.
+    """Return a figure, flagged if its pressure is near the estimated burst, or left out if it is
+    past that.
     """
     if isinstance(item, LeftOut) or item.pressure_kpa is None:
         return item

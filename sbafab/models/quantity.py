@@ -1,6 +1,6 @@
-"""What a predicted figure is of: its quantity and the conditions that it holds at.
+"""Quantity and conditions of a predicted figure.
 
-Programs ask by these. The words that people read are made from them here, and nowhere read back.
+Programs use these as keys. Display text is made from them here, and never parsed.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from sbafab.errors import DesignError
 
 
 class Conditions(NamedTuple):
-    """State of the actuator that a figure holds at; None where the figure does not depend on it.
+    """State of the actuator for a figure; None if the figure does not depend on it.
 
     ``kpa`` gauge, a vacuum below 0; ``share`` of the reference stroke, of a pocket's length by
     which it is shorter, or of the free bend; ``chambers`` pressurised, the others empty or flat;
@@ -50,7 +50,7 @@ ANYWHERE = Conditions()
 
 class Quantity(Enum):
     """Quantities of figures: ``key`` for programs, ``group`` in the output, ``unit``, and the
-    ``words`` of their names, in which ``c`` is the conditions in words.
+    ``words`` of their names, in which ``c`` stands for the text of the conditions.
     """
 
     key: str
@@ -179,7 +179,7 @@ class Quantity(Enum):
     JAMMED_STIFFNESS = "jammed_stiffness", "stiffness", "N mm2", "bending stiffness{c.of}, jammed"
 
     def named(self, at: Conditions) -> str:
-        """Return the figure's name in words."""
+        """Return the figure's display name."""
         return self.words.format(c=_Words(at))
 
     @classmethod
@@ -193,7 +193,7 @@ class Quantity(Enum):
 
 
 class _Words:
-    """Conditions in words, as the names of figures have them."""
+    """Conditions as text, for the names of figures."""
 
     def __init__(self, at: Conditions) -> None:
         self._at = at
@@ -235,12 +235,12 @@ class _Words:
 
 
 def share_of_stroke(share: float) -> str:
-    """Return a share of the reference stroke in words."""
+    """Return a share of the reference stroke as text."""
     return f"at {100 * share:g} % of the reference stroke" if share else "flat"
 
 
 def chamber_count(number: int) -> str:
-    """Return a number of chambers in words."""
+    """Return a number of chambers as text."""
     return "one chamber" if number == 1 else f"{number} chambers"
 
 
@@ -340,7 +340,7 @@ OVER_FLOW = {
     ModelId.LENS_STROKE: ModelId.LENS_OVER_FLOW,
 }
 P_V = {ModelId.EQ_4: ModelId.P_V_EQ_4, ModelId.LENS_STROKE: ModelId.P_V_LENS}
-"""What follows from the models of a pocket's volume: virtual work, time, work at most."""
+"""Models derived from a pocket's volume: virtual work, time, largest work."""
 OF_STACK = (ModelId.ELASTIC_STACK, ModelId.STACK_IN_TIME, ModelId.STACK_SHUT)
 """Models of the elastic stack."""
 FACTOR_WORDS = {
@@ -353,7 +353,7 @@ FACTOR_WORDS = {
 
 
 class FigureKey(NamedTuple):
-    """What tells a figure from all others of a prediction."""
+    """The key that identifies a figure within a prediction."""
 
     quantity: Quantity
     at: Conditions
@@ -366,7 +366,7 @@ class FigureKey(NamedTuple):
 
     @classmethod
     def read(cls, text: str) -> FigureKey:
-        """Return the key of such a text. Raises DesignError or ValueError for any other."""
+        """Return the key parsed from its text. Raises DesignError or ValueError for other text."""
         of, _, model = text.partition("|")
         quantity, _, at = of.partition("@")
         given = dict(part.split("=", 1) for part in at.split(",") if part)
@@ -375,7 +375,7 @@ class FigureKey(NamedTuple):
 
     @property
     def heading(self) -> str:
-        """The figure in words, with its model if several may give it, and its unit."""
+        """Heading of the figure, with its model if several may give it, and its unit."""
         model = f", {self.model.words}" if self.quantity in BY_SEVERAL else ""
         return f"{self.quantity.named(self.at)}{model} [{self.quantity.unit}]"
 

@@ -1,5 +1,5 @@
-"""Inverse kinematics of a stack: the pressures at which the middle of its top stands at a place,
-under a load and in contact.
+"""Inverse kinematics of a stack: the pressures that bring the middle of its top to a place, under a
+load and in contact.
 
 First freedoms and pressures are found together by Newton's method: each step solves the linearised
 equilibrium, and the pressures' change is the least, within their limits, that brings the linearised
@@ -45,25 +45,25 @@ P0 = 0.1
 NEAR, MET = 1e-4, 1e-3
 """Distances in mm from the place at which a search ends, and at which the tip has reached it."""
 STRANDED = 0.5
-"""Distance in mm from the place within which a search that ended is tried again about there."""
+"""Distance in mm from the place within which a failed search is repeated from nearby places."""
 STEPS, LAST_STEP = 25, 2e-3
-"""Newton's steps of freedoms and pressures; one so small (mm, rad, asinh) is the last."""
+"""Maximum Newton steps of freedoms and pressures; step size (mm, rad, asinh) of the last one."""
 WHOLE_STEPS = 5
-"""Steps after which one that closes or opens contacts is halved, lest they do so for ever."""
+"""Halve steps that change contacts after this many, to stop cycling."""
 CLOSE = 0.05
-"""Step (mm, rad, asinh) from which on tangents are exact."""
+"""Step (mm, rad, asinh) below which tangents are exact."""
 ROUGH_CONTACT, CLOSE_CONTACT = 0.3, 1e-4
 """Last step (mm, rad, asinh) against a soft plate, and against the plate itself."""
 SOFT_STEPS, PLATE_STEPS = 4, 16
-"""Most of Newton's steps against a soft plate, whatever these come to, and against the plate."""
+"""Newton steps against a soft plate, converged or not, and maximum against the plate itself."""
 TURNED_BACK = 0.5
-"""Share of a step of pressures that the next takes back, from which on that one is halved."""
+"""Share of a pressure step reversed by the next step, above which that one is halved."""
 CONTACT_RESIDUAL = 1e-3
-"""Residual in mN (or mN mm) against an outer plate that counts as none."""
+"""Tolerance of the residual against an outer plate, mN or mN mm."""
 LONGEST_STEP = 1.5
 """Largest change of asinh(p / P0) in one step."""
 POSES = 40
-"""Equilibria from one start."""
+"""Maximum number of equilibria from one start."""
 DESCENT_STARTS = 3
 """Starts of descents against an outer plate, after Newton's method from all starts."""
 CONTACT_ROUNDS = 8
@@ -74,7 +74,7 @@ LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e3
 PLATE_DAMPING = 1e-4
 """Damping against an outer plate, a mm away from the place."""
 STILL = 1e-6
-"""Step (mm, rad, asinh) that changes nothing."""
+"""Step (mm, rad, asinh) that counts as no change."""
 
 
 class TipTarget(NamedTuple):
@@ -89,12 +89,12 @@ class TipTarget(NamedTuple):
 
 
 class Way(NamedTuple):
-    """A way to solutions against an outer plate: it begins at an equilibrium (``is_posed``), on the
-    arc that pressures of ``starts`` give or on the one that ends at the place (``is_aimed``);
-    ``soft`` is the stiffness in mN/mm of the plate in the first solutions.
+    """A continuation path to solutions against an outer plate: it starts at an equilibrium
+    (``is_posed``), on the arc from the pressures of ``starts``, or on the arc that ends at the
+    place (``is_aimed``); ``soft`` is the plate's stiffness in mN/mm in the first solutions.
 
-    Against soft plates the top's load goes gradually from one point to the next as it rolls, and
-    rates hardly jump.
+    On soft plates the top's load shifts gradually from point to point as it rolls, so rates hardly
+    jump.
     """
 
     is_posed: bool
@@ -104,12 +104,12 @@ class Way(NamedTuple):
 
 POSED, ON_ARC = Way(True), Way(False)
 STICKING = (ON_ARC, Way(False, (3e2, 3e3, 3e4)), POSED)
-"""Ways against a plate that the tip sticks to, tried in turn."""
+"""Paths against a plate that the tip sticks to, tried in turn."""
 SLIDING = (Way(False, (3e2, 3e3, 3e4)), Way(False, (1e3, 3e3, 1e4, 3e4, 1e5)), ON_ARC)
-"""Ways against a plate without friction."""
+"""Paths against a plate without friction."""
 AIMED = tuple(Way(False, soft, is_aimed=True) for soft in ((3e2, 3e3, 3e4), (1e5,), ()))
-"""Ways after those from two starts: a stack that folds below a plate has several stable equilibria
-at the same pressures, and only a start near one leads to it.
+"""Paths tried after the ones from two starts: a stack that folds below a plate has several stable
+equilibria at the same pressures, and only a start near one converges to it.
 """
 
 
@@ -137,7 +137,7 @@ def reach(
     near: Pose | None,
 ) -> Pose:
     """Return the pose whose tip stands at ``place`` (3,) in mm, with no more than ``most_pressure``
-    kPa; ``near`` is a pose to start from, ``arguments`` those of ``Stack.pose`` for the load.
+    kPa; ``near`` is a pose to start from, ``arguments`` are passed to ``Stack.pose`` for the load.
 
     Raises UnreachableError with the nearest tip found.
     """
@@ -164,7 +164,7 @@ def reach(
 def _without_plate(
     target: TipTarget, guess: Array, arguments: dict[str, Any], near: Pose | None
 ) -> Pose | None:
-    """Return the pose whose tip is nearest to the place; None where there is no equilibrium."""
+    """Return the pose whose tip is nearest to the place; None without an equilibrium."""
     pose = _by_freedoms(target, guess, near)
     if pose is not None:
         return pose
@@ -186,8 +186,8 @@ def _without_plate(
 def _against_plate(
     target: TipTarget, guess: Array, arguments: dict[str, Any], near: Pose | None
 ) -> Pose | None:
-    """Return the pose against an outer plate whose tip is nearest to the place; None where there is
-    no equilibrium.
+    """Return the pose against an outer plate whose tip is nearest to the place; None without an
+    equilibrium.
     """
     assert target.load is not None
     assert target.load.wall is not None
@@ -199,7 +199,7 @@ def _against_plate(
             yield _by_contacts(target, x, near if x is guess else None, arguments, way)
 
     def about(best: Pose | None) -> Iterator[Pose | None]:
-        """Descents end where a contact opens or closes: poses from places about there."""
+        """Descents end at a contact change, so try poses from places near it."""
         if best is not None and _distance(target, best) < STRANDED:
             for x in _around(target, np.arcsinh(np.array(best.pressures) / P0)):
                 for from_near, way in ((best, POSED), (None, ways[0])):
@@ -316,7 +316,7 @@ def plate_starts(guess: Array, most: float) -> tuple[Array, ...]:
 
 
 def ways_to(wall: OuterPlate) -> tuple[Way, ...]:
-    """Return the ways to solutions against an outer plate, the first to be tried first."""
+    """Return the paths to solutions against an outer plate, in the order of trial."""
     return STICKING if wall.sticks else SLIDING
 
 
@@ -333,10 +333,10 @@ def _is_met(target: TipTarget, pose: Pose) -> bool:
 
 
 def movable(wall: OuterPlate, missing: Array) -> Array:
-    """Return what pressures can make up for of distances (3, ...) in mm.
+    """Return the part of distances (3, ...) in mm that pressures can remove.
 
-    A plate that the tip sticks to gives way across its line by less than ``MET``: pressures that
-    would move the tip there would stray.
+    A plate that the tip sticks to yields across its line by less than ``MET``: pressures would
+    stray if they tried to move the tip that way.
     """
     if not wall.sticks:
         return missing
@@ -349,8 +349,8 @@ def bounded_step(rates: Array, missing: Array, damping: float, room: tuple[Array
     """Return the step (n,) with least |rates @ step - missing|^2 + damping |step|^2 that stays
     within ``room``, its least and largest values (n,).
 
-    What would leave the room is set to its end, until the rest stays within: an active set that
-    only grows, enough for one of many steps.
+    Components outside the room are clamped until the rest stays within: an active set that only
+    grows, sufficient for one of many steps.
     """
     least, most = room
     matrix = rates.T @ rates
@@ -377,8 +377,8 @@ def bounded_step(rates: Array, missing: Array, damping: float, room: tuple[Array
 
 
 def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
-    """Return the pose by Newton's method, None where it does not converge to a stable pose within
-    the limits.
+    """Return the pose by Newton's method, None if it does not converge to a stable pose within the
+    limits.
     """
     stack = target.stack
     if near is not None:
@@ -412,7 +412,7 @@ def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
 
 
 def _linearised(target: TipTarget, x: Array, at: Array, is_close: bool) -> Linearisation | None:
-    """Return the linearised equilibrium, None where it is singular; exact only if ``is_close``."""
+    """Return the linearised equilibrium, None if it is singular; exact only if ``is_close``."""
     stack, load = target.stack, target.load
     springs = stack.springs((P0 * np.sinh(x)).tolist())
     if load is None:
@@ -474,8 +474,8 @@ def _by_contacts(
     arguments: dict[str, Any],
     way: Way,
 ) -> Pose | None:
-    """Return the pose by Newton's method, with the plate's contact forces as unknowns besides; None
-    where it does not converge to a stable pose within the limits.
+    """Return the pose by Newton's method, with the plate's contact forces as additional unknowns;
+    None if it does not converge to a stable pose within the limits.
     """
     load, forces = target.load, None
     assert load is not None
@@ -515,7 +515,7 @@ def _contact_newton(
     target: TipTarget, x: Array, at: Array, forces: Array | None, most: int, enough: float
 ) -> tuple[Array, Array, Array | None, LoadedEnergy | None] | None:
     """Return asinh(p / P0), freedoms and contact forces after a step below ``enough``, or after
-    ``most`` steps; None where one is singular.
+    ``most`` steps; None if one is singular.
 
     Against the plate itself such a step ends in equilibrium, whose energy comes with it.
     """
@@ -539,7 +539,7 @@ def _contact_newton(
         move, ahead = step
         share = float(step_limit(move).min())
         if ahead @ before < -TURNED_BACK * (before @ before):
-            # To and fro, at the limits of pressures and where contacts open and close.
+            # Oscillation at the limits of pressures and at contact changes.
             share /= 2
         before = ahead
         forces = touch.resists(touch.deep + share * (now.deeper(touch) @ move.ravel()))
@@ -552,7 +552,7 @@ def _contact_step(
     target: TipTarget, x: Array, at: Array, now: LoadedEnergy, springs: Springs
 ) -> tuple[Array, Array] | None:
     """Return the steps of freedoms (levels, 3) and of asinh(p / P0) (chambers,) to the linearised
-    equilibrium with the contacts at their end; None where it is singular.
+    equilibrium with the contacts at their end; None if it is singular.
     """
     touch, size = now.touch, now.gradient.size
     assert touch is not None
@@ -582,7 +582,7 @@ def _contact_step(
         rates = motion @ by_pressure
         missing = movable(wall, away - motion @ own)
         if np.linalg.norm(missing) < NEAR / 2:
-            # Friction may let no pressure move it further: these would stray.
+            # Friction may prevent pressures from moving it further, and they would stray.
             missing = np.zeros(3)
         damping = float(share * (rates * rates).sum()) + 1e-12
         ahead = bounded_step(rates, missing, damping, room)
@@ -595,17 +595,17 @@ def _contact_step(
 
 
 def is_turn(number: int) -> bool:
-    """Return True for a round of contacts that ends one that goes to and fro between two sets: the
-    rounds to come would end with the same.
+    """Return True for a round that ends an oscillation between two sets of contacts: later rounds
+    would repeat it.
     """
     return number > 0 and (CONTACT_ROUNDS - 1 - number) % 2 == 0
 
 
 def plate_damping(away: Array) -> Array:
-    """Return the damping (...) against an outer plate, so many mm (3, ...) away, as a share of the
-    sum of the squares of all rates.
+    """Return the damping (...) against an outer plate at a distance in mm (3, ...), as a share of
+    the sum of the squares of all rates.
 
-    A top that lies flat on the plate goes nowhere along its normal: far off, no step is for that.
+    A top flat on the plate cannot move along its normal, so distant steps must not try to.
     """
     return np.asarray(LEAST_DAMPING + PLATE_DAMPING * np.minimum((away * away).sum(0), 1.0))
 
@@ -616,8 +616,8 @@ def plate_damping(away: Array) -> Array:
 def _by_poses(
     target: TipTarget, x: Array, arguments: dict[str, Any], near: Pose | None
 ) -> Pose | None:
-    """Return the pose whose tip is nearest to the place, as seen from a start; None where there is
-    no equilibrium.
+    """Return the pose whose tip is nearest to the place, as reached from a start; None without an
+    equilibrium.
     """
     stack = target.stack
     pose = _equilibrium(target, x, arguments, near)
