@@ -21,13 +21,13 @@ OUTLINE = "outline"
 
 
 def read_drawing(path: Path, layer: str | None = None) -> Region:
-    """Return all that the closed contours of a drawing enclose, where they lie in it, mm.
+    """Return the region enclosed by the closed contours of a drawing, at their place in it, mm.
 
-    Contours are nested by the even-odd rule: one inside another is a hole. What a DXF file has on
-    layers that are not plotted does not count unless it is named. ``layer`` names a layer of a DXF
-    file, a group of an SVG file by its label or id, or a pattern, ``outline`` or ``seam NAME`` of a
-    ``laminate.json``. Units are read as those of an outline. Raises DesignError, which names the
-    file and the place.
+    Contours are nested by the even-odd rule: one inside another is a hole. Layers of a DXF file
+    that are not plotted are ignored unless named. ``layer`` names a layer of a DXF file, a group of
+    an SVG file by its label or id, or a pattern, ``outline`` or ``seam NAME`` of a
+    ``laminate.json``. Units are read as for an outline. Raises DesignError with the file and the
+    place.
     """
     try:
         if path.suffix.lower() == ".json":
@@ -41,7 +41,7 @@ def read_drawing(path: Path, layer: str | None = None) -> Region:
 
 @lru_cache(maxsize=64)
 def _drawn(path: Path, content: bytes, layer: str | None) -> Region:
-    """The region of a file that holds this; a run asks for it more than once."""
+    """The region of a file with this content; cached, as a run needs it more than once."""
     strands = list(counted(traced(path, layer, is_plot=True).strands, MOST_OF_ENTITY))
     loops = [sealed(loop) for loop in closed_loops(strands)]
     for loop in loops:
@@ -80,7 +80,7 @@ def _refuse_extent(contours: list[Contour]) -> None:
 
 
 def nested(contours: list[Contour]) -> Region:
-    """Return what contours that do not meet enclose: each inside an odd number is a hole."""
+    """Return the region enclosed by disjoint contours: each inside an odd number is a hole."""
     oriented = []
     for contour in contours:
         place = contour.edges[0].at(0.5)
@@ -104,7 +104,7 @@ def _profiles(path: Path, content: bytes) -> dict[str, Region]:
 
 
 def seam_layer(name: str) -> str:
-    """Return the name that the closed path of a seam has among a laminate's patterns."""
+    """Return the name of a seam's closed path among a laminate's patterns."""
     return f"seam {name}"
 
 

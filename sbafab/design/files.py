@@ -29,7 +29,7 @@ PATTERNS = {
     "letter",
     DATE_PATTERN: "must be a date such as 2026-03-31",
 }
-"""What texts may be that must match a pattern."""
+"""Descriptions of texts that must match a pattern."""
 _SHEETS = (
     "belongs to registered sheets, which were removed; delete it, and register the films by "
     'registration.method = "ears" or "channel-pin"'
@@ -51,11 +51,12 @@ REMOVED: Mapping[str, str] = {
     "sheets.engine": "was removed, as parts are nested in one way; delete it",
     "sheets.seconds": "was removed, as nesting takes no time limit; delete it",
 }
-"""Tables, keys ("*": any name) and values of earlier design files: what was removed, what to do."""
+"""Tables, keys ("*": any name) and values of earlier design files: the removed thing, and its
+replacement."""
 
 
 KEY_UNITS = {"_kpa": "kPa", "minutes": "minutes", "seconds": "s", "hours": "h", "_speed": "mm/s"}
-"""Units of numbers by the ends of their keys."""
+"""Units of numbers by their keys' suffixes."""
 
 
 def listed(values: Iterable[object]) -> str:
@@ -87,7 +88,7 @@ def sentence(
     unknown = [problem for problem in problems if problem["type"] == "extra_forbidden"]
     wrong = [problem for problem in problems if problem["type"] == "literal_error"]
     first = (unknown or wrong or problems)[0]
-    # Alternatives of a union put their own name in the location; a key is what the file holds.
+    # Alternatives of a union put their own name in the location; the file has only keys.
     where = [_plain(part) for part in first["loc"] if not _is_alternative(part)]
     field = (prefix + ".".join(where)).rstrip(".")
     for name in (field, where[0] if where else "", f'{field} = "{first["input"]}"'):
@@ -181,9 +182,9 @@ def _unknown_key(
     table = ".".join(where[:-1])
     own = next(_tables_at(record, where[:-1]), None)
     siblings = [f"{table}.{key}".lstrip(".") for key in _keys(own)] if own else []
-    # A key without its table; else one that is misspelt.
+    # A key without its table; otherwise a misspelt key.
     near = _nearest(field, paths, 1.0) or _nearest(where[-1], siblings, 0.6)
-    # A key cut short is one of its own table, not one of another that is spelled alike.
+    # A truncated key belongs to its own table, not to a similar key of another.
     if near is None and not any(path.startswith(field) for path in siblings):
         near = _nearest(where[-1], paths, 0.75)
     if near:
@@ -193,7 +194,9 @@ def _unknown_key(
 
 
 def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:
-    """Return three paths whose last part is most like ``key``, in words, the pockets' first."""
+    """Return three paths whose last part is most similar to ``key``, as text, the pockets'
+    first.
+    """
     leaves: dict[str, list[str]] = {}
     for path in sorted(paths, key=lambda path: not path.startswith("chamber.")):
         leaves.setdefault(path.split(".")[-1], []).append(path)
@@ -203,12 +206,12 @@ def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:
 
 
 def _keys(record: type[BaseModel]) -> dict[str, FieldInfo]:
-    """Return the keys of a table, as a file spells them."""
+    """Return the keys of a table, as spelled in a file."""
     return {info.alias or name: info for name, info in record.model_fields.items()}
 
 
 def _tables_at(kind: Any, where: Sequence[str]) -> Iterator[type[BaseModel]]:
-    """Yield the records of the table at a place, past rows of lists and names that a user gave."""
+    """Yield the records of the table at a location, skipping list rows and users' names."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         keys = _keys(kind)
         if not where:
@@ -216,17 +219,17 @@ def _tables_at(kind: Any, where: Sequence[str]) -> Iterator[type[BaseModel]]:
         elif where[0] in keys:
             yield from _tables_at(keys[where[0]].annotation, where[1:])
         elif kind.model_config.get("extra") == "allow":
-            # Tables that a user names, such as further films.
+            # Tables named by the user, such as further films.
             yield from _tables_at(get_type_hints(kind)["__pydantic_extra__"], where)
         return
-    # A list and a table of tables take a part of the place; alternatives take none.
+    # A list and a table of tables take a part of the location; alternatives take none.
     takes = isinstance(get_origin(kind), type) and issubclass(get_origin(kind), Collection)
     for inner in get_args(kind):
         yield from _tables_at(inner, where[1:] if takes else where)
 
 
 def key_paths(record: type[BaseModel], prefix: str = "") -> dict[str, object]:
-    """Return every dotted key of a record, as a file spells it, with its annotation."""
+    """Return every dotted key of a record, as spelled in a file, with its annotation."""
     paths: dict[str, object] = {}
     for key, info in _keys(record).items():
         paths[prefix + key] = info.annotation
@@ -247,7 +250,7 @@ KIT = "kit"
 AnyRecord = TypeVar("AnyRecord", bound=BaseModel)
 MOST_BYTES = 1_000_000
 ASSEMBLY = "assembly"
-"""The family of files that name several designs; :mod:`sbafab.assemblies` reads them."""
+"""The family of files with several designs; :mod:`sbafab.assemblies` reads them."""
 DEEPEST = 8
 """Most parts of a dotted key; a design file needs three."""
 _PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
@@ -292,7 +295,7 @@ def _may_be_a_design(path: Path) -> bool:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Return the tables of a design file. Raises DesignError where it cannot be read."""
+    """Return the tables of a design file. Raises DesignError if it cannot be read."""
     try:
         with path.open("rb") as opened:
             content = opened.read(MOST_BYTES + 1)
@@ -335,7 +338,7 @@ def toml_tables(text: str, path: str | Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=8)
 def _parsed(text: str) -> dict[str, Any]:
-    """The tables of a text; a file that is varied is read again and again."""
+    """The tables of a text; cached, as a varied file is read again and again."""
     return tomllib.loads(text)
 
 
@@ -377,7 +380,7 @@ def _key_parts(key: str) -> list[str]:
 
 
 def _set(table: dict[str, Any], key: str, value: Any) -> None:
-    """Sets a dotted key; a table as value changes only the keys that it holds."""
+    """Sets a dotted key; a table as value changes only its own keys."""
     parts = _key_parts(key)
     if len(parts) > DEEPEST:
         raise DesignError(f"--set {shown(key)} has {len(parts)} parts; a design's keys have three")
@@ -429,7 +432,7 @@ def add_waivers(
 ) -> dict[str, Any]:
     """Return ``data`` with names of rules, or of ``checks``, added to ``rules.waive``.
 
-    Raises DesignError for another name, in the command line's words.
+    Raises DesignError for other names, with the command line's message.
     """
     names = (*rule_names(), *checks) if waivers else ()
     for name in waivers:
@@ -475,17 +478,17 @@ def checked(
         raise DesignError(sentence(error, record, families, prefix, file)) from None
 
 
-# Designs out: resolved TOML, design hash, JSON schema.
+# Output of designs: resolved TOML, design hash, JSON schema.
 
 
 FITS = "fits"
 
 
-# The designs and kits that ship, and files that start from them.
+# The bundled designs and kits, and files that start from them.
 
 
 KITS = "kits"
-"""The folder of the kits that ship, among the templates."""
+"""The folder of the bundled kits, among the templates."""
 
 
 @cache
@@ -500,13 +503,13 @@ def template_names() -> list[str]:
 
 
 def kit_names() -> list[str]:
-    """Return the names of the kits that ship."""
+    """Return the names of the bundled kits."""
     return list(_designs_in(templates_folder() / KITS))
 
 
 @cache
 def _designs_in(folder: Path) -> tuple[str, ...]:
-    """Names of what ships in a folder, which stays as it is while a process runs."""
+    """Names of the bundled files in a folder, which does not change while a process runs."""
     return tuple(sorted(path.stem for path in folder.glob("*.toml")))
 
 
@@ -541,7 +544,7 @@ def write_new(template: str, file: Path | None) -> Path:
 
 
 def name_of(file: Path) -> str:
-    """Return a design's name from that of its file; empty if no character of it is allowed."""
+    """Return a design's name from its file's; empty if no character of it is allowed."""
     return re.sub(r"[^A-Za-z0-9._-]+", "-", file.stem).strip("-._")[:64]
 
 

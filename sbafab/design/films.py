@@ -1,4 +1,4 @@
-"""The films that a design is cut from, the sheets they come on, and which film a layer is of.
+"""The films of a design, their sheets, and the film of each layer.
 
 Lengths are mm.
 """
@@ -38,9 +38,9 @@ from sbafab.laminate.joints import BondProcess
 UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
 FILM_NAME = re.compile(r"[a-z][a-z0-9]{0,15}")
 MOST_FILMS = 20
-"""Beside TPE and PTFE."""
+"""Further films, beside TPE and PTFE."""
 HOTTEST = 400.0
-"""C, of any film."""
+"""Highest temperature of any film, C."""
 Density = Annotated[float, Field(gt=0, le=20000), DENSITIES]
 FilmTemperature = Annotated[float, Field(gt=0, le=HOTTEST), CELSIUS]
 Modulus = Annotated[float, Field(gt=0, le=1e6), MEGAPASCALS]
@@ -86,30 +86,31 @@ SheetPin = Annotated[tuple[LengthOrZero, LengthOrZero, Length], Field(strict=Fal
 
 
 class Sheet(Section):
-    """Film to cut from, as it lies on the machine."""
+    """Film to cut from, as placed on the machine."""
 
     width: Annotated[float, Millimetres(SHORTEST, 10000)] = 152.4
     """Size along x; the heated area of the paper's press."""
     length: Annotated[float, Millimetres(SHORTEST, 10000)] = 152.4
     """Size along y; of a roll, the most that is unrolled for one sheet."""
     roll: bool = False
-    """Whether it comes off a roll: a sheet then ends where its parts do."""
+    """True if it comes off a roll: a sheet then ends where its parts do."""
     border: LengthOrZero = 10.0
-    """What is left free along every edge of the sheet."""
+    """Margin along every edge of the sheet."""
     spacing: Annotated[float, Millimetres(SHORTEST, 100)] = 1.0
     """Least distance between two parts' cuts, and to pins."""
     pins: tuple[SheetPin, ...] = Field(default=(), max_length=100, strict=False)
-    """What holds the sheet down: x, y from its lower left corner, and diameter."""
+    """Pins that hold the sheet down: x, y from its lower left corner, and diameter."""
     most: int = Field(default=20, ge=1, le=1000)
     """Sheets that may be used."""
     lead_in: Annotated[float, Millimetres(0.01, 20)] | None = None
     """Length of the straight line in the waste by which the beam comes to each contour, in machine
     files; by default none."""
     overcut: Annotated[float, Millimetres(0.01, 20)] | None = None
-    """How far the beam follows a contour past its start, in machine files; by default not."""
+    """Distance for which the beam follows a contour past its start, in machine files; by default
+    0."""
     tab_width: Annotated[float, Millimetres(0.01, 20)] | None = None
     """Width of the tabs of film that hold an outline in the skeleton, in machine files; by default
-    there are none. A tab's rest stays on the part."""
+    there are none. The remainder of a tab stays on the part."""
     tabs: int | None = Field(default=None, ge=1, le=50)
     """Tabs of each outline; 3 unless given."""
 
@@ -126,7 +127,7 @@ FaceName = Annotated[str, Field(pattern=FACE_PATTERN)]
 
 
 class FilmFaces(Section):
-    """What the two faces of a film are of, where they are not the film's own."""
+    """Materials of the two faces of a film, if they are not the film's own."""
 
     upper: FaceName
     """The face that lies up, unless the layer is turned."""
@@ -135,20 +136,22 @@ class FilmFaces(Section):
 
 
 class FaceBonding(Section):
-    """Two faces that bond to each other, and by what."""
+    """Two faces that bond to each other, and the process."""
 
     faces: Annotated[tuple[FaceName, FaceName], Field(strict=False)]
     """The two face materials, in either order; a film without faces has its own name for both."""
     by: BondProcess
     """press, or the tool of a seam: laser, hot-tip, ultrasonic, roller."""
     temperature_c: Annotated[float, Field(gt=0, le=1000), CELSIUS] | None = None
-    """C at which they bond; of a press it must not be more than its temperature."""
+    """C at which they bond; in a press, at most its temperature."""
     after: str | None = Field(default=None, max_length=32)
     """The bond that must be made before this one."""
 
 
 class FaceBondings(Section):
-    """Which faces bond, a table each; with any, faces that are not in one do not bond."""
+    """Faces that bond, a table for each pair; with any table, faces that are in none do not
+    bond.
+    """
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, FaceBonding] = Field(init=False)
@@ -171,16 +174,16 @@ class FaceBondings(Section):
 
 
 OF_THE_PRODUCT = ("density", "melting_point", "modulus", "poisson")
-"""Keys of a film that another product does not share."""
+"""Keys of a film that do not apply to another product."""
 
 
 class TpeFilm(Section):
-    """The structural film that is bonded. Defaults are those of the paper's film; another product
-    has none of them: what its table leaves out is not known.
+    """The structural film that is bonded. The defaults describe the paper's film and do not apply
+    to another product: values missing in its table are unknown.
     """
 
     product: str = Field(default=PAPER_PRODUCT, max_length=80)
-    """What to order."""
+    """Product to order."""
     thickness: Annotated[float, Millimetres(SHORTEST, 1)] = PAPER_THICKNESS
     """Thickness of the structural film; another product than the paper's must give it."""
     density: Density | None = 1122.0
@@ -190,9 +193,9 @@ class TpeFilm(Section):
     modulus: Modulus | None = PAPER_TPE[0]
     """MPa, Young's (paper Sec. 3.2.1); elastic models and simulators need it."""
     poisson: PoissonRatio | None = PAPER_TPE[1]
-    """Poisson's ratio (paper Sec. 3.2.1), likewise."""
+    """Poisson's ratio (paper Sec. 3.2.1); elastic models and simulators need it."""
     faces: FilmFaces | None = None
-    """What its faces are of; by default both are tpe."""
+    """Materials of its faces; by default both are tpe."""
 
     @model_validator(mode="before")
     @classmethod
@@ -218,7 +221,7 @@ class PtfeFilm(Section):
     """The film of the masks, which nothing bonds to."""
 
     product: str = Field(default="PTFE film", max_length=80)
-    """What to order."""
+    """Product to order."""
     thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.025
     """Thickness of the mask film."""
     density: Density = 2200.0
@@ -233,7 +236,7 @@ class OtherFilm(Section):
     kind: FilmKind
     """"structural": bonds where it touches another structural film. "mask": nothing bonds to it."""
     product: str = Field(max_length=80)
-    """What to order."""
+    """Product to order."""
     thickness: Annotated[float, Millimetres(SHORTEST, 1)]
     """Its thickness."""
     density: Density | None = None
@@ -246,15 +249,15 @@ class OtherFilm(Section):
     modulus: Modulus | None = None
     """MPa, Young's; elastic models and simulators need it."""
     poisson: PoissonRatio | None = None
-    """Poisson's ratio, likewise."""
+    """Poisson's ratio; elastic models and simulators need it."""
     faces: FilmFaces | None = None
-    """What its faces are of, for instance a coating and a textile; by default the film's name."""
+    """Materials of its faces, for instance a coating and a textile; by default the film's name."""
     warning: str = Field(default="", max_length=200)
-    """What every cut file of it says, for instance of its fumes."""
+    """Warning in every cut file of it, for instance of its fumes."""
     kerf: KerfWidth = UNCALIBRATED
     """Full kerf width in this film, as laser.kerf_tpe."""
     sheet: Sheet = Sheet.model_construct()
-    """What it is cut from, as sheets.tpe."""
+    """Sheet that it is cut from, as sheets.tpe."""
 
     @model_validator(mode="after")
     def _mask_has_a_limit(self) -> Self:
@@ -266,7 +269,7 @@ class OtherFilm(Section):
 
 
 class Films(Section):
-    """What the layers are cut from: TPE, PTFE, and further films, a table each."""
+    """Films that the layers are cut from: TPE, PTFE, and further films, a table for each."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, OtherFilm] = Field(init=False)
@@ -293,7 +296,7 @@ class Films(Section):
 
     @property
     def face_names(self) -> frozenset[str]:
-        """What the faces of structural films are of; a film without faces has its own name."""
+        """Materials of the faces of structural films; a film without faces has its own name."""
         bonding = {name: film for name, film in self.stock.items() if film.kind != "mask"}
         return frozenset(face for name, film in bonding.items() for face in film.faces or (name,))
 
@@ -343,23 +346,23 @@ class Films(Section):
 
 
 def _elastic(film: TpeFilm | OtherFilm) -> tuple[float, float] | None:
-    """Young's modulus in MPa and Poisson's ratio, where both are known."""
+    """Young's modulus in MPa and Poisson's ratio, if both are known."""
     if film.modulus is None or film.poisson is None:
         return None
     return film.modulus, film.poisson
 
 
 def _faces(film: TpeFilm | OtherFilm) -> tuple[str, str] | None:
-    """What the upper and the lower face are of, if that is stated."""
+    """Materials of the upper and the lower face, if stated."""
     return None if film.faces is None else (film.faces.upper, film.faces.lower)
 
 
 def without_other_products(table: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:
-    """Return ``table``, tables of films by name, as far as it holds for ``changed``.
+    """Return ``table``, tables of films by name, without values that do not hold for ``changed``.
 
-    A film of which ``changed`` names another product loses all that ``table`` says of it but its
-    kind, sheet and kerf: thickness, density and the rest are those of the first product. PTFE is
-    one polymer under any name, and keeps them.
+    A film with another product in ``changed`` loses all its values in ``table`` except kind, sheet
+    and kerf: thickness, density and the rest describe the first product. PTFE is one polymer under
+    any name, and keeps them.
     """
     rest = dict(table)
     for name, film in table.items():
@@ -372,12 +375,12 @@ def without_other_products(table: Mapping[str, Any], changed: Mapping[str, Any])
 
 
 def material(name: str) -> Material:
-    """What files and lists call the film of this table."""
+    """Name of this table's film in files and lists."""
     return name.upper()
 
 
 class LayerFilms(Section):
-    """Which film each layer is cut from, by the names of the tables in ``films``."""
+    """Film of each layer, by the names of the tables in ``films``."""
 
     base: str = "tpe"
     """The lowest film of the bottom balloons."""

@@ -16,7 +16,9 @@ from sbafab.laminate.films import Film
 
 
 def design_sha256(design: Design) -> str:
-    """Return the hash of all that decides the output; a named file counts by its content."""
+    """Return the hash of everything that determines the output; a named file counts by its
+    content.
+    """
     return _sha256(_with_files(with_unused(design), design) | {"kit": kit_of(design).sha256})
 
 
@@ -48,7 +50,7 @@ NO_ACTUATOR = (
     "seam_tools",
     FITS,
 )
-"""Sections that do not make another actuator; of films and laser the layup says what counts."""
+"""Sections that do not change the actuator; for films and laser, the layup decides what counts."""
 
 
 PINNED = ("pin_diameter", "pin_clearance", "full_bond_pins")
@@ -86,7 +88,7 @@ def _sha256(table: dict[str, Any]) -> str:
 
 
 OTHER_TUBE = "tubing of your choice"
-"""What a tube is called whose name stands for another size in the kit."""
+"""Name of a tube whose name means another size in the kit."""
 
 
 def kit_of(design: Design) -> Kit:
@@ -95,7 +97,7 @@ def kit_of(design: Design) -> Kit:
 
 
 def departures(design: Design) -> list[str]:
-    """Return the dotted keys that a design sets otherwise than its kit."""
+    """Return the dotted keys that a design sets differently from its kit."""
     kit = kit_of(design)
     values, kit_values = with_unused(design), dict(_values(kit))
     keys = [key for key, value in kit_values.items() if _at(values, key) != value]
@@ -118,8 +120,8 @@ def tube_name(design: Design) -> str:
 
 
 def adhesive_for(design: Design, films: Iterable[Film]) -> str | None:
-    """Return the adhesive that bonds tubes to these films; None if it is the kit's, which does not
-    list them. One that the kit lacks is the designer's choice.
+    """Return the adhesive that bonds tubes to these films; None if it is the kit's and they are not
+    listed. An adhesive outside the kit is the designer's choice.
     """
     adhesive = kit_of(design).adhesives.get(design.inlet.adhesive)
     if adhesive is None or all(film.product in adhesive.bonds for film in films):
@@ -136,7 +138,7 @@ def cure_hours(design: Design) -> float | None:
 
 
 def _values(kit: Kit) -> Iterator[tuple[str, object]]:
-    """Every key that a kit gives, and its value as a design would have it."""
+    """Every key given by a kit, with its value in a design."""
     record = checked(KitFile, {"schema": SCHEMA, "name": "x", "version": "x", **kit.tables}, {})
     usual = without_none(record.model_dump(mode="json"))
     for key in _dotted(kit.tables):
@@ -169,6 +171,6 @@ def citation(design: Design) -> dict[str, Any]:
 
 
 def cited(design: Design) -> str:
-    """Return the kit's name, version and hash in words."""
+    """Return the kit's name, version and hash as text."""
     kit = kit_of(design)
     return f"kit {kit.name}, version {kit.version} (sha256 {kit.sha256[:12]})"

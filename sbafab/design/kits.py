@@ -71,9 +71,9 @@ OF_A_DESIGN = (
     "rules.target_yield",
     "rules.yield_builds",
 )
-"""Keys in them that are no lab's to say."""
+"""Keys of these sections that a kit must not set."""
 TEXTS = ("product", "use", "warning", "plate_material", "release_film", "fitting", "machine")
-"""Keys that are no numbers, whatever they say."""
+"""Keys that never count as numbers."""
 BONDS = "bonds"
 """The films that an adhesive bonds, which need a source as numbers do."""
 Product = Annotated[str, Field(min_length=1, max_length=120)]
@@ -89,10 +89,10 @@ class Tube(Section):
 
 
 class Adhesive(Section):
-    """What seals an inlet."""
+    """Adhesive that seals an inlet."""
 
     use: str = Field(default="", max_length=400)
-    """How it is used."""
+    """Instructions for use."""
     bonds: Annotated[tuple[Product, ...], Field(max_length=50, strict=False)] = ()
     """Products of the films that it bonds. Where tubes are glued to any other, the traveller leaves
     a blank."""
@@ -127,7 +127,7 @@ class Kit:
     """A lab's kit.
 
     ``tables`` hold the keys that it gives a design, ``sources`` the origin of its numbers by dotted
-    key; ``sha256`` is that of all tables.
+    key; ``sha256`` is the hash of all tables.
     """
 
     name: str
@@ -139,7 +139,7 @@ class Kit:
     tubes: Mapping[str, Tube]
     adhesives: Mapping[str, Adhesive]
     text: bytes
-    """The file as it lies on disk."""
+    """The file on disk, unchanged."""
 
 
 def kit_path(kit: object, folder: Path) -> Path:
@@ -246,7 +246,7 @@ def _is_number(value: object) -> bool:
 def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return a design's tables with every key filled in that its kit gives and the design lacks.
 
-    Raises DesignError where there is no such kit, it is faulty, or it lacks the tube.
+    Raises DesignError if there is no such kit, it is faulty, or it lacks the tube.
     """
     kit = load_kit(data.get("kit", DEFAULT), folder)
     filled = {**data}
@@ -256,7 +256,7 @@ def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         table = without_other_products(kit_table, design_table) if is_of_films else kit_table
         if section == "models":
             table = _from_folder(table, kit_path(data.get("kit", DEFAULT), folder).parent, folder)
-        # What is no table is refused later, in the words for it.
+        # A value that is not a table is refused later, with its own message.
         filled[section] = (
             _merged(table, design_table) if isinstance(design_table, dict) else design_table
         )
@@ -267,7 +267,9 @@ def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _from_folder(table: Mapping[str, Any], kit_folder: Path, folder: Path) -> Mapping[str, Any]:
-    """The table with a calibration that lies beside the kit named from the design's folder."""
+    """The table, with the path of a calibration beside the kit made relative to the design's
+    folder.
+    """
     name = table.get("calibration")
     if not isinstance(name, str) or not (kit_folder / name).is_file():
         return table
@@ -284,7 +286,9 @@ def _merged(table: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str,
 
 
 def inlet_of_kit(kit: Kit, inlet: Mapping[str, Any], is_named: bool) -> dict[str, Any]:
-    """Kit's tube and adhesive: the first of each, or the size of the tube that the inlet names."""
+    """The kit's tube and adhesive: the first of each, or the size of the tube that the inlet
+    names.
+    """
     values: dict[str, Any] = {}
     if kit.adhesives:
         values["adhesive"] = next(iter(kit.adhesives))

@@ -1,7 +1,7 @@
 """``laminate.json``: a laminate with exact edges, to be read by other programs and read back here.
 
-Films and shapes stand once each; layers name them by their place in the lists, from 0.
-``LaminateDocument`` is the format: its JSON schema is published, and files are read by it.
+Films and shapes are listed once each; layers refer to them by index, from 0. ``LaminateDocument``
+is the format: its JSON schema is published, and files are read by it.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin,
 FILE = "laminate.json"
 SCHEMA = "sbafab/laminate@1"
 JOINED = 1e-5
-"""mm within which an edge begins where the one before it ends, and an arc's ends on its circle."""
+"""Tolerance for the continuity of edges, and for an arc's ends on its circle, mm."""
 PARALLEL = 1e-3
-"""Sine of the angle between two edges below which they touch and do not cross."""
+"""Sine of the angle below which two edges touch instead of crossing."""
 
 
 # The format.
@@ -72,7 +72,7 @@ class _Row(BaseModel):
 
 
 class LayerRow(_Row):
-    """A layer of a ``laminate.json``; its film and shape by their places."""
+    """A layer of a ``laminate.json``; its film and shape by index."""
 
     index: FromOne
     role: Role
@@ -133,20 +133,20 @@ class LaminateDocument(_Row):
 
 
 def laminate_json(laminate: Laminate) -> str:
-    """Return the contents of ``laminate.json``: a row a line."""
+    """Return the contents of ``laminate.json``, one row per line."""
     lines = (f"{json.dumps(key)}: {_rows(value)}" for key, value in _document(laminate).items())
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
 class _Places:
-    """Values that stand once each in a list, and their places in it."""
+    """Unique values in a list, and their indices in it."""
 
     def __init__(self) -> None:
         self.values: list[Any] = []
         self._places: dict[str, int] = {}
 
     def of(self, value: Any) -> int:
-        """The place of a value, told apart by its text in the file."""
+        """The index of a value, identified by its text in the file."""
         text = json.dumps(value)
         if text not in self._places:
             self._places[text] = len(self.values)
@@ -156,7 +156,7 @@ class _Places:
 
 def _document(laminate: Laminate) -> dict[str, Any]:
     films, shapes = _Places(), _Places()
-    # Many layers share one profile, which is turned into rows once.
+    # Many layers share one profile, which is converted to rows once.
     rows: dict[int, int] = {}
 
     def shape(region: Region) -> int:
@@ -214,7 +214,7 @@ def _shape_rows(region: Region) -> list[list[list[float | bool]]]:
 
 
 def _edge_row(edge: Edge) -> list[float | bool]:
-    # A contour drawn with whole numbers, which compares equal, is written like any other.
+    # An equal contour drawn with whole numbers is written like any other.
     ends = [*map(float, (*edge.start, *edge.end))]
     if isinstance(edge, Line):
         return [*ends]
@@ -233,8 +233,7 @@ def _rows(value: Any) -> str:
 def read_laminate(path: Path) -> Laminate:
     """Return the laminate of a ``laminate.json``, equal to the one that was written.
 
-    Keys that the format does not know are passed over. Raises DesignError, which names the file and
-    the place in it, for what is no such file.
+    Unknown keys are ignored. Raises DesignError with the file and the place in it for other files.
     """
     try:
         document = LaminateDocument.model_validate_json(path.read_bytes())
@@ -303,7 +302,7 @@ def _edge(row: Sequence[Any]) -> Edge:
     return Line(start, end) if len(row) == 4 else Arc(start, end, (row[4], row[5]), row[6], row[7])
 
 
-# Faults that no schema tells: sizes, references, heights and geometry.
+# Faults that no schema detects: sizes, references, heights and geometry.
 
 
 SIZES = {
@@ -312,11 +311,11 @@ SIZES = {
     "inlets": ("width", "length", "tube_diameter"),
     "pins": ("diameter",),
 }
-"""What must be above 0, by list."""
+"""Values that must be above 0, by list."""
 
 
 def _faults(document: LaminateDocument) -> Iterator[str]:
-    """Yield the faults of a document that keeps to the schema, each with its place."""
+    """Yield the faults of a document that matches the schema, each with its place."""
     for key, names in SIZES.items():
         for i, row in enumerate(getattr(document, key)):
             for name in names:
@@ -352,7 +351,7 @@ def _chain_faults(where: str, rows: Sequence[Any], is_closed: bool) -> Iterator[
 
 
 def _crossing(edges: Sequence[Edge]) -> Point | None:
-    """Return where two edges cross, away from their ends; None if no two do."""
+    """Return the point where two edges cross, away from their ends; None if no two do."""
     for i, j in close_pairs([edge.bounds for edge in edges], 0.0):
         a, b = edges[i], edges[j]
         for p in meeting_points(a, b):
@@ -381,7 +380,7 @@ def _layer_faults(document: LaminateDocument) -> Iterator[str]:
 
 
 def _reference_faults(document: LaminateDocument) -> Iterator[str]:
-    """Yield names and places that stand for nothing."""
+    """Yield names and indices without a referent."""
     chambers = {chamber.name for chamber in document.chambers}
     for key in ("bores", "inlets"):
         for i, row in enumerate(getattr(document, key)):
@@ -395,7 +394,7 @@ def _reference_faults(document: LaminateDocument) -> Iterator[str]:
 
 
 def _joint_faults(document: LaminateDocument) -> Iterator[str]:
-    """Yield joints that lie between no two layers of the laminate, and nets of unknown ports."""
+    """Yield joints that are not between two layers of the laminate, and nets of unknown ports."""
     count = len(document.layers)
     pairs = [(f"seams[{i}]", row.below, row.above) for i, row in enumerate(document.seams)]
     pairs += [(f"folds[{i}]", row.lower, row.upper) for i, row in enumerate(document.folds)]

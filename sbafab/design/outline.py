@@ -52,16 +52,16 @@ class Outline(NamedTuple):
 def read_outline(path: Path) -> Region:
     """The one closed path of a DXF or SVG file as lines and arcs, in mm, counter-clockwise.
 
-    The chamber's axis is the file's origin where that lies inside, else the outline's centroid.
-    DXF units follow $INSUNITS, none meaning mm; an SVG without width and height in physical units
-    is read as 1 unit = 1 mm, and its y axis is turned upward, so that the outline looks as it is
-    drawn. Ellipses, Béziers and splines become arcs within 0.5 um. Raises DesignError.
+    The chamber's axis is the file's origin if that lies inside, else the outline's centroid. DXF
+    units follow $INSUNITS, none meaning mm; an SVG without width and height in physical units is
+    read as 1 unit = 1 mm, and its y axis is turned upward, so that the outline looks as drawn.
+    Ellipses, Béziers and splines become arcs within 0.5 um. Raises DesignError.
     """
     return understood(path).region
 
 
 def understood(path: Path) -> Outline:
-    """Return a drawn outline with its size in words. Raises DesignError."""
+    """Return a drawn outline with its size as text. Raises DesignError."""
     try:
         return _understood(path, content(path))
     except FitError as error:
@@ -72,12 +72,12 @@ def understood(path: Path) -> Outline:
 
 @lru_cache(maxsize=4)
 def _understood(path: Path, content: bytes) -> Outline:
-    """The outline of a file that holds this; a run asks for it more than once."""
+    """The outline of a file with this content; cached, as a run needs it more than once."""
     strands, scale = traced(path)
     region, moved = _on_its_axis(_checked(sealed(_one_loop(list(counted(strands))))))
     low_x, low_y, high_x, high_y = region.bounds
     size = f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
-    # Without the file's name: a design is the same wherever its drawing lies.
+    # Without the file's name: the design is the same wherever its drawing is stored.
     return Outline(region, f"drawn outline: {size}, {scale}{moved}")
 
 
@@ -100,9 +100,9 @@ def content(path: Path) -> bytes:
 def traced(path: Path, layer: str | None = None, is_plot: bool = False) -> Traced:
     """Return the strands of a DXF or SVG file, or of one of its layers. Raises DesignError.
 
-    ``is_plot``: layers of a DXF file that are not plotted count only where one is named.
+    ``is_plot``: layers of a DXF file that are not plotted count only if named.
     """
-    # Each reader brings its own library, loaded for the format at hand only.
+    # Each reader loads its own library, only for the format needed.
     if path.suffix.lower() == ".dxf":
         return dxf_strands(path, layer, is_plot)
     if path.suffix.lower() == ".svg":
@@ -113,7 +113,7 @@ def traced(path: Path, layer: str | None = None, is_plot: bool = False) -> Trace
 
 
 def closed_loops(strands: list[Strand]) -> list[Strand]:
-    """Return the loops that strands close to. Raises DesignError where one is open or doubled."""
+    """Return the loops that strands close to. Raises DesignError if one is open or doubled."""
     _refuse_doubles(strands)
     loops, opens = joined(strands)
     if opens:
@@ -169,7 +169,7 @@ def _checked(loop: Strand) -> Region:
 
 
 def _on_its_axis(region: Region) -> tuple[Region, str]:
-    """The region round the chamber's axis at (0, 0), and how it got there, in words."""
+    """The region around the chamber's axis at (0, 0), and the description of its shift."""
     if _surrounds(region, (0.0, 0.0)):
         return region, ""
     x, y = centroid(region)
@@ -178,7 +178,7 @@ def _on_its_axis(region: Region) -> tuple[Region, str]:
             "has its centroid outside itself, so the chamber's axis has no place; draw it round "
             "(0, 0)"
         )
-    # What is printed is what is done.
+    # The printed shift is the one applied.
     x, y = round(x, 6), round(y, 6)
     return region.moved(-x, -y), ", centred on its centroid"
 
@@ -188,7 +188,7 @@ def _surrounds(region: Region, p: Point) -> bool:
 
 
 def refuse_crossings(loop: Strand) -> None:
-    """Raises DesignError where a closed loop crosses or touches itself."""
+    """Raises DesignError if a closed loop crosses or touches itself."""
     p = crossing(loop)
     if p is not None:
         raise DesignError(
@@ -197,8 +197,8 @@ def refuse_crossings(loop: Strand) -> None:
 
 
 def crossing(loop: Strand) -> Point | None:
-    """Return a place where edges of closed loops cross or touch, beside ends that follow."""
-    # A tangle is told at its first knot: there may be one for every two edges.
+    """Return a place where edges of closed loops cross or touch, except at shared ends."""
+    # A tangle is reported at its first crossing: there may be one for every two edges.
     for i, j in close_pairs([edge.bounds for edge in loop], EPSILON):
         ends = loop[i].start, loop[i].end, loop[j].start, loop[j].end
         for p in meeting_points(loop[i], loop[j]):
@@ -217,7 +217,7 @@ def crossing(loop: Strand) -> Point | None:
 
 
 MM_PER_UNIT = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0}
-"""By $INSUNITS: none (taken as mm), inch, mm, cm, m."""
+"""Units by $INSUNITS: none (taken as mm), inch, mm, cm, m."""
 SCALES = {
     0: "read at 1 mm a unit, for the file names no unit ($INSUNITS)",
     1: "drawn in inches",
@@ -233,27 +233,28 @@ NO_PATHS = frozenset(
         *("TOLERANCE", "VIEWPORT", "WIPEOUT"),
     }
 )
-"""Lettering, dimensions, fills and pictures: no outline, whatever they show."""
+"""Lettering, dimensions, fills and pictures: never an outline."""
 COMPENSATED = "compensated"
-"""What a cut file's custom property KERF_STATE says where its edges are moved."""
+"""Value of a cut file's custom property KERF_STATE if its edges are moved."""
 LEVEL = 1e-6
 HIGHEST_DEGREE = 10
 MOST_ITEMS = 20_000
-"""Entities, table entries and flags of a drawing; the reader's time grows faster than these."""
+"""Most entities, table entries and flags of a drawing; the reader's time grows faster than
+these."""
 
 
 def dxf_strands(path: Path, layer: str | None = None, is_plot: bool = False) -> Traced:
     """Every line, arc, circle, polyline, ellipse and spline that the model space shows.
 
-    They must lie in one plane at one height. Only what lies on ``layer`` counts where that is
-    given, and else, of a plot, what lies on layers that are plotted. Raises DesignError, also for
-    what draws by other means, such as block references.
+    They must lie in one plane at one height. Only entities on ``layer`` count if it is given;
+    otherwise, for a plot, those on plotted layers. Raises DesignError, also for entities that draw
+    by other means, such as block references.
     """
     content = path.read_bytes()
     _refuse_excess(content)
     drawing, space = _drawing(path)
     _refuse_compensated(drawing)
-    # Where a file has no header at all, the reader makes one up that says metres.
+    # If a file has no header at all, the reader invents one in metres.
     unit = drawing.header.get("$INSUNITS", 0) if b"$INSUNITS" in content else 0
     if unit not in MM_PER_UNIT:
         raise DesignError(
@@ -306,7 +307,7 @@ def _is_plotted(layer: str, drawing: Drawing) -> bool:
 def _is_shown(entity: Any, drawing: Drawing) -> bool:
     """Return True if a program shows the entity: it is visible, and its layer on and thawed."""
     if not (entity.dxf.is_supported("layer") and entity.dxf.is_supported("invisible")):
-        return True  # no entity at all, such as a BLOCK: refused by its kind
+        return True  # not an entity, such as a BLOCK: refused by its kind
     name = str(entity.dxf.get("layer", "0"))
     if entity.dxf.get("invisible", 0) or name not in drawing.layers:
         return not entity.dxf.get("invisible", 0)
@@ -315,7 +316,7 @@ def _is_shown(entity: Any, drawing: Drawing) -> bool:
 
 
 def _refuse_excess(content: bytes) -> None:
-    """Raises DesignError for a drawing that would take long to read."""
+    """Raises DesignError for a drawing that would take too long to read."""
     if content.startswith(b"AutoCAD Binary DXF"):
         items = len(re.findall(rb"\0[A-Z]", content))
     else:
@@ -354,12 +355,12 @@ def _read(entity: Any, factor: float) -> Strand:
     except (DesignError, FitError):
         raise
     except Exception:
-        # As above: what a damaged entity lacks shows itself anywhere.
+        # As above: missing values of a damaged entity may raise anything.
         raise DesignError(f"holds a damaged {entity.dxftype()}; draw it again") from None
 
 
 def _heights(entity: Any) -> list[float]:
-    """The z of every point that an entity is drawn by, in its own units."""
+    """The z of every point that defines an entity, in its own units."""
     try:
         return [float(z) for z in HEIGHTS[entity.dxftype()](entity)]
     except Exception:
@@ -367,7 +368,7 @@ def _heights(entity: Any) -> list[float]:
 
 
 def _facing(entity: Any) -> float:
-    """1, or -1 where an entity's own z runs down."""
+    """1, or -1 if an entity's own z points down."""
     return -1.0 if entity.dxf.extrusion.z < 0 else 1.0
 
 
@@ -479,7 +480,7 @@ def _spline(entity: Any, factor: float) -> Strand:
 
     knots = list(tool.knots())
     first, last = knots[tool.degree], knots[tool.count]
-    # A knot as often repeated as the degree lets the curve turn a corner there.
+    # A knot repeated as often as the degree lets the curve turn a corner there.
     corners = sorted(
         {knot for knot in knots if first < knot < last and knots.count(knot) >= tool.degree}
     )
@@ -506,8 +507,8 @@ HEIGHTS = {
     "CIRCLE": lambda e: [_facing(e) * e.dxf.center.z],
     "LWPOLYLINE": lambda e: [_facing(e) * e.dxf.get("elevation", 0.0)],
     "POLYLINE": _polyline_heights,
-    # Both lie in the coordinates of the world; an axis that rises is an ellipse that is tilted.
+    # Both are in world coordinates; an axis that rises means a tilted ellipse.
     "ELLIPSE": lambda e: [e.dxf.center.z, e.dxf.center.z + e.dxf.major_axis.z],
     "SPLINE": _spline_heights,
 }
-"""By type of entity, where its points lie."""
+"""Attributes with an entity's points, by its type."""

@@ -1,7 +1,7 @@
 """The strands of a plain SVG drawing, in mm and with y upward.
 
 Paths and basic shapes are read, in groups, with their transforms. Elements, attributes and styles
-that leave a shape as it is are listed here; a drawing with any other is refused.
+that do not change a shape are listed here; a drawing with any other is refused.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PLAIN = (
 )
 MOST_ELEMENTS = 2000
 WHITE = " \t\r\n"
-"""What SVG takes for space, and no more."""
+"""Exactly the characters that are space in SVG."""
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _NUMBER = re.compile(NUMBER, re.ASCII)
 _FLAG = re.compile(r"[01]")
@@ -40,10 +40,10 @@ _BETWEEN = re.compile(r"\s*(?:,\s*)?", re.ASCII)
 def svg_strands(path: Path, layer: str | None = None) -> Traced:
     """Return every path and basic shape that is drawn, transforms applied. Raises DesignError.
 
-    Only what stands in the group of the label or id ``layer`` counts where that is given.
+    Only shapes in the group with the label or id ``layer`` count if it is given.
 
-    The origin is that of the user coordinates, wherever the viewBox begins. A page without a size
-    in mm, cm or the like is read as 1 unit = 1 mm.
+    The origin is the origin of the user coordinates, wherever the viewBox begins. A page without a
+    size in mm, cm or the like is read as 1 unit = 1 mm.
     """
     root = _root(path)
     if layer is not None:
@@ -60,7 +60,7 @@ def _strands(drawn: list[DrawnShape], scale: float) -> Iterator[Strand]:
         try:
             segments = list(PathData(text))
         except Exception:
-            # Numbers out of all bounds fail anywhere in the library, with any built-in error.
+            # Extremely large numbers fail anywhere in the library, with any built-in error.
             raise DesignError(
                 f"holds a <{local(element)}> that cannot be read; draw it again"
             ) from None
@@ -68,9 +68,9 @@ def _strands(drawn: list[DrawnShape], scale: float) -> Iterator[Strand]:
 
 
 def _numbers(text: str, are_arcs: bool = False) -> Iterator[str]:
-    """Yield the numbers of a list parted by spaces or commas.
+    """Yield the numbers of a list separated by spaces or commas.
 
-    ``are_arcs``: of each seven the fourth and fifth are flags, which need nothing between them.
+    ``are_arcs``: in each group of seven the fourth and fifth are flags, which need no separator.
     Raises ValueError, with the text from there on, for anything else.
     """
     at, count = len(text) - len(text.lstrip(WHITE)), 0
@@ -92,21 +92,21 @@ def _numbers(text: str, are_arcs: bool = False) -> Iterator[str]:
 
 MM_PER_PIXEL = 25.4 / 96
 PER_PIXEL = {"mm": 96 / 25.4, "cm": 96 / 2.54, "in": 96.0, "pt": 96 / 72, "pc": 16.0}
-"""User units to one of a physical unit, as CSS has it: 96 an inch."""
+"""User units per physical unit, as in CSS: 96 per inch."""
 FARTHEST_PAGE = 1e9
 _PAGE_SIZE = re.compile(rf"({NUMBER})(mm|cm|in|pt|pc|px|%|)", re.ASCII)
 _FIT = re.compile(r"x(?:Min|Mid|Max)Y(?:Min|Mid|Max)(?:\s+meet)?", re.ASCII)
 
 
 class Page(NamedTuple):
-    """``scale``: mm a user unit; ``physical``: the page has a size in mm, cm or the like."""
+    """``scale``: mm per user unit; ``physical``: the page has a size in mm, cm or the like."""
 
     scale: float
     physical: bool
 
     @property
     def description(self) -> str:
-        """Size of a unit in words."""
+        """Size of a unit as text."""
         if not self.physical:
             return "read at 1 mm a unit, for the page has no size in mm"
         inch = ", 96 units an inch" if self.scale == MM_PER_PIXEL else ""
@@ -135,7 +135,7 @@ def page_of(root: ElementTree.Element) -> Page:
 
 
 def _page_size(root: ElementTree.Element, key: str) -> tuple[float | None, str]:
-    """Return a page's size in user units, None if it has none or is a percentage, and its unit."""
+    """Return a page's size in user units, None if it is missing or a percentage, and its unit."""
     text = root.get(key, "").strip(WHITE)
     if text in ("", "auto"):
         return None, ""
@@ -163,7 +163,7 @@ def _view(root: ElementTree.Element) -> tuple[float, float] | None:
     return width, height
 
 
-# The tree: what is drawn, and what is refused because it might change that.
+# The tree: the drawn elements, and those refused because they might change them.
 
 
 NAMESPACES = ("{http://www.w3.org/2000/svg}", "")
@@ -175,11 +175,11 @@ UNDRAWN = frozenset(
         *("radialGradient", "solidcolor", "style", "symbol", "title", "view"),
     }
 )
-"""Never drawn where they stand, whatever they hold."""
+"""Never drawn in place, whatever they contain."""
 NO_PATHS = frozenset({"foreignObject", "image", "text"})
 """Drawn, but no outline: lettering and pictures beside it, as in a DXF."""
 CHANGING = frozenset({"animate", "animateMotion", "animateTransform", "script", "set", "link"})
-"""What changes other elements, wherever it stands."""
+"""Elements that change others, wherever they are."""
 SHAPES = {
     "circle": ("cx", "cy", "r"),
     "ellipse": ("cx", "cy", "rx", "ry"),
@@ -189,7 +189,7 @@ SHAPES = {
     "polyline": ("points",),
     "rect": ("x", "y", "width", "height", "rx", "ry"),
 }
-"""The attributes that a shape is drawn by."""
+"""The attributes that define a shape."""
 ATTRIBUTES = {
     "svg": {"x", "y", "width", "height", "viewBox", "preserveAspectRatio", "version", "baseProfile"}
     | {"contentScriptType", "contentStyleType", "zoomAndPan"},
@@ -197,7 +197,7 @@ ATTRIBUTES = {
     "a": {"transform", "href", "target"},
     **{name: {"transform", "pathLength", *keys} for name, keys in SHAPES.items()},
 }
-"""Attributes that are read, or change nothing."""
+"""Attributes that are read, or have no effect."""
 _NAMES = re.compile(r"id|class|style|lang|role|tabindex|(?:data|aria)-.*")
 _PAINT = re.compile(
     r"(?:-inkscape|background|fill|stroke|marker|stop|solid|flood|lighting|color|opacity|font|text|letter|word"
@@ -216,17 +216,17 @@ VALUES = {
     "vector-effect": ("none", "non-scaling-stroke"),
     "visibility": ("visible", "inherit"),
 }
-"""Properties that change what is drawn, and the values that are read."""
+"""Properties that change the drawing, and the supported values."""
 _DECLARATION = re.compile(r"[{;]\s*([^\s{};:]+)\s*:")
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
-"""The name that Inkscape shows of a layer or group."""
+"""The name of a layer or group as shown by Inkscape."""
 Matrix = tuple[float, float, float, float, float, float]
 """a to f, as SVG's matrix() has them."""
 UNIT: Matrix = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 
 
 class DrawnShape(NamedTuple):
-    """A shape and what takes it to the drawing's user units."""
+    """A shape and its transform to the drawing's user units."""
 
     element: ElementTree.Element
     matrix: Matrix
@@ -273,9 +273,9 @@ def _refuse_sheet(text: str) -> None:
 
 
 def _drawn(root: ElementTree.Element) -> Iterator[DrawnShape]:
-    """Yield the shapes that are drawn, in their order."""
+    """Yield the drawn shapes, in order."""
     space = root.tag.removesuffix("svg")
-    # Outermost last, so that the next one to look at is the last of the list.
+    # Outermost last, so that the next one is the last of the list.
     waiting = [(root, UNIT)]
     while waiting:
         element, outer = waiting.pop()
@@ -294,7 +294,7 @@ def _drawn(root: ElementTree.Element) -> Iterator[DrawnShape]:
 
 
 def _is_displayed(element: ElementTree.Element) -> bool:
-    """Return True if the element is drawn. Raises DesignError for anything that may change it."""
+    """Return True if the element is drawn. Raises DesignError for anything that may change that."""
     name = local(element)
     own = {key: value for key, value in element.attrib.items() if not key.startswith("{")}
     style = own.get("style", "").split(";")
@@ -314,7 +314,7 @@ def _is_displayed(element: ElementTree.Element) -> bool:
 
 
 def _keep_layer(root: ElementTree.Element, layer: str) -> None:
-    """Take all but one layer, and the groups that it stands in, out of a drawing."""
+    """Remove everything except one layer, and the groups that contain it, from a drawing."""
     groups = [element for element in root.iter() if local(element) in GROUPS]
     named = [group for group in groups if layer in (group.get(LABEL), group.get("id"))]
     if not named:
@@ -342,7 +342,7 @@ TRANSFORMS = {
     "skewY": (1,),
     "translate": (1, 2),
 }
-"""By name, how many numbers each may take."""
+"""Allowed counts of numbers, by name."""
 _TRANSFORM = re.compile(r"\s*(?:,\s*)?([A-Za-z]+)\s*\(([^()]*)\)\s*", re.ASCII)
 
 
@@ -387,10 +387,10 @@ def _product(outer: Matrix, inner: Matrix) -> Matrix:
 
 SIZES = frozenset({"height", "r", "rx", "ry", "width"})
 TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
-"""How many numbers a path command takes, over and over."""
+"""Numbers per repetition of a path command."""
 UNLIKE = frozenset({"CT", "ST", "QS", "TS"})
-"""Smooth curves after curves of the other degree: these begin without a tangent to go on with. The
-library would mirror one, which a line of no length between them keeps it from."""
+"""Smooth curves after curves of the other degree: these begin without a tangent to continue. The
+library would mirror one; a line of zero length between them prevents it."""
 _COMMANDS = re.compile(r"([MmLlHhVvCcSsQqTtAaZz])")
 
 
@@ -414,7 +414,7 @@ def path_data(element: ElementTree.Element) -> str:
         if (value["rx"] is None) != (value["ry"] is None):
             raise DesignError("has <ellipse> with only one of rx and ry; give both")
         return _ellipse(*number.values())
-    # A radius that is not given is the other one.
+    # A missing radius equals the other one.
     rx, ry = (value["rx"], value["ry"]) if value["rx"] is not None else (value["ry"],) * 2
     return _rect(number, rx or 0.0, rx or 0.0 if ry is None else ry)
 
@@ -472,7 +472,9 @@ def _corners(text: str, name: str) -> str:
 
 
 def _commands(text: str) -> Iterator[str]:
-    """Yield path data with every command and number apart. Raises DesignError if it is damaged."""
+    """Yield path data with every command and number separate. Raises DesignError if it is
+    damaged.
+    """
     if text.strip(WHITE) in ("", "none"):
         return
     start, *rest = _COMMANDS.split(text)
@@ -516,7 +518,7 @@ ToMillimetres = Callable[[Any], Point]
 
 
 def _placement(matrix: Matrix, scale: float) -> ToMillimetres:
-    """Return what takes a point of a shape to mm, by the shape's transform and the page's scale."""
+    """Return the map from a shape's points to mm, by the shape's transform and the page's scale."""
     a, b, c, d, e, f = matrix
 
     def point(p: Any) -> Point:

@@ -1,7 +1,7 @@
 """Records of a design file: the sections that all families share, and the form of an actuator.
 
-Every field has the paper's value as default (paper Sec. 2) or, where the paper is silent, ours,
-and says so. Lengths are mm.
+Every field has the paper's value as default (paper Sec. 2) or, if the paper is silent, ours, and
+says so. Lengths are mm.
 """
 
 from __future__ import annotations
@@ -77,9 +77,9 @@ if TYPE_CHECKING:
 
 
 def card(title: str, symbol: str) -> ConfigDict:
-    """Return what forms show of a family: a few words, and a drawing.
+    """Return the form's entries for a family: a few words, and a drawing.
 
-    ``symbol`` is SVG path data in a box 54 wide and 40 high. Both stand in the JSON schema.
+    ``symbol`` is SVG path data in a box 54 wide and 40 high. Both are in the JSON schema.
     """
     return ConfigDict(title=title, json_schema_extra={"symbol": symbol})
 
@@ -95,13 +95,13 @@ class Design(Section):
     """The sections that all families share; a family adds its own, sets ``family`` and ``form``."""
 
     unused: ClassVar[Mapping[str, str]] = {}
-    """Of the sections and keys below those that a family does not use, each with what to do in its
-    place. Nobody can set them, and no file and no form has them."""
+    """Sections and keys below that a family does not use, each with its replacement. They cannot be
+    set, and no file and no form has them."""
 
     name: str = Field(pattern=NAME_PATTERN)
     """Names the output folder: letters, digits, dot, dash, underscore."""
     family: str
-    """Which kind of actuator this is."""
+    """Kind of actuator."""
     kit: str = Field(default="paper", min_length=1, max_length=1000)
     """The lab's films, tubes, press, laser and limits: "paper", or a file beside the design. It
     gives every key of its sections that the design leaves out."""
@@ -114,10 +114,10 @@ class Design(Section):
     films: Films = Films.model_construct()
     layup: LayerFilms = LayerFilms.model_construct()
     face_bonds: FaceBondings | None = None
-    """Which faces of films bond, and by what; by default all structural films in the press."""
+    """Faces of films that bond, and the process; by default all structural films in the press."""
     registration: Registration = Registration.model_construct()
     seam_tools: SeamTools | None = None
-    """Tools that make seams beside their machine's head; by default each is in its place."""
+    """Tools that make seams beside their machine's head; by default each is at the head."""
     press: Press = Press.model_construct()
     acceptance: Acceptance = Acceptance.model_construct()
     laser: Laser = Laser.model_construct()
@@ -132,7 +132,7 @@ class Design(Section):
 
     @property
     def folder(self) -> Path:
-        """Folder of the design's file, at which relative paths start."""
+        """Folder of the design's file, for relative paths."""
         return self._folder
 
     @property
@@ -156,27 +156,27 @@ class Design(Section):
 
     @property
     def layer_films(self) -> dict[int, str]:
-        """Films that single layers name, by the layer's index; else ``layup`` has the role's."""
+        """Films named by single layers, by the layer's index; else the role's film in ``layup``."""
         return {}
 
     @property
     def layer_roles(self) -> tuple[str, ...]:
-        """The roles of all layers, bottom to top, where the design lists them; else none."""
+        """The roles of all layers, bottom to top, if the design lists them; else empty."""
         return ()
 
     @property
     def has_nets(self) -> bool:
-        """True if the design says which ports its voids join."""
+        """True if the design states which ports its voids join."""
         return False
 
     @property
     def seamed_layers(self) -> frozenset[tuple[int, int]]:
-        """Pairs of layers, by index, that seams bond."""
+        """Pairs of layers, by index, bonded by seams."""
         return frozenset()
 
     @property
     def turned_layers(self) -> frozenset[int]:
-        """Layers, by index, that lie upper face down."""
+        """Layers, by index, that are laid upper face down."""
         return frozenset()
 
     @property
@@ -186,9 +186,9 @@ class Design(Section):
 
     @property
     def stated_bonds(self) -> tuple[FaceBond, ...]:
-        """Which faces bond, and by what; none where nothing is said of it.
+        """Faces that bond, and the process; empty if not stated.
 
-        Raises DesignError for a face that no film has.
+        Raises DesignError for a face of no film.
         """
         bonds = {} if self.face_bonds is None else self.face_bonds.by_name
         faces = self.films.face_names if bonds else frozenset()
@@ -206,7 +206,9 @@ class Design(Section):
 
     @property
     def seam_offsets(self) -> dict[str, tuple[float, float]]:
-        """Where tools are from their machine's head, mm, by the tools' names; none in its place."""
+        """Offsets of tools from their machine's head, mm, by the tools' names; tools at the head
+        have none.
+        """
         return {} if self.seam_tools is None else self.seam_tools.offsets
 
     @property
@@ -232,7 +234,7 @@ class Design(Section):
 
     @property
     def plate_machine(self) -> PlateMachine | None:
-        """What makes the base plate's holes; None if the pins' error is stated, or bonds drawn."""
+        """Machine for the base plate's holes; None if the pins' error is stated, or bonds drawn."""
         is_stated = self.registration.pin_error is not None or self.form.is_drawn
         return None if is_stated else self.registration.plate_made_by
 
@@ -247,8 +249,8 @@ class Design(Section):
     def strip_width(self) -> float:
         """Width of the inlet strips, mm: as given, or the least that opens to the tube.
 
-        A flat channel opens to half the perimeter of what is in it: the tube, and the PTFE strip
-        along one side of it (rule tube-fit). Up to 0.05 mm.
+        A flat channel opens to half the perimeter of its content: the tube, and the PTFE strip
+        along one side of it (rule tube-fit). Rounded up to 0.05 mm.
         """
         if self.inlet.width is not None:
             return self.inlet.width
@@ -257,7 +259,7 @@ class Design(Section):
 
     @property
     def strip_loss(self) -> float:
-        """Width by which a strip may come out narrower than drawn, mm, for any kerf.
+        """Width by which a cut strip may be narrower than drawn, mm, for any kerf.
 
         A kerf that is measured later changes no strip.
         """
@@ -270,7 +272,7 @@ class Design(Section):
 
     @classmethod
     def uses(cls, key: str) -> bool:
-        """Return True unless a key, or the section it is in, is none that the family uses."""
+        """Return True if the family uses a key and its section."""
         return not {key, key.partition(".")[0]} & cls.unused.keys()
 
     @classmethod
@@ -329,7 +331,7 @@ class Design(Section):
     def fitted(self) -> Self:
         """Return the design with its chamber solved from ``fits``, in families that have it.
 
-        Raises DesignError where no chamber fits.
+        Raises DesignError if no chamber fits.
         """
         return self
 
@@ -340,18 +342,20 @@ class Design(Section):
         return copy
 
     def placed(self, folder: Path) -> Self:
-        """Return the design with relative paths starting at ``folder``."""
+        """Return the design with relative paths based on ``folder``."""
         copy = self.model_copy()
         copy._folder = folder
         return copy
 
 
-# The form of an actuator: what a family says of a design to all who do not know the family.
+# The form of an actuator: a family's description of a design for family-independent code.
 
 
 @dataclass(frozen=True)
 class Discs:
-    """Round pockets on one axis a stack: their diameters in mm, one a balloon, bottom to top."""
+    """Round pockets on one axis per stack: their diameters in mm, one per balloon, bottom to
+    top.
+    """
 
     diameters: tuple[float, ...]
 
@@ -376,9 +380,8 @@ Pockets = Discs | Slots | Drawn
 class Wrap:
     """A laminate that is wrapped round a tube.
 
-    ``tube_diameter`` is the outer one and ``pitch`` that of the stacks round it, mm; ``glue`` is
-    the adhesive that holds it there, and ``overlap`` the width (mm) by which the sheet's ends
-    overlap.
+    ``tube_diameter`` is the outer diameter and ``pitch`` the distance between the stacks round it,
+    mm; ``glue`` is the adhesive, and ``overlap`` the width (mm) by which the sheet's ends overlap.
     """
 
     tube_diameter: float
@@ -392,7 +395,7 @@ MechanismKind = Literal["pouch-motor", "hinge", "beam", "jamming", "push"]
 
 @dataclass(frozen=True)
 class Mechanism:
-    """What drawn pockets do when they fill, for the models that know it.
+    """Action of drawn pockets when they fill, for models that support it.
 
     ``direction`` in degrees from x, counter-clockwise: along it a pouch motor shortens, the two
     plates of a hinge lie, and a beam or jammed stack reaches. ``friction`` is the coefficient
@@ -410,7 +413,7 @@ class Form:
 
     ``words`` is a technician's name for it; ``stacks`` of balloons stand side by side, all with the
     same ``pockets``; ``lumen`` is the diameter in mm of the channel through all layers,
-    ``lumen_pin`` its dowel pin's; ``mechanism`` what drawn pockets do, where the design says so.
+    ``lumen_pin`` its dowel pin's; ``mechanism`` the action of drawn pockets, if stated.
     ``is_drawn``: every layer is drawn, so that the paper's handling times do not carry over.
     """
 
@@ -430,7 +433,7 @@ class Form:
 
     @property
     def works_under_vacuum(self) -> bool:
-        """True if its pressures are below that of the atmosphere: negative, as gauges show them."""
+        """True if its pressures are below atmospheric: negative gauge pressures."""
         return self.mechanism is not None and self.mechanism.kind == "jamming"
 
     @property
@@ -443,8 +446,8 @@ class Form:
 class Free:
     """A key that a search may change: from ``low`` to ``high`` in steps, or one of ``choices``.
 
-    ``asked``: only where a requirement names this quantity; else it stays as it is. ``widens``: the
-    ends are where a search begins, and may move.
+    ``asked``: free only if a requirement names this quantity. ``widens``: the ends are where a
+    search begins, and may move.
     """
 
     key: str
@@ -454,7 +457,7 @@ class Free:
     asked: str = ""
     widens: bool = False
     choices: tuple[str, ...] = ()
-    """Words that the key may be, if it is no number; its steps then count them from 0."""
+    """Words allowed for the key, if it is not a number; its steps then count them from 0."""
 
     @classmethod
     def of_words(cls, key: str, choices: Iterable[str], asked: str = "") -> Free:
@@ -514,7 +517,7 @@ def validated(
 
 
 def _refuse_unused(data: Mapping[str, Any], record: type[Design], family: str) -> None:
-    """Raises DesignError for a key that the family does not use, whatever it says."""
+    """Raises DesignError for a key that the family does not use, whatever its value."""
     for key, _ in dotted(data):
         if not record.uses(key):
             instead = record.unused.get(key) or record.unused[key.partition(".")[0]]
@@ -527,7 +530,7 @@ def resolved(design: Design) -> dict[str, Any]:
 
 
 def with_unused(design: Design) -> dict[str, Any]:
-    """Return the same with the keys that its family does not use, which have their defaults."""
+    """Return the same including the keys that its family does not use, at their defaults."""
     return _tables(design.completed())
 
 
@@ -542,7 +545,7 @@ def plain_tables(design: Design) -> dict[str, Any]:
 def _tables(design: Design) -> dict[str, Any]:
     tables = without_none(design.model_dump(mode="json"))
     if not tables.get(FITS):
-        # Nothing is asked for: an empty table would say nothing.
+        # No requirement: an empty table would be meaningless.
         tables.pop(FITS, None)
     return tables
 
@@ -591,7 +594,9 @@ def design_toml(design: Design) -> str:
 
 
 def without_kit(data: Mapping[str, Any], design: Design) -> dict[str, Any]:
-    """Return a design's tables without values that its kit or a default gives: another kit may."""
+    """Return a design's tables without values from its kit or defaults, so that another kit
+    applies.
+    """
     kit = load_kit(design.kit, design.folder)
     kit_values = {**kit.tables, "inlet": inlet_of_kit(kit, {}, False)}
     usual = type(design).model_validate({"name": "x", "family": design.family, **kit_values})
@@ -600,7 +605,7 @@ def without_kit(data: Mapping[str, Any], design: Design) -> dict[str, Any]:
 
 
 def _less(data: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
-    """Values that differ from the usual ones; tables that become empty are removed."""
+    """Values that differ from the defaults; tables that become empty are removed."""
     rest: dict[str, Any] = {}
     for key, value in data.items():
         inner = usual.get(key)

@@ -34,36 +34,36 @@ ROUNDING = 1e-9
 
 
 class Order(Section):
-    """How many, for whom, and how many at once."""
+    """Number of actuators, customer, and copies at once."""
 
     copies: int = Field(default=1, ge=1, le=MOST)
-    """How many of the actuator are made; more where order.good takes more."""
+    """Number of actuators made; more if order.good needs more."""
     success_rate: float = Field(default=0.9, gt=0, le=1)
-    """Share of builds that come out good (paper Sec. 4: under 10 % failed). Take your lab's own
-    from "sbafab record --report" once it has one."""
+    """Share of builds that succeed (paper Sec. 4: under 10 % failed). Take your lab's own from
+    "sbafab record --report" once it has one."""
     certainty: float = Field(default=0.8, gt=0, lt=1)
-    """With what probability at least order.good come out good (ours): 20 good ones at 0.9 take 23
-    with 0.81, 24 with 0.91, 25 with 0.97."""
+    """Probability that at least order.good succeed (ours): 20 good ones at 0.9 take 23 with 0.81,
+    24 with 0.91, 25 with 0.97."""
     good: int | None = Field(default=None, ge=1, le=MOST)
-    """How many must come out good. As many more are made as order.success_rate and order.certainty
-    ask for; none asked for by default."""
+    """Number that must succeed. order.success_rate and order.certainty determine how many more are
+    made; none by default."""
     spare_share: float = Field(default=0.05, ge=0, le=2)
-    """Spare parts as a share of the number that the actuators take of each pattern, rounded up
-    (ours). A part that is lost or torn at the press else costs a trip to the laser."""
+    """Spare parts as a share of the number that the actuators need of each pattern, rounded up
+    (ours). A part lost or torn at the press otherwise means recutting."""
     spares: int = Field(default=1, ge=0, le=100)
     """The fewest spares of a pattern, films and masks alike; 0, with spare_share = 0, cuts none."""
     at_once: int | None = Field(default=None, ge=1, le=MOST)
     """Most copies in one press cycle, as far as the heated area has room for them; by default as
     many as one person lays up and presses in 8 hours (ours)."""
     batch: str | None = Field(default=None, max_length=12)
-    """Name of the batch, before its serials: "24" makes "24-A-03" of "A-03". By default none; take
-    one where a design is made again, as records know an actuator by design and serial."""
+    """Name of the batch, before its serials: "24" makes "24-A-03" of "A-03". None by default; set
+    one if a design is made again, as records identify an actuator by design and serial."""
     tray: bool | None = None
-    """Whether a tray plan (tray.pdf, 1:1) and a page of counts for a phone (tray.html) are written;
+    """True if a tray plan (tray.pdf, 1:1) and a page of counts for a phone (tray.html) are written;
     by default for more than one copy."""
     cure_hours: float | None = Field(default=None, gt=0, le=168)
-    """Hours in which the adhesive of the tubes cures, by its package; by default those of
-    the kit's adhesive, else the traveller's times take 24 (ours)."""
+    """Hours in which the adhesive of the tubes cures, by its package; by default the time of the
+    kit's adhesive, else the traveller's times assume 24 (ours)."""
     made_for: str = Field(default="", max_length=120)
     """Printed on the traveller."""
     note: str = Field(default="", max_length=400)
@@ -73,7 +73,7 @@ class Order(Section):
     @classmethod
     def _is_short_name(cls, batch: object) -> object:
         text = str(batch) if type(batch) is int else batch
-        # What cannot be printed is named by the check that all texts have.
+        # Characters that cannot be printed are reported by the check on all texts.
         if (
             isinstance(text, str)
             and text.isprintable()
@@ -113,7 +113,9 @@ class Order(Section):
 
     @property
     def why(self) -> str:
-        """Sentence on what the number that is made is good for; empty where none was asked for."""
+        """Sentence on the number made and its chances; empty if no number of good ones is
+        required.
+        """
         if self.good is None:
             return ""
         likely = probability_of(self.good, self.quantity, self.success_rate)
@@ -124,7 +126,7 @@ class Order(Section):
         )
 
     def spare_parts(self, needed: int) -> int:
-        """Number of spares of a pattern of which the actuators take ``needed`` parts."""
+        """Number of spares of a pattern if the actuators need ``needed`` parts of it."""
         return max(self.spares, math.ceil(self.spare_share * needed - ROUNDING)) if needed else 0
 
 
@@ -132,7 +134,7 @@ def probability_of(good: int, builds: int, rate: float) -> float:
     """Probability that at least ``good`` of ``builds`` succeed, each with probability ``rate``.
 
     The upper tail of the binomial distribution, summed over the number of failures. Builds are
-    taken as independent of each other, which those of one press cycle are not wholly.
+    assumed independent, which builds of one press cycle are only in part.
     """
     return math.fsum(
         math.comb(builds, failed) * rate ** (builds - failed) * (1 - rate) ** failed
@@ -141,7 +143,7 @@ def probability_of(good: int, builds: int, rate: float) -> float:
 
 
 def builds_for(good: int, rate: float, certainty: float) -> int | None:
-    """Least number of builds of which ``good`` succeed with this certainty; None beyond MOST."""
+    """Least number of builds such that ``good`` succeed with this certainty; None beyond MOST."""
     low, high = good, MOST
     if probability_of(good, high, rate) < certainty:
         return None
@@ -187,13 +189,13 @@ RuleName = Literal[
 
 
 def rule_names() -> tuple[str, ...]:
-    """Return the names of all rules, those of installed packages last."""
+    """Return the names of all rules, with rules of installed packages last."""
     return (*get_args(RuleName), *(entry.name for entry in plugins.installed(plugins.RULES)))
 
 
 def name_of(names: Callable[[], Sequence[str]]) -> tuple[AfterValidator, Any]:
-    """Return what allows one of some names, which installed packages may add to, in validation and
-    in the schema.
+    """Return the annotation for one of some names, which installed packages may extend, in
+    validation and in the schema.
     """
 
     def checked(name: str) -> str:
@@ -211,7 +213,7 @@ def name_of(names: Callable[[], Sequence[str]]) -> tuple[AfterValidator, Any]:
 
 
 class Bond(Section):
-    """Where two structural films melt together."""
+    """Bond where two structural films melt together."""
 
     width: Length = 0.75
     """Width of every bonded ring, web and strip edge."""
@@ -221,7 +223,7 @@ class Mask(Section):
     """The Teflon that keeps films apart."""
 
     overhang: Length = 0.5
-    """How far a mask reaches past the edges of the TPE layers it keeps apart."""
+    """Distance by which a mask reaches past the edges of the TPE layers it keeps apart."""
 
 
 class Bore(Section):
@@ -231,7 +233,7 @@ class Bore(Section):
     """Channel between the balloons of a chamber, and hole for its dowel pin (the paper gives
     none)."""
     clearance: Annotated[float, Millimetres(0, 1)] = 0.04
-    """By how much the bore is wider than its dowel pin. Ours: what registration leaves, for 0.75 -
+    """Excess of the bore over its dowel pin in diameter. Ours: what registration leaves, for 0.75 -
     2 x (0.1 + 0.004 + 0.02) is just the 0.5 that must be left of a bond at worst."""
     pin_diameter: Length | None = None
     """Dowel pin of the bore; by default the bore less the clearance."""
@@ -261,20 +263,20 @@ class Inlet(Section):
     adhesive: str = Field(
         default="Loctite Vinyl, Fabric & Plastic Flexible Adhesive", min_length=1, max_length=120
     )
-    """What seals tube and mouth (paper Sec. 2)."""
+    """Adhesive that seals tube and mouth (paper Sec. 2)."""
     width: Length | None = None
     """Width of the inlet strip; by default what tube and strip need together, with cutting error
     and an unknown kerf taken off, rounded up to 0.05."""
     tab_length: Length = 5.0
-    """How far the inlet tab reaches past the outline (the paper gives none)."""
+    """Distance by which the inlet tab reaches past the outline (the paper gives none)."""
 
 
 GUIDED_TOOL = 0.3
-"""mm: error of place of a seam's tool other than a laser; ours, nobody measured it."""
+"""Position error of a seam's tool other than a laser, mm; ours, not measured."""
 
 
 class Registration(Section):
-    """What keeps the layers in register, and how far off they may lie."""
+    """Registration of the layers, and its errors."""
 
     method: Literal["channel-pin", "ears"] = "channel-pin"
     """"channel-pin": dowel pins in the channel bores, and in the lumen if there is one (the
@@ -290,34 +292,36 @@ class Registration(Section):
     then the middle layers on the pins, then both with the top layer. "middle-first": all layers
     between base and cap on the pins, then base and cap; one placement by hand less, not tried."""
     pin_clearance: Annotated[float, Millimetres(0, 1)] = 0.0
-    """By how much the holes of the ears are wider than their pins; up to three steps add it up."""
+    """Excess of the ears' holes over their pins in diameter; it adds up over as many as three
+    steps."""
     pin_stretch: float = Field(default=0.3, ge=0, le=2)
     """The most by which a hole may be stretched over its pin, as a share of itself. Ours, untested:
     less than a tenth of the 400 % that cast PTFE film of 0.025 mm must stand before it tears (ASTM
     D3369, Table 1); skived film stands less, TPE more."""
     pin_standard: Literal["ISO 8734", "ISO 2338"] = "ISO 8734"
-    """Whose diameters and lengths the dowel pins have; order them ground to m6."""
+    """Standard for the diameters and lengths of dowel pins; order them ground to m6."""
     pin_lengths: tuple[Length, ...] = Field(default=(), max_length=30, strict=False)
     """Lengths of pins that you have, in place of the standard's."""
     cutting_error: Annotated[float, Millimetres(0, 1)] = 0.1
     """The most by which a cut edge lies off its place (paper Sec. 2)."""
     plate_made_by: PlateMachine = "jig-borer"
-    """What makes the holes of the base plate: "jig-borer" (places to 0.003, each hole lapped to its
-    pin), "cnc-mill" (0.025, reamed H7) or "drill-press" (marked out by hand, 0.2, reamed H7)."""
+    """Machine for the holes of the base plate: "jig-borer" (places to 0.003, each hole lapped to
+    its pin), "cnc-mill" (0.025, reamed H7) or "drill-press" (marked out by hand, 0.2, reamed
+    H7)."""
     pin_error: Annotated[float, Millimetres(0, 1)] | None = None
     """The most by which a layer on its pins lies off its place; by default what plate_made_by
     gives: a jig borer the paper's 0.004 (Sec. 2), a CNC mill 0.029, a drill press 0.204. The place
     of a plate's only pin does not count: there each gives 0.004."""
     hand_placement: Annotated[float, Millimetres(0, 5)] = 0.08
-    """The most by which what no pin holds lies off what it is laid on. The paper gives none: this,
+    """The most by which a part without pins lies off the part below. The paper gives none: this,
     with hand_turn, is calibrated so that the designs it built keep their limits as often as it
     succeeded, nine times in ten. A rougher hand takes larger values of both."""
     hand_turn: float = Field(default=0.4, ge=0, le=10)
-    """Degrees: the most by which what fewer than two pins hold is turned. Calibrated together with
+    """Degrees: the most by which a part on fewer than two pins is turned. Calibrated together with
     hand_placement."""
     seam_error: Annotated[float, Millimetres(0, 5)] | None = None
     """The most by which a seam lies off its path, whatever its tool; by default cutting_error for a
-    laser, which the same machine moves, and 0.3 for other tools: ours, nobody measured it."""
+    laser, which the same machine moves, and 0.3 for other tools: ours, not measured."""
 
     @property
     def is_middle_first(self) -> bool:
@@ -340,15 +344,15 @@ MountCoordinate = Annotated[float, Millimetres(-500, 500)]
 
 
 class SeamToolSection(Section):
-    """How a tool that makes seams is mounted on its machine."""
+    """Mounting of a tool for seams on its machine."""
 
     offset: Annotated[tuple[MountCoordinate, MountCoordinate], Field(strict=False)]
-    """Where its middle is, x and y from the laser or pen head by which the machine's origin is set.
-    Seam files are shifted by minus that; all else shows seams where they are made."""
+    """Position of its middle, x and y from the laser or pen head that sets the machine's origin.
+    Seam files are shifted by minus that; everything else shows seams where they are made."""
 
 
 class SeamTools(Section):
-    """Tools that make seams, where they are not mounted in place of the machine's head."""
+    """Tools for seams that are not mounted in place of the machine's head."""
 
     laser: SeamToolSection | None = None
     """The laser."""
@@ -361,7 +365,7 @@ class SeamTools(Section):
 
     @property
     def offsets(self) -> dict[str, tuple[float, float]]:
-        """The offsets other than none, by the tools' names in seams."""
+        """The nonzero offsets, by the tools' names in seams."""
         rows = {name.replace("_", "-"): getattr(self, name) for name in SeamTools.model_fields}
         return {tool: row.offset for tool, row in rows.items() if row and any(row.offset)}
 
@@ -376,7 +380,7 @@ LONGEST_CONSTANT = 120.0
 def named_film(text: str) -> tuple[str, float]:
     """Return product and thickness (mm) of a text such as "Stretchlon 200, 0.038 mm".
 
-    Raises ValueError with a sentence that says what is allowed.
+    Raises ValueError with a sentence on the allowed form.
     """
     product, _, thickness = text.rpartition(",")
     try:
@@ -423,17 +427,20 @@ class Press(Section):
     plate_material: str = Field(default="steel", max_length=80)
     """Base plate, as large as the platen: under every lay-up, with the holes for the pins."""
     plate_thickness: Length | None = None
-    """Of the base plate; by default the thinnest plate sold, from 6 mm, that takes the pins."""
+    """Thickness of the base plate; by default the thinnest plate sold, from 6 mm, that holds the
+    pins."""
     release_film: str = Field(default="PTFE film", max_length=80)
-    """What TPE does not stick to, one sheet below and one above (the paper names none)."""
+    """Release film, to which TPE does not stick, one sheet below and one above (the paper names
+    none)."""
     release_thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.05
     """Thickness of one release film; PTFE film is sold in this thickness."""
     underlay_thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.1
-    """Thickness of the printed underlay, where one lies on the plate; plain paper of 80 g/m2."""
+    """Thickness of the printed underlay, if one lies on the plate; plain paper of 80 g/m2."""
     pad_material: Literal["silicone sponge", "silicone rubber"] = "silicone sponge"
     """Press pad: the compliant sheet, as large as the platen, that spreads the force (ours)."""
     pad_thickness: Length | None = None
-    """Of the press pad; by default the thinnest sold that gives films 1.5 times the pressure."""
+    """Thickness of the press pad; by default the thinnest sold that gives films 1.5 times the
+    pressure."""
     pad_hardness: float = Field(default=10.0, ge=5, le=90)
     """Shore A; 10 is a soft closed-cell silicone sponge, between grades 3 and 4 of ASTM D1056 class
     D; sheets of solid silicone rubber have 40 to 70."""
@@ -451,8 +458,8 @@ class Press(Section):
     """Films that the minutes above were stated for, each as "product, thickness". A laminate of any
     other structural film gets no minutes: blanks on the traveller, null in press.json."""
     time_constant: TimeConstant = NOT_MEASURED
-    """Minutes in which the edge of the base plate, laid cold between the hot platens under the
-    pad, makes 63 % of its way; measured once at the bench."""
+    """Minutes in which the edge of the base plate, laid cold between the hot platens under the pad,
+    covers 63 % of the temperature difference; measured once at the bench."""
     cool_minutes: float | None = Field(default=None, gt=0, le=600)
     """Minutes in which the base plate cools beside the press until it can be touched; measured once
     at the bench. By default the traveller's times take a first-order estimate."""
@@ -479,43 +486,43 @@ class Press(Section):
 
 
 class Acceptance(Section):
-    """What an actuator works at, and must stand before it is handed on: all ours but the burst that
-    it stays below.
+    """Working pressure of an actuator, and its tests before delivery: all ours except the burst
+    pressure.
     """
 
     working_pressure_kpa: float | None = Field(default=None, ge=-101.325, le=10000)
-    """The most that it works at, as a gauge shows it: a vacuum is negative. By default none is
-    stated, and the rule pressure-rating warns where it would not do for 100 kPa, at which the paper
-    gives forces."""
+    """Highest working gauge pressure; a vacuum is negative. By default none is stated, and the rule
+    pressure-rating warns if the actuator is not fit for 100 kPa, at which the paper gives
+    forces."""
     safety_factor: float = Field(default=2.0, ge=1, le=100)
-    """The estimated burst pressure over the most that it works at. Ours: the estimate is of three
-    actuators, and nobody knows how many strokes a film stands."""
+    """Ratio of the estimated burst pressure to the highest working pressure. Ours: the estimate
+    rests on three actuators, and the fatigue life of the film is unknown."""
 
     leak_pressure_kpa: float = Field(default=5.0, gt=0, le=1000)
     """Leak test under water: enough to open every balloon (a stack of d = 5 unfolds up to 0.95)."""
     leak_seconds: float = Field(default=60.0, gt=0, le=36000)
-    """How long it is held."""
+    """Time for which it is held."""
     proof_pressure_kpa: float = Field(default=150.0, gt=0, le=10000)
-    """Proof test: 1.5 times the 100 kPa at which the paper gives forces. Lower where 60 % of the
-    estimated burst pressure is less. For a film that nobody has burst these 150 kPa are left blank,
-    and any other pressure is printed as it is stated."""
+    """Proof test: 1.5 times the 100 kPa at which the paper gives forces. Lower if 60 % of the
+    estimated burst pressure is less. For a film without a burst test these 150 kPa are left blank,
+    and any other pressure is printed as stated."""
     proof_seconds: float = Field(default=60.0, gt=0, le=36000)
-    """How long it is held."""
+    """Time for which it is held."""
     fitting: str = Field(default=FITTING, min_length=1, max_length=200)
-    """What joins the tube to a syringe, regulator or gauge."""
+    """Connector from the tube to a syringe, regulator or gauge."""
 
 
 HoldDown = Literal["border", "carrier", "vacuum"]
-"""What holds a film under the beam."""
+"""Means of holding a film under the beam."""
 
 
 class Laser(Section):
-    """The laser: what it can cut, its kerf, how film is held, speeds for estimates."""
+    """The laser: its limits, its kerf, film holding, speeds for estimates."""
 
     least_feature: Length = 0.2
     """The narrowest slot or web the laser cuts well."""
     cut_speed: float = Field(default=20.0, gt=0, le=5000)
-    """mm/s; for estimates of time only, no setting of a machine."""
+    """mm/s; only for estimates of time, not a machine setting."""
     travel_speed: float = Field(default=200.0, gt=0, le=5000)
     """mm/s between cuts; for estimates of time only."""
     pierce_seconds: float = Field(default=0.1, ge=0, le=60)
@@ -526,18 +533,18 @@ class Laser(Section):
     """Full kerf width in TPE, measured, or [along x, along y]; "uncalibrated" writes nominal edges
     and says so."""
     kerf_ptfe: KerfWidth = UNCALIBRATED
-    """Full kerf width in PTFE, measured, likewise."""
+    """Full kerf width in PTFE, measured, as laser.kerf_tpe."""
     hold_tpe: HoldDown = "border"
-    """What holds TPE, and other films that bond, under the beam: its "border" taped to card, a
+    """Holding of TPE, and other films that bond, under the beam: its "border" taped to card, a
     "carrier" sheet of low tack, or a "vacuum" bed. Ours, not tried: adhesive of a carrier that
     stays in a bond may leak."""
     hold_ptfe: HoldDown = "carrier"
-    """What holds PTFE, and other masks, likewise. Ours, not tried: masks are light and loose, and
-    nothing bonds to them."""
+    """Holding of PTFE, and other masks, as laser.hold_tpe. Ours, not tried: masks are light and
+    loose, and nothing bonds to them."""
     unknown_kerf: Annotated[float, Millimetres(0, 1)] = 0.1
-    """What a kerf that was not measured may take off the width of a part: ours."""
+    """Allowance in a part's width for a kerf that was not measured: ours."""
     machine: MachineName | None = None
-    """The machine whose recipes LightBurn's projects take; by default none: every power is 0."""
+    """The machine whose recipes LightBurn's projects use; by default none: every power is 0."""
     recipe: Annotated[tuple[Recipe, ...], Field(max_length=200, strict=False)] | None = None
     """Power and speed by film, thickness and machine, a [[laser.recipe]] each."""
 
@@ -559,10 +566,10 @@ class Sheets(Section):
     tpe: Sheet = Sheet.model_construct()
     ptfe: Sheet = Sheet.model_construct()
     label: bool = True
-    """Whether name, material, number and design hash are engraved into the border."""
+    """True if name, material, number and design hash are engraved into the border."""
     index_marks: bool | None = None
-    """Whether the number of its pattern is engraved into the skeleton beside each part that has
-    room for it; off by default. Wider spacing leaves more room."""
+    """True if the number of its pattern is engraved into the skeleton beside each part with enough
+    room; off by default. Wider spacing leaves more room."""
     program: Literal["rdworks", "epilog"] | None = None
     """A laser program, beside LightBurn, that each sheet gets a machine file for: "rdworks" (DXF
     R12 by colours) or "epilog" (SVG with hairlines by colours)."""
@@ -573,18 +580,18 @@ REMOVED_RULES = ("bridges", "scrap")
 
 
 class Rules(Section):
-    """Limits of the rule deck, and what is waived."""
+    """Limits of the rule deck, and waivers."""
 
     bond_width: Length = 0.75
     """Every bond must be at least this wide."""
     mask_overhang: Length = 0.5
     """Every mask must reach at least this far past the edges it keeps apart."""
     worst_bond_width: LengthOrZero = 0.5
-    """What must be left of every bond with all errors of cutting and registration at worst."""
+    """Least remaining width of every bond with all errors of cutting and registration at worst."""
     worst_mask_overhang: LengthOrZero = 0.25
-    """What must be left of every overhang with all errors at worst."""
+    """Least remaining width of every overhang with all errors at worst."""
     target_yield: float | None = Field(default=None, gt=0, lt=1)
-    """The share of random builds that must keep the two limits above; none asked for by default."""
+    """The share of random builds that must keep the two limits above; none by default."""
     yield_builds: Annotated[int, Field(ge=100, le=1_000_000)] | None = None
     """Random builds drawn for registration-yield; by default 10,000, fewer for tall stacks."""
     validated_balloons: int = Field(default=20, ge=1, le=1000)
@@ -593,14 +600,14 @@ class Rules(Section):
     """A channel of a net must open at this pressure: one of its films lifts by its thickness. By
     default 100 kPa, at which the paper gives forces."""
     dead_end: float | None = Field(default=None, ge=0.5, le=1000)
-    """A branch of a net without a port may be so many times as long as wide; by default 2."""
+    """Largest ratio of length to width of a branch of a net without a port; by default 2."""
     waive: tuple[Annotated[str, *name_of(rule_names)], ...] = Field(default=(), strict=False)
-    """Rules whose failure shall not stop the cut files; every file then says so."""
+    """Rules whose failure does not stop the cut files; every file then says so."""
 
     @field_validator("waive", mode="before")
     @classmethod
     def _without_removed_rules(cls, names: object) -> object:
-        # What is not checked any more needs no waiver.
+        # A removed rule needs no waiver.
         if not isinstance(names, list | tuple):
             return names
         return [name for name in names if name not in REMOVED_RULES]
@@ -612,12 +619,12 @@ class Rules(Section):
 
     @property
     def longest_dead_end(self) -> float:
-        """Widths that a blind branch of a net may be long."""
+        """Largest ratio of length to width of a blind branch of a net."""
         return self.dead_end or 2.0
 
 
 class Models(Section):
-    """What predictions are made with."""
+    """Basis of predictions."""
 
     calibration: str = Field(default="paper", min_length=1, max_length=1000)
     """The calibration of the models: "paper", a file beside the design that sbafab calibrate wrote,
@@ -625,7 +632,7 @@ class Models(Section):
 
 
 class Stack(Section):
-    """How high the actuator is."""
+    """Height of the actuator."""
 
     balloons: int = Field(default=6, ge=1, le=1000)
     """Balloons in each chamber, bottom to top."""
@@ -636,4 +643,4 @@ class Chamber(Section):
 
     outline: str | None = Field(default=None, max_length=1000)
     """DXF or SVG file with one closed path: the pocket, in place of the shape that the family gives
-    it. Drawn round (0, 0) it stays as it lies, else its centroid comes to the chamber's axis."""
+    it. Drawn round (0, 0) it keeps its place, else its centroid moves to the chamber's axis."""

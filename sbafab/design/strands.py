@@ -15,24 +15,24 @@ from sbafab.geometry.edges import EPSILON, Edge, Line, Point, edge_from_bulge
 Strand = tuple[Edge, ...]
 
 JOIN = 0.001
-"""Ends at most this far apart, in mm, are joined."""
+"""Largest gap between joined ends, mm."""
 MOST_EDGES = 500
-"""Edges of an outline."""
+"""Most edges of an outline."""
 MOST_OF_ENTITY = 5000
-"""Edges of anything that a drawing holds."""
+"""Most edges of a whole drawing."""
 FARTHEST = 10_000.0
 """No coordinate of a drawing may be larger, in mm."""
 
 
 class Traced(NamedTuple):
-    """Strands of a drawing in mm, and the size of its unit in words."""
+    """Strands of a drawing in mm, and the size of its unit as text."""
 
     strands: Iterator[Strand]
     scale: str
 
 
 def place(x: float, y: float) -> Point:
-    """A point of a drawing. Raises DesignError unless it is finite and of a sane size."""
+    """A point of a drawing. Raises DesignError unless it is finite and of a sensible size."""
     if not abs(x) <= FARTHEST or not abs(y) <= FARTHEST:
         raise DesignError(
             f"has a coordinate of x {x:g}, y {y:g} mm, where at most {FARTHEST:g} is allowed; "
@@ -42,13 +42,13 @@ def place(x: float, y: float) -> Point:
 
 
 def nothing_on(layer: str, others: Sequence[str]) -> DesignError:
-    """Return the error of a layer that holds nothing, with the names of ``others`` that do."""
+    """Return the error for an empty layer, with the names of ``others`` that are not."""
     hint = f"paths lie on {', '.join(others)}" if others else "no layer has any"
     return DesignError(f"has no paths on a layer {layer!r}; {hint}")
 
 
 def counted(strands: Iterable[Strand], most: int = MOST_EDGES) -> Iterator[Strand]:
-    """The strands as they come, until they have more than ``most`` edges: then DesignError."""
+    """Yield the strands; raises DesignError once they have more than ``most`` edges."""
     total = 0
     for strand in strands:
         total += len(strand)
@@ -94,7 +94,7 @@ def is_closed(strand: Strand) -> bool:
 
 
 def joined(strands: Iterable[Strand]) -> tuple[list[Strand], list[Strand]]:
-    """Closed loops, and the open strands that are left, after joining ends that meet."""
+    """Closed loops, and the remaining open strands, after joining ends that meet."""
     whole = [strand for strand in strands if sum(edge.length for edge in strand) > JOIN]
     loops = [strand for strand in whole if is_closed(strand)]
     rest = [strand for strand in whole if not is_closed(strand)]
@@ -108,7 +108,7 @@ def joined(strands: Iterable[Strand]) -> tuple[list[Strand], list[Strand]]:
 
 
 def _extended(strand: Strand, rest: list[Strand]) -> Strand:
-    """The strand with every strand of ``rest`` that continues it; those are taken out."""
+    """The strand extended by every continuing strand of ``rest``; these are removed from it."""
     while not is_closed(strand):
         for candidate in rest:
             if _near(strand[-1].end, candidate[0].start):
@@ -130,7 +130,7 @@ def _near(a: Point, b: Point) -> bool:
 
 
 def sealed(loop: Strand) -> Strand:
-    """The loop with ends that meet exactly and no edge shorter than JOIN."""
+    """The loop with exactly matching ends and no edge shorter than JOIN."""
     edges: list[Edge] = []
     here = loop[-1].end
     for edge in loop:

@@ -19,10 +19,10 @@ _UNWRITABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]
 class Section(BaseModel):
     """A frozen table of a design file that knows all its keys.
 
-    Texts stand in pictures, pages and tables, so they hold no character that cannot be written
-    there. A validator is made when the first table is read, and what the source says of a key is
-    read when a schema is asked for: a command needs the tables of one family only. So a default
-    that is a table is made by ``model_construct()``, which needs no validator.
+    Texts appear in pictures, pages and tables, so characters that cannot be written there are not
+    allowed. A validator is built when the first table is read, and docstrings of keys are read when
+    a schema is requested: a command needs the tables of one family only. So a default that is a
+    table is made by ``model_construct()``, which needs no validator.
     """
 
     model_config = ConfigDict(
@@ -39,7 +39,8 @@ class Section(BaseModel):
         """With each key's docstring as its description."""
         for field in cls.model_fields.values():
             if isinstance(field.default, BaseModel):
-                # Pydantic before 2.14 writes a default with what its record has not made yet.
+                # Pydantic before 2.14 writes a default including parts that its record has not
+                # built yet.
                 type(field.default).model_rebuild()
         schema = handler(core)
         keys = handler.resolve_ref_schema(schema).get("properties", {})
@@ -53,7 +54,7 @@ class Section(BaseModel):
 
 @functools.cache
 def _descriptions(record: type[Section]) -> tuple[tuple[str, str], ...]:
-    """The keys of a record, those that it inherits aside, and their docstrings.
+    """The keys of a record, without inherited ones, and their docstrings.
 
     Python parses the whole module to find a class, and many records inherit the same.
     """

@@ -1,5 +1,5 @@
-"""Lengths as people write them: ``0.75``, ``"0.75 mm"``, ``"6 in"``, ``"38 um"``; moduli, densities
-and temperatures likewise; units of pressure and flow.
+"""Lengths as people write them: ``0.75``, ``"0.75 mm"``, ``"6 in"``, ``"38 um"``; also moduli,
+densities and temperatures; units of pressure and flow.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ KILOPASCALS = {
     "bar": 100.0,
     "psi": 6.894757293168,
 }
-"""How many kPa each unit is (psi: NIST SP 811, App. B)."""
+"""Size of each unit in kPa (psi: NIST SP 811, App. B)."""
 MILLILITRES_PER_MINUTE = {"ml/min": 1.0, "ul/min": 0.001, "ml/s": 60.0, "l/min": 1000.0}
-"""How many ml/min each unit is."""
+"""Size of each unit in ml/min."""
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _WRITTEN = re.compile(rf"\s*([-+]?{_NUMBER})\s*([^\d\s]*)\s*")
 _MEASURED = re.compile(rf"\s*([-+]?{_NUMBER})\s*(\S*)\s*")
@@ -43,7 +43,7 @@ _MEASURED = re.compile(rf"\s*([-+]?{_NUMBER})\s*(\S*)\s*")
 def millimetres(value: object) -> float:
     """A length in mm from a number (mm) or a text with a unit.
 
-    Raises ValueError with a sentence that says what is allowed.
+    Raises ValueError with a sentence on the allowed form.
     """
     if isinstance(value, str):
         written = _WRITTEN.fullmatch(value)
@@ -63,7 +63,7 @@ def millimetres(value: object) -> float:
 
 @dataclass(frozen=True)
 class Millimetres:
-    """How a length in mm is read, and the range it must lie in.
+    """Parser of a length in mm, with its allowed range.
 
     To be used as ``Annotated[float, Millimetres(least, most)]``; the JSON schema has the same range
     for numbers, and texts with a unit.
@@ -73,7 +73,7 @@ class Millimetres:
     most: float
 
     def read(self, value: object) -> float:
-        """Raises ValueError with a sentence that says what is allowed."""
+        """Raises ValueError with a sentence on the allowed form."""
         length = millimetres(value)
         if length < self.least:
             raise ValueError(f"must be at least {self.least:g} mm")
@@ -94,8 +94,8 @@ class Millimetres:
 
 @dataclass(frozen=True, eq=False)
 class InUnit:
-    """How a number is read that a file gives alone, in the first of ``units``, or with one of them:
-    their sizes in the first. ``example`` is such a text.
+    """Parser of a number, alone in the first of ``units`` or with one of them: their sizes in the
+    first. ``example`` is such a text.
 
     To be used as ``Annotated[float, Field(gt=0), InUnit(...)]``; the JSON schema has both.
     """
@@ -104,7 +104,7 @@ class InUnit:
     example: str
 
     def read(self, value: object) -> object:
-        """Raises ValueError with a sentence that says what is allowed."""
+        """Raises ValueError with a sentence on the allowed form."""
         if not isinstance(value, str):
             return value
         written = _MEASURED.fullmatch(value)
