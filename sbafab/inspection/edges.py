@@ -123,7 +123,7 @@ def _is_corner(before: Edge, after: Edge) -> bool:
 
 
 class Crossings(NamedTuple):
-    """By sample: distance of the film's edge outside the drawn edge, mm; NaN if no edge is visible.
+    """Distance per sample of the film's edge outside the drawn edge, mm; NaN if no edge is visible.
 
     ``blur``: the deviation of the picture's blur, mm. ``contrast``: film less paper, grey levels.
     """
@@ -330,7 +330,8 @@ def _matrix(laid: Samples, warp: Warp, count: int) -> tuple[NDArray[np.float64],
 def _strength(
     matrix: NDArray[np.float64], laid: Samples, displacements: NDArray[np.float64], terms: int
 ) -> NDArray[np.float64]:
-    """Return the prior weight of each unknown: displacements are as small as those of other pieces.
+    """Return the prior weight of each unknown: all displacements are expected to be about equally
+    small.
 
     A turn counts by the motion of the edge.
     """

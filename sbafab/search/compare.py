@@ -205,7 +205,7 @@ class FigureEntry(Document):
 
 
 class CompareDocument(Document, schema="sbafab/compare@1"):
-    """What ``compare --json`` prints."""
+    """The content of ``compare --json``."""
 
     designs: tuple[DesignEntry, DesignEntry]
     keys: list[KeyDifference]
