@@ -471,7 +471,7 @@ class Copies:
         self._firsts: dict[int, tuple[Contour, Contour]] = {}
 
     def first(self, contour: Contour) -> Contour:
-        """Return the first contour of which this one is a moved copy, edge by edge, else itself.
+        """Return the first contour that equals this one moved, edge by edge, else this one.
 
         Ends, centres and radii agree within ``COPIED``.
         """

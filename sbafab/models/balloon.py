@@ -409,7 +409,7 @@ def wrinkle_stress(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
     """Return the hoop stress in kPa that wrinkles over a zone carry, by each element's tension."""
     film = balloon.film
     tension = balloon.membrane_stiffness * strain(film, r, z).meridian
-    # A wrinkle in a curved film stretches the meridian, so many short ones cost least.
+    # A wrinkle in a curved film stretches the meridian: a large number of short ones costs least.
     support = np.maximum(tension, 0.0) * (math.pi / zone[:, None]) ** 2
     support = support + balloon.membrane_stiffness * curvature(film, r, z) ** 2
     force = 2 * np.sqrt(balloon.bending_stiffness * support)
@@ -561,7 +561,7 @@ class RippleEnergy(NamedTuple):
 
 
 def ripple_energy(flat: FlatFilm, edge: int, ripple: Ripple, r: Array) -> RippleEnergy:
-    """Return the energy of a rippled rim less that of a smooth one: at most 0."""
+    """Return the energy of a rippled rim less the energy of a smooth one: at most 0."""
     drive = _ripple_drive(_rim_hoop(flat, edge, r), ripple)
     middles = flat.middles[edge:]
     wide = (r[:, edge + 1 :] + r[:, edge:-1]) / (2 * middles)

@@ -2,12 +2,12 @@
 
 Both come from one potential, the films' energy less the work of the air: force -dW/dh, volume
 -dW/dp. It is a quintic spline in the height and in asinh(p / p0), fitted by least squares to W and
-both derivatives of balloons between plates, and to free ones. So the map conserves energy: no cycle
-of pressure and height gives or takes work. A balloon of least energy holds the more the higher its
-pressure, and pushes the less the higher it stands (W is concave in p, convex in h): of all splines
-whose Bernstein coefficients say so, whose volumes are above 0 and no more than balloons hold at the
-pressure, the map is the one nearest to the balloons. So these hold at every place of the map, by
-construction. Lengths mm, pressures kPa, volumes ul, forces mN, energies uJ.
+both derivatives of balloons between plates, and to free ones. The map therefore conserves energy:
+no cycle of pressure and height yields or consumes work. A balloon of least energy holds more at a
+higher pressure, and pushes less at a greater height (W is concave in p, convex in h). The map is
+the spline nearest to the balloons whose Bernstein coefficients guarantee this, with volumes above 0
+and at most what balloons hold at the pressure, so it holds everywhere on the map by construction.
+Lengths mm, pressures kPa, volumes ul, forces mN, energies uJ.
 """
 
 from __future__ import annotations

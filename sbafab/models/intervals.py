@@ -37,8 +37,8 @@ MODULUS_RATIO, LOSS = (
 
 
 def calibration_of(design: Design) -> ModelCalibration | None:
-    """Return the calibration of a design, as it holds ``for_film``. Raises DesignError if there
-    is no such calibration.
+    """Return the calibration of a design, adapted by ``for_film``. Raises DesignError if it is
+    unknown.
     """
     calibration = load_calibration(design.models.calibration, design.folder)
     return None if calibration is None else for_film(calibration, design.films.tpe.product)

@@ -95,7 +95,7 @@ class MapDocument(Document, schema="sbafab/balloon-map@1"):
     design: str
     units: dict[str, str]
     levels: list[int]
-    """which of the balloons stands there, from 1"""
+    """number of the balloon at each level, from 1"""
     flat_level_mm: Short = attribute("pitch")
     chamber_axes_mm: list[list[Short]]
     balloons: list[MappedBalloon]

@@ -72,7 +72,7 @@ class MeasuredPocket(NamedTuple):
 class FilledChamber:
     """A chamber with its pockets, all of one size, at the ``pressures`` asked for in kPa.
 
-    ``of`` names the chamber in a figure's name, where there are several.
+    ``of`` names the chamber in a figure's name, if there are several.
     """
 
     mechanism: Mechanism

@@ -102,7 +102,7 @@ FULL_SHARE = FULL_HEIGHT.value / BALLOONS / 2.5
 #
 # One table for all users of such figures: predictions, searches, sweeps, pictures, pages and the
 # studio. A row applies to every design whose figure comes from the row's model: other designs were
-# not measured, and a model that is off for the paper's actuators is no better for them.
+# not measured, and a model that is off for the paper's actuators is not better for them.
 
 
 MISFIT = 0.25

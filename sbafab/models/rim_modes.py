@@ -295,13 +295,13 @@ class Sums:
 RESIDUAL = 1e-6
 """Residual force, as a share of pressure times pocket area, that counts as equilibrium."""
 DAMPINGS = (0.001, 0.01, 0.1, 1.0)
-"""Shares of the diagonal that are added in turn where the tangent stiffness is indefinite."""
+"""Shares of the diagonal added in turn if the tangent stiffness is indefinite."""
 
 
 class Slices(NamedTuple):
     """Rates of elements in each slice: along the meridian (rows, elements, 3, slices), and round
-    the hoop (.., 4, ..), of which the last is z. And an energy's derivatives by them, first and
-    second.
+    the hoop (.., 4, ..), where the last is z; and an energy's first and second derivatives by
+    them.
     """
 
     along: Array
@@ -330,8 +330,8 @@ class Waves:
     """Energies of waving films, as a ``least_energy.Potential``: coordinates (nodes x places,
     rows).
 
-    ``normals`` (rows, elements, 3) are those of the mean meridian in r and z, and its stretch; they
-    are the direction out of the film in which it bends round the hoop.
+    ``normals`` (rows, elements, 3) are the mean meridian's normals in r and z, and its stretch;
+    they point out of the film, in the direction in which it bends round the hoop.
     """
 
     def __init__(self, of: Waving, pressure: Array, normals: Array) -> None:
@@ -380,7 +380,7 @@ class Waves:
         stored = stored + bent + self._waves_bend(parts, rows) + self._plate_bends(parts)
         sums = Sums(of, parts, self._joined(kinks))
         volume = volume + self._inner_face(sums, places, p) + self._lid(sums, places, p)
-        # The film's end comes down as the rim tilts, and all of the film with it.
+        # The film's end, and with it the whole film, comes down as the rim tilts.
         down = p * math.pi * balloon.pocket**2 / (2 * balloon.thickness)
         end = x[PLACES * edge + EDGE]
         sums.by_node[:, edge, EDGE] += 2 * down * end
@@ -606,13 +606,13 @@ class Waves:
 
 
 def _newton_steps(band: Array, right_side: Array) -> Array:
-    """Return Newton's steps; with a larger diagonal where the tangent stiffness is indefinite."""
+    """Return Newton's steps, with a larger diagonal if the tangent stiffness is indefinite."""
     step = least_energy.solve_positive(band, right_side)
     if step is not None:
         return step
     rows = band.shape[-1]
     if rows > 1:
-        # Only those that need more are given more.
+        # Increase the diagonal only where needed.
         halves = slice(None, rows // 2), slice(rows // 2, None)
         return np.concatenate(
             [_newton_steps(band[..., half], right_side[..., half]) for half in halves], -1

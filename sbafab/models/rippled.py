@@ -24,15 +24,15 @@ from sbafab.models.rim_modes import EDGE, PLACES, UP, R, Waves, Waving, Z
 from sbafab.process import one_blas_thread
 
 WIDE = 4.0
-"""Ring widths in a pocket's radius from which on films fall in step with the rim: strokes of
-narrower ones are within 0.5 % with either model.
+"""Pocket radius in ring widths above which films fall in step with the rim: strokes of narrower
+pockets agree within 0.5 % between both models.
 """
 START = 0.0005
-"""Film strain, p R / (E t), at which ripples are first followed: they come from 0.001 on."""
+"""Film strain, p R / (E t), at which ripples are first followed: they appear above 0.001."""
 USUAL = 0.013
-"""Film strain at which the number of waves is chosen, where none is given."""
+"""Film strain at which the number of waves is chosen, if none is given."""
 END = 0.256
-"""Film strain from which on films are stretched so far that waves make no difference."""
+"""Film strain above which waves make no difference."""
 STEP = 2.0
 """Ratio of the pressures of two rungs, along which ripples are continued."""
 SEED = 0.02
@@ -42,23 +42,23 @@ LEVEL = 0.001
 KICK = 0.02
 """Share of the radius by which films are pushed in step with the rim, as a trial."""
 CLEARLY = 1e-5
-"""Relative gain of energy from which on a balloon counts as in step."""
+"""Relative gain of energy above which a balloon counts as in step."""
 LATEST = 0.02
-"""Film strain up to which films fall in step, if ever."""
+"""Largest film strain at which films fall in step."""
 ALIKE = 0.9
 """Cosine of the angle between waves that belong to one branch."""
 JUMP_PARTS = 3
-"""Parts of the way between rungs of unlike branches at which balloons with waves are computed."""
+"""Subdivisions between rungs of different branches at which balloons with waves are computed."""
 RUNG_PARTS = 32
-"""Parts of the way from rung to rung at which balloons with waves are interpolated."""
+"""Subdivisions from rung to rung at which balloons with waves are interpolated."""
 LADDER_STEPS, LADDER_TOP = 16, 1.25
 """Heights at which smooth balloons are compared with those with waves; the square root of the
 highest, over the highest free balloon.
 """
 SAME_HEIGHT = 1e-9
-"""Difference of heights in mm that counts as none."""
+"""Tolerance of equal heights in mm."""
 HALVINGS = 3
-"""Times that a step between rungs is halved where it finds no equilibrium."""
+"""Times that a step between rungs is halved if it finds no equilibrium."""
 
 
 class Rippled(NamedTuple):
@@ -93,8 +93,8 @@ def with_waves(balloon: Balloon, shapes: Shapes) -> Shapes:
 
 
 def _grown(balloon: Balloon, edge: Array, outside: Array) -> NDArray[np.bool_]:
-    """Return True where there are waves: at the rim's outside, or in step at the pocket's edge, by
-    which a rim may stay level.
+    """Return True for balloons with waves: at the rim's outside, or in step at the pocket's edge
+    with a rim that may stay level.
     """
     waves: NDArray[np.bool_] = np.maximum(np.abs(edge), np.abs(outside)) > LEVEL * balloon.ring
     return waves
@@ -106,12 +106,12 @@ def compressed_shapes(
     """Return balloons between plates at heights (mm), by ``inflate``; where waves are in step with
     the rim, by the least energy of all states known.
 
-    A balloon of least energy has no more than any of its states: those of ``inflate`` at all
-    heights, and the free ones with waves of all pressures, each with the work of its air. Its
-    potential W(p, h) is concave in p, as the least of functions E - p V, and convex in h where it
-    is stable. So the convex envelope of these states in h stands for it: it has the free heights
-    and volumes of balloons with waves, and volumes that rise with pressure. Waves between plates
-    are not computed. Shapes r and z are those of ``inflate``.
+    The least energy is bounded by every known state: states by ``inflate`` at all heights, and
+    free ones with waves at all pressures, each with the work of its air. The potential W(p, h) is
+    concave in p, as the least of functions E - p V, and convex in h if it is stable. The convex
+    envelope of these states in h therefore represents it: it has the free heights and volumes of
+    balloons with waves, and volumes that rise with pressure. Waves between plates are not computed.
+    Shapes r and z come from ``inflate``.
     """
     p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
     p, h = np.atleast_1d(p), np.atleast_1d(h)
@@ -145,8 +145,8 @@ def compressed_shapes(
 
 
 def least_free_states(balloon: Balloon, smooth: Shapes) -> FilmStates:
-    """Return the free balloons of least energy of all states known, at the pressures of those by
-    ``inflate``: the ones at which ``compressed_shapes`` carries no force.
+    """Return the free balloons of least energy among all known states, at the pressures of
+    ``smooth``: the states at which ``compressed_shapes`` carries no force.
     """
     waves = wave_states(balloon)
     states = FilmStates(smooth.height.copy(), smooth.energy.copy(), smooth.volume.copy())
@@ -172,8 +172,9 @@ class FilmStates(NamedTuple):
 def _between(
     states: FilmStates, pressure: float, count: int
 ) -> tuple[NDArray[np.int_], NDArray[np.int_], Array]:
-    """Return the neighbours on the convex envelope of E - p V between which each of the first
-    ``count`` states lies, and its share of the way; both are the state itself where it is on it.
+    """Return the neighbours on the convex envelope of E - p V on either side of each of the first
+    ``count`` states, and its fraction between them; both are the state itself if it is on the
+    envelope.
     """
     potential = states.energy - pressure * states.volume
     order = np.lexsort((potential, states.height))
@@ -202,11 +203,11 @@ def _between(
 @lru_cache(maxsize=64)
 @one_blas_thread
 def wave_states(balloon: Balloon) -> FilmStates:
-    """Return free balloons with waves in step with the rim at pressures all over their range; none
-    where there are no such waves.
+    """Return free balloons with waves in step with the rim at pressures throughout their range;
+    empty without such waves.
 
-    Between rungs of one branch they are interpolated; where another branch begins some are
-    computed.
+    They are interpolated between rungs of one branch, and some are computed where another branch
+    begins.
     """
     none = FilmStates(np.zeros(0), np.zeros(0), np.zeros(0))
     if not resolves_waves(balloon):
@@ -270,11 +271,11 @@ def resolves_waves(balloon: Balloon) -> bool:
 
 @one_blas_thread
 def rippled(balloon: Balloon, pressure: ArrayLike, waves: int | None = None) -> Rippled:
-    """Return free balloons at pressures in kPa, all with as many ``waves`` round the rim; else with
-    those of least energy where ripples are well grown.
+    """Return free balloons at pressures in kPa, all with this number of ``waves`` round the rim; by
+    default the number of least energy for well-grown ripples.
 
-    A balloon with a bore is pulled on by the air in it. Raises DesignError for pressures that are
-    not above 0, or where Newton's method finds no equilibrium.
+    The air in the bore pulls on a balloon. Raises DesignError for pressures that are not above 0,
+    or if Newton's method finds no equilibrium.
     """
     p = np.atleast_1d(np.asarray(pressure, dtype=float))
     if not (np.isfinite(p) & (p > 0)).all():
@@ -355,8 +356,8 @@ class Rung(NamedTuple):
 
 
 def _rung(balloon: Balloon, waves: int, k: int) -> Rung:
-    """Return a balloon at the pressure of rung ``k``. Shapes hang on pressure over modulus alone:
-    films of any modulus have the rungs of the paper's.
+    """Return a balloon at the pressure of rung ``k``. Shapes depend only on pressure over modulus,
+    so films of any modulus share the rungs of the paper's film.
     """
     return _rung_of_paper(replace(balloon, modulus=Balloon.modulus), waves, k)
 
@@ -415,7 +416,7 @@ def _normals(of: Waving, x: Array) -> Array:
 
 
 def _continued(of: Waving, x: Array, low: float, high: float, halvings: int = HALVINGS) -> Array:
-    """Return the equilibrium at a pressure from that at another, if need be in smaller steps."""
+    """Return the equilibrium at a pressure, continued from another, in smaller steps if needed."""
     try:
         return _equilibrium(Waves(of, np.full(x.shape[1], high), _normals(of, x)), x)
     except DesignError:
@@ -427,7 +428,7 @@ def _continued(of: Waving, x: Array, low: float, high: float, halvings: int = HA
 
 
 def _equilibrium(problem: Waves, x: Array) -> Array:
-    """Return the equilibria downhill. Raises DesignError if there are none."""
+    """Return the equilibria downhill. Raises DesignError if none are found."""
     try:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return equilibrium(problem, x)

@@ -1,9 +1,9 @@
 """Rates of a design's pose by its keys: diameter, film, modulus, number of balloons.
 
-The equilibrium follows a key by the implicit function theorem (``derivatives``), with the change of
-the energy's slope at plates held still. By the modulus that change is exact: stresses, and so the
-films' energy U = W + p V, are in proportion to it. By other keys it is a central difference of
-balloons mapped anew. Balloons are counted: their rate is half of what two more change.
+The equilibrium follows a key by the implicit function theorem (``derivatives``), from the change of
+the energy's slope with the plates held. For the modulus that change is exact: stresses, and so the
+films' energy U = W + p V, are proportional to it. For other keys it is a central difference of
+newly mapped balloons. The number of balloons is an integer: its rate is half the change by two.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ KEYS = (
     "films.tpe.modulus",
     "stack.balloons",
 )
-"""Keys whose rates are given unless others are asked for."""
+"""Default keys for rates."""
 STRAIGHT = 1e-6
 """Twice the sine of a turn below which a stack stands straight."""
 SHARE = 0.1
-"""Share of a key by which balloons are mapped anew, either way: maps are fitted, and smaller steps
-say more of their errors. Rates by the modulus come within 8 % of the exact ones."""
+"""Relative step of a key, either way, for newly mapped balloons: maps are fitted, and smaller steps
+show more of their errors. Rates by the modulus come within 8 % of the exact ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +56,13 @@ class Sensitivity:
 
     @property
     def stroke(self) -> float:
-        """Relative change of the rise above the flat stack, as a ratio to that of the key."""
+        """Relative change of the rise above the flat stack, as a ratio to the key's change."""
         rise = self.pose.height - self.pose.pitch * len(self.pose.freedoms)
         return (float(self.rates.tip[2, 0]) - self.flat) * self.value / rise
 
     @property
     def bend(self) -> float | None:
-        """Relative change of the bend, as a ratio to that of the key; None where it stands straight
+        """Relative change of the bend, as a ratio to the key's change; None if it stands straight
         or is bent by half a turn.
         """
         turned = self.pose.frames[1][-1]
@@ -78,8 +78,8 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class SensitivityRow:
-    """By how many percent 1 % more of a ``key`` moves the free ``stroke``, and the ``bend`` of one
-    chamber, None where it does not bend; the ratio of the changes.
+    """Change in percent of the free ``stroke`` for 1 % more of a ``key``, and of the ``bend`` of
+    one chamber, None if it does not bend; the ratio of the changes.
     """
 
     key: str
@@ -111,10 +111,10 @@ def sensitivities(
 ) -> list[Sensitivity]:
     """Return the rates of a design's pose at pressures (kPa, one a chamber) by each of ``keys``.
 
-    ``factors`` are by default those of the design's calibration; ``load`` are keyword arguments of
-    ``Stack.pose`` beside pressures. By lengths of pockets and
-    rims, contacts of rims that open or close are smoothed over that step. Raises
-    DesignError for keys that are no single number, and as ``Stack.pose`` does.
+    Default ``factors`` come from the design's calibration; ``load`` are keyword arguments of
+    ``Stack.pose`` beside pressures. For lengths of pockets and rims, contacts of rims that open or
+    close are smoothed over that step. Raises DesignError for keys that are not a single number, and
+    as ``Stack.pose`` does.
     """
     factors = factors or factors_of(design)
 
@@ -143,7 +143,7 @@ def sensitivities(
 
 
 def sensitivity_table(design: Design, pressure: float) -> list[SensitivityRow]:
-    """Return a row a key of KEYS for a pressure in kPa in all chambers, and in one for the bend.
+    """Return a row per key of KEYS for a pressure in kPa in all chambers, and in one for the bend.
 
     Raises DesignError for pockets that are not round.
     """
@@ -184,7 +184,7 @@ def _is_film_of_all(design: Design, key: str, factors: Factors) -> bool:
 
 
 def _difference(low: Pose, high: Pose) -> Rates:
-    """Return half of what lies between two poses."""
+    """Return half the difference of two poses."""
     first, last = low.frames[1][-1], high.frames[1][-1]
     turned = last @ first.T
     vector = np.array(
@@ -238,7 +238,7 @@ def _by_key(
     )
     pulls, force = -slope, 0.0
     if touch is not None:
-        # A stiff plate goes on touching where it does.
+        # A stiff plate keeps its contacts.
         harder = touch.stiff * (touch.deep > touch.least) * deep
         pulls = pulls - (harder @ now.deeper(touch)).reshape(-1, 3)
         force = float(harder[:WALL_POINTS].sum())

@@ -67,12 +67,12 @@ class Stack(PosedStack):
         near: Pose | None = None,
         **load: Any,
     ) -> Pose:
-        """Return a pose whose tip stands at a place (3) in mm, within 1e-3 mm; its ``pressures``
-        (kPa) are from 0 to ``most_pressure``, by default that of the maps.
+        """Return a pose whose tip is at a place (3) in mm, within 1e-3 mm; its ``pressures`` (kPa)
+        are from 0 to ``most_pressure``, by default the maps' highest.
 
         ``near`` is a pose to start from, such as the last one of a motion; ``load`` are keyword
-        arguments of ``pose`` beside pressures. Of several solutions of a stack with many chambers
-        it is one near the start. Raises UnreachableError, with the nearest tip found, and
+        arguments of ``pose`` beside pressures. If a stack with many chambers has several solutions,
+        the result is one near the start. Raises UnreachableError, with the nearest tip found, and
         DesignError for bad input.
         """
         place = vector_of(tip, "the place of the tip in mm")
@@ -109,16 +109,16 @@ def stack(
 ) -> Stack:
     """Return the stack of a design with round pockets on one axis or side by side.
 
-    ``most_pressure`` in kPa is the range of its maps; those of wide pockets end before. A lone
+    ``most_pressure`` in kPa is the range of its maps; maps of wide pockets end earlier. A lone
     balloon is held by a small disc. ``factors`` are calibrated ones; ``form`` replaces the
-    design's own, for drawn pockets that are nearly round (``drawn_pockets.model_form``). Raises
+    design's, for drawn pockets that are nearly round (``drawn_pockets.model_form``). Raises
     DesignError for pockets of another shape, for actuators round a tube and for films of unknown
     modulus.
     """
     flat = laminate or build(design)
     factors = factors or Factors()
     ratio = factors.modulus_ratio
-    # Maps scale with the modulus: that of the film as bought serves every ratio.
+    # Maps scale with the modulus, so a map for the film as bought serves every ratio.
     drawn = balloons_of(design, flat, replace(factors, modulus_ratio=1.0), form)
     row = [_clamped(balloon) for balloon in drawn]
     kinds = list(dict.fromkeys(row))
@@ -139,7 +139,7 @@ def stack(
 
 
 def _clamped(balloon: Balloon) -> Balloon:
-    """Return a balloon with a disc by which plates hold it, where it has no neck."""
+    """Return a balloon with a disc by which plates hold it, if it lacks a neck."""
     if balloon.neck:
         return balloon
     mate = None if balloon.mate is None else replace(balloon.mate, neck=GRIP * balloon.pocket)
@@ -147,7 +147,7 @@ def _clamped(balloon: Balloon) -> Balloon:
 
 
 def _mapped(kind: Balloon, most_pressure: float) -> BalloonMap:
-    """Return a balloon's map, to a lower pressure where a wide pocket has no equilibrium."""
+    """Return a balloon's map, to a lower pressure if a wide pocket has no equilibrium."""
     for share in PRESSURE_SHARES:
         try:
             return balloon_map(kind, share * most_pressure)
@@ -170,7 +170,7 @@ SCALE_PRESSURE = 0.01
 """Pressure in kPa below which volumes are nearly linear in pressure, above in its logarithm."""
 LONGEST_STEP = 2.0
 SUCTION = 90.0
-"""kPa below the atmosphere to which a shut chamber may come before its fluid boils or leaks."""
+"""Limit of suction in kPa for a shut chamber, before its fluid boils or leaks."""
 TOLERANCE = 1e-5
 LEAST_CONTENT = 20.0
 """Tolerance as a share of a chamber's content; in ul, the least content it is taken of."""
@@ -345,7 +345,7 @@ class Motion:
             may = (now.x[which] > least) | (ahead[which] >= 0)
             if may.all():
                 return ahead
-            # What has no less pressure to give stays: the others move alone.
+            # Chambers at their least pressure stay; only the others move.
             which, slopes = which[may], slopes[np.ix_(may, may)]
 
 

@@ -29,10 +29,10 @@ from sbafab.models.stack_loads import (
 )
 
 SOFT_PLATES = ((1e3, 1e5), (1e3, 1e4, 1e5), (1e4, 1e5))
-"""Stiffness in mN/mm of an outer plate in the first solutions; ways, tried in turn."""
+"""Stiffness in mN/mm of an outer plate in the first solutions, for paths tried in turn."""
 MOST_STEPS = 300
 RESIDUAL = 1e-7
-"""Residual in mN (or mN mm) that counts as none."""
+"""Tolerance of the residual, mN or mN mm."""
 SMALLEST_SUM_STEP = 5e-8
 """Smallest step where the errors of all levels add up: tilts under a load, volumes without."""
 PLATE_LAST_STEP, PLATE_LAST_GAIN = 3e-5, 1e-7
@@ -54,15 +54,15 @@ REUSED_STEP, REUSED_PRODUCT, SPRING_CHANGE = 2e-3, 1e-9, 0.2
 is the last, and the relative change of springs in between.
 """
 FEW_STEPS = 12
-"""Steps in which a far start meets an outer plate, or never does."""
+"""Steps within which a far start must meet an outer plate."""
 PLATE_STEPS = 12
 """Steps against an outer plate before another method is tried."""
 PLATE_SMALLEST_STEP = 1e-7
 """Step (mm, rad) against an outer plate below which an equilibrium counts as converged."""
 PLATE_RESIDUAL = 1e-4
-"""Residual in mN (or mN mm), and as a share of the plate's force, that counts as none."""
+"""Tolerance of the residual, mN or mN mm, and as a share of the plate's force."""
 FIRST_STEP = 1e-3
-"""Step (mm, rad) that is taken to come before the first one."""
+"""Assumed step (mm, rad) before the first one."""
 PLATE_CORRECTIONS, PLATE_SMALL_CORRECTION = 24, 0.2
 """Corrections of a step by springs and contacts at its end, and the share of it that is small."""
 CONTACT_ROUNDS, CONTACT_RIM_ROUNDS = 8, 2
@@ -105,7 +105,7 @@ def loaded_equilibrium(
     """Return rise and tilt of each level (levels, 3) under a load, the force in mN on the plate,
     and True for a stable equilibrium.
 
-    An outer plate that is not met soon is stiffened by and by, for steps without contact would
+    An outer plate that is not met soon is stiffened gradually, since steps without contact would
     run far into it; ``is_near`` marks a start that may be in contact. Raises DesignError if no
     equilibrium is found.
     """
@@ -132,8 +132,8 @@ def loaded_equilibrium(
 def _by_softer_plates(
     springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
 ) -> tuple[Array, float, bool] | None:
-    """Return the loaded equilibrium against a plate by way of softer plates; None where no way
-    leads to one.
+    """Return the loaded equilibrium against a plate by continuation in plate stiffness; None if it
+    fails.
     """
     for way in SOFT_PLATES:
         at = _below_soft_plates(springs, pitch, load, start, way)
@@ -148,8 +148,8 @@ def _by_softer_plates(
 def _below_soft_plates(
     springs: Springs, pitch: float, load: Load, start: Array, way: tuple[float, ...]
 ) -> Array | None:
-    """Return freedoms near equilibrium against the last of ever stiffer plates; None where one has
-    no equilibrium.
+    """Return freedoms near equilibrium against the last of increasingly stiff plates; None if one
+    has no equilibrium.
     """
     at = start
     for stiffness in way:
@@ -170,7 +170,7 @@ def _energy_descent(
     enough: float = 0.0,
     quick: float = 0.0,
 ) -> tuple[Array, float, bool] | None:
-    """Return the loaded equilibrium, or None where ``most`` steps do not reach it.
+    """Return the loaded equilibrium, or None if ``most`` steps do not reach it.
 
     A step no larger than ``enough`` ends it. ``quick`` makes fewer and larger steps, until the
     error is below it.
@@ -182,7 +182,7 @@ def _energy_descent(
         if np.abs(now.gradient).max() < RESIDUAL * (1 + 1e-3 * now.push):
             return at, now.push, is_positive_definite(with_diagonal_blocks(now.rest(), now.blocks))
         if last is not None:
-            # The matrix of a step so small is still good enough for the last one.
+            # The matrix of such a small step is good enough for the last one.
             matrix, blocks = last
             flat = -np.linalg.solve(matrix, now.gradient)
             if np.abs(flat).max() * before < REUSED_PRODUCT and _are_close(blocks, now.blocks):
@@ -307,7 +307,7 @@ def _contact_descent(
     springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
 ) -> tuple[Array, float, bool] | None:
     """Return rise and tilt of each level (levels, 3), the force in mN on the plate, and True for a
-    stable equilibrium; None where the steps lead over an unstable place, or are too many.
+    stable equilibrium; None if the steps pass an unstable place, or are too many.
 
     A mixed method: a plate is stiff, so the contact forces are unknowns beside the freedoms, found
     with each step and handed to the next. The set of points in contact is found within a step, with
@@ -317,7 +317,7 @@ def _contact_descent(
     now = loaded_energy(springs, pitch, load, at)
     touch = now.touch
     if touch is not None and touch.push > PUSH_RATIO * np.abs(now.spring_gradient[:, 0]).max():
-        # So deep that it says nothing of the force, nor the first step of what is stable.
+        # Too deep to estimate the force, or for the first step to show stability.
         before = 0.0
         now = loaded_energy(springs, pitch, load, at, np.zeros(len(touch.deep)))
     for _ in range(PLATE_STEPS):
@@ -348,8 +348,8 @@ def _contact_descent(
 def _contact_step(
     springs: Springs, at: Array, now: LoadedEnergy, touch: PlateContact
 ) -> tuple[Array, PlateContact, bool] | None:
-    """Return the step (freedoms) to equilibrium with all linear but springs and contacts, the
-    contact there, and True for converged; None where the tangent stiffness is indefinite.
+    """Return the step (freedoms) to equilibrium, linear except for springs and contacts, the
+    contact there, and True for converged; None if the tangent stiffness is indefinite.
     """
     lines, turned = now.deeper(touch), now.turned()
     outside = now.gradient - now.spring_gradient.ravel() - touch.forces @ lines
@@ -421,5 +421,5 @@ def _active_set_step(
             held_off += 1
         touches = ahead
         tried.append(step[0])
-    # None is the least: the best place on the ways there, of which the first leads downhill.
+    # Otherwise take the best place on the paths there; the first one leads downhill.
     return min((share * trial for trial in tried for share in STEP_SHARES), key=energy), False

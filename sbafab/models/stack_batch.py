@@ -1,10 +1,10 @@
 """Many states of one stack at once: poses, inverse kinematics, and motions as chambers fill through
 their lines.
 
-The same equilibria as of ``Stack.pose`` and ``Motion``, by Newton's method for all states in one
-step; states that it does not solve soon are solved one by one, and so are all against an outer
-plate. Without a load levels of equal balloons are equal, and a state has a row a kind of balloon;
-under one it has a row a level. Lengths mm, pressures kPa, volumes ul.
+The same equilibria as in ``Stack.pose`` and ``Motion``, by Newton's method for all states at once;
+states that it does not solve soon are solved one by one, like all states against an outer plate.
+Without a load levels of equal balloons are equal, and a state has one row per kind of balloon;
+under a load it has one row per level. Lengths mm, pressures kPa, volumes ul.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from sbafab.models.stack_poses import NO_LOAD, Pose
 from sbafab.process import one_blas_thread
 
 MOTION_STEPS = 16
-"""Most of Newton's steps of a motion before a state is solved alone."""
+"""Maximum Newton steps for a motion before a state is solved alone."""
 MOTION_ERRORS = np.array([[1e-6], [1e-5]])
 """Errors at which a step of a motion ends: mm and rad, and the share of a pressure."""
 VOLUME_POWER = 0.3
@@ -41,7 +41,7 @@ VOLUME_POWER = 0.3
 ROUNDS = 2
 """Newton's steps of flows and contents in the first step of films."""
 CHUNK, LOADED_CHUNK = 1024, 512
-"""States solved together, without and with a load: more are no faster, and take more memory."""
+"""States solved together, without and with a load: more bring no speed, and cost memory."""
 
 
 class LevelRun(NamedTuple):
@@ -226,7 +226,7 @@ class StackBatch:
         return np.asarray(freedoms.transpose(2, 0, 1)[:, self.stack.levels])
 
     def table(self, pressures: ArrayLike, rows: int | None = None) -> Array:
-        """Return pressures (rows, chambers) in kPa. Raises DesignError if they are no such."""
+        """Return pressures (rows, chambers) in kPa. Raises DesignError if they are invalid."""
         try:
             table = np.asarray(pressures, dtype=float)
         except (TypeError, ValueError):
@@ -288,7 +288,7 @@ class StackBatch:
 
 
 def _parts(count: int, size: int = CHUNK) -> list[slice]:
-    """Return the parts of so many states that are solved together."""
+    """Return the parts of ``count`` states that are solved together."""
     return [slice(begin, begin + size) for begin in range(0, count, size)]
 
 
@@ -305,7 +305,7 @@ def batch_of(pressures: Array, poses: Sequence[Pose]) -> BatchPoses:
 
 
 def _places(tips: ArrayLike) -> Array:
-    """Return places (N, 3) in mm. Raises DesignError if they are no such."""
+    """Return places (N, 3) in mm. Raises DesignError if they are invalid."""
     try:
         places = np.asarray(tips, dtype=float)
     except (TypeError, ValueError):
@@ -439,8 +439,8 @@ class BatchMotion:
         """Return True (n) where states are solved, and the states (n) after ``acts`` s with
         pressures (chambers, n) at the valves.
 
-        Newton's method for freedoms and pressures at once, as of ``Motion``: less pressure than 0
-        is none, and a chamber that would need it draws in the rest.
+        Newton's method for freedoms and pressures at once, as in ``Motion``: pressures stay at or
+        above 0, and a chamber that would need less draws in the rest.
         """
         count, most = len(acts), self.batch.stack.most_pressure
         end = _State(begin.freedoms.copy(), begin.pressures.copy())
@@ -483,7 +483,7 @@ class BatchMotion:
         return is_solved, end
 
     def _fits(self, freedoms: Array, pressures: Array) -> NDArray[np.bool_]:
-        """Return True (n) where no balloon is higher than its map, nor a pressure at its end."""
+        """Return True (n) if balloons are within their maps' heights, pressures below the end."""
         fits = (pressures < self.batch.stack.most_pressure).all(0)
         return np.asarray(fits & self.levels.fits(self.batch.stack.centres, freedoms))
 
@@ -557,7 +557,7 @@ def _pressure_rate(pressures: Array, places: Array) -> Array:
 
 
 def _free_step(matrix: Array, more: Array, right: Array, at_end: NDArray[np.bool_]) -> Array:
-    """Return the solutions (size, n) of matrices with ``more`` on their diagonals, of which those
+    """Return the solutions (size, n) of matrices with ``more`` on their diagonals; entries
     ``at_end`` (size, n) may not fall.
     """
     whole = matrix.copy()

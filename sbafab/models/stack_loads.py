@@ -2,8 +2,8 @@
 external forces.
 
 A level has three freedoms: its rise (mm) and the tilt of its upper plate, a rotation vector in the
-lower plate's plane (rad). Half of the tilt comes before the rise and half after, as by constant
-curvature within a level. Arrays have a row a level.
+lower plate's plane (rad). Half of the tilt comes before the rise and half after, as with constant
+curvature within a level. Arrays have one row per level.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def rotations(vectors: Array) -> tuple[Array, Array]:
     formula, and the mean of the left and the right Jacobian.
     """
     count = len(vectors)
-    # A column a level: numpy is the faster the longer its last axis.
+    # One column per level: numpy is faster with a longer last axis.
     each = vectors.T
     pairs = (each[:, None] * each).reshape(4, count)
     safe = np.maximum(pairs[0] + pairs[3], SMALL)
@@ -138,7 +138,7 @@ def force_motions(arms: Array, forces: Array) -> Array:
     4).
 
     From the sum of x f (n, 3, 3) and of f (n, 3) over the points. The first three of the last axis
-    are the sum of (motion of x) x f, the fourth is that of (motion of x) . f.
+    are the sum of (motion of x) x f, the fourth is the sum of (motion of x) . f.
     """
     both = np.concatenate([arms.reshape(-1, 9), forces], axis=1)
     return np.asarray((both @ FORCE_MOTION).reshape(-1, 6, 4))
@@ -158,13 +158,13 @@ def level_motions(at: Chain) -> Array:
 
 # Springs of the levels: energy of balloons and of rims that meet.
 #
-# Arrays have a row a level, or a row a kind of balloon; lengths mm, energies uJ, volumes ul.
+# Arrays have one row per level or per kind of balloon; lengths mm, energies uJ, volumes ul.
 
 
 RING_POINTS = 6
 """Points of each balloon at which its gap is evaluated."""
 RIM_STIFFNESS = 2e4
-"""Contact stiffness in mN/mm of a flat balloon, and of rims: no film gives way visibly."""
+"""Contact stiffness in mN/mm of a flat balloon, and of rims: films barely yield."""
 
 
 class GapPlaces(NamedTuple):
@@ -173,7 +173,7 @@ class GapPlaces(NamedTuple):
     ``begins`` (rows, chambers x points) is the first row of each point's potential in the table of
     springs. ``ring`` (rows, chambers x points, 3) are the gaps there, in pieces of the spline, by
     rise and tilt, ``squares`` (rows, chambers x points, 9) their products. ``meet`` (rows, 3,
-    points) are all gaps that may close: those of the rings, then the rims in mm; ``shut`` (rows,
+    points) are all gaps that may close: the rings' gaps, then the rims' in mm; ``shut`` (rows,
     points, 9) their products times the contact stiffness.
     """
 
@@ -185,7 +185,7 @@ class GapPlaces(NamedTuple):
 
     @classmethod
     def of(cls, maps: Sequence[BalloonMap], gaps: Array, rims: Array) -> GapPlaces:
-        """Return a row a kind of balloon, with gaps at its ring and round its rim, in mm."""
+        """Return one row per kind of balloon, with gaps at its ring and round its rim, in mm."""
         count = gaps.shape[1]
         begins = np.arange(len(maps) * count // RING_POINTS).reshape(len(maps), -1) * PIECES_IN_ALL
         spans = np.array([[kind.spans] for kind in maps])
@@ -203,7 +203,7 @@ class GapPlaces(NamedTuple):
         )
 
     def at(self, levels: NDArray[np.int_]) -> GapPlaces:
-        """Return a row for each level; one row for all where they are equal."""
+        """Return a row for each level; a single row if all are equal."""
         if len(self.begins) == 1:
             return self
         begins, ring, squares, meet, shut = self
@@ -235,8 +235,8 @@ class Springs:
         return cls(derivatives(rows), places)
 
     def meeting(self, freedoms: Array, move: Array) -> tuple[Array, Array] | None:
-        """Return gradient (rows, 3) and second derivatives (rows, 3, 3) of the contact of those
-        rims that a move closes, as if shut from the start; None where it closes none.
+        """Return gradient (rows, 3) and second derivatives (rows, 3, 3) of the contact of the rims
+        that a move closes, as if shut from the start; None if it closes none.
         """
         first = self.places.begins.shape[1]
         rims = self.places.meet[:, :, first:]
@@ -397,13 +397,13 @@ class PlateContact(NamedTuple):
         return float(self.forces[:WALL_POINTS].sum())
 
     def resists(self, deep: Array) -> Array:
-        """Return the forces in mN at points so deep (mm)."""
+        """Return the forces in mN at depths in mm."""
         return self.stiff * np.maximum(deep, self.least)
 
 
 class ExternalForces(NamedTuple):
-    """External forces on the plates: the sum of the forces f beyond each level (n, 3), that of x f
-    over their points x (n, 3, 3), and their energy; n is 1 where all levels carry the same.
+    """External forces on the plates: the sum of the forces f beyond each level (n, 3), the sum of
+    x f over their points x (n, 3, 3), and their energy; n is 1 if all levels carry the same.
     """
 
     forces: Array
@@ -434,7 +434,7 @@ def external_forces(plates: Chain, load: Load, forces: Array | None) -> External
 def _with_contact(
     acting: ExternalForces, plates: Chain, wall: OuterPlate, stiffness: float, forces: Array | None
 ) -> ExternalForces:
-    """Return the forces with those of the outer plate: ``forces``, or by its stiffness."""
+    """Return the forces, including the outer plate's: ``forces``, or by its stiffness."""
     points = plates.places[-1] + wall.local @ plates.axes[-1].T
     deep = ((points - wall.point) * wall.ways).sum(-1)
     lines = np.concatenate([(points[:, None] @ wall.crosses)[:, 0], wall.ways], axis=1)

@@ -4,8 +4,8 @@ Plates are the planes between balloons. Two neighbours are joined by one balloon
 lengthens and tilts, and carries no shear ("a 2-DoF spring joint", paper, Sec. 4.4). A tilted
 balloon is taken to push at six points of a ring, each as hard as the axisymmetric balloon does at
 the gap there; between rigid plates that touch the film in a disc the ring's radius would be the
-disc's, and it is taken midway between neck and pocket. Flat balloons do not sink into each other,
-nor do rims where levels lean: contact by a stiff penalty, without friction.
+disc's, and it is taken midway between neck and pocket. Flat balloons, and rims of leaning levels,
+do not sink into each other: contact by a stiff penalty, without friction.
 The equilibrium is the minimum of one energy, found by Newton's method. Levels of equal balloons
 without a load are equal and solved once. Lengths mm, pressures kPa, volumes ul; forces mN inside,
 N outside.
@@ -60,7 +60,7 @@ class Plate:
 
     @classmethod
     def at(cls, height: float) -> Plate:
-        """Return a level plate so many mm above the base."""
+        """Return a level plate at a height in mm above the base."""
         return cls((0.0, 0.0, height))
 
 
@@ -71,7 +71,7 @@ class Pose:
     ``pitch`` is the height of a flat level in mm, ``freedoms`` (levels, 3) are rise in mm and tilt
     in rad of each level; ``gaps`` (levels, chambers) by how many mm each balloon has risen at its
     own centre; ``volumes`` ul a chamber; ``force`` N on the outer plate; ``energy`` uJ stored in
-    the films. Where it is not ``stable`` it is an unstable equilibrium, as of a straight column
+    the films. A pose that is not ``stable`` is an unstable equilibrium, such as a straight column
     that would buckle.
     """
 
@@ -121,10 +121,10 @@ class Pose:
 class PosedStack:
     """Levels of balloons, bottom to top.
 
-    ``maps`` are those of the different balloons, ``levels`` the number of each level's map;
+    ``maps`` are the maps of the different balloons, ``levels`` the index of each level's map;
     ``axes`` (chambers, 2) the centres of the chambers, ``pitch`` the height of a flat level and
-    ``outline`` the radius of the plates, in mm; ``weight`` mN of each level, None where a film's
-    density is not known.
+    ``outline`` the radius of the plates, in mm; ``weight`` mN of each level, None if a film's
+    density is unknown.
     """
 
     maps: tuple[BalloonMap, ...]
@@ -294,7 +294,7 @@ class PosedStack:
         return holds.tolist()
 
     def start_freedoms(self, pressures: Sequence[float]) -> Array:
-        """Return rise and tilt to start from, a row a kind of balloon: the plane nearest to the
+        """Return rise and tilt to start from, one row per kind of balloon: the plane nearest to the
         free heights of the balloons.
         """
         return np.stack([kind.rises(pressures) for kind in self.maps]) @ self.planes

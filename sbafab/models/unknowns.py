@@ -14,7 +14,7 @@ from sbafab.models.figures import Factors
 
 @dataclass(frozen=True)
 class Unknown:
-    """One unknown of the models: ``field`` is that of ``Factors``.
+    """One unknown of the models; ``field`` names the field of ``Factors``.
 
     The prior is normal in the coordinate, which is the logarithm of the value (``is_log``) or the
     value itself: ``middle`` is the value at its mean, ``spread`` its standard deviation in the

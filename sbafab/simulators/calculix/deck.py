@@ -131,7 +131,7 @@ def uneven(points: NDArray[np.float64], height: float) -> NDArray[np.float64]:
         along = x * np.cos(direction) + y * np.sin(direction)
         waves += np.cos(2 * np.pi * along / length + phase)
     moved = points.copy()
-    # The sum rarely approaches that of all crests: half of that counts as its height.
+    # The sum rarely approaches the sum of all crests: half of that counts as its height.
     moved[:, 2] += height * np.clip(2 * waves / len(WAVES), -1.0, 1.0)
     return moved
 
@@ -154,8 +154,8 @@ def supports(mesh: Mesh, is_free: bool = False, is_glued: bool = False) -> Itera
     """The node set ``held``, and lines of ``*BOUNDARY`` and ``*EQUATION``.
 
     A stack stands on its base. A lone balloon bulges both ways, and its ring may ripple, as in the
-    paper's model: a few nodes of the ring prevent rigid-body motion only, and likewise if the deck
-    ``is_free``. If it ``is_glued``, inlets are shut by their tubes.
+    paper's model: a few nodes of the ring prevent rigid-body motion only. The same applies if the
+    deck ``is_free``. If it ``is_glued``, inlets are shut by their tubes.
     """
     is_free = is_free or is_lone_balloon(mesh)
     if is_free:
