@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 from sbafab.design.records import Design
@@ -132,7 +131,8 @@ def _press_fit() -> Pair:
 
 def _pressure_rating() -> Pair:
     """The mask of a balloon as drawn, and wider than the film bears at twice the pressure."""
-    good, limits = built("1dof-5mm", "bond.width=1"), replace(EXACT, working_pressure=170.0)
+    good = built("1dof-5mm", "bond.width=1")
+    limits = EXACT.with_("acceptance.working_pressure_kpa=170")
     bad = spoiled(good, 6, disc((0, 0), 2.71) - disc((0, 0), 0.5))
     found = _found("pressure-rating", bad, limits)
     box = _box([good.layer(6), good.layer(7)], None)

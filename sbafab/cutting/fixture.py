@@ -96,6 +96,7 @@ def write_fixture(
     laminate: Laminate,
     folder: Path,
     settings: CutSettings,
+    platen: tuple[float, float],
     places: Sequence[Point] = ONE,
     notes: Sequence[str] = (),
 ) -> str | None:
@@ -104,7 +105,7 @@ def write_fixture(
     Nominal edges: the holes are to be finished to the pins. ``notes`` say how; they stand as
     strokes on the plate, which are not cut, and in the file's properties.
     """
-    plate = fixture(laminate, settings.platen, places)
+    plate = fixture(laminate, platen, places)
     if plate is None:
         return None
     properties = fixture_properties(settings, notes)

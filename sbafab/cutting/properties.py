@@ -55,11 +55,9 @@ class CutSettings:
     curves: Curves = TRUE_ARCS
     generator: str = "sbafab"
     warnings: Mapping[str, str] = field(default_factory=lambda: {"PTFE": PTFE_WARNING})
-    platen: tuple[float, float] = (152.4, 152.4)
     machine: str | None = None
     recipes: Mapping[Material, Recipes] = field(default_factory=dict)
     entries: Mapping[Material, Entries] = field(default_factory=dict)
-    program: LaserProgram | None = None
     seam_offsets: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def kerf_width(self, material: Material) -> Kerf | None:

@@ -16,7 +16,7 @@ from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
 from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.entries import PLAIN, Entries
-from sbafab.cutting.index_marks import IndexMark, index_marks
+from sbafab.cutting.index_marks import index_marks
 from sbafab.cutting.lettering import Stroke, strokes, width
 from sbafab.cutting.lightburn import (
     ENDING,
@@ -46,7 +46,7 @@ from sbafab.cutting.properties import (
     sheet_properties,
 )
 from sbafab.cutting.verify import check_surroundings, verify_file
-from sbafab.design.sections import Laser
+from sbafab.design.sections import Laser, Sheets
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Bounds, Point
@@ -108,9 +108,8 @@ def write_sheets(
     folder: Path,
     settings: CutSettings,
     laser: Laser,
-    labelled: bool = True,
+    sheets: Sheets,
     progress: Counted | None = None,
-    marked: bool = False,
 ) -> list[SheetFile]:
     """Writes ``sheets/<material>_<number>.dxf``, ``.lbrn2`` and ``.svg`` of every sheet.
 
@@ -123,8 +122,7 @@ def write_sheets(
     written: list[SheetFile] = []
     for nest in nests:
         for sheet in range(nest.sheets):
-            marks = index_marks(nest, sheet) if marked else None
-            written.append(_write_sheet(nest, sheet, folder, settings, laser, labelled, marks))
+            written.append(_write_sheet(nest, sheet, folder, settings, laser, sheets))
             if progress is not None:
                 progress(len(written), total)
     return written
@@ -136,15 +134,16 @@ def _write_sheet(
     folder: Path,
     settings: CutSettings,
     laser: Laser,
-    labelled: bool,
-    marks: Sequence[IndexMark] | None,
+    sheets: Sheets,
 ) -> SheetFile:
+    marks = index_marks(nest, sheet) if sheets.index_marks else None
     placements = nest.on_sheet(sheet)
     region = Region(tuple(c for p in placements for c in nest.region(p).contours))
     contours = cutting_order(region, laser.heat_distance)
     width, length = nest.stock.width, nest.length(sheet)
-    around = _surroundings(nest, sheet, (width, length), settings, labelled)
-    label_state: LabelState = "engraved" if around.engraved else "no room" if labelled else "off"
+    around = _surroundings(nest, sheet, (width, length), settings, sheets.label)
+    unlabelled: LabelState = "no room" if sheets.label else "off"
+    label_state: LabelState = "engraved" if around.engraved else unlabelled
     beside = tuple(stroke for mark in marks or () for stroke in mark.strokes)
     around = around._replace(engraved=(*around.engraved, *beside))
     properties = sheet_properties(
@@ -158,11 +157,12 @@ def _write_sheet(
     read = verify_file(path, Region(contours), properties)
     _verify_surroundings(path.name, read, around)
     project = path.with_suffix(ENDING)
-    layout = _Layout(nest, sheet, contours, around)
+    entries = settings.entries.get(nest.material, PLAIN)
+    layout = _Layout(nest, sheet, contours, around, entries)
     runs = _write_project(project, layout, settings, properties)
     picture = path.with_suffix(".svg")
     title = f"{settings.design}: {nest.material} sheet {sheet + 1} of {nest.sheets}"
-    machine_file = _write_machine_file(path, layout, settings, runs, title)
+    machine_file = _write_machine_file(path, layout, sheets.program, runs, title)
     picture.write_text(
         sheet_svg(contours, around, width, length, title), encoding="utf-8", newline="\n"
     )
@@ -192,12 +192,13 @@ def _write_sheet(
 
 
 class _Layout(NamedTuple):
-    """A sheet of a nest: its contours in cutting order, and what surrounds them."""
+    """A sheet of a nest: its contours in cutting order, what surrounds them, and their entries."""
 
     nest: Nest
     sheet: int
     contours: Sequence[Contour]
     around: Surroundings
+    entries: Entries
 
 
 def _write_project(
@@ -208,7 +209,7 @@ def _write_project(
     Returns what it has the beam follow, in its order.
     """
     material, around = layout.nest.material, layout.around
-    entries = settings.entries.get(material, PLAIN)
+    entries = layout.entries
     name = f"{material} sheet {layout.sheet + 1}"
     cuts = beam_runs(layout.contours, entries, around, layout.nest.stock.pins, name)
     runs = list(drawn(cuts, around))
@@ -222,21 +223,20 @@ def _write_project(
 
 
 def _write_machine_file(
-    sheet: Path, layout: _Layout, settings: CutSettings, runs: Sequence[LaserRun], title: str
+    sheet: Path, layout: _Layout, program: LaserProgram | None, runs: Sequence[LaserRun], title: str
 ) -> str | None:
     """Write and read back the file of a sheet for another laser program, if one is asked for.
 
     Returns its path in the output folder.
     """
-    if settings.program is None or layout.around.frame is None:
+    if program is None or layout.around.frame is None:
         return None
-    path = sheet.with_name(f"{sheet.stem}{ENDINGS[settings.program]}")
-    text = machine_text(settings.program, runs, layout.around.frame, title)
+    path = sheet.with_name(f"{sheet.stem}{ENDINGS[program]}")
+    text = machine_text(program, runs, layout.around.frame, title)
     path.write_bytes(text.encode())
-    verify_machine_file(path, settings.program, runs)
-    entries = settings.entries.get(layout.nest.material, PLAIN)
-    cuts = parts_cut(path, settings.program)
-    check_cuts(path, cuts, Region(tuple(layout.contours)), entries)
+    verify_machine_file(path, program, runs)
+    cuts = parts_cut(path, program)
+    check_cuts(path, cuts, Region(tuple(layout.contours)), layout.entries)
     return f"{FOLDER}/{path.name}"
 
 

@@ -196,7 +196,8 @@ def write_plates(checked: Checked, folder: Path, settings: CutSettings) -> None:
     design, laminate = checked.design, checked.laminate
     write_seam_files(laminate, folder, settings)
     places = design_runs(design, laminate).places
-    write_fixture(laminate, folder, settings, places, hole_notes(design, laminate))
+    notes = hole_notes(design, laminate)
+    write_fixture(laminate, folder, settings, design.press.platen, places, notes)
 
 
 def write_nested_sheets(
@@ -205,10 +206,8 @@ def write_nested_sheets(
     """Write the film sheets, and beside them the places for a later run; nothing for no nest."""
     if not nests:
         return []
-    label = design.sheets.label
-    sheet_progress = partial(progress, "sheets")
-    marked = bool(design.sheets.index_marks)
-    sheets = write_sheets(nests, folder, settings, design.laser, label, sheet_progress, marked)
+    count = partial(progress, "sheets")
+    sheets = write_sheets(nests, folder, settings, design.laser, design.sheets, count)
     write_text(folder / PLACES, json.dumps(as_dict(nests), indent=1) + "\n")
     return sheets
 

@@ -182,11 +182,9 @@ def cut_settings(
         curves=curves,
         generator=GENERATOR,
         warnings=warnings(design),
-        platen=design.press.platen,
         machine=design.laser.machine,
         recipes=recipes(design),
         entries=entries(design),
-        program=design.sheets.program,
         seam_offsets=design.seam_offsets,
     )
 

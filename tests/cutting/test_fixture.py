@@ -16,13 +16,14 @@ from sbafab.cutting.properties import Curves, CutSettings
 from sbafab.output.checked import hole_notes
 
 SETTINGS = CutSettings("test", "0" * 64)
+PLATEN = (152.4, 152.4)
 
 
 @pytest.mark.parametrize("method", ["channel-pin", "ears"])
 @pytest.mark.parametrize("name", ["1dof-5mm", "3dof-15mm", "radial-15mm"])
 def test_every_pin_has_its_hole(name: str, method: str, tmp_path: Path) -> None:
     laminate = build(load_design(name, [f'registration.method="{method}"', "stack.balloons=2"]))
-    path = write_fixture(laminate, tmp_path, SETTINGS)
+    path = write_fixture(laminate, tmp_path, SETTINGS, PLATEN)
     assert path == PATH
     plate = read_profile(tmp_path / PATH).region
     circles = [hole.circle for hole in plate.holes]
@@ -57,7 +58,7 @@ def test_the_plate_is_as_large_as_the_platen_and_lacks_one_corner() -> None:
 def test_no_pins_no_plate(tmp_path: Path) -> None:
     laminate = build(load_design("radial-15mm"))
     assert laminate.pins == ()
-    assert write_fixture(laminate, tmp_path, SETTINGS) is None
+    assert write_fixture(laminate, tmp_path, SETTINGS, PLATEN) is None
     assert list(tmp_path.iterdir()) == []
 
 
@@ -67,14 +68,14 @@ def test_the_plate_carries_what_the_shop_must_know(curves: Curves, tmp_path: Pat
     laminate = build(load_design("3dof-15mm"))
     notes = ("D1 H7, from above 2.35 +-0.05 deep", "each hole within 0.025 of its place")
     settings = replace(SETTINGS, curves=curves)
-    path = write_fixture(laminate, tmp_path, settings, notes=notes)
+    path = write_fixture(laminate, tmp_path, settings, PLATEN, notes=notes)
     assert path is not None
     document = ezdxf.readfile(tmp_path / path)
     kinds = {(e.dxftype(), e.dxf.layer) for e in document.modelspace()}
     assert {kind for kind, layer in kinds if layer == "REFERENCE"} == {"LINE", "LWPOLYLINE"}
     assert not any(kind in ("TEXT", "MTEXT") for kind, _ in kinds)
     assert dict(document.header.custom_vars)["HOLES"] == " / ".join(notes)
-    plate = fixture(laminate, settings.platen)
+    plate = fixture(laminate, PLATEN)
     assert plate is not None
     letters = [
         list(e.get_points("xy"))

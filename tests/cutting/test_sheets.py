@@ -16,7 +16,7 @@ from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.lettering import GLYPHS, strokes, width
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import SheetFile, label, write_sheets
-from sbafab.design.sections import Laser
+from sbafab.design.sections import Laser, Sheets
 from sbafab.errors import OutputError
 from sbafab.geometry.region import disc, rectangle, stadium
 from sbafab.nesting.nest import nest
@@ -25,6 +25,7 @@ from sbafab.nesting.records import Nest, NestPart, Placement, Stock
 SETTINGS = CutSettings("demo", "cd" * 32, generator="sbafab 1.2.3")
 STOCK = Stock(width=60.0, length=80.0, border=6.0)
 RING = disc((0.0, 0.0), 5.0) - disc((0.0, 0.0), 2.0)
+PLAIN = Sheets()
 LASER = Laser(cut_speed=10.0, travel_speed=100.0, pierce_seconds=0.5, heat_distance=0.0)
 
 
@@ -34,7 +35,7 @@ def ring_nest(count: int, stock: Stock = STOCK) -> Nest:
 
 
 def test_the_file_holds_the_parts_with_holes_before_outlines(tmp_path: Path) -> None:
-    (sheet,) = write_sheets([ring_nest(7)], tmp_path, SETTINGS, LASER)
+    (sheet,) = write_sheets([ring_nest(7)], tmp_path, SETTINGS, LASER, PLAIN)
     found = read_profile(tmp_path / sheet.path)
     assert sheet.path == "sheets/TPE_1.dxf"
     assert found.region.area == pytest.approx(7 * math.pi * (25 - 4))
@@ -48,7 +49,7 @@ def test_the_file_holds_the_parts_with_holes_before_outlines(tmp_path: Path) -> 
 
 
 def test_time_is_cut_travel_and_piercing(tmp_path: Path) -> None:
-    (sheet,) = write_sheets([ring_nest(3)], tmp_path, SETTINGS, LASER)
+    (sheet,) = write_sheets([ring_nest(3)], tmp_path, SETTINGS, LASER, PLAIN)
     length = 3 * 2 * math.pi * (5 + 2)
     assert sheet.cut_length == pytest.approx(length)
     assert sheet.minutes * 60 == pytest.approx(length / 10 + sheet.travel / 100 + 6 * 0.5)
@@ -56,7 +57,7 @@ def test_time_is_cut_travel_and_piercing(tmp_path: Path) -> None:
 
 
 def test_the_frame_is_the_sheet_and_starts_at_the_origin(tmp_path: Path) -> None:
-    (sheet,) = write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER)
+    (sheet,) = write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER, PLAIN)
     frame = [
         edges
         for layer, edges in read_profile(tmp_path / sheet.path).strokes
@@ -66,7 +67,7 @@ def test_the_frame_is_the_sheet_and_starts_at_the_origin(tmp_path: Path) -> None
 
 
 def test_the_label_is_engraved_in_the_border_alone(tmp_path: Path) -> None:
-    (sheet,) = write_sheets([ring_nest(20)], tmp_path, SETTINGS, LASER)
+    (sheet,) = write_sheets([ring_nest(20)], tmp_path, SETTINGS, LASER, PLAIN)
     engraved = [
         edge
         for layer, edges in read_profile(tmp_path / sheet.path).strokes
@@ -76,7 +77,7 @@ def test_the_label_is_engraved_in_the_border_alone(tmp_path: Path) -> None:
     assert engraved
     assert all(0 < y < 6 for edge in engraved for _, y in (edge.start, edge.end))
     assert all(6 - 1e-6 <= x <= 54 for edge in engraved for x, _ in (edge.start, edge.end))
-    (plain,) = write_sheets([ring_nest(20)], tmp_path, SETTINGS, LASER, labelled=False)
+    (plain,) = write_sheets([ring_nest(20)], tmp_path, SETTINGS, LASER, Sheets(label=False))
     assert "ENGRAVE" not in read_profile(tmp_path / plain.path).layers
 
 
@@ -90,10 +91,10 @@ def engraved_box(sheet: SheetFile, folder: Path) -> tuple[float, float, float, f
 
 def test_a_sheet_says_that_its_narrow_border_has_no_room_for_a_label(tmp_path: Path) -> None:
     narrow = STOCK.model_copy(update={"border": 2.0})
-    (sheet,) = write_sheets([ring_nest(1, narrow)], tmp_path, SETTINGS, LASER)
+    (sheet,) = write_sheets([ring_nest(1, narrow)], tmp_path, SETTINGS, LASER, PLAIN)
     assert sheet.label == "no room"
     assert "ENGRAVE" not in read_profile(tmp_path / sheet.path).layers
-    (plain,) = write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER, labelled=False)
+    (plain,) = write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER, Sheets(label=False))
     assert plain.label == "off"
 
 
@@ -103,15 +104,14 @@ def test_a_label_makes_way_for_pins(tmp_path: Path) -> None:
     sides = [(6, 0, 54, 6), (0, 6, 6, 74), (6, 74, 54, 80), (54, 6, 60, 74)]
     for count, (low_x, low_y, high_x, high_y) in enumerate(sides):
         stock = STOCK.model_copy(update={"pins": tuple(pins[:count])})
-        (sheet,) = write_sheets([ring_nest(1, stock)], tmp_path, SETTINGS, LASER)
+        (sheet,) = write_sheets([ring_nest(1, stock)], tmp_path, SETTINGS, LASER, PLAIN)
         found = engraved_box(sheet, tmp_path)
         assert low_x - 1e-6 <= found[0]
         assert low_y - 1e-6 <= found[1]
         assert found[2] <= high_x + 1e-6
         assert found[3] <= high_y + 1e-6
-    (full,) = write_sheets(
-        [ring_nest(1, STOCK.model_copy(update={"pins": tuple(pins)}))], tmp_path, SETTINGS, LASER
-    )
+    full_stock = STOCK.model_copy(update={"pins": tuple(pins)})
+    (full,) = write_sheets([ring_nest(1, full_stock)], tmp_path, SETTINGS, LASER, PLAIN)
     assert full.label == "no room"
 
 
@@ -128,12 +128,12 @@ def test_a_label_stays_where_a_pin_s_edge_is_clear_of_it(gap: float, stays: bool
 def test_a_label_that_is_too_long_is_turned_or_wrapped(tmp_path: Path) -> None:
     narrow = STOCK.model_copy(update={"width": 44.0, "border": 10.0, "roll": True, "length": 900.0})
     # One row of rings 1 mm apart: the long side has room for 1.5 mm letters, the short one not.
-    (tall,) = write_sheets([ring_nest(12, narrow)], tmp_path, SETTINGS, LASER)
+    (tall,) = write_sheets([ring_nest(12, narrow)], tmp_path, SETTINGS, LASER, PLAIN)
     low_x, low_y, high_x, high_y = engraved_box(tall, tmp_path)
     assert 0 < low_x < high_x < 10
     assert high_x - low_x >= 1.5
     assert 10 - 1e-6 <= low_y < high_y <= tall.length - 10 + 1e-6
-    (short,) = write_sheets([ring_nest(2, narrow)], tmp_path, SETTINGS, LASER)
+    (short,) = write_sheets([ring_nest(2, narrow)], tmp_path, SETTINGS, LASER, PLAIN)
     low_x, low_y, high_x, high_y = engraved_box(short, tmp_path)
     assert 0 < low_y < high_y < 10
     # More than a line of at least 1.5 mm.
@@ -144,7 +144,7 @@ def test_a_label_that_is_too_long_is_turned_or_wrapped(tmp_path: Path) -> None:
 
 def test_a_roll_is_cut_off_one_border_past_its_parts(tmp_path: Path) -> None:
     roll = STOCK.model_copy(update={"roll": True, "length": 500.0})
-    (sheet,) = write_sheets([ring_nest(4, roll)], tmp_path, SETTINGS, LASER)
+    (sheet,) = write_sheets([ring_nest(4, roll)], tmp_path, SETTINGS, LASER, PLAIN)
     # Four rings of 10 mm, 1 mm apart, take 43 of the 48 mm: one row.
     assert sheet.length == pytest.approx(6 + 10 + 6, abs=1e-6)
     found = read_profile(tmp_path / sheet.path)
@@ -157,7 +157,7 @@ def test_a_roll_is_cut_off_one_border_past_its_parts(tmp_path: Path) -> None:
 
 def test_the_cut_that_frees_a_roll_takes_its_time(tmp_path: Path) -> None:
     roll = STOCK.model_copy(update={"roll": True})
-    (sheet,) = write_sheets([ring_nest(3, roll)], tmp_path, SETTINGS, LASER)
+    (sheet,) = write_sheets([ring_nest(3, roll)], tmp_path, SETTINGS, LASER, PLAIN)
     length = 3 * 2 * math.pi * (5 + 2) + STOCK.width
     assert sheet.cut_length == pytest.approx(length)
     assert sheet.minutes * 60 == pytest.approx(length / 10 + sheet.travel / 100 + 7 * 0.5)
@@ -165,7 +165,7 @@ def test_the_cut_that_frees_a_roll_takes_its_time(tmp_path: Path) -> None:
 
 
 def test_the_picture_has_the_sheets_size_and_colours(tmp_path: Path) -> None:
-    (sheet,) = write_sheets([ring_nest(2)], tmp_path, SETTINGS, LASER)
+    (sheet,) = write_sheets([ring_nest(2)], tmp_path, SETTINGS, LASER, PLAIN)
     picture = (tmp_path / sheet.picture).read_text(encoding="utf-8")
     assert 'width="60mm" height="80mm" viewBox="0 0 60 80"' in picture
     assert picture.count('r="5"') == picture.count('r="2"') == 2
@@ -176,7 +176,7 @@ def test_the_picture_s_arcs_are_as_round_as_the_part_s(tmp_path: Path) -> None:
     """As svgelements reads the outline of a stadium 14 mm long and 4 mm wide."""
     part = NestPart("demo", "P01", 1, "TPE", stadium((0.0, 0.0), 4.0, 14.0), 1)
     (placed,) = nest([part], {"TPE": STOCK})
-    (sheet,) = write_sheets([placed], tmp_path, SETTINGS, LASER)
+    (sheet,) = write_sheets([placed], tmp_path, SETTINGS, LASER, PLAIN)
     picture = SVG.parse(tmp_path / sheet.picture, ppi=25.4)
     lengths = [path.length() for path in picture.elements(lambda each: isinstance(each, SvgPath))]
     assert any(length == pytest.approx(20 + 4 * math.pi, abs=1e-3) for length in lengths)
@@ -184,7 +184,7 @@ def test_the_picture_s_arcs_are_as_round_as_the_part_s(tmp_path: Path) -> None:
 
 def test_a_compensated_sheet_says_so_in_its_name(tmp_path: Path) -> None:
     settings = replace(SETTINGS, kerf_widths={"TPE": 0.12})
-    (sheet,) = write_sheets([ring_nest(1)], tmp_path, settings, LASER)
+    (sheet,) = write_sheets([ring_nest(1)], tmp_path, settings, LASER, PLAIN)
     assert sheet.path == "sheets/TPE_1_kerf0.12.dxf"
     properties = read_profile(tmp_path / sheet.path).properties
     assert (properties["KERF_STATE"], properties["KERF_WIDTH"]) == ("compensated", "0.12")
@@ -195,7 +195,7 @@ def test_parts_that_overlap_are_not_let_through(tmp_path: Path) -> None:
     places = (Placement(0, 0, 0, (11.0, 11.0)), Placement(0, 0, 0, (12.0, 11.0)))
     bad = Nest("TPE", STOCK, (part,), places)
     with pytest.raises(OutputError, match="touch or cross"):
-        write_sheets([bad], tmp_path, SETTINGS, LASER)
+        write_sheets([bad], tmp_path, SETTINGS, LASER, PLAIN)
 
 
 def test_engraving_that_runs_through_a_part_is_found(
@@ -206,7 +206,7 @@ def test_engraving_that_runs_through_a_part_is_found(
 
     monkeypatch.setattr(module, "_label", through)
     with pytest.raises(OutputError, match=r"engraving at .* lies in a part"):
-        write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER)
+        write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER, PLAIN)
 
 
 def test_a_frame_of_another_size_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -217,7 +217,7 @@ def test_a_frame_of_another_size_is_found(tmp_path: Path, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(module, "dxf_text", scaled)
     with pytest.raises(OutputError, match="REFERENCE"):
-        write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER)
+        write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER, PLAIN)
 
 
 def test_letters_are_as_high_and_wide_as_asked() -> None:
@@ -239,5 +239,5 @@ def test_every_letter_is_another() -> None:
 def test_engraving_does_not_touch_a_part_that_fills_its_sheet(tmp_path: Path) -> None:
     full = rectangle((0.0, 0.0), (48.0, 68.0))
     (whole,) = nest([NestPart("demo", "P01", 1, "TPE", full, 1)], {"TPE": STOCK})
-    (sheet,) = write_sheets([whole], tmp_path, SETTINGS, LASER)
+    (sheet,) = write_sheets([whole], tmp_path, SETTINGS, LASER, PLAIN)
     assert "ENGRAVE" in read_profile(tmp_path / sheet.path).layers
