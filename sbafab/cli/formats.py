@@ -33,8 +33,7 @@ from sbafab.output.artefacts import PredictDocument
 from sbafab.output.checked import Checks
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
-from sbafab.pressing.schedule import Schedule
-from sbafab.pressing.schedule_files import PRESS_SCHEMA
+from sbafab.pressing.schedule_files import PressDocument
 from sbafab.reports.assembly_prediction import AssemblyPrediction
 from sbafab.reproduction.comparison import ComparisonDocument
 from sbafab.reproduction.page import ReproductionDocument
@@ -228,36 +227,6 @@ def _error() -> dict[str, Any]:
     return table(schema={"const": ERROR_SCHEMA}, error=error)
 
 
-def _press() -> dict[str, Any]:
-    body = TypeAdapter(Schedule).json_schema(mode="serialization")
-    body["properties"] = {"schema": {"const": PRESS_SCHEMA}, **body["properties"]}
-    body["properties"]["batch"] = _batch()
-    body["properties"]["hands_minutes"] = number("null")
-    body["properties"]["warnings"] = array(TEXT)
-    del body["$defs"]["Caution"]
-    for name in ("is_timed", "cautions", "remarks"):
-        del body["properties"][name]
-    given = [name for name in body["required"] if name != "cautions"]
-    body["required"] = ["schema", *given, "hands_minutes", "warnings"]
-    return body
-
-
-def _batch() -> dict[str, Any]:
-    pattern = table(pattern=TEXT, each=COUNT, cycles=array(COUNT))
-    place = {**array(number()), "minItems": 2, "maxItems": 2}
-    times = ("press_minutes", "hands_minutes", "total_minutes")
-    return table(
-        copies=COUNT,
-        at_once=COUNT,
-        at_once_at_most=COUNT,
-        cycles={**array(COUNT), "description": "copies pressed in each cycle"},
-        serials={**array(TEXT), "description": "of each copy: cycle and place"},
-        places_mm=array(place),
-        **{name: number("null") for name in times},
-        patterns=array(pattern),
-    )
-
-
 # All formats.
 
 
@@ -289,7 +258,7 @@ FORMATS: Mapping[str, Format] = {
         "`manifest.json` of an assembly's folder",
         lambda: _manifest(AssemblyManifest, ASSEMBLY_SCHEMA),
     ),
-    "press": Format(PRESS_SCHEMA, "`press.json`, the heat-press schedule", _press),
+    "press": Format(PressDocument.SCHEMA, "`press.json`, the heat-press schedule", PressDocument),
     "predict": Format(
         PredictDocument.SCHEMA,
         "`predict.json`, and what `predict --json` prints of a design",

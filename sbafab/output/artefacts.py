@@ -45,8 +45,8 @@ from sbafab.output.checked import (
 )
 from sbafab.output.manifest import as_json
 from sbafab.output.schema_ids import SIMULATE_SCHEMA
-from sbafab.pressing.cycles import batch_json, design_runs
-from sbafab.pressing.schedule_files import PRESS_SCHEMA, press_csv, press_json
+from sbafab.pressing.cycles import batch_entry, design_runs
+from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json
 from sbafab.process import Progress
 from sbafab.rules.finding import Finding
 from sbafab.simulators.simulator import NAMES as SIMULATORS
@@ -219,10 +219,10 @@ def _press_json(folder: DesignFolder) -> str:
     assert folder.plan.pressing is not None
     schedule = folder.plan.pressing
     copies = design_runs(folder.design, folder.laminate).copies
-    table = press_json(schedule)
     if copies > 1:
-        table = {**table, "batch": batch_json(folder.design, folder.laminate, schedule)}
-    return as_json(table)
+        batch = batch_entry(folder.design, folder.laminate, schedule)
+        return as_json(press_json(schedule, batch=batch))
+    return as_json(press_json(schedule))
 
 
 def _press_csv(folder: DesignFolder) -> str:
@@ -482,7 +482,7 @@ ARTEFACTS: tuple[Artefact, ...] = (
         "press",
         "the press schedule; minutes and totals are `null` where nobody stated any for the film",
         _press_json,
-        PRESS_SCHEMA,
+        PressDocument.SCHEMA,
     ),
     Artefact("press.csv", "press", "the press schedule as a table", _press_csv),
     Artefact("tray.pdf", "press", "of a batch: a place for every part, 1:1", _tray_pdf),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from sbafab.design.records import Design
+from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.laminate.assembly import PLATE_MARGIN, assembly, films_without_minutes
 from sbafab.laminate.laminate import Laminate
@@ -189,26 +189,46 @@ def most_together(laminate: Laminate, platen: tuple[float, float]) -> int:
     return runs_of(laminate, 10_000, platen).together
 
 
-def batch_json(design: Design, laminate: Laminate, schedule: Schedule) -> dict[str, Any]:
+class PatternEntry(Document):
+    """Layers of one shape: how many each copy has, and each cycle."""
+
+    pattern: str
+    each: int
+    cycles: list[int]
+
+
+class BatchEntry(Document):
+    """A batch of several copies."""
+
+    copies: int
+    at_once: int = attribute("together")
+    at_once_at_most: int
+    cycles: list[int]
+    """copies pressed in each cycle"""
+    serials: list[str]
+    """of each copy: cycle and place"""
+    places_mm: list[tuple[PlainNumber, PlainNumber]] = attribute("places")
+    press_minutes: PlainNumber | None
+    hands_minutes: PlainNumber | None
+    total_minutes: PlainNumber | None
+    patterns: list[PatternEntry]
+
+
+def batch_entry(design: Design, laminate: Laminate, schedule: Schedule) -> BatchEntry:
     """Return the entry of ``press.json`` for a batch of several copies."""
     runs = design_runs(design, laminate)
     times = batch_times(runs, schedule)
-    return {
-        "copies": runs.copies,
-        "at_once": runs.together,
-        "at_once_at_most": most_together(laminate, design.press.platen),
-        "cycles": list(runs.cycles),
-        "serials": [serial(runs, n + 1, design.order.batch) for n in range(runs.copies)],
-        "places_mm": [list(place) for place in runs.places],
-        "press_minutes": times.press,
-        "hands_minutes": times.hands,
-        "total_minutes": times.total,
-        "patterns": [
-            {
-                "pattern": pattern,
-                "each": len(layers),
-                "cycles": [len(layers) * count for count in runs.cycles],
-            }
-            for pattern, layers in laminate.patterns.items()
+    platen = design.press.platen_width, design.press.platen_length
+    patterns = laminate.patterns.items()
+    return BatchEntry.read(
+        runs,
+        at_once_at_most=most_together(laminate, platen),
+        serials=[serial(runs, n + 1, design.order.batch) for n in range(runs.copies)],
+        press_minutes=times.press,
+        hands_minutes=times.hands,
+        total_minutes=times.total,
+        patterns=[
+            {"pattern": name, "each": len(of), "cycles": [len(of) * n for n in runs.cycles]}
+            for name, of in patterns
         ],
-    }
+    )

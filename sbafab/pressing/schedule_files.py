@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
+from sbafab.documents import Document, PlainNumber
+from sbafab.pressing.cycles import BatchEntry
 from sbafab.pressing.dowels import PinSetting
-from sbafab.pressing.plate_heating import HeatPoint
-from sbafab.pressing.schedule import HANDLING_MINUTES, Schedule, Step, layers_in_words
+from sbafab.pressing.plate_heating import Heating, HeatPoint
+from sbafab.pressing.schedule import (
+    HANDLING_MINUTES,
+    FoldStep,
+    Schedule,
+    SeamStep,
+    Step,
+    layers_in_words,
+)
 from sbafab.spreadsheet import csv_text
 
-PRESS_SCHEMA = "sbafab/press@1"
+JOINTS = ("seams", "folds", "batch")
 COLUMNS = (
     "step",
     "title",
@@ -37,36 +45,29 @@ COLUMNS = (
 )
 
 
-def press_json(plan: Schedule) -> dict[str, Any]:
-    """Return the content of ``press.json``."""
-    joints = {
-        "seams": [_plain(asdict(step)) for step in plan.seams],
-        "folds": [_plain(asdict(step)) for step in plan.folds],
-    }
-    return {
-        "schema": PRESS_SCHEMA,
-        "steps": [_pressed(step) for step in plan.steps],
-        "total_press_minutes": plan.total_press_minutes,
-        "estimated_build_minutes": plan.estimated_build_minutes,
-        "estimate_basis": plan.estimate_basis,
-        "warnings": list(plan.warnings),
-        "heating": asdict(plan.heating),
-        "hands_minutes": HANDLING_MINUTES if plan.is_timed else None,
-        **{key: steps for key, steps in joints.items() if steps},
-    }
+class PressDocument(Document, schema="sbafab/press@1"):
+    """The heat-press schedule."""
+
+    steps: list[Step]
+    total_press_minutes: PlainNumber | None
+    estimated_build_minutes: PlainNumber | None
+    estimate_basis: str
+    warnings: list[str]
+    heating: Heating
+    hands_minutes: PlainNumber | None
+    seams: tuple[SeamStep, ...] = ()
+    folds: tuple[FoldStep, ...] = ()
+    batch: BatchEntry | None = None
 
 
-def _pressed(step: Step) -> dict[str, Any]:
-    """Return a step with its reason, if it has any."""
-    table: dict[str, Any] = _plain(asdict(step))
-    return table if step.reason else {key: table[key] for key in table if key != "reason"}
-
-
-def _plain(value: Any) -> Any:
-    """Return a value with tuples as lists, as in JSON, at every depth."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    return [_plain(item) for item in value] if isinstance(value, tuple | list) else value
+def press_json(plan: Schedule, **more: object) -> dict[str, Any]:
+    """Return ``press.json``, without seams, folds and reasons where there are none."""
+    hands = HANDLING_MINUTES if plan.is_timed else None
+    document = PressDocument.of(plan, hands_minutes=hands, **more)
+    for step in document["steps"]:
+        if not step["reason"]:
+            del step["reason"]
+    return {key: value for key, value in document.items() if value or key not in JOINTS}
 
 
 def press_csv(plan: Schedule) -> str:

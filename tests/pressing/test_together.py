@@ -11,7 +11,7 @@ from sbafab.pressing.build_up import footprint
 from sbafab.pressing.cycles import (
     Runs,
     are_apart,
-    batch_json,
+    batch_entry,
     batch_times,
     design_runs,
     press_runs,
@@ -130,8 +130,8 @@ def test_a_cycle_takes_what_one_person_makes_in_eight_hours_or_what_is_ordered()
 def test_patterns_are_counted_a_cycle() -> None:
     design = load_design("1dof-5mm", ["stack.balloons=2", "order.copies=5", "order.at_once=3"])
     column = build(design)
-    said = batch_json(design, column, schedule(column, design))
-    assert said["cycles"] == [3, 2]
-    for row in said["patterns"]:
-        assert row["each"] == len(column.patterns[row["pattern"]])
-        assert row["cycles"] == [3 * row["each"], 2 * row["each"]]
+    said = batch_entry(design, column, schedule(column, design))
+    assert said.cycles == [3, 2]
+    for row in said.patterns:
+        assert row.each == len(column.patterns[row.pattern])
+        assert row.cycles == [3 * row.each, 2 * row.each]
