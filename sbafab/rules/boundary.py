@@ -20,7 +20,7 @@ from sbafab.laminate.laminate import LOOSE, Interface, Laminate, Layer
 from sbafab.rules.limits import TOLERANCE
 
 END_ROOM: Final = 1e-5
-"""mm left out at both ends of an edge: what starts at a corner does not lie beside the edge."""
+"""mm skipped at both ends of an edge: a feature that starts at a corner is not beside the edge."""
 LEANING: Final = 4e-3
 """mm from its ends, beside which an edge that leaves the corner along the normal may lean in: both
 are read from files, whose coordinates are off by up to 1 um."""
@@ -88,9 +88,9 @@ def outward_reach(edge: Edge, targets: EdgeIndex) -> Reach | None:
 
 
 def _swept(edge: Edge, moved: Edge | None) -> Bounds:
-    """A box round what the edge sweeps when it moves along its right-hand normal.
+    """A box round the area that the edge sweeps when it moves along its right-hand normal.
 
-    An arc that shrinks to nothing on its way sweeps what lies between it and its centre.
+    An arc that shrinks to a point on its way sweeps the area between it and its centre.
     """
     box = edge.bounds
     if moved is None:
@@ -164,7 +164,7 @@ class _Band(NamedTuple):
         return at_side and _runs_along(target, p, left_normal(self.edge, p))
 
     def nearest_candidates(self, target: Edge) -> Iterator[Point]:
-        """Points of ``other`` of which one is the nearest within the band."""
+        """Candidate points of ``other``; the nearest point within the band is among them."""
         yield target.start
         yield target.end
         yield from _extremes(self.edge, target)
@@ -243,9 +243,9 @@ def _on_ray(origin: Point, unit: Point, edge: Edge) -> list[Point]:
 class Facing(NamedTuple):
     """Two films with no film between them over some area outside pins' openings.
 
-    ``gap`` holds both, the masks it takes to cover that area from above, and as its unbonded
-    region what they cover; its index is that of the interface just below the upper film. ``bare``
-    is what no mask covers.
+    ``gap`` holds both films, the masks that cover that area from above, and the covered area as
+    its unbonded region; its index is the index of the interface just below the upper film.
+    ``bare`` is the area that no mask covers.
     """
 
     gap: Interface
@@ -287,7 +287,7 @@ class _Shapes:
     def __init__(self, laminate: Laminate) -> None:
         self.laminate = laminate
         self.openings = pin_openings(laminate)
-        # Not methods of its own, or it would hold itself until rings are searched for.
+        # Not bound methods: they would form a reference cycle that outlives its last use.
         self.laid = cache(_overlaid)
         self.minus = cache(_minus)
         self.both = cache(Region.__and__)
@@ -303,7 +303,7 @@ class _Shapes:
         return without_slivers(below.profile - above.profile)
 
     def kept_apart(self, region: Region, index: int, below: Layer, above: Layer) -> Facing | None:
-        """Two films that face each other over a region; None where it is all pins' openings."""
+        """Two films that face each other over a region; None if pins' openings fill the region."""
         facing = bare = self.minus(region, self.openings)
         masks: dict[Region, Layer] = {}
         for layer in reversed(self.laminate.layers[below.index : above.index - 1]):

@@ -36,8 +36,8 @@ class Channel(NamedTuple):
 def channels(laminate: Laminate) -> list[Channel]:
     """Bores, through the balloons of their chamber, and the lumen, through every layer.
 
-    Where nets say what is joined, a bore is the holes that films have at its place: masks go on
-    over them, and a film without one may be passed elsewhere.
+    If nets declare the connections, a bore consists of the holes in films at its place: masks
+    continue over them, and air may pass a film without a hole elsewhere.
     """
     gaps = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
     spans = {
@@ -139,7 +139,7 @@ def _clear(channel: Channel) -> _Clear:
     if any(_is_round_about(hole, channel.centre, radius) for hole in tightest.profile.holes):
         return _Clear(channel, 2 * radius, channel.centre, tightest)
     near = [layer for layer in channel.layers if room[layer.index] < 2 * channel.diameter]
-    # What is nearest to any place within reach lies no further from the axis than this.
+    # The nearest edge to any place within reach is no further from the axis than this.
     edges = {
         layer.index: [
             edge

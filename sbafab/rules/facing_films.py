@@ -85,7 +85,7 @@ def _past_films(pairs: Iterable[tuple[Facing, int]]) -> Iterator[_Weld]:
 
 
 def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
-    """Bonds between neighbouring balloons that reach an edge of film that is no bore's."""
+    """Bonds between neighbouring balloons that reach a film edge other than a bore's."""
     for distinct in distinct_interfaces(laminate):
         gap = distinct.interface
         if gap.kind == "chamber" or not gap.pressed or _is_of_one_balloon(gap):

@@ -31,7 +31,7 @@ class Finding:
 
     ``by_user`` distinguishes a failure that the design waives by name from a waiver that the rule
     grants (a flush mask at a pinned bore). ``remedy`` is the action that a warning asks for; the
-    message begins with it. Of a share that was counted, ``interval`` is that of 95 %.
+    message begins with it. ``interval`` is the 95 % interval of a counted share.
     """
 
     rule: str
@@ -45,7 +45,7 @@ class Finding:
     remedy: str = ""
     interval: tuple[float, float] | None = None
     design: str = ""
-    """Of several designs: the name of its own, with which the message begins."""
+    """The design's name if there are several designs; the message begins with it."""
 
     def __post_init__(self) -> None:
         # Limits are in um: what arithmetic leaves below 1 nm says nothing.
@@ -114,7 +114,7 @@ class Findings(tuple[Finding, ...]):
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """A flat row a finding."""
+        """One flat row for each finding."""
         return [
             {
                 "rule": f.rule,

@@ -54,8 +54,9 @@ class Freedom(NamedTuple):
 
     @property
     def by_hand(self) -> bool:
-        """True if the hand decides it: every turn, and the place of a body without pins. A seam's
-        place is its tool's, as a cut edge's is the laser's.
+        """True if it depends on the hand: every turn, and the place of a body without pins.
+
+        A seam's place depends on its tool, as a cut edge's place depends on the laser.
         """
         if self.seam:
             return False
@@ -156,14 +157,14 @@ def freedoms(laminate: Laminate, design: Design, laid: Sequence[Laid]) -> Freedo
 
 
 def seam_part(seam: Seam, piece: int = 0) -> Part:
-    """Return a seam's region as a part: its layer is below 0, so that none of the films has it."""
+    """Return a seam's region as a part; its layer index is negative, so no film shares it."""
     return Part(-seam.order, piece)
 
 
 def _of_seam(
     laminate: Laminate, seam: Seam, by_part: Mapping[Part, Sequence[Freedom]], design: Design
 ) -> dict[Part, tuple[Freedom, ...]]:
-    """Freedoms of a seam: those of the film above, on which its path is laid, and its tool's."""
+    """Freedoms of a seam: the upper film's, since its path is laid on that film, and its tool's."""
     films = laminate.layer(seam.above).profile.pieces
     under = next((n for n, film in enumerate(films) if not (film & seam.region).is_empty), 0)
     step = next(

@@ -45,7 +45,7 @@ SHARP: Final = 30.0
 """Degrees: a sharper corner is a bond that tapers to nothing. Blunter ones are where a strip leaves
 its pocket aslant, between two edges of one void, and no way for a leak."""
 ROOM: Final = 1e-6
-"""mm: far more than the rounding of what is compared."""
+"""mm: far more than the rounding of the compared values."""
 
 
 UNCUT: Final = -1
@@ -104,7 +104,7 @@ class Push(NamedTuple):
 class InterfaceMargins:
     """Interfaces of equal profiles and equal freedoms, and the margins of the first.
 
-    ``places`` are those of bonds, then those of overhangs.
+    ``places`` lists the places of bonds, then the places of overhangs.
     """
 
     interfaces: tuple[Interface, ...]
@@ -130,7 +130,7 @@ class InterfaceMargins:
 
 
 def seated(interface: Interface) -> tuple[int, ...]:
-    """Return layer indices by seat; those of seams as ``seam_part`` numbers them."""
+    """Return layer indices by seat; seams are numbered as in ``seam_part``."""
     return (
         interface.below.index,
         interface.above.index,
@@ -140,7 +140,7 @@ def seated(interface: Interface) -> tuple[int, ...]:
 
 
 def bonding_seams(interface: Interface) -> tuple[Seam, ...]:
-    """Return the seams whose edges end a bond: where films are pressed none does."""
+    """Return the seams whose edges end a bond; empty if the films are pressed."""
     return () if interface.pressed else interface.seams
 
 
@@ -149,7 +149,7 @@ def relative_freedoms(
 ) -> list[tuple[Freedom, bool]]:
     """Return the freedoms that only one of two edges has, each with True if it is the end's.
 
-    ``layers`` are those of the interface, by seat.
+    ``layers`` are the interface's layers, by seat.
     """
     start, end = (moves[Part(layers[o.seat], o.piece)] for o in owners)
     at_start, at_end = set(map(id, start)), set(map(id, end))
@@ -176,8 +176,8 @@ def group_interfaces(
 ) -> list[list[Interface]]:
     """Return interfaces grouped by equal profiles and equal freedoms.
 
-    Films that face each other past a smaller balloon count as an interface of their own;
-    facing-films reports those without a mask between them.
+    Films that face each other past a smaller balloon count as a separate interface;
+    facing-films reports the pairs without a mask between them.
     """
     groups: dict[object, list[Interface]] = {}
     faced = [pair.gap for pair in facing if pair.bare.is_empty]
@@ -236,10 +236,10 @@ def narrow_places(
     reaches: Sequence[Sequence[tuple[Edge, Reach]]],
     overlaps: Sequence[Sequence[Overlap]],
 ) -> list[dict[MarginKind, Places]]:
-    """All margins that could become the least under the tolerances, or come short of a limit.
+    """All margins that could become the least under the tolerances, or fall short of a limit.
 
-    ``reaches`` are the masks' reaches past film edges, for each group of interfaces, ``overlaps``
-    those of its seams.
+    ``reaches`` are the masks' reaches past film edges for each group of interfaces, ``overlaps``
+    the overlaps of its seams.
     """
     slacks = [group.loss if group.bond is not None else 0.0 for group in groups]
     # Of one bond all interfaces ask for the same places.
@@ -363,8 +363,8 @@ class Places(NamedTuple):
 class BondQuery(NamedTuple):
     """Query of a bond's places at most ``slack`` mm wider than its narrowest.
 
-    ``widest`` is the largest slack of any interface with the same bond; ``profiles`` are those of
-    ``layers`` films and masks, by seat, and of seams.
+    ``widest`` is the largest slack of any interface with the same bond; ``profiles`` are the
+    profiles of ``layers`` films and masks, by seat, and of seams.
     """
 
     bond: Region
@@ -704,10 +704,10 @@ class MarginRun(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """Freedoms that one of two owners has and the other not: a column a pair, a line a move.
+    """Freedoms that only one of two owners has: a column for each pair, a row for each move.
 
-    It shifts by up to ``shift`` mm or turns by up to ``turn`` radians, and counts by its ``sign``:
-    1 if it acts at the end. ``freedoms`` are the same, by column.
+    A move shifts by up to ``shift`` mm or turns by up to ``turn`` radians, and counts by its
+    ``sign``: 1 if it acts at the end. ``freedoms`` holds the same freedoms, by column.
     """
 
     freedoms: Sequence[Sequence[Freedom]]
@@ -719,12 +719,12 @@ class Moves(NamedTuple):
 class LinearForms(NamedTuple):
     """The margins of all interfaces, run after run, in the order they were found.
 
-    ``begins`` says where each run begins, ``run`` which one a margin is of. ``nominal`` (mm) and
-    ``normal`` (2 rows) have a column each; ``between`` is the number of the owners of both edges
-    among ``owners`` and ``moves``. ``levers`` has a line for each of these moves: mm per radian of
-    what turns, as it counts, else 0. ``loss`` is the most that all of them take from each margin,
-    mm; ``pinned_loss`` that of all but what the hand does. ``cut_edges`` is how many of its two
-    edges are cut ones: both, or none of an overlap.
+    ``begins`` is the first margin of each run, ``run`` the run of each margin. ``nominal`` (mm)
+    and ``normal`` (2 rows) have a column for each margin; ``between`` numbers the owners of both
+    edges among ``owners`` and ``moves``. ``levers`` has a row for each of these moves: the signed
+    mm per radian of a turn, else 0. ``loss`` is the greatest total loss of each margin by all
+    moves, mm; ``pinned_loss`` leaves out the moves made by hand. ``cut_edges`` is the number of
+    cut edges of each margin: 2, or 0 for an overlap.
     """
 
     runs: Sequence[MarginRun]

@@ -46,7 +46,7 @@ class Measures:
     def by_hand(self, design: Design) -> Measures:
         """Measures of the same laminate under ``design`` with a hand no rougher than this one.
 
-        Places that are narrow with the rougher hand include all that are so with a steadier one.
+        Places that are narrow with the rougher hand include every narrow place of a steadier one.
         """
         steadier = Measures(self.laminate, design, self.pause)
         steadier.margins, steadier.laid = self.margins, self.laid
@@ -93,7 +93,7 @@ class Measures:
 
     @cached_property
     def seam_ends(self) -> list[SeamEnds]:
-        """What seams end on in the first of every set of equal interfaces."""
+        """Seam ends in the first interface of each set of equal interfaces."""
         first = [interfaces[0] for interfaces in self._equal_interfaces]
         return seam_ends(self.laminate, first, self.design.registration.error_of_seam)
 

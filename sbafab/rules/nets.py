@@ -50,7 +50,7 @@ from sbafab.rules.voids import (
 
 NAME = "nets"
 NETLIST = "netlist"
-"""Check of a laminate against a netlist in a file of its own."""
+"""Check of a laminate against a netlist in a separate file."""
 
 FaultKind = Literal["open", "short", "leak", "dead-end", "stray"]
 
@@ -90,8 +90,8 @@ class NarrowPlace:
 class Connectivity:
     """The voids of a laminate against its nets.
 
-    ``owners`` holds the names of the nets that every cavity belongs to, none for a slit or hole;
-    ``groups`` the names of ports and chambers that are joined, ``faults`` what is not as declared.
+    ``owners`` holds the names of each cavity's nets, empty for a slit or hole; ``groups`` the names
+    of ports and chambers that are joined, ``faults`` the deviations from the declared nets.
     """
 
     cavities: tuple[Cavity, ...]
@@ -144,7 +144,7 @@ def _counted(count: int, noun: str) -> str:
 
 
 def declared(laminate: Laminate) -> tuple[Net, ...]:
-    """Return the nets, and a net of its own for every chamber and port that none names."""
+    """Return the nets, and a separate net for every chamber and port that no net names."""
     named = {member for net in laminate.nets for member in net.ports}
     names = [chamber.name for chamber in laminate.chambers] + [p.name for p in laminate.ports]
     alone = (Net(name, (name,)) for name in dict.fromkeys(names) if name not in named)
@@ -152,9 +152,9 @@ def declared(laminate: Laminate) -> tuple[Net, ...]:
 
 
 def connectivity(laminate: Laminate, design: Design, faults: bool = True) -> Connectivity:
-    """Return the voids of a laminate, the nets that they belong to, and what is not as declared.
+    """Return the voids of a laminate, their nets, and the deviations from the declared nets.
 
-    Without ``faults`` these are not searched for.
+    Without ``faults`` the deviations are not searched for.
     """
     reading = _Reading(laminate)
     differences = (
@@ -182,8 +182,8 @@ def netlist_findings(
 ) -> list[Finding]:
     """Return the findings of a laminate against a netlist alone, in place of its own nets.
 
-    Ports of the netlist that have a place need not be the laminate's; of others, and of chambers,
-    the names must be.
+    Ports of the netlist that have a place need not exist in the laminate; the names of other
+    ports and of chambers must.
     """
     placed = {port.name for port in netlist.ports}
     own = (port for port in laminate.ports if port.name not in placed)
@@ -218,9 +218,9 @@ def _missing(name: str, file: str, names: Iterable[str]) -> str:
 
 
 class _Terminal(NamedTuple):
-    """A place that a port or chamber stands for, and the cavities of which one must be its own.
+    """The place of a port or chamber; one of the ``cavities`` must belong to it.
 
-    ``layers`` are those that it lies between; none for an inlet.
+    ``layers`` are the layers that it lies between; empty for an inlet.
     """
 
     member: str
@@ -310,7 +310,7 @@ class _Reading:
 
     @cached_property
     def homes(self) -> dict[str, dict[_Terminal, int | None]]:
-        """By net: the part in which every one of its terminals lies, None for no void.
+        """The part that holds each terminal of a net, by net; None for a terminal in no void.
 
         A terminal that several cavities may hold lies in the net's main part if one of them does.
         """
@@ -644,7 +644,7 @@ def _overlaps(a: Cavity, b: Cavity) -> list[_Cut]:
 
 
 def _parts(graph: VoidGraph, walls: Collection[str] = ("outside",)) -> dict[Void, int]:
-    """Return the number of the part that every void belongs to; what is a wall joins none."""
+    """Return the part number of every void; walls join no parts."""
     parts: dict[Void, int] = {}
     for void in [*graph.pieces, *graph.gaps, *graph.openings]:
         if void not in parts:

@@ -37,8 +37,9 @@ WIDEST = 3.0
 
 
 class OpeningPlace(NamedTuple):
-    """A place of a channel as drawn, what is ``left`` of its width at worst, mm, and the kPa that
-    open it then; None where no film is known.
+    """A place of a channel as drawn, and the width ``left`` at worst, mm, with its opening kPa.
+
+    The pressure is None if no film is known.
     """
 
     width: Width
@@ -68,7 +69,7 @@ def hardest_place(
         loads = [side.lifting(len(side.films), width) for side in sides]
         return min((load for load in loads if load is not None), default=math.inf)
 
-    # Pressures fall with the fourth power of the width: wider places are no harder to open.
+    # Pressures fall with the fourth power of the width: wider places open more easily.
     harder = most(left.value) / worst.pressure
     widest = left.value * (harder**0.25 if math.isfinite(harder) else WIDEST)
     if widest - left.value <= TOUCH:

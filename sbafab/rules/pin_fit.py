@@ -88,7 +88,7 @@ RULE = Rule(
 
 
 def _stretch_text(fit: _Fit) -> str:
-    """The stretch of a fit in words."""
+    """Text for the stretch of a fit."""
     if math.isinf(fit.stretch):
         return "no hole may be left to go over a pin"
     if fit.stretch > 0:

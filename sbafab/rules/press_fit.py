@@ -1,5 +1,5 @@
 """press-fit: the laminate fits the heated area; a warning for untested heights and press minutes,
-and for a film that is no elastomer.
+and for a film that is not an elastomer.
 
 Heights are untested above ``validated_balloons``; minutes where no kit or design states them for a
 film.
@@ -16,7 +16,7 @@ from sbafab.rules.rule import Explanation, Rule
 
 NAME = "press-fit"
 STIFFEST = 1000.0
-"""MPa, Young's modulus above that of the hardest thermoplastic elastomers: ours."""
+"""MPa, a Young's modulus above the hardest thermoplastic elastomers' (our value)."""
 
 
 def check(measures: Measures) -> list[Finding]:

@@ -248,7 +248,7 @@ def costs(acting: Iterable[Push]) -> list[Push]:
 
 
 def _moved(freedom: Freedom) -> str:
-    """The layers of a freedom in words."""
+    """Text for the layers of a freedom."""
     is_single = freedom.lowest == freedom.highest
     return (
         f"layer {freedom.lowest}" if is_single else f"layers {freedom.lowest} to {freedom.highest}"
@@ -256,7 +256,7 @@ def _moved(freedom: Freedom) -> str:
 
 
 def _source(freedom: Freedom) -> str:
-    """Cause of a displacement, its layers and its press step in words."""
+    """Text for a displacement: its cause, its layers and its press step."""
     layers = _moved(freedom)
     if freedom.seam:
         return f"place of seam {freedom.seam}"

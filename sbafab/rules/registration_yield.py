@@ -87,9 +87,9 @@ class MarginRows(NamedTuple):
 
 
 def rows_of(forms: LinearForms, layers: Sequence[Sequence[int]], design: Design) -> MarginRows:
-    """Return the margins that can come short at all, by the two contours whose edges they join.
+    """Return the margins that can fall short at all, by the two contours whose edges they join.
 
-    Kinds are in the order of the first of them. ``layers`` are those of each group, by seat.
+    Kinds are in the order of their first margin. ``layers`` are each group's layers, by seat.
     """
     room = forms.nominal - forms.by_quantity(
         {"bond": design.rules.worst_bond_width, "overhang": design.rules.worst_mask_overhang}
@@ -192,8 +192,8 @@ NAME = "registration-yield"
 SEED = 20_240
 PAPER_SUCCESS = 0.9
 """The paper's success rate (Sec. 2), of everything that can go wrong: a yield that is surely below
-it by errors of place alone draws a warning. The hand is calibrated on this very rate, so that what
-the interval leaves open is no news."""
+it by errors of place alone draws a warning. The hand is calibrated on this very rate, so a rate
+within the interval tells nothing new."""
 Z95 = 1.959963984540054
 BATCH = 5_000
 """Builds drawn at a time, which bounds the memory."""
@@ -301,7 +301,7 @@ def _remedy(laminate: Laminate) -> str:
 
 
 def _by_hand(errors: Registration) -> str:
-    """The design's assumed placement errors in words."""
+    """Text for the design's assumed placement errors."""
     return (
         f"{errors.hand_placement:g} mm and {errors.hand_turn:g} degree where a hand places"
         f"{_calibrated(errors)}"
@@ -426,7 +426,7 @@ def _precise_number(share: Share) -> int:
 def _renamed(
     errors: list[Error], first: Interface, target: Interface, moves: Freedoms
 ) -> list[Error]:
-    """Errors of ``target`` that correspond to those of an equal interface."""
+    """Errors of ``target`` that correspond to the errors of an equal interface."""
     if target is first:
         return errors
     from_layers, to_layers = seated(first), seated(target)

@@ -63,7 +63,7 @@ def check(measures: Measures) -> list[Finding]:
 
 
 def _judged_by_nets(laminate: Laminate) -> list[Finding]:
-    """Where nets are declared, the rule nets says what joins; loose films stay a fault."""
+    """If nets are declared, the rule nets judges how voids join; loose films stay a fault."""
     offences = _loose_films(laminate)
     if offences:
         return [_failed(offences, laminate)]
@@ -124,7 +124,7 @@ def _owners(laminate: Laminate, graph: VoidGraph) -> dict[Void, frozenset[str]]:
 def _leave_to_innermost(
     laminate: Laminate, graph: VoidGraph, owners: dict[Void, frozenset[str]], level: int
 ) -> None:
-    """Leave chambers between seams to the pocket inside; what lies outside all seams is a flap.
+    """Assign chambers between seams to the pocket inside; the void outside all seams is a flap.
 
     A closed seam parts the films round it in two: a pocket, and a flap that holds no pressure.
     """
@@ -347,7 +347,7 @@ def _cut_off(void: Void, names: frozenset[str], laminate: Laminate, graph: VoidG
 
 
 def _is_seamed(interface: Interface) -> bool:
-    """Return True where seams alone bond, so that no mask decides what is open."""
+    """Return True if seams alone bond, so that masks do not decide which areas are open."""
     return bool(interface.seams) and not interface.pressed
 
 

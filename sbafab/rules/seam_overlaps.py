@@ -1,4 +1,4 @@
-"""Overlaps of seams: where one ends on another or past the edge of a film, and parts two voids.
+"""Overlaps of seams: one ends on another or past the edge of a film, and separates two voids.
 
 Each seam lies off its path as a whole. Two of them meet in any case if one must be moved farther
 than both errors together until it leaves the other, whichever way. That is asked of two at a time,
@@ -35,8 +35,8 @@ ToolError = Callable[[SeamTool], float]
 class Overlap(NamedTuple):
     """An overlap of two seams, by their places among the interface's.
 
-    They meet no more once the ``seam`` has moved by ``depth``, mm, along the unit vector ``way``,
-    and by no less in any direction.
+    They separate once the ``seam`` has moved by ``depth``, mm, along the unit vector ``way``; no
+    shorter move in any direction separates them.
     """
 
     seam: int
@@ -56,7 +56,7 @@ class EdgeBond(NamedTuple):
 
 
 class SeamEnds(NamedTuple):
-    """What seams of an interface end on, where that parts two voids: each other, and edges."""
+    """Ends of an interface's seams, on each other or on edges, that separate two voids."""
 
     overlaps: Sequence[Overlap] = ()
     edges: Sequence[EdgeBond] = ()
@@ -65,7 +65,7 @@ class SeamEnds(NamedTuple):
 def seam_ends(
     laminate: Laminate, interfaces: Sequence[Interface], error: ToolError
 ) -> list[SeamEnds]:
-    """Return what seams end on in each interface; nothing where films are pressed."""
+    """Return the seam ends of each interface; none if its films are pressed."""
     if all(gap.pressed or not gap.seams for gap in interfaces):
         return [SeamEnds() for _ in interfaces]
     graph = void_graph(laminate)
@@ -99,7 +99,7 @@ class _Voids(NamedTuple):
         return _Voids(named, [edge for edge in outer if not lies_on(edge, gap.fold_lines)])
 
     def are_parted_by(self, overlap: Region, near: float) -> bool:
-        """Return True if an overlap touches two voids, of which the outside is one."""
+        """Return True if an overlap touches two voids and one of them is the outside."""
         names: set[object] = set()
         for p in {edge.start for edge in overlap.edges}:
             here = {name for name, void in self.cavities if void.distance_to_edge(p) <= near}
@@ -169,7 +169,8 @@ class _Seams(NamedTuple):
 def _depth(seam: Seam, body: Region, piece: Region, reach: float) -> tuple[float, Point]:
     """Shortest way, mm and unit vector, by which a seam leaves a body that it meets in a piece.
 
-    What is farther from the piece than ``reach`` is left out: a longer way is at least as long.
+    Path parts farther than ``reach`` from the piece are ignored: a depth beyond ``reach`` remains
+    at least ``reach``.
     """
     near = _edges_near(piece, seam, reach)
     # All ways that the seam may be moved so that its middle stays within half its width of it.
@@ -202,7 +203,7 @@ def _edges_near(piece: Region, seam: Seam, reach: float) -> list[Edge]:
 
 
 def _short_parts(edge: Edge) -> Iterator[Edge]:
-    """Yield arcs in parts, as it takes time to drag a region along a long one."""
+    """Yield arcs in parts, since dragging a region along a long arc is slow."""
     count = math.ceil(abs(edge.sweep) / PART) if isinstance(edge, Arc) else 1
     for k in range(count):
         yield edge.part(edge.at(k / count), edge.at((k + 1) / count))

@@ -41,7 +41,7 @@ UNLIKE = 2 * PAST_MOUTH
 class _Fit(NamedTuple):
     """One measure of an inlet: the feature, its value at worst and its least value, mm.
 
-    ``drawn`` is the width as drawn; ``firm`` what is left of it with seams on their paths.
+    ``drawn`` is the width as drawn; ``firm`` the width left at worst with seams on their paths.
     """
 
     inlet: Inlet
@@ -192,7 +192,7 @@ def _on_hole(port: Port, laminate: Laminate, design: Design) -> Iterator[_HoleFi
 
 
 def _farthest(edge: Edge, p: Point) -> float:
-    """The greatest distance of an edge from a point, mm; of an arc, that of its whole circle."""
+    """The greatest distance of an edge from a point, mm; an arc counts as its whole circle."""
     if isinstance(edge, Line):
         return max(math.dist(edge.start, p), math.dist(edge.end, p))
     return math.dist(edge.centre, p) + edge.radius
@@ -233,7 +233,7 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, design: Design
     beside = strip(inner, inlet.mouth, 2 * inlet.width)
     near = [piece for piece in interface.unbonded.pieces if boxes_meet(piece.bounds, beside.bounds)]
     if not interface.pressed:
-        # Films go on beside a seam; their other side is no part of the strip.
+        # Films continue beside a seam; their other side does not belong to the strip.
         near = [piece for piece in near if piece.contains((x - dx * TOLERANCE, y - dy * TOLERANCE))]
     every = Region(tuple(contour for piece in near for contour in piece.contours))
     run = every & beside
@@ -271,7 +271,7 @@ def _edges(interface: Interface | None, design: Design) -> VoidEdges:
 
 
 def _at_worst(fit: _Fit, p: Point, q: Point, design: Design) -> _Fit:
-    """Return the fit of a strip between two points of its edges, with what is left at worst."""
+    """Return the fit of a strip between two points of its edges, with the width left at worst."""
     drawn = Width(math.dist(p, q), p, q)
     edges = _edges(fit.interface, design)
     value = edges.left(drawn).value

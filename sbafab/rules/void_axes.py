@@ -36,7 +36,7 @@ INWARD = 1e-6
 POCKET = 3.0
 """A pocket is this many times as wide as the channels that lead to it."""
 POCKET_OF_VIAS = 6.0
-"""As POCKET, of the holes that lead to it: many are narrower than the channels that they join."""
+"""Like POCKET, for holes that lead to a pocket: many are narrower than the channels they join."""
 NUDGE = 1e-3
 """mm by which places are moved off the boundary, inward."""
 
@@ -124,7 +124,7 @@ def _circles(points: Floats, normals: Floats) -> tuple[Floats, Counts]:
     return radii, partners
 
 
-# Blind ends: what lies behind a cut straight across a void and holds no way on.
+# Blind ends: parts behind a cut straight across a void, without a way on.
 
 
 class Terminal(NamedTuple):
@@ -146,9 +146,9 @@ class BlindEnd(NamedTuple):
 def blind_ends(axis: VoidAxis, terminals: Sequence[Terminal], ratio: float) -> list[BlindEnd]:
     """Return the parts of a void that end blind, more than ``ratio`` times as long as wide.
 
-    Such a part lies behind a cut straight across the void and holds no terminal. It is none where a
-    port lies at its foot, within the width of the cut, nor where it is part of a pocket that holds
-    a port. Length is half of the way round it along the boundary, less the cut.
+    Such a part lies behind a cut straight across the void and holds no terminal. It does not count
+    if a port lies at its foot, within the width of the cut, or if it belongs to a pocket that holds
+    a port. Length is half of the boundary round it, less the cut.
     """
     cuts = _cuts(axis)
     closed = ~_holds_any(axis, cuts, [terminal.at for terminal in terminals])
@@ -263,7 +263,7 @@ def _is_excused(axis: VoidAxis, foot: Point, width: float, terminals: Sequence[T
     ports = [terminal for terminal in terminals if terminal.is_port]
     if any(math.dist(port.at, foot) <= width for port in ports):
         return True
-    # What is left a third of the way in has no channel that leads to the pocket.
+    # The part that remains a third of the way in has no channel that leads to the pocket.
     inset = width / POCKET / 2
     inner = shrink(axis.region, inset)
     pocket = next((piece for piece in inner.pieces if piece.contains(foot)), None)

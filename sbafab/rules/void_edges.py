@@ -24,9 +24,9 @@ NEAR: Final = 1e-5
 
 @dataclass(frozen=True)
 class VoidEdges:
-    """The edges that bound the voids of an interface, with what they may lie off, mm.
+    """The edges that bound the voids of an interface, with their errors of place, mm.
 
-    ``kerf`` is the kerf that is not known, ``seams`` those that bond, with their tools' errors.
+    ``kerf`` is the unknown kerf, ``seams`` the bonding seams with their tools' errors.
     """
 
     cutting: float
@@ -59,7 +59,7 @@ class VoidEdges:
         return self.cutting + self.kerf / 2
 
     def left(self, place: Width) -> Width:
-        """Return what is left of a place at worst; a width of 0 where it closes."""
+        """Return the place as narrow as it can become; its width is 0 if it closes."""
         at_start, at_end = self._lost(place.start, place.end)
         if at_start + at_end >= place.value:
             return Width(0.0, place.middle, place.middle)
@@ -92,9 +92,9 @@ class VoidEdges:
         return beside or [(None, self._cut)]
 
     def narrow_places(self, void: Region, widest: float = 0.0) -> Iterator[tuple[Width, Width]]:
-        """Yield places of a void as drawn, and what is left of each at worst, narrow ones first.
+        """Yield places of a void as drawn, each with its worst case, narrow places first.
 
-        The narrowest at worst is among them, and all of which no more than ``widest`` mm is left.
+        They include the narrowest at worst, and every place at most ``widest`` mm wide at worst.
         """
         least = least_width(void, 0.0)
         if least is None:
@@ -110,7 +110,7 @@ class VoidEdges:
             yield place, self.left(place)
 
     def words(self) -> str:
-        """The causes of what is lost, in words."""
+        """Text for the causes of the loss."""
         if self.seams:
             errors = " or ".join(f"{error:g}" for error in sorted({e for _, e in self.seams}))
             return f"seams up to {errors} off their paths"

@@ -49,7 +49,7 @@ class VoidGraph:
     pieces: dict[Void, Region] = field(default_factory=dict)
     """The unbonded pieces of every interface."""
     gaps: dict[Void, Region] = field(default_factory=dict)
-    """Where a film is missing beside an interface, but for the outside."""
+    """Places beside an interface without a film; the outside does not count."""
     openings: dict[Void, Region] = field(default_factory=dict)
     """The holes of films."""
     joins: dict[Void, dict[Void, Point]] = field(default_factory=dict)
@@ -248,9 +248,9 @@ def mouth_of(inlet: int) -> Void:
 
 
 def _outlets(edge: Edge, inlets: Mapping[int, Inlet]) -> Iterator[tuple[Void, Point]]:
-    """Yield the mouths that an edge of the outline lies in, and the outside for what lies in none.
+    """Yield the mouths that an edge of the outline lies in, and the outside for the rest of it.
 
-    Each with the middle of its stretch.
+    Each comes with the middle of its stretch.
     """
     covered = []
     for number, inlet in inlets.items():
@@ -268,7 +268,7 @@ def _outlets(edge: Edge, inlets: Mapping[int, Inlet]) -> Iterator[tuple[Void, Po
 def _share_at(edge: Edge, inlet: Inlet, reach: float) -> tuple[float, float] | None:
     """Return the part of an edge on a mouth's line within ``reach`` mm of the mouth's middle.
 
-    As shares of the edge's length; None where there is none.
+    As shares of the edge's length; None if it has no such part.
     """
     start, end = inlet.offset(edge.start), inlet.offset(edge.end)
     if not isinstance(edge, Line) or start == end:
@@ -300,7 +300,7 @@ def mouth_openings(inlet: Inlet, interface: Interface) -> list[tuple[float, floa
 
 
 def past_mouth(laminate: Laminate, level: int, p: Point) -> str | None:
-    """Return in words how the opening of a mouth reaches past it at a place; None for no mouth."""
+    """Return text on how a mouth's opening reaches past it at a place; None without a mouth."""
     interface = laminate.interfaces[level - 1]
     for inlet in laminate.inlets if interface.kind == "chamber" else ():
         for low, high in mouth_openings(inlet, interface):
