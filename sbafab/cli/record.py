@@ -146,7 +146,7 @@ def record(
         if task == "report":
             print_report(report(records, builds), as_json)
         else:
-            recording.write_text(values["chart"], success_svg(records, builds))
+            recording.save_text(values["chart"], success_svg(records, builds))
             print_verdict(str(values["chart"]))
     elif task == "export":
         count = recording.write_history(_matches(store, values), values["export"])

@@ -211,11 +211,11 @@ def write_history(contents: Contents, path: Path) -> int:
     if writer is None:
         raise DesignError(f"{path} ends in none of {', '.join(writers)}; choose one of them")
     devices = _devices(contents)
-    write_text(path, writer(devices, contents.builds))
+    save_text(path, writer(devices, contents.builds))
     return len(devices)
 
 
-def write_text(path: Path, text: str) -> None:
+def save_text(path: Path, text: str) -> None:
     """Write a temporary file and swap it in. Raises OutputError."""
     try:
         replace_text(path, text)
