@@ -101,7 +101,7 @@ class AsBuiltFolder:
 
 @dataclass(frozen=True)
 class FolderReadBack:
-    """An output folder read back and measured; nothing of it is made again.
+    """An output folder read back and measured, without regenerating any of it.
 
     ``findings`` are those on files, claims, rules, and on the layers of each design of a job;
     ``problems``: where a folder of one design cuts other layers than its ``design.toml`` makes.
@@ -119,12 +119,12 @@ class FolderReadBack:
 
 
 def read_back(folder: Path, works: Mapping[str, WrittenDesign] | None = None) -> FolderReadBack:
-    """Read an output folder, of one design or several, as it lies on the disk.
+    """Read an output folder, of one design or several, from the disk.
 
     ``works``: the designs of a run that has just written the folder, by name, with their expected
-    laminates and findings: layers that are cut just so are not measured again. Without, both are
-    made from each ``design.toml``. Raises OutputError for a folder without a sound manifest or
-    without cut files.
+    laminates and findings; layers cut exactly as expected are not measured again. Without
+    ``works``, both are made from each ``design.toml``. Raises OutputError for a folder without a
+    sound manifest or without cut files.
     """
     if is_job(folder):
         return _read_job(folder, works)
@@ -235,9 +235,9 @@ def read_folder(
 ) -> AsBuiltFolder:
     """Read the laminate of a folder's cut files, with the problems of files and claims.
 
-    The folder of a design ``of_job`` has no film sheets of its own. ``work``: the design of a run
-    that has just written the folder. Raises OutputError as ``read_back`` does, and DesignError for
-    a ``design.toml`` that is missing or makes no laminate.
+    The folder of a design ``of_job`` does not hold film sheets: they are in the job's folder.
+    ``work``: the design of a run that has just written the folder. Raises OutputError like
+    ``read_back``, and DesignError if ``design.toml`` is missing or does not make a laminate.
     """
     claims = read_claims(folder)
     if all(layer.file is None for layer in claims.layers):
@@ -283,9 +283,9 @@ def read_folder(
 
 
 def _as_laid(files: Sequence[LayerFile], expected: ExpectedLaminate) -> list[LayerFile]:
-    """Return the files with each layer as it lies: turned over, or its half of a folded film.
+    """Return the files with each layer as assembled: turned over, or its half of a folded film.
 
-    What the design's own layers are cut from is that already.
+    The design's layers already have this position.
     """
     laminate = expected.laminate
     if len(files) != len(laminate.layers):
@@ -413,7 +413,7 @@ def _unlisted_waivers(measured: Sequence[Finding], claims: Manifest) -> list[Pro
 BY_LAYER = (film_limits.NAME,)
 """Rules that measure single layers."""
 UNMEASURED = (ArithmeticError, ValueError, LookupError, StopIteration)
-"""Errors of rules on shapes that no design makes; a programming error is not among them."""
+"""Errors that rules raise on shapes no design makes; programming errors are not included."""
 
 
 def findings_as_built(rule: Rule, measures: Measures) -> list[Finding]:
@@ -455,7 +455,7 @@ def rules_by_layer(
     return tuple(findings)
 
 
-# The assembly of a folder: its parts as design.toml puts them together, and what is claimed.
+# The assembly of a folder: its parts as design.toml joins them, and the manifest's claims.
 
 
 def assembly_findings(folder: Path) -> tuple[tuple[Finding, ...], list[Problem]]:

@@ -1,4 +1,4 @@
-"""Claims of the manifest in words: files and hashes, order and roles, heights, properties."""
+"""Claims of the manifest on files and hashes, order and roles, heights, properties."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def could_be_cut(path: str) -> bool:
 
 
 def _links(folder: Path) -> list[str]:
-    """Return links to folders, and all else whose contents have no hash."""
+    """Return links to folders, and everything else without a hash of its contents."""
     return [
         path.relative_to(folder).as_posix()
         for path in sorted(folder.rglob("*"))

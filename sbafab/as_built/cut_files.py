@@ -1,4 +1,4 @@
-"""The cut files and seams of a folder read back: what each cuts or joins, or what is wrong."""
+"""The cut files and seams of a folder read back: the part or seam of each file, and its faults."""
 
 from __future__ import annotations
 
@@ -67,8 +67,8 @@ class CutPart:
 
     ``path`` is the beam's path as drawn. ``chord_error``: as the file claims, mm, 0 for true arcs.
     ``corner_room``: mm2 by which the area may differ since the beam rounds corners. ``properties``
-    and ``units`` are empty if the file has none. ``is_expected``: the path agrees with the design's
-    layer, and ``region`` is that layer.
+    and ``units`` are empty if the file does not state them. ``is_expected``: the path agrees with
+    the design's layer, and ``region`` is that layer.
     """
 
     region: Region
@@ -99,10 +99,10 @@ def read_layers(
     chords_drawn: bool,
     expected: Sequence[Expected | None],
 ) -> tuple[list[LayerFile], list[Problem]]:
-    """Read the file of every layer, files of equal bytes once; agreeing contours become one.
+    """Read the file of every layer, equal files once; agreeing contours become one.
 
-    ``chords_drawn``: the design's outline is drawn in chords, which are then no fault. ``expected``
-    holds the design's layers, None where unknown.
+    ``chords_drawn``: the design's outline is drawn in chords, so chords are permitted. ``expected``
+    holds the design's layers, None if unknown.
     """
     parts: dict[tuple[str, Material, str], CutPart] = {}
     files, problems = [], []
@@ -191,13 +191,13 @@ def path_in_folder(folder: Path, file: str | None) -> Path:
 def sound_digest(path: Path) -> str:
     """Return the sha256 of a file. Raises OutputError if it is missing, unreadable or too large."""
     try:
-        # A pipe or a device would be read for ever.
+        # Reading a pipe or a device would never end.
         if path.exists() and not path.is_file():
             raise OutputError("no plain file; regenerate it")
         if path.stat().st_size > MAX_BYTES:
             raise OutputError(f"larger than {MAX_BYTES:,} bytes; regenerate it")
         data = path.read_bytes()
-        # A mark has a line of its own, and lines are counted in a moment.
+        # Each mark is on a separate line, and counting lines is fast.
         is_long = data.count(b"\n") > MAX_ENTITIES
         marks = sum(1 for _ in MARK.finditer(data)) if is_long else 0
         if marks > MAX_ENTITIES:
@@ -222,7 +222,7 @@ def read_part(
 ) -> CutPart:
     """Read the part that a cut file cuts. Raises OutputError if the file is not sound.
 
-    ``properties`` replace those of a file that has none. ``expected``: the design's layer, if
+    ``properties`` are used if the file has no properties. ``expected``: the design's layer, if
     known. ``has_letters``: letters on REFERENCE are permitted, as on a base plate.
     """
     try:
@@ -255,7 +255,7 @@ def _part(
                 "does not say so; regenerate it with arcs"
             )
     if expected is not None and not departure(drawing.region, expected.path):
-        # What is cut within its tolerance needs no guess at what the beam may have left.
+        # A path within tolerance needs no estimate of the part that the beam leaves.
         return CutPart(
             expected.profile,
             drawing.region,
@@ -319,10 +319,11 @@ def check_sequence(drawing: ReadBack) -> None:
 def read_seams(
     folder: Path, claims: Manifest, design: Design, expected: ExpectedLaminate
 ) -> tuple[tuple[Seam, ...] | None, list[Problem]]:
-    """Return the seams as their files draw them, and problems; None where the design has none.
+    """Return the seams as their files draw them, and problems; None if the design has no seams.
 
-    A path within a micrometre of the design's is the design's own. Each lies where its tool, which
-    the design says is beside the machine's head, comes when the head follows the file.
+    A path within a micrometre of the design's is replaced by it. Each seam lies where its tool
+    runs when the machine's head follows the file; the design states the tool's offset from the
+    head.
     """
     designed = expected.laminate.seams
     problems = _seam_problems(claims, designed)
@@ -349,7 +350,7 @@ def read_seams(
 
 
 def _seam_problems(claims: Manifest, designed: tuple[Seam, ...]) -> list[Problem]:
-    """Return what manifest and design say otherwise of the seams."""
+    """Return the differences between manifest and design in the seams."""
     problems = []
     by_name = {seam.name: seam for seam in designed}
     for claim in claims.seams:

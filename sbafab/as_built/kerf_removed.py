@@ -148,7 +148,7 @@ ON_CIRCLE = 1e-5
 """Largest distance of the ends of chords from their circle, mm."""
 MIN_CHORDS = 5
 MAX_STEP = math.radians(20)
-"""As many chords on one circle, each turning less than this, replace an arc."""
+"""MIN_CHORDS or more chords on one circle, each turning less than this, replace an arc."""
 
 
 class ChordRun(NamedTuple):

@@ -314,7 +314,7 @@ def with_plate_pins(folder: Path, laminate: Laminate, claims: Manifest) -> Lamin
     low_x, low_y, high_x, high_y = laminate.bounds
     middle = (low_x + high_x) / 2, (low_y + high_y) / 2
     for number, (spot, radius) in enumerate((h.circle for h in holes if h.circle), start=1):
-        # As it lies in the laminate whose place is nearest.
+        # Its position within the nearest laminate on the plate.
         candidates = [(spot[0] - x, spot[1] - y) for x, y in _places(claims)]
         centre = min(candidates, key=lambda place: math.dist(place, middle))
         if not any(

@@ -62,7 +62,7 @@ Read = TypeVar("Read", Manifest, JobManifest, AssemblyManifest)
 def _read(folder: Path, kind: type[Read], schema: str) -> Read:
     path = folder / "manifest.json"
     try:
-        # A pipe or a device would be read for ever.
+        # Reading a pipe or a device would never end.
         if path.exists() and not path.is_file():
             raise OutputError(f"{path} is no plain file; regenerate the folder")
         if path.stat().st_size > MAX_MANIFEST_BYTES:
