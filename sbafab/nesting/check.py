@@ -18,11 +18,11 @@ SLACK = 1e-6
 """mm by which a distance may fall short of the spacing: rounding."""
 
 NEAR = 1e-4
-"""mm by which the relative places of two pairs may differ that share a bound of their gaps."""
+"""Two pairs share a bound of their gaps if their relative places differ by less than this, mm."""
 
 
 class Gap(NamedTuple):
-    """A least distance in mm (0 for an overlap) and a place where it is found."""
+    """A least distance in mm (0 for an overlap) and a place at which it occurs."""
 
     value: float
     place: Point
@@ -112,7 +112,7 @@ class _Gaps:
 
     def _shape(self, region: Region) -> int:
         if id(region) not in self._shapes:
-            # Regions of several pieces are no copies.
+            # Regions of several pieces are not matched as copies.
             alone = len(region.contours) == 1
             shape = id(self._copies.first(region.contours[0]) if alone else region)
             self._shapes[id(region)] = region, shape
@@ -120,14 +120,14 @@ class _Gaps:
 
 
 def _round(region: Region) -> tuple[Point, float]:
-    """Return centre and radius of a circle that holds the region: of a disc its own."""
+    """Return centre and radius of a circle that encloses the region; exact for a disc."""
     low_x, low_y, high_x, high_y = region.bounds
     centre = (low_x + high_x) / 2, (low_y + high_y) / 2
     return centre, max(edge.farthest_from(centre) for edge in region.edges)
 
 
 def _circle_gap(a: tuple[Point, float], b: tuple[Point, float]) -> float:
-    """Return the gap between two circles, mm: regions in them are no nearer."""
+    """Return the gap between two circles, mm: a lower bound for regions inside them."""
     return math.dist(a[0], b[0]) - a[1] - b[1]
 
 
@@ -162,7 +162,7 @@ def edge_distance(a: Edge, b: Edge) -> Gap:
 
 
 def _feet(a: Edge, b: Edge) -> Iterator[Point]:
-    """Yield points of ``a`` where its normal can be that of ``b``, too: on the line of centres."""
+    """Yield points of ``a`` whose normal may also be a normal of ``b``: on the line of centres."""
     if isinstance(a, Line) and isinstance(b, Line):
         return
     if isinstance(b, Arc):

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 MANY = 600
 """Number of parts from which only the first few ways to fill a sheet are tried."""
 MOST_LATTICES = 3
-"""Shapes of which a lattice is tried."""
+"""Number of shapes for which lattices are tried."""
 LEAST_COPIES = 3
 """Copies that are worth a lattice or an arrangement."""
 FEW = 16
@@ -132,7 +132,7 @@ def _lattice_ways(parts: Sequence[NestPart], lattices: Mapping[int, Lattice]) ->
 
 
 def takes_lattices(parts: Sequence[NestPart], stock: Stock, sheets: int) -> bool:
-    """Return True if lattices may save film where bottom-left alone takes so many sheets."""
+    """Return True if lattices may save film; bottom-left alone needs this number of ``sheets``."""
     shapes, shape_of = _shapes(parts)
     counts: Counter[int] = Counter()
     for part, shape in zip(parts, shape_of, strict=True):
@@ -496,7 +496,7 @@ def reached(region: Region, corner: Point, shape: tuple[int, int], cell: float) 
 
 
 def meetings(a: Cells, b: Cells) -> Cells:
-    """Return the offsets at which the cells of ``b`` meet those of ``a``.
+    """Return the offsets at which cells of ``b`` meet cells of ``a``.
 
     Entry (0, 0) is where b's upper right cell lies on a's lower left one; the last, the reverse.
     """
@@ -615,8 +615,8 @@ ROUNDING = 5e-7
 class TurnedShape:
     """A shape in one of its turns.
 
-    ``cells`` fill ``frame``, ``bounds`` are those of the shape itself; both mm, in the shape's
-    own frame turned. ``number`` counts the forms of all shapes.
+    ``cells`` fill ``frame``; ``bounds`` are the bounds of the shape itself; both mm, in the
+    shape's own frame turned. ``number`` counts the forms of all shapes.
     """
 
     number: int

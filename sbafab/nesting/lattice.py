@@ -229,7 +229,7 @@ class _Rows:
 
     @cached_property
     def _table(self) -> dict[tuple[int, int], tuple[Numbers, Numbers]]:
-        """How far above one copy another must lie, by its offset to the right."""
+        """The least height of one copy above another, by its offset to the right."""
         width = self.reach[0] - 1e-6
         places = np.linspace(-width, width, TABLE)
         halves = (0,) if self.is_symmetric else (0, 1)

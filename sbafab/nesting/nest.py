@@ -22,7 +22,7 @@ from sbafab.nesting.records import (
 )
 
 NESTED_BY = ("width", "length", "border", "spacing", "pins", "most", "roll", "turns")
-"""What of a film sheet the places of its parts depend on."""
+"""Fields of a film sheet that affect the places of its parts."""
 PLACES = "sheets/nest.json"
 """File of the placements in an output folder, which a later run takes over."""
 
@@ -134,7 +134,7 @@ def from_dict(
 
 
 def _key(nests: Iterable[tuple[Stock, Sequence[NestPart], int]]) -> str:
-    """Return a hash of what was nested, and of whether lattices and arrangements were tried."""
+    """Return a hash of the nesting's inputs and of the methods tried: lattices and arrangements."""
     inputs = [
         (
             "bottom-left, lattices, pairs of lattices, arrangements"
