@@ -130,8 +130,8 @@ FOR_LINES: tuple[Seat, ...] = ("lumen", "inlet")
 def building_order(parts: Mapping[str, AnyPart]) -> tuple[str, ...]:
     """Return part names, the root first, each after its host; else in the file's order.
 
-    Raises DesignError where there is not exactly one root, or a part is fixed on an unknown one, in
-    a circle, or at a place that its host does not have.
+    Raises DesignError unless there is exactly one root, and if a part is fixed on an unknown part,
+    in a circle, or at a place that its host does not have.
     """
     roots = [name for name, part in parts.items() if part.on is None]
     for name, part in parts.items():
@@ -237,7 +237,7 @@ class PlacedPart:
 
     @property
     def height(self) -> float:
-        """Size along its own axis, mm; of an SBA, that of the nominal films."""
+        """Size along its own axis, mm; an SBA's is computed from the nominal films."""
         part = self.part
         if isinstance(part, Tube | Line):
             return part.length
@@ -270,7 +270,7 @@ class PlacedPart:
 
 @dataclass(frozen=True)
 class PlacedSba(PlacedPart):
-    """An SBA in its place; ``radius`` is that of the tube which it is bent round, if any."""
+    """An SBA in its place; ``radius`` is the radius of the tube it is bent round, if any."""
 
     made: PartDesign
     radius: float | None = None
@@ -381,7 +381,7 @@ def _keep_outline(data: dict[str, Any], part: Sba, folder: Path) -> None:
 
 
 def _keep_kit(data: dict[str, Any], part: Sba, assembly: Assembly) -> None:
-    """Resolve a kit's file likewise."""
+    """Resolve a kit's file that the assembly's file names against its folder, not the design's."""
     kit = data.get("kit")
     is_named_here = assembly.kit is not None or "kit" in part.set
     if is_named_here and isinstance(kit, str) and kit not in kit_names():

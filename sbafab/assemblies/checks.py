@@ -197,7 +197,7 @@ def _around(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
 
 
 def _lower_face(placed: PlacedPart) -> Region:
-    """Return the face that is glued on, as it lies on the host's."""
+    """Return the face that is glued on, in its position on the host's face."""
     part = placed.part
     region = _face_of(placed, "bottom").turned(part.turn)
     if part.at in ("bottom", "start"):
@@ -607,7 +607,7 @@ CHECKS: Mapping[CheckName, Callable[[Assembled], Iterator[Finding]]] = {
 AT_MOST: frozenset[CheckName] = frozenset(
     ("tube-match", "inlet-match", "collision", "aperture", "lumen-pass", "supply-tubes")
 )
-"""Checks with an upper limit; those of all others are lower limits."""
+"""Checks with an upper limit; all others have a lower limit."""
 
 
 def run_checks(assembled: Assembled) -> tuple[Finding, ...]:

@@ -117,7 +117,7 @@ def plain_tables(assembly: Assembly) -> dict[str, Any]:
 
 
 def resolved(assembled: Assembled) -> dict[str, Any]:
-    """The assembly with every default written out; designs are those of the parts' folders."""
+    """The assembly with every default written out; designs refer to the parts' folders."""
     assembly = assembled.assembly
     table = assembly.model_dump(mode="json", exclude={"kit", "sheets", "laser", "press"})
     for name, part in table["parts"].items():

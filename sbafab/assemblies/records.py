@@ -48,24 +48,24 @@ class Fixed(Section):
     on: str | None = None
     """The part that this one is fixed on."""
     at: Seat | None = None
-    """Where on it: top or bottom (of an SBA, a magnet, a base), start, end or outside (of a tube),
-    lumen (lines only: of an SBA or a tube), inlet (lines only: of an SBA)."""
+    """Place on that part: top or bottom (of an SBA, a magnet, a base), start, end or outside (of a
+    tube), lumen (lines only: of an SBA or a tube), inlet (lines only: of an SBA)."""
     angle: Degrees = 0.0
-    """At the outside of a tube: how far round it."""
+    """At the outside of a tube: angle round the tube."""
     turn: Degrees = 0.0
     """Turn of the part about its own axis before it is fixed."""
     along: Shift = 0.0
-    """At the outside of a tube or in a lumen: how far from the start, to the part's own origin."""
+    """At the outside of a tube or in a lumen: distance from the start to the part's own origin."""
     offset: Annotated[tuple[Shift, Shift], Field(strict=False)] = (0.0, 0.0)
-    """At a top, bottom, start or end: how far off the axis, x and y."""
+    """At a top, bottom, start or end: offset from the axis, x and y."""
     glue: Words | None = None
-    """The adhesive to order; none where the part is held otherwise."""
+    """The adhesive to order; none if the part is held otherwise."""
     note: Annotated[str, Field(max_length=400)] = ""
     """Printed with the part's step in the traveller."""
 
 
 class Sba(Fixed):
-    """A stacked balloon actuator, cut and pressed from a design of its own."""
+    """A stacked balloon actuator, cut and pressed from its own design."""
 
     kind: Literal["sba"]
     """A stacked balloon actuator, from a design."""
@@ -79,7 +79,7 @@ class Tube(Fixed):
     kind: Literal["tube"]
     """A tube."""
     outer_diameter: Length = 15.0
-    """As in the paper, Sec. 2.1."""
+    """From the paper, Sec. 2.1."""
     inner_diameter: Length = 11.0
     """Ours: the paper gives none."""
     length: Length = 40.0
@@ -100,9 +100,9 @@ class Magnet(Fixed):
     diameter: Length = 1.5875
     """1/16 in, as the seller's part numbers read: D, then sixteenths of an inch."""
     thickness: Length = 1.5875
-    """Likewise 1/16 in."""
+    """1/16 in."""
     part: Words = "K&J Magnetics D11SH"
-    """What to order (paper, Sec. 2.1)."""
+    """The part to order (paper, Sec. 2.1)."""
 
 
 class Cup(Fixed):
@@ -111,7 +111,7 @@ class Cup(Fixed):
     kind: Literal["cup"]
     """A cast suction cup."""
     diameter: Length = 8.0
-    """Of the rim. Ours: the paper gives none."""
+    """Diameter of the rim. Ours: the paper gives none."""
     neck: Length = 5.0
     """Diameter of the end that is glued on. Ours."""
     height: Length = 4.0
@@ -121,7 +121,7 @@ class Cup(Fixed):
     bore: Length = 1.1
     """For the vacuum line. Ours."""
     material: Words = "Ecoflex 00-30 silicone"
-    """What it is cast from (paper, Sec. 2.1)."""
+    """The cast material (paper, Sec. 2.1)."""
 
     @model_validator(mode="after")
     def _is_hollow(self) -> Self:
@@ -140,13 +140,13 @@ class Line(Fixed):
     kind: Literal["line"]
     """Tubing for vacuum or fluid."""
     outer_diameter: Length = 1.016
-    """Of the paper's tubing."""
+    """The paper's tubing."""
     inner_diameter: Length = 0.635
-    """Of the paper's tubing."""
+    """The paper's tubing."""
     length: Length = 60.0
-    """What is drawn of it. Ours."""
+    """The length to draw. Ours."""
     tubing: Words = "Braintree RPT040"
-    """What to order (paper, Sec. 2.1)."""
+    """The tubing to order (paper, Sec. 2.1)."""
     chamber: Words = "chamber1"
     """The chamber whose inlet it goes into, at an inlet."""
 
@@ -167,7 +167,7 @@ class Base(Fixed):
     length: Length
     """Along y."""
     thickness: Length
-    """How high it is."""
+    """Its height."""
     material: Words
     """Printed on the traveller."""
 
@@ -198,12 +198,12 @@ def _waivable() -> tuple[str, ...]:
 
 
 class AssemblyRules(Section):
-    """Limits of the checks between parts, and what is waived."""
+    """Limits of the checks between parts, and waived checks and rules."""
 
     line_clearance: LengthOrZero = 0.1
     """Lumen less line, in diameter, at least (the paper gives none)."""
     tube_tolerance: LengthOrZero = 0.05
-    """By how much a radial design's tube and the tube it is wrapped round may differ (ours)."""
+    """Largest difference between a radial design's tube and the tube it is wrapped round (ours)."""
     seat_share: float = Field(default=0.25, ge=0, le=1)
     """Least share of the smaller of two glued faces that lies on the other (ours)."""
     waive: tuple[Annotated[str, *name_of(_waivable)], ...] = Field(default=(), strict=False)
@@ -214,7 +214,7 @@ class AssemblyRules(Section):
 class Assembly(Section):
     """An assembly: a tree of parts with one root.
 
-    ``kit``, ``sheets``, ``laser`` and ``press``, where given, count for every part's design.
+    ``kit``, ``sheets``, ``laser`` and ``press``, if given, apply to every part's design.
     """
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -222,7 +222,7 @@ class Assembly(Section):
     family: Literal["assembly"] = "assembly"
     """That this is an assembly."""
     pose: Literal["upright", "lying"] = "upright"
-    """How pictures and the solid show it: the root's axis upright, or lying (angle 0 is down)."""
+    """Pose in pictures and the solid: the root's axis upright, or lying (angle 0 is down)."""
     parts: Annotated[
         dict[PartName, Annotated[AnyPart, Field(discriminator="kind")]],
         Field(min_length=1, max_length=60),
@@ -232,9 +232,9 @@ class Assembly(Section):
     rules: AssemblyRules = AssemblyRules.model_construct()
     order: Order = Order.model_construct()
     kit: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
-    """The kit of all parts' designs, in place of their own: a kit's name, or a file beside this."""
+    """The kit for all parts' designs, overriding theirs: a kit's name, or a file beside this."""
     sheets: Sheets | None = None
-    """Sheets for all parts' designs, in place of their own."""
+    """Sheets for all parts' designs, which override theirs."""
     laser: Laser | None = None
     """The laser for all parts' designs."""
     press: Press | None = None
