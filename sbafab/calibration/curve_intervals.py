@@ -31,12 +31,13 @@ def uncertainty_for(curve: MeasuredCurve, calibration: ModelCalibration) -> Unce
 
 
 def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends | None] | None:
-    """Return the interval that holds the measured value at each point of a curve, in its unit, over
-    all that its source leaves open; None where the calibration does not cover its quantity. It
-    counts the calibration's uncertainty, what the models miss and the error of the measurement.
+    """Return the interval of the measured value at each point of a curve, in its unit.
 
-    A point has none where an assumption that reaches it at the median fails to with factors one
-    standard deviation away.
+    The interval spans every assumption on the set-up that the source leaves open. It includes the
+    calibration's uncertainty, the models' discrepancy and the error of the measurement. Returns
+    None if the calibration does not cover the quantity. A point's interval is None if an
+    assumption reaches the point with the median factors, but not with factors one standard
+    deviation away.
     """
     group = GROUP_OF.get(curve.quantity)
     if group is None or isinstance(model_values(curve, uncertainty.factors), NoModel):

@@ -65,8 +65,9 @@ class LeftOutFit(NamedTuple):
 
 @dataclass(frozen=True)
 class OpenSetUp:
-    """What a curve's source leaves open: each ``phrase`` that was assumed, with its probability by
-    the fit, from equal ones before.
+    """The set-ups that a curve's source leaves open: each assumed ``phrase`` with its probability.
+
+    The probabilities are the fit's, from equal prior ones.
     """
 
     curve: str
@@ -206,8 +207,9 @@ def relative_errors(curve: MeasuredCurve) -> Array:
 def held_out(
     measured: Sequence[MeasuredCurve], curves: Sequence[SampledCurve], progress: Progress
 ) -> list[HeldOutPoint]:
-    """Return each curve's points as a fit without its test predicts them; none where all curves
-    are of one test.
+    """Return each curve's points, predicted by a fit without its test.
+
+    Empty if all curves are of one test.
     """
     return [
         point
@@ -221,8 +223,9 @@ def held_out(
 def left_out_fits(
     curves: Sequence[SampledCurve], progress: Progress, only: Collection[str] = ()
 ) -> Iterator[LeftOutFit]:
-    """Yield a fit without each test, or each of ``only`` these, one after the other; none where all
-    curves are of one.
+    """Yield fits that each leave out one test: every test in turn, or each of ``only``.
+
+    Yields nothing if all curves are of one test.
     """
     tests = list(dict.fromkeys(curve.test for curve in curves))
     for done, test in enumerate(tests if len(tests) > 1 else ()):
@@ -290,7 +293,7 @@ def as_calibration(
 
 
 def calibration_text(calibration: ModelCalibration) -> str:
-    """Return the text of a calibration's file, its unknowns in words at the top."""
+    """Return the text of a calibration's file; comments at the top describe its unknowns."""
     lines = ["# Written by sbafab calibrate. Medians, with 90 % intervals in parentheses:"]
     for unknown in UNKNOWNS:
         low, high = calibration.bounds(unknown.field)

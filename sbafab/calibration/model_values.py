@@ -34,33 +34,34 @@ from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack
 from sbafab.models.unknowns import UNKNOWNS
 
 ModelValue = float | None
-"""A value of a model; None where the model has no such state."""
+"""A value of a model; None if the model has no such state."""
 SAMPLES = 16
 LEAST_FREE_KPA, FIRST_KPA, MOST_FREE_KPA = 0.002, 0.5, 20.0
 """Pressures between which a single balloon is inflated, and the first end of its range."""
 NO_TUBE = 1e-3
 """Length in mm of a tube that takes no pressure."""
 OPEN_PRESSURES = (10.0, 30.0, 100.0)
-"""Pressures in kPa that stand for one that a source does not give: from the paper's full actuation
-(Sec. 4.5) to that of its forces (Sec. 4.3)."""
+"""Pressures in kPa to assume if a source does not state one: from the paper's full actuation
+(Sec. 4.5) to the pressure of its forces (Sec. 4.3)."""
 LEAST_RATIO = UNKNOWNS[0].least
-"""Modulus ratio for which maps are made; those of stiffer films reach further."""
+"""Modulus ratio for which maps are made; maps of stiffer films reach further."""
 
 
 @dataclass(frozen=True)
 class ModelValues:
     """Values of a model at a curve's points, in its unit.
 
-    ``series`` has one value a point for each assumption on what the source does not say, by a
-    phrase that names it; the phrase is "" where nothing is assumed.
+    ``series`` maps each assumption on the set-up, as a phrase, to one value for each point. The
+    phrase is "" if nothing is assumed.
     """
 
     model: str
     series: Mapping[str, tuple[ModelValue, ...]]
 
     def ranges(self) -> list[tuple[float, float] | None]:
-        """Return the least and largest value of the assumptions at each point; None where no
-        assumption has one.
+        """Return the least and largest value over the assumptions at each point.
+
+        None for a point at which no assumption has a value.
         """
         ends: list[tuple[float, float] | None] = []
         for values in zip(*self.series.values(), strict=True):
@@ -80,8 +81,8 @@ def model_values(
 ) -> ModelValues | NoModel:
     """Return the values of the models at a curve's points, or why there are none.
 
-    ``factors`` are those of a calibration; by default there are none. What the curve's set-up
-    leaves open is assumed in every way that counts, a series each. ``shares_maps`` is for fits
+    ``factors`` come from a calibration; by default the models use none. For an open set-up, every
+    assumption that matters gives one series. ``shares_maps`` is for fits
     that ask for many factors.
     """
     answer = ANSWERS.get(curve.quantity)
@@ -117,7 +118,7 @@ def measured_design(text: str) -> tuple[Design, Laminate]:
     name, changes, toml = json.loads(text)
     if toml:
         tables = toml_tables(toml, "the record's design")
-        # All that its kit gave stands in the record.
+        # The record contains every value of the kit.
         tables.pop("kit", None)
         design = validated(tables, records(), Path())
     else:
@@ -132,18 +133,19 @@ def _drawn_stack(text: str, loss: float) -> tuple[Stack, Factors]:
 
 
 def drawn_stack(measured: MeasuredActuator, loss: float) -> tuple[Stack, Factors]:
-    """Return the stack with a pocket loss in mm at the least modulus ratio, and its factors: other
-    factors need no maps of their own.
+    """Return the stack with a pocket loss in mm at the least modulus ratio, and its factors.
+
+    Its maps also serve all other factors.
     """
     return _drawn_stack(_text(measured), loss)
 
 
 @dataclass(frozen=True)
 class ModelledActuator:
-    """The actuator of a curve as the models take it; parts are built when first asked for.
+    """The actuator of a curve for the models; parts are built on first use.
 
-    Where it ``shares_maps`` one map of its balloons serves every modulus and press factor: poses
-    are then within 1 % of those of maps made for them, and take no second.
+    With ``shares_maps``, one map of its balloons serves every modulus and press factor: poses are
+    then within 1 % of poses from dedicated maps, and take less than a second.
     """
 
     measured: MeasuredActuator
@@ -181,7 +183,7 @@ class ModelledActuator:
         return elastic.calibrated(elastic.FORCE, self.factors).name
 
     def figure(self, quantity: Quantity) -> Figure:
-        """Return the prediction's figure of a quantity. Raises DesignError where it has none."""
+        """Return the prediction's figure of a quantity. Raises DesignError if it does not exist."""
         pressures = usual_pressures(self.design.form)[-1:]
         request = PredictionRequest(pressures, calibration=self.factors)
         prediction = predict(self.design, request, self.laminate, quick=True)
@@ -195,8 +197,9 @@ class ModelledActuator:
 def _by_pressure(
     curve: MeasuredCurve, value: Callable[[float], ModelValue]
 ) -> dict[str, tuple[ModelValue, ...]]:
-    """Return a value at each pressure of a curve, by what is assumed of the pressure where neither
-    axis nor set-up gives one: OPEN_PRESSURES.
+    """Return a value at each pressure of a curve, by the assumption on the pressure.
+
+    OPEN_PRESSURES are assumed if neither axis nor set-up gives a pressure.
     """
 
     def reached(pressure: float) -> ModelValue:
@@ -273,8 +276,10 @@ def _blocked_states(
 
 
 def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> dict[str, tuple[ModelValue, ...]]:
-    """Return the strokes in mm at shares of the full one, by assumption on that: a free stroke at
-    OPEN_PRESSURES, or one of those that the paper gives; None where it does not rise freely.
+    """Return the strokes in mm at shares of the full stroke, by the assumption on the full stroke.
+
+    Assumptions are a free stroke at each of OPEN_PRESSURES, or one that the paper gives. Values
+    are None if the actuator does not rise freely.
     """
     if not any(shares):
         return {"": shares}
@@ -318,7 +323,7 @@ def _bent_forces(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | No
 
 
 def _bent_force(whole: Stack, chambers: int, angle: float, pressure: float) -> ModelValue:
-    """Return N on a plate square to the tip at an angle; None where it does not bend so far."""
+    """Return N on a plate square to the tip at an angle; None if it does not bend that far."""
     pose = elastic.pose_bent_by(whole, chambers, angle)
     if pose is None or pose.pressures[0] > pressure:
         return None
@@ -342,7 +347,7 @@ def _chamber_counts(of: ModelledActuator, curve: MeasuredCurve) -> list[int]:
 
 
 def _chambers(count: int, counts: list[int]) -> str:
-    """Return the assumption that so many chambers are pressurised; "" where the source says so."""
+    """Return the phrase that assumes ``count`` pressurised chambers; "" if the source states it."""
     return chamber_count(count) if len(counts) > 1 else ""
 
 
@@ -400,8 +405,9 @@ def _at_pressure(
 
 
 def _pose_with(whole: Stack, chambers: int, volume: float) -> Pose | None:
-    """Return the free pose whose chambers took in so many ul in all; None beyond the stack's
-    pressures.
+    """Return the free pose with ``volume`` ul added to the pressurised chambers in total.
+
+    None if that takes more than the stack's greatest pressure.
     """
     empty = float(whole.pose((0.0,) * whole.chambers).volumes[:chambers].sum())
     low, high = 0.0, min(whole.most_pressure, MOST_PRESSURE)
@@ -432,7 +438,10 @@ def _balloon_strokes(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues 
 
 
 def _strokes_by_volume(balloon: Balloon, volumes: tuple[float, ...]) -> tuple[ModelValue, ...]:
-    """Return mm of a free balloon by ul in it, to 0.2 %; None where MOST_FREE_KPA hold less."""
+    """Return the strokes in mm of a free balloon by its volume in ul, to 0.2 %.
+
+    None for a volume that MOST_FREE_KPA does not reach.
+    """
     top = FIRST_KPA
     while top < MOST_FREE_KPA and _free_volume(balloon, top) < max(volumes):
         top = min(2 * top, MOST_FREE_KPA)

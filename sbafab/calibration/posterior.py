@@ -1,9 +1,9 @@
 """Posterior of the unknowns and of the models' discrepancy, sampled by emcee.
 
-The logarithm of a measured value is that of the model, plus a discrepancy, plus the error of the
-measurement. Discrepancies are normal with one standard deviation for each group of quantities; half
-of their variance is shared by the points of a curve. Where a source leaves a set-up open, each one
-is as likely as the others.
+The logarithm of a measured value is the logarithm of the model's value, plus a discrepancy, plus
+the error of the measurement. Discrepancies are normal with one standard deviation for each group of
+quantities; half of their variance is shared by the points of a curve. If a source leaves the set-up
+open, all candidate set-ups are equally likely.
 """
 
 from __future__ import annotations
