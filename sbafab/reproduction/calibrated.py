@@ -95,7 +95,7 @@ def _number(point: ComparedPoint) -> str:
 
 
 def lines(paper: CalibratedPaper) -> Iterator[str]:
-    """Yield the section of the page: what was fitted and how well it holds, then the table."""
+    """Yield the section of the page: the fit and how well it holds, then the table."""
     yield f"## {TITLE}\n"
     yield from sentences(paper)
     yield ""
@@ -107,7 +107,7 @@ def lines(paper: CalibratedPaper) -> Iterator[str]:
 
 
 def sentences(paper: CalibratedPaper) -> Iterator[str]:
-    """Yield what a calibration was fitted to, its values, and what they leave unknown."""
+    """Yield sentences on a calibration: its data, its values, and the uncertainty that remains."""
     calibration = paper.calibration
     yield (
         f"The calibration `{calibration.name}`, the default of predictions, is fitted to the "

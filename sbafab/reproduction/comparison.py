@@ -14,16 +14,16 @@ from sbafab.models.calibrated import Ends, ModelCalibration
 from sbafab.models.figures import Factors
 
 Intervals = Callable[[MeasuredCurve], Sequence[Ends | None] | None]
-"""Intervals of a prediction at the points of a curve; None where there are none."""
+"""Intervals of a prediction at the points of a curve; None for a point or a curve without any."""
 WIDTH = 100
 
 
 @dataclass(frozen=True)
 class ComparedPoint:
-    """A measured value beside the models' range over what its source leaves open.
+    """A measured value beside the models' range over the set-ups that its source leaves open.
 
-    ``error`` is the measured value's standard error. ``model`` is None where no model has a value;
-    ``interval`` is that of the prediction, None where it has none.
+    ``error`` is the measured value's standard error. ``model`` is None if no model has a value;
+    ``interval`` is the prediction's, None if it has no interval.
     """
 
     x: float | None
@@ -49,8 +49,10 @@ class ComparedPoint:
 
 @dataclass(frozen=True)
 class ComparedCurve:
-    """A measured curve with its points; ``assumptions`` are those of the model's range, and
-    ``reason`` says why there is no model.
+    """A measured curve with its points.
+
+    ``assumptions`` are the assumptions behind the model's range; ``reason`` explains a missing
+    model.
     """
 
     source: str
@@ -115,7 +117,7 @@ COLUMN = "{:<8}{:>12}{:>20}{:>22}{:>18}  {}"
 
 
 def table_lines(curves: Sequence[ComparedCurve]) -> Iterator[str]:
-    """Yield the lines of the table, and below it what there is to say of its curves."""
+    """Yield the lines of the table, and below it the notes on its curves."""
     yield COLUMN.format(*HEADER)
     for compared in curves:
         curve = compared.curve
@@ -210,7 +212,7 @@ class CurveDocument(Document):
 
 
 class SourceDocument(Document):
-    """What a source is, and what of it is not had."""
+    """A source of evidence, and the parts of it that are missing."""
 
     id: str
     citation: str

@@ -22,11 +22,11 @@ from sbafab.models.stack import Stack, stack
 from sbafab.pressing.schedule import schedule
 
 NONE = "none"
-"""The model of what none predicts."""
+"""The model's name for a figure that no model predicts."""
 
 
 class Row(NamedTuple):
-    """A figure of the paper; ``predicted`` None where no model knows it."""
+    """A figure of the paper; ``predicted`` is None if no model predicts it."""
 
     figure: str
     measured: paper.Measured
@@ -36,12 +36,12 @@ class Row(NamedTuple):
 
     @property
     def paper(self) -> float | None:
-        """The paper's value; None where it is a word."""
+        """The paper's value; None if it is a word."""
         return self.measured.value if self.measured.unit else None
 
     @property
     def error(self) -> float | None:
-        """The paper's error; None where it gives none."""
+        """The paper's error; None if it does not state one."""
         return self.measured.error or None
 
 
@@ -261,7 +261,7 @@ def simulators() -> Iterator[Row]:
 STACK = ModelId.ELASTIC_STACK.words
 FORCE_MODELS = (ModelId.WORK_ON_EQ_4, ModelId.WORK_ON_EQS_1_TO_3, ModelId.ELASTIC_STACK)
 ENERGY_BALLOONS = 6
-"""Of the actuator whose energy was measured (Sec. 7)."""
+"""Balloons of the actuator whose energy was measured (Sec. 7)."""
 AVERAGED = (
     "the paper's mean is over two 3-DoF and one 1-DoF actuator (Sec. 7), whose numbers of balloons "
     "it does not give; ours is one 3-DoF of 15"
@@ -423,7 +423,7 @@ def _times(three: Prediction, whole: Stack) -> Iterator[Row]:
 
 
 def _pressure_at(whole: Stack, height: float) -> float:
-    """KPa in all chambers at which the stack is so many mm high."""
+    """Pressure in kPa in all chambers at which the stack reaches a height in mm."""
     low, high = 0.0, whole.most_pressure
     for _ in range(40):
         middle = (low + high) / 2
@@ -492,7 +492,7 @@ def stiffness(single: Prediction, three: Prediction) -> Iterator[Row]:
 
 
 def fuller() -> Iterator[Row]:
-    """Strokes of Fig. 7a, which the paper gives as Eq. 4 and the largest error up to a volume."""
+    """Strokes of Fig. 7a, which the paper states as Eq. 4 with the largest error up to a volume."""
     design = load_design("1dof-10mm")
     (balloon,) = set(balloons_of(design, build(design), Factors()))
     shapes = free_shapes(balloon, np.geomspace(0.01, 20.0, 60))
