@@ -95,9 +95,9 @@ def evidence_ids() -> tuple[str, ...]:
 
 
 def load_evidence(source: str | Path) -> Evidence:
-    """Return the evidence of a source that ships, or of a file (``.toml``, ``.csv``).
+    """Return the evidence of a shipped source, or of a file (``.toml``, ``.csv``).
 
-    Raises DesignError with one sentence for what is no such source, or for a fault in it.
+    Raises DesignError with one sentence if the source does not exist or has a fault.
     """
     if str(source) in evidence_ids():
         return _shipped(str(source))
@@ -214,7 +214,7 @@ def _check_ids(curves: Sequence[MeasuredCurve], path: Path) -> None:
             raise DesignError(f"{path} has two curves {shown(name)}; give each its id")
 
 
-# CSV: a row a value; the cells of a curve stand in its first row, and may be repeated below.
+# CSV: one row for each value; a curve's cells are in its first row, and may be repeated below.
 
 
 COLUMNS = (
@@ -389,7 +389,7 @@ def _curve_of_rows(name: str, rows: Sequence[TableRow], path: Path) -> MeasuredC
 
 
 def _cells_of_curve(rows: Sequence[TableRow]) -> dict[str, str]:
-    """Return what the rows say of their curve. Raises DesignError where two rows do not agree."""
+    """Return the curve's fields from its rows. Raises DesignError if two rows do not agree."""
     cells: dict[str, str] = {}
     for where, row in rows:
         for key, cell in row.items():

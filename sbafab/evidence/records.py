@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 
 class CurveQuantity(NamedTuple):
-    """A measured quantity: its unit, its name in words, and the axes that it is measured against.
+    """A measured quantity: its unit, its title, and the axes that it is measured against.
 
-    The axis "" stands for a quantity that is measured against none.
+    The axis "" means that the quantity is measured without an axis.
     """
 
     unit: str
@@ -29,7 +29,7 @@ AXES = {
     NO_AXIS: "",
 }
 """Axes and their units. ``height_share`` counts from the flat to the full height, as the source
-counts it; ``volume_ul`` of ``balloon_stroke_mm`` is that of one balloon, else of all chambers."""
+counts it; ``volume_ul`` is one balloon's for ``balloon_stroke_mm``, else all chambers' in total."""
 QUANTITIES = {
     "force_n": CurveQuantity(
         "N", "blocked force", ("height_share", "stroke_mm", "bend_deg", "pressure_kpa", NO_AXIS)
@@ -96,17 +96,17 @@ class StatedError:
 
 TIPS = ("free", "held", "bent", "pushed", "")
 """States of the tip: free; held at a height by a plate or sensor; bent and held by a sensor; pushed
-to a side; not known, or of no matter."""
+to a side; unknown or irrelevant."""
 
 
 @dataclass(frozen=True)
 class Setup:
-    """The set-up of a measurement; None and "" are what the source does not say.
+    """The set-up of a measurement; None and "" mean that the source does not state the value.
 
     ``supply`` feeds ``fluid`` ("air" or "water") at ``flow_ml_min`` through a tube of ``tube_mm``
     length and ``tube_bore_mm`` bore. ``chambers`` are pressurised, the others empty. ``tip`` is one
-    of TIPS; it is held at ``height_share`` or ``stroke_mm``, or bent by ``bend_deg``. What is an
-    axis of the curve, as ``pressure_kpa`` may be, is empty here.
+    of TIPS; it is held at ``height_share`` or ``stroke_mm``, or bent by ``bend_deg``. The curve's
+    axis, which may be ``pressure_kpa``, is empty here.
     """
 
     supply: str = ""
@@ -182,7 +182,7 @@ class MeasuredCurve:
 
     @property
     def y_name(self) -> str:
-        """The quantity in words."""
+        """The quantity's title."""
         return QUANTITIES[self.quantity].title
 
     @property
@@ -192,7 +192,7 @@ class MeasuredCurve:
 
     @property
     def errors(self) -> tuple[float | None, ...]:
-        """Standard errors of the values, in their unit; None where the source states none."""
+        """Standard errors of the values, in their unit; None if the source does not state them."""
         if not self.error.is_stated:
             return (None,) * len(self.y)
         absolute = self.error.absolute or (0.0,) * len(self.y)
