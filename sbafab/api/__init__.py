@@ -110,7 +110,7 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    """Return a function or a record from the module that has it."""
+    """Return a function or a record from its module."""
     if name not in __all__:
         raise AttributeError(f"module 'sbafab.api' has no attribute '{name}'")
     home = next((module for module, names in MODULES.items() if name in names), "api.designs")

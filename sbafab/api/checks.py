@@ -43,8 +43,8 @@ def checking(
     """Yield every rule's name and its findings in a design, as they are measured.
 
     Iteration may stop at any rule; registration-yield, which draws builds, comes last.
-    ``laminate`` is the design's, where it is built already; ``pause`` is called between parts of
-    long rules, and what it raises ends the deck. Raises DesignError.
+    ``laminate`` is the design's, if already built; ``pause`` is called between parts of long
+    rules, and an exception from it ends the deck. Raises DesignError.
     """
     design = load(source)
     measures = Measures(laminate or build(design), design, pause or (lambda: None))
@@ -57,8 +57,8 @@ def nets_of(source: Source, *changes: Change, **tables: Any) -> NetMap:
 
     ``areas`` have an ``interface``, counted from 1 at the bottom, a ``net`` ("" for none), its
     ``colour`` and their outline as SVG ``path``, mm. ``faults`` are opens, shorts, leaks, dead ends
-    and voids of no net, each with its place; a design that declares no nets has none, and every
-    chamber of it is a net. Raises DesignError.
+    and voids outside all nets, each with its place. If a design declares no nets, every chamber is
+    a net and ``faults`` is empty. Raises DesignError.
     """
     design = load(source, *changes, **tables)
     laminate = build(design)

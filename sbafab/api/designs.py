@@ -130,12 +130,13 @@ def load(
 @overload
 def load(source: str | Path, *changes: Change, **tables: Any) -> Design: ...
 def load(source: Source, *changes: Change, **tables: Any) -> Design:
-    """Return a design, with keys changed and checked like those of a file.
+    """Return a design, optionally with changed keys.
 
-    Lengths are mm, or texts with a unit such as ``"0.75 mm"`` and ``"6 in"``. A type checker knows
-    the family of a template, and so ``load("3dof-15mm").chamber.diameter``; that of a file is told
-    by ``typing.cast(LobedDesign, load("my.toml"))``, with ``LobedDesign`` of
-    ``sbafab.actuators.lobed``. Raises DesignError with field, value and what is allowed.
+    Keys are checked like keys of a file. Lengths are mm, or texts with a unit such as ``"0.75 mm"``
+    and ``"6 in"``. A type checker knows a template's family, and so
+    ``load("3dof-15mm").chamber.diameter``; for a file, state the family with
+    ``typing.cast(LobedDesign, load("my.toml"))``, where ``LobedDesign`` is from
+    ``sbafab.actuators.lobed``. Raises DesignError with field, value and the allowed values.
     """
     return design_of(source, changes, tables)
 
@@ -165,7 +166,7 @@ def build(source: Source, *changes: Change, **tables: Any) -> Laminate:
 def read_laminate(path: str | Path) -> Laminate:
     """Return the laminate of a ``laminate.json``, equal to the one that was written.
 
-    Raises DesignError, which names the file and the place in it, for what is no such file.
+    Raises DesignError with the file and the place in it if the file is not a valid laminate.
     """
     return laminate_file.read_laminate(Path(path))
 
@@ -184,8 +185,8 @@ def assemble(source: str | Path | Assembly, *changes: Change, **tables: Any) -> 
 def solid(source: Source | Laminate | PlacedPart, *changes: Change, **tables: Any) -> Surface:
     """Return the closed surface of the flat actuator in mm, as for ``solid(...).trimesh()``.
 
-    Films have their nominal thickness, pockets that of their mask. Of an assembly's part it is the
-    outside, in the part's own frame and bent round its tube; ``part.pose`` places it. Raises
+    Films have their nominal thickness, pockets their mask's thickness. For an assembly's part it is
+    the outside, in the part's own frame and bent round its tube; ``part.pose`` places it. Raises
     DesignError.
     """
     if isinstance(source, PlacedPart):

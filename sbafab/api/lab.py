@@ -44,10 +44,10 @@ def record(
     """Record results of a design or an assembly in the lab's file; return the records added.
 
     ``values`` holds ``serial``, ``leak`` ("pass" or "fail"), ``operator``, ``kit``, ``note``, and
-    what was measured: ``proof_kpa``, ``burst_kpa``, ``stroke_mm``, ``force_n``, ``height_mm``,
-    ``mass_g``, one or several of ``offset_mm``, ``turn_deg``, ``cut_mm``; beside tables of the
-    design. A ``table`` (CSV) says it of a batch instead. ``again`` records new attempts of
-    actuators that were mended and tested again. Raises DesignError, OutputError.
+    the measurements: ``proof_kpa``, ``burst_kpa``, ``stroke_mm``, ``force_n``, ``height_mm``,
+    ``mass_g``, one or several of ``offset_mm``, ``turn_deg``, ``cut_mm``. It may also hold tables
+    of the design. For a batch, pass a ``table`` (CSV) instead. ``again`` records new attempts of
+    actuators that were repaired and tested again. Raises DesignError, OutputError.
     """
     result = {name: values.pop(name) for name in columns(Record) if name in values}
     if table is not None and result:

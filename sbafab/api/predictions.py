@@ -41,17 +41,17 @@ def predict(
     laminate: Laminate | None = None,
     **tables: Any,
 ) -> Prediction:
-    """Predict what a design will do; each figure has a unit and names its model and its trust.
+    """Predict the behaviour of a design; each figure has a unit, a model and a level of trust.
 
-    Forces and works are at ``pressures_kpa`` (gauge; by default 10 and 100, of a design that works
-    under a vacuum -10 and -100), times at ``flow_ml_min`` into each chamber, strokes
+    Forces and works are at ``pressures_kpa`` (gauge; by default 10 and 100, or -10 and -100 for a
+    design that works under a vacuum), times at ``flow_ml_min`` into each chamber, strokes
     with ``volumes_ul`` in each balloon. ``quick`` leaves out the curves and the figures of the
-    elastic stack, which take seconds; ``laminate`` is the design's, where it is built already.
+    elastic stack, which take seconds; ``laminate`` is the design's, if already built.
     The user's own ``press_factor`` and ``contact_factor`` (ratios), ``pocket_loss`` in mm and
-    ``modulus_mpa`` take the place of the calibration's. ``tables`` are those of the design, such as
+    ``modulus_mpa`` replace the calibration's. ``tables`` override tables of the design, such as
     ``models={"calibration": "none"}``. Figures of calibrated models have a 90 % ``interval``.
-    Raises DesignError for what is out of every model's range. Models: the paper's Eqs. 1-4 (Sec.
-    3), and elastic balloons of axisymmetric film in balance.
+    Raises DesignError if a request is outside every model's range. Models: the paper's Eqs. 1-4
+    (Sec. 3), and elastic balloons of axisymmetric film in equilibrium.
     """
     design = load(source, *changes, **tables)
     usual = usual_pressures(design.form)
@@ -118,11 +118,11 @@ def stack(
 ) -> Stack:
     """The actuator as plates joined by balloons, for poses in real time: ``stack.pose((5, 5, 0))``.
 
-    ``most_pressure`` kPa is the most that it may be asked for: for ``stack.pose((300, 300, 300))``
+    ``most_pressure`` kPa is the largest pressure of any pose: for ``stack.pose((300, 300, 300))``
     make it with ``most_pressure=300``. The user's own ``press_factor`` (a ratio), ``pocket_loss``
-    in mm and ``modulus_mpa`` take the place of the calibration's; ``tables`` are those of the
-    design. Raises DesignError for pockets that are not round. Balloons lengthen and tilt and carry
-    no shear (paper, Sec. 4.4).
+    in mm and ``modulus_mpa`` replace the calibration's; ``tables`` override tables of the design.
+    Raises DesignError for pockets that are not round. Balloons lengthen and tilt but do not carry
+    shear (paper, Sec. 4.4).
     """
     design = load(source, *changes, **tables)
     own = {"press_factor": press_factor, "pocket_loss": pocket_loss, "modulus_mpa": modulus_mpa}

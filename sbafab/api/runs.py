@@ -23,12 +23,12 @@ from sbafab.simulators.simulator import Name, SimulationRequest
 
 
 def import_design(source: str | Path, out: str | Path | None = None) -> Design:
-    """Import what another program, or a run, wrote: a design of drawn layers, with its files.
+    """Import files of another program, or of a run: a design of drawn layers, with its files.
 
-    ``source`` is what ``sbafab import`` reads; ``out`` is the design file to write, by default
-    its name in this folder, with drawings in a folder beside it. What is not carried over is
-    warned of, a ``UserWarning`` a place. Raises DesignError for what cannot be imported,
-    OutputError where a file is in the way.
+    ``source`` is any source that ``sbafab import`` reads; ``out`` is the design file to write, by
+    default its name in this folder, with drawings in a folder beside it. A ``UserWarning`` names
+    each place that is not carried over. Raises DesignError if the source cannot be imported,
+    OutputError if a file is in the way.
     """
     path = Path(source)
     _, imported = import_source(path)
@@ -49,9 +49,9 @@ def generate(
 ) -> Run:
     """Writes everything into ``out/<name>/``; the run tells whether a rule failed.
 
-    ``progress`` is told what is done; what it raises ends the run, with the old folder whole.
-    Raises DesignError, OutputError where the folder cannot be written or is another design's, and
-    DefectError where what was written is not what was checked.
+    ``progress`` is called with each step; an exception from it ends the run and leaves the old
+    folder intact. Raises DesignError, OutputError if the folder cannot be written or belongs to
+    another design, and DefectError if the written files differ from the checked design.
     """
     return run(RunRequest(either_of(source, changes, tables), Path(out)), progress)
 
@@ -68,8 +68,8 @@ def cut(
 ) -> Run:
     """Writes the cut files and film sheets, DXF R2010 in mm.
 
-    ``dxf_profile`` is "bulges", "arcs" (LINE, ARC, CIRCLE) or "chords"; ``chord_error`` mm counts
-    for the last. ``progress`` is told what is done, as in ``generate``. Raises DesignError,
+    ``dxf_profile`` is "bulges", "arcs" (LINE, ARC, CIRCLE) or "chords"; ``chord_error`` mm applies
+    to the last. ``progress`` is called with each step, as in ``generate``. Raises DesignError,
     OutputError and DefectError.
     """
     design = load(source, *changes, **tables)
@@ -101,11 +101,11 @@ def mesh(
     wrapped: bool = MeshSettings.wrapped,
     **tables: Any,
 ) -> Run:
-    """Writes solid, cavities and conforming meshes; the latter stand in the run's ``conforming``.
+    """Writes solid, cavities and conforming meshes; the run's ``conforming`` lists the latter.
 
-    ``formats`` are of "vtu", "vtk", "msh", "inp", "stl", "obj" and "ply". ``h`` mm and all after it
-    are the fields of ``MeshSettings``; ``tables`` are those of the design. Takes the extra "mesh".
-    Raises DesignError and OutputError.
+    ``formats`` are any of "vtu", "vtk", "msh", "inp", "stl", "obj" and "ply". ``h`` mm and the
+    arguments after it are the fields of ``MeshSettings``; ``tables`` override tables of the design.
+    Needs the extra "mesh". Raises DesignError and OutputError.
     """
     settings = MeshSettings(h, element, symmetry, fill_ul, gaps, wrapped)
     each = (formats,) if isinstance(formats, str) else tuple(formats)
@@ -140,13 +140,14 @@ def simulate(
     volumes: Mapping[str, float] | None = None,
     **tables: Any,
 ) -> Simulated:
-    """Runs a simulator that is installed into ``out/<name>/<simulator>/``.
+    """Runs an installed simulator and writes to ``out/<name>/<simulator>/``.
 
-    ``simulator`` is "calculix", "sofa" or "mujoco"; ``export`` writes what it reads and runs
-    nothing. ``pressure`` kPa (a vacuum is negative), ``chambers`` kPa by name and all after them
-    are the fields of ``SimulationRequest``: ``h`` in mm, ``seconds`` of simulated time, ``volumes``
-    in ul by chamber; ``tables`` are those of the design. Raises DesignError for another simulator
-    or word and for what cannot be done, OutputError, and VoidError where the result cannot be.
+    ``simulator`` is "calculix", "sofa" or "mujoco"; ``export`` writes its input and does not run
+    it. ``pressure`` kPa (a vacuum is negative), ``chambers`` kPa by name and the arguments after
+    them are the fields of ``SimulationRequest``: ``h`` in mm, ``seconds`` of simulated time,
+    ``volumes`` in ul by chamber; ``tables`` override tables of the design. Raises DesignError for
+    an unknown simulator or argument and for an impossible request, OutputError, and VoidError if
+    the result is impossible.
     """
     request = SimulationRequest(
         pressure, chambers or {}, minutes, h, symmetry, procedure, scene, seconds, volumes or {}

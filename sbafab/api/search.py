@@ -36,16 +36,16 @@ def find(
     sure: float | None = None,
     **tables: Any,
 ) -> FoundDesign:
-    """The design that meets requirements and is best in one thing, or the nearest miss.
+    """The design that meets the requirements and is best by one quantity, or the nearest miss.
 
     ``find("3dof-15mm", least={"lumen": 3, "force@12.5mm@50kPa": 3}, most={"outline_diameter":
     20})``: ``least`` and ``most`` are in mm, degrees, N, N/mm, s, g and kPa, or texts with a unit;
     a ``time`` is with water at ``flow_ml_min``. ``free`` are the keys to vary in place of the
-    family's own, as texts ``["chamber.diameter=8:12:0.1", "stack.balloons=6:9:1"]``, mm. What
-    follows are the fields of ``FindRequest``, such as ``sure``, a share that is the probability of
-    each requirement; ``tables`` are those of the design. ``found.best.values`` are the found keys,
-    ``found.intervals`` the 90 % intervals. Raises DesignError for a quantity that it does not know,
-    with those it does.
+    family's own, as texts ``["chamber.diameter=8:12:0.1", "stack.balloons=6:9:1"]``, mm. The other
+    arguments are the fields of ``FindRequest``, such as ``sure``, the probability (a share) of
+    meeting each requirement; ``tables`` override tables of the design. ``found.best.values`` are
+    the found keys, ``found.intervals`` the 90 % intervals. Raises DesignError for an unknown
+    quantity, with the known ones.
     """
     at_least = [f"{name}={value}" for name, value in (least or {}).items()]
     at_most = [f"{name}={value}" for name, value in (most or {}).items()]
@@ -57,13 +57,13 @@ def find(
 
 @command
 def reach_yield(source: Source, *changes: Change, target: float, **tables: Any) -> ReachedYield:
-    """The design changed as little as a yield needs, and what that costs.
+    """The design with the least change that reaches a yield, and the cost of that change.
 
     ``reach_yield("3dof-15mm", target=0.95).design`` goes to ``generate``; ``target`` is the share
     of random builds that are good. Order of stacking, bond, overhang, base plate and ears may
-    change; keys in ``changes`` and ``tables`` stay. Of the result, ``changes`` has both values of
+    change; keys in ``changes`` and ``tables`` stay. In the result, ``changes`` has both values of
     each key, ``comparison`` the figures of both designs, ``found.share`` the share; ``design`` is
-    None where no change reaches the target, and ``sentence`` says why. Raises DesignError.
+    None if no change reaches the target, and ``sentence`` explains why. Raises DesignError.
     """
     fixed = frozenset(changed_keys([*changes, tables]))
     return run_reach_yield(load(source, *changes, **tables), target, fixed)
@@ -119,14 +119,14 @@ def sweep(
     all_columns: bool = False,
     **tables: Any,
 ) -> SweptDesigns:
-    """Checks and predicts a design with keys varied into ``out/<name>-sweep/``; a row a design.
+    """Checks and predicts a design with varied keys; writes one row per design.
 
-    ``vary`` has the values of each key, ``{"chamber.diameter": numpy.linspace(4, 8, 9),
-    "stack.balloons": [3, 6, 9]}`` (lengths in mm), or their range in words, ``"4:8:0.5"``; or it
-    holds texts such as ``"chamber.diameter=4:8:0.5"``. ``samples`` and all after it are the fields
-    of ``SweepRequest``, with the ``seconds`` s that a design may take; ``tables`` are those of the
-    design. ``swept.frame()`` has the rows. Raises DesignError for a key that is not there, and
-    OutputError.
+    Files go to ``out/<name>-sweep/``. ``vary`` has the values of each key, ``{"chamber.diameter":
+    numpy.linspace(4, 8, 9), "stack.balloons": [3, 6, 9]}`` (lengths in mm), or their range as
+    text, ``"4:8:0.5"``; or it holds texts such as ``"chamber.diameter=4:8:0.5"``. ``samples`` and
+    the arguments after it are the fields of ``SweepRequest``, with the ``seconds`` s that a design
+    may take; ``tables`` override tables of the design. ``swept.frame()`` returns the rows. Raises
+    DesignError for an unknown key, and OutputError.
     """
     request = SweepRequest(
         load(source, *changes, **tables),
