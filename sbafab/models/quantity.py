@@ -187,8 +187,9 @@ class Quantity(Enum):
         """Return the quantity of a key. Raises DesignError for any other, with the nearest ones."""
         keys = {quantity.key: quantity for quantity in cls}
         if key not in keys:
-            near = difflib.get_close_matches(key, keys, 3) or keys
-            raise DesignError(f"no quantity has the key {key!r}; did you mean {' or '.join(near)}?")
+            near = difflib.get_close_matches(key.replace(" ", "_"), keys, 3, 0.3)
+            mends = f"did you mean {' or '.join(near)}?" if near else "each figure states its own"
+            raise DesignError(f"no quantity has the key {key!r}; {mends}")
         return keys[key]
 
 

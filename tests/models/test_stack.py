@@ -168,7 +168,7 @@ def test_a_tapered_stack_pushes_at_most_as_its_smallest_balloon() -> None:
     assert (np.diff(found) <= 1e-9).all()
     assert found[0] > 0.9 * bound
     predicted = sbafab.predict("1dof-10mm", *changes)
-    for model in ("elastic stack", "virtual work on Eq. 4", "virtual work on Eqs. 1-3"):
+    for model in ("elastic-stack", "work-on-eq-4", "work-on-eqs-1-to-3"):
         assert predicted.value("blocked_force", model, kpa=100, share=0) <= bound
 
 

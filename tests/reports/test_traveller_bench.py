@@ -412,7 +412,7 @@ def test_a_long_sheet_is_drawn_in_rows_across_the_page(sheet_files: Any) -> None
     _, laminate = built("1dof-5mm")
     sheet = sheet_files(laminate)[0]
     nest = sheet.nest
-    stock = replace(nest.stock, width=60.0, length=900.0, roll=True, pins=())
+    stock = nest.stock.model_copy(update={"width": 60.0, "length": 900.0, "roll": True, "pins": ()})
     part = nest.parts[0]
     low_x, low_y, high_x, high_y = part.region.bounds
     step = high_y - low_y + 1

@@ -679,7 +679,7 @@ def test_a_figure_is_that_of_predict_above_the_pressure_of_usual_maps() -> None:
         free=["chamber.diameter=5:5:1", "stack.balloons=15:15:1"],
     )
     predicted = sbafab.predict(design, pressures_kpa=200)
-    force = predicted.value("blocked force at 200 kPa, flat", "elastic stack")
+    force = predicted.value("blocked_force", "elastic-stack", kpa=200, share=0)
     assert found.best.figures["force@0mm@200kPa"] == pytest.approx(force, rel=1e-9)
 
 
