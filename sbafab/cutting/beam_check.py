@@ -1,8 +1,7 @@
-"""Machine files against the design: each contour is cut once, and begun, ended and held as asked.
+"""Machine files against the design: each contour is cut once, with its lead-in, overcut and tabs.
 
-What is written is not trusted here: from the curves of a file, as they were read back, it is
-measured how far they lie from the contours of the sheet, where along them they run, and what they
-leave out.
+The check does not trust the writer. It reads a file's curves back and measures their distance from
+the contours of the sheet, the stretches they follow, and the stretches they leave out.
 """
 
 from __future__ import annotations
@@ -24,9 +23,9 @@ from sbafab.geometry.region import Region
 from sbafab.nesting.check import edge_distance
 
 BETWEEN = (0.25, 0.5, 0.75, 1.0)
-"""Of a curve, where it is looked at behind its start."""
+"""Shares of a curve, from its start, at which it is sampled."""
 LONGEST_STEP = 0.45
-"""Of a contour: a longer way from one place looked at to the next is none along it."""
+"""Share of a contour: a longer step from one sample to the next does not follow the contour."""
 ROOM = 4 * TOLERANCE
 """mm by which lengths along a contour may be off: ends of a stretch are off by TOLERANCE each."""
 
@@ -74,7 +73,7 @@ class _Laps:
                 way += edge.length
 
     def near(self, p: Point, within: float = TOLERANCE) -> list[Edge]:
-        """Edges that come so near to a point."""
+        """Edges within a distance of a point."""
         near = self.region.index.touching(widened((*p, *p), within))
         return [edge for edge in near if distance_to(edge, p) <= within]
 
@@ -90,7 +89,7 @@ class _Laps:
 
 
 def check_beam_runs(runs: Sequence[BeamRun], region: Region, entries: Entries) -> None:
-    """Raises OutputError where the runs do not cut the region's contours as asked, and no more.
+    """Raises OutputError unless the runs cut exactly the region's contours, as the entries request.
 
     ``runs`` are those that cut parts; ``region`` holds the paths of a film sheet.
     """
@@ -188,7 +187,7 @@ def _straight(curve: BeamCurve) -> Line:
 
 
 def _check_lead(lead: Line, number: int, laps: _Laps, entries: Entries) -> None:
-    """Raises OutputError for a lead-in that was not asked for, or is not in the waste alone."""
+    """Raises OutputError for a lead-in that was not requested, or that leaves the waste."""
     x, y = lead.start
     place = f"the lead-in at x {x:.3f}, y {y:.3f}"
     if abs(lead.length - entries.lead_in) > 2 * TOLERANCE:
@@ -212,7 +211,7 @@ def _check_lead(lead: Line, number: int, laps: _Laps, entries: Entries) -> None:
 
 
 def _check_lap(number: int, stretches: Sequence[_Stretch], laps: _Laps, entries: Entries) -> None:
-    """Raises OutputError where the stretches of a contour are not one lap with what was asked."""
+    """Raises OutputError unless a contour's stretches make one lap with its overcut and tabs."""
     contour, length = laps.region.contours[number], laps.lengths[number]
     x, y = contour.edges[0].start
     place = f"the {'hole' if contour.is_hole else 'outline'} at x {x:.3f}, y {y:.3f}"
@@ -238,7 +237,7 @@ def _check_lap(number: int, stretches: Sequence[_Stretch], laps: _Laps, entries:
 
 
 def _has_corner(laps: _Laps, number: int, first: float, gap: float) -> bool:
-    """Return True if a contour turns sharply in a stretch that begins so far along it."""
+    """Return True if a contour turns sharply in a stretch that begins at a distance along it."""
     edges, length = laps.region.contours[number].edges, laps.lengths[number]
     way = 0.0
     for before, after in zip(edges, [*edges[1:], edges[0]], strict=True):

@@ -1,9 +1,9 @@
-"""What the beam follows on a film sheet: contours, where asked with lead-ins, overcuts and tabs.
+"""Paths of the beam on a film sheet: contours, with lead-ins, overcuts and tabs if requested.
 
 A lead-in is a straight line in the waste that ends on the contour at a right angle, or at half of
 one: inside a hole, outside an outline. An overcut follows the contour on past its start. A tab is a
-stretch of an outline that is not cut, so that the part stays in the skeleton; holes have none, for
-what falls out of them is waste. Tabs lie where the outline is smooth, clear of corners and of the
+stretch of an outline that is not cut, so that the part stays in the skeleton; holes have no tabs,
+since the pieces that fall out are waste. Tabs lie on smooth stretches, clear of corners and of the
 start. Only machine files have these: the sheet's own DXF and the layer files stay the design.
 """
 
@@ -32,7 +32,7 @@ TRIED = 32
 STEPS = 60
 """Places between one tab and the next where the tab is tried."""
 DEPTHS = (0.25, 0.5, 0.75, 1.0)
-"""Of a lead-in from its end, where its distance from its own contour is looked at."""
+"""Shares of a lead-in, from its end, at which its distance from its own contour is checked."""
 TILTED = math.sqrt(0.5)
 SHARE = 0.99 * TILTED
 """Least distance from the own contour at a depth, as a share of that depth."""
@@ -87,7 +87,7 @@ def beam_runs(
     pins: Sequence[KeepOff] = (),
     name: str = "the sheet",
 ) -> list[LaserRun]:
-    """Return what the beam follows of the contours of the sheet called ``name``, in their order.
+    """Return the beam's paths for the contours of the sheet called ``name``, in their order.
 
     Raises DesignError with the place where a lead-in or a tab finds none.
     """
@@ -175,7 +175,7 @@ class _Lap:
 
 
 class _Waste:
-    """What lead-ins keep off: contours, engraving, parting cut, frame, pins and other lead-ins."""
+    """Obstacles of lead-ins: contours, engraving, parting cut, frame, pins and other lead-ins."""
 
     def __init__(
         self,

@@ -41,7 +41,7 @@ MOST_DEGREES = 200
 LARGEST = 1.0
 """mm; a wider kerf is a mistake in the table."""
 WORST_SCALE = 0.1
-"""Of measured over nominal sizes: no machine is so far off, another unit is."""
+"""Bounds of measured over nominal size: a larger deviation means another unit, not the machine."""
 LARGEST_SLIP = 0.25
 """mm; more than twice the largest error of laser cutting (paper, Sec. 2) is a slip of the pen."""
 MOST_SUSPECTS = 20
@@ -55,9 +55,9 @@ SAME_COLUMN = 1e-6
 FREE = 4
 """Degrees of freedom that a difference between x and y must leave: Student's t is 2.8 there."""
 RESOLUTIONS = {"calliper": 0.01, "scanner": 25.4 / 2400, "microscope": 0.001}
-"""mm: the least step of an instrument, of a scanner that of 2400 dots an inch."""
+"""mm: the least step of each instrument; a scanner's is for 2400 dots per inch."""
 UNNAMED = RESOLUTIONS["calliper"]
-"""mm, of an instrument that nobody named."""
+"""mm: the least step of an unnamed instrument."""
 Kind = Literal["outer", "window"]
 Axis = Literal["x", "y"]
 
@@ -75,7 +75,7 @@ class Measurement:
 
     @property
     def sign(self) -> int:
-        """By which the kerf counts in the size: -1 of an outside, 1 of a window."""
+        """The kerf's sign in the size: -1 for an outside, 1 for a window."""
         return -1 if self.kind == "outer" else 1
 
     @property
@@ -117,13 +117,13 @@ class Value:
 
 @dataclass(frozen=True)
 class Estimate:
-    """The kerf in mm from ``count`` sizes, fitted together with what else they tell.
+    """The kerf in mm from ``count`` sizes, fitted together with offsets and scale.
 
-    ``offsets``: what each instrument reads too much, mm, by its name; empty where the sizes cannot
-    tell, which takes it as 0. ``scale``: measured over nominal size apart from both; None where the
-    sizes cannot tell, which takes it as 1. Both are means of x and y; ``kerf_along_x`` mm and
-    ``scale_along_x``, a ratio, are what they are more along x, and less along y. ``degrees`` of
-    freedom are left.
+    ``offsets``: the excess of each instrument's readings, mm, by its name; empty if the sizes do
+    not determine it, and then taken as 0. ``scale``: measured over nominal size after kerf and
+    offsets; None if the sizes do not determine it, and then taken as 1. Kerf and scale are means
+    of x and y; ``kerf_along_x`` mm and ``scale_along_x``, a ratio, are added to them along x and
+    subtracted along y. ``degrees`` of freedom are left.
     """
 
     kerf: Value
@@ -174,8 +174,8 @@ class Calibration:
 def calibrated(measurements: Sequence[Measurement], resolution: float | None = None) -> Calibration:
     """The kerf from two sizes or more; ``resolution`` in mm is the instrument's least step.
 
-    By default it is that of RESOLUTIONS, the coarsest where several were used. Raises DesignError
-    where there are fewer sizes, where one of them is a slip, or where no beam cuts so.
+    By default it comes from RESOLUTIONS, the coarsest if several instruments were used. Raises
+    DesignError for fewer sizes, if one of them is a slip, or if the kerf is implausible.
     """
     if resolution is None:
         steps = [RESOLUTIONS.get(size.instrument, UNNAMED) for size in measurements]
@@ -479,7 +479,7 @@ def read_measurements(path: Path, instrument: str = "") -> list[Measurement]:
 
 
 def table_text(path: Path) -> str:
-    """The text of a table that someone filled in. Raises DesignError where it is none."""
+    """The text of a filled-in table. Raises DesignError if the file is not a table."""
     try:
         if path.stat().st_size > MOST_BYTES:
             raise DesignError(
@@ -509,7 +509,7 @@ def _header(path: Path, first: tuple[str, str]) -> tuple[str, list[str]]:
 
 
 def _row(line: str, separator: str, count: int, where: str) -> list[str]:
-    """The cells of a row: parted like the header, or what stands behind a semicolon is the last."""
+    """The cells of a row: separated like the header, or with the last one after a semicolon."""
     cells = row_cells(line, separator, where)
     if separator != "," or ";" not in line:
         return cells

@@ -74,10 +74,10 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
 
 
 def _joints(ends: Sequence[Point]) -> dict[Point, Point]:
-    """Return the joint that each end is taken to lie on.
+    """Return the joint of each end.
 
-    Two ends that meet by themselves stay where they are, however near others lie; what is left
-    over is joined within JOINED.
+    Two ends that meet exactly stay in place, however near others lie; the remaining ends are joined
+    within JOINED.
     """
     joints = _nearest_known(ends, EPSILON)
     meeting = Counter(joints[p] for p in ends)
@@ -88,7 +88,7 @@ def _joints(ends: Sequence[Point]) -> dict[Point, Point]:
 
 def _nearest_known(points: Sequence[Point], within: float) -> dict[Point, Point]:
     """For each point the nearest one known before it, if that is near enough, or itself."""
-    # Cells so wide that most points are near to those of their own alone.
+    # Cells wide enough that most points are near only to points of the same cell.
     side = CELL * within
     cells: dict[tuple[int, int], list[Point]] = {}
     joints: dict[Point, Point] = {}
@@ -239,7 +239,7 @@ def nested_region(
 
 
 def _turn(edges: Sequence[Edge], neighbours: Sequence[Edge]) -> int | None:
-    """From which of the edges on the others are these; None where they are others."""
+    """The index of the edge from which the others equal these; None if they are different."""
     turn = next((i for i, edge in enumerate(edges) if _run_equally(edge, neighbours[0])), 0)
     turned = (*edges[turn:], *edges[:turn])
     is_same = len(turned) == len(neighbours) and all(map(_run_equally, turned, neighbours))
@@ -247,9 +247,7 @@ def _turn(edges: Sequence[Edge], neighbours: Sequence[Edge]) -> int | None:
 
 
 def _run_equally(first: Edge, second: Edge) -> bool:
-    """Return True if edges of two contours, each of which ends where the next one starts, run
-    equally.
-    """
+    """Return True if two edges agree; their ends need no check, being the next edges' starts."""
     if math.dist(first.start, second.start) > COPIED or type(first) is not type(second):
         return False
     return not (isinstance(first, Arc) and isinstance(second, Arc)) or (
@@ -267,7 +265,7 @@ def _from(contour: Contour, turn: int | None) -> Contour | None:
 
 
 def _whole(contour: Contour, centre: Point, radius: float) -> Contour:
-    """A circle as four quarter arcs from its rightmost point on; as it is where it is drawn so."""
+    """A circle as four quarter arcs from its rightmost point on; unchanged if already drawn so."""
     (x, y), is_hole = centre, contour.is_hole
     compass = [(x + radius, y), (x, y + radius), (x - radius, y), (x, y - radius)]
     if is_hole:

@@ -92,19 +92,18 @@ def _bulge_edges(start: Point, end: Point, bulge: float) -> list[Edge]:
 
 BY_LAYER = 256
 PAPER = re.compile(r"(?m)^ *67\r?\n *1\r?$")
-"""Where an entity may be marked as one of paper space."""
+"""Places at which an entity may be marked as belonging to paper space."""
 SOLID = ("continuous", "bylayer")
 """Linetypes that are drawn without gaps, in small letters; no model space entity has a block's."""
 
 
 def check_appearance(document: Drawing) -> None:
-    """Raises OutputError where a laser program would skip, break or re-order what is drawn.
+    """Raises OutputError if a laser program would skip, break or re-order the drawing.
 
     Every entity has to be visible, in an unbroken line, on a layer that is on, thawed and (but
-    REFERENCE) plotted, and in that layer's colour. Other programs may say this in their own words:
-    a colour of the entity that is the layer's, a true colour of the same red, green and blue,
-    ``ByLayer`` in any letters. Layers that nothing is drawn on may look as they like, and so may
-    line weights.
+    REFERENCE) plotted, and in that layer's colour. Other programs may state this differently: an
+    entity colour equal to the layer's, a true colour of the same red, green and blue, ``ByLayer``
+    in any case. Empty layers and line weights are not checked.
     """
     entities = list(document.modelspace())
     for name in dict.fromkeys(entity.dxf.layer for entity in entities):
@@ -174,7 +173,7 @@ def _check_entity(entity: DXFGraphic) -> None:
 
 
 def _is_true(colour: int | None, layer: str) -> bool:
-    """Return True if a true colour, if there is one, is that of the layer's index."""
+    """Return True if the true colour, if any, equals the colour of the layer's index."""
     if colour is None:
         return True
     from ezdxf.colors import aci2rgb, int2rgb
@@ -210,7 +209,7 @@ _EXTENTS = re.compile(
     rf"  9\n\$LIMMIN\n{_LOW}  9\n\$LIMMAX\n{_HIGH}"
 )
 ROUND = {"CIRCLE": ("x", "y", "radius"), "ARC": ("x", "y", "radius", "from", "to")}
-"""What round entities are drawn with."""
+"""Fields of round entities."""
 _HANDLE = re.compile(r"[0-9A-F]{1,8}")
 _ROW = re.compile(rf" 10\n{_VALUE} 20\n{_VALUE}(?: 42\n{_VALUE})?")
 
@@ -247,7 +246,7 @@ def as_written(text: str) -> OwnFile | None:
 
 
 def _properties(text: str, place: int) -> tuple[dict[str, str] | None, int]:
-    """The custom properties from a place on, and where they end; None where they may be others."""
+    """The custom properties from a position on, and their end; None if they may differ."""
     properties: dict[str, str] = {}
     while match := _PROPERTY.match(text, place):
         name, value = match.groups()
@@ -321,7 +320,7 @@ def _rows(text: str) -> Iterator[tuple[float, ...]]:
 # Reading back into exact contours, refused where they could not be cut.
 #
 # Those that stand letter by letter as this program writes them are read by that form; of all
-# others, and so of all that was touched by hand or another program, ezdxf says what they hold.
+# others, including files edited by hand or by another program, are read with ezdxf.
 
 
 DRAWN = ("LWPOLYLINE", "POLYLINE", "CIRCLE", "LINE", "ARC")
@@ -329,7 +328,7 @@ R12 = "AC1009"
 CLOSED = 1
 """Flag of a closed POLYLINE; all others are of splines and meshes."""
 FLAT = 1e-9
-"""Heights and widths up to this, in mm, are none."""
+"""Heights and widths up to this, in mm, count as 0."""
 
 
 @dataclass(frozen=True)
@@ -337,7 +336,7 @@ class ReadBack:
     """The content of a cut file.
 
     ``region``: the contours on CUT_INNER and CUT_OUTER; ``properties``: the custom properties,
-    which a DXF before R2004 has none of; ``units`` is "mm", or empty in R12, which cannot say;
+    which a DXF before R2004 cannot hold; ``units`` is "mm", or empty in R12, which cannot say;
     ``layers``: the layer of every entity in file order; ``other``: types of the entities that are
     not part of the region (datum, engraving, sheet), and ``strokes`` their layers and edges.
     """
@@ -353,9 +352,9 @@ class ReadBack:
 def read_profile(source: Path | str) -> ReadBack:
     """The cut file at a path, or given as text.
 
-    Raises OutputError for what is no whole DXF in millimetres of closed, separate contours of
+    Raises OutputError unless it is a complete DXF in millimetres of closed, separate contours of
     lines and arcs at z = 0, holes on CUT_INNER and outlines on CUT_OUTER. Ends of loose edges
-    within 1 um of each other are one.
+    within 1 um of each other are joined.
     """
     name = source.name if isinstance(source, Path) else "the DXF text"
     try:
@@ -522,9 +521,7 @@ def _numbers(entity: DXFEntity) -> Iterator[float]:
 
 
 def _is_plain(entity: Polyline) -> bool:
-    """Return True if an old polyline is flat and drawn as it stands: no mesh, no curve fitted to
-    it.
-    """
+    """Return True if an old polyline is flat and drawn as given: not a mesh, not curve-fitted."""
     return bool(entity.is_2d_polyline) and not entity.dxf.flags & ~CLOSED
 
 

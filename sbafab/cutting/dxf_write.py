@@ -80,7 +80,7 @@ def dxf_text(
 
     Holes (clockwise) go on CUT_INNER, outlines on CUT_OUTER. ``properties`` become the
     document's custom properties. The chords profile takes contours of lines only. A layer's file
-    has a cross at the origin on REFERENCE, after all that is cut, and there the strokes of its
+    has a cross at the origin on REFERENCE, after all cuts, and on the same layer the strokes of its
     ``notes``; a ``sheet`` has its engraving, parting cut and frame instead.
     """
     cuts = _cuts(contours, profile)
@@ -116,9 +116,9 @@ def _seam_run(edges: Sequence[Edge]) -> _Entity:
 
 
 def _with_seam_layer(text: str) -> str:
-    """Return a document with the layer SEAM in its table, made after that of engraving.
+    """Return a document with the layer SEAM in its table, a copy of the engraving layer before it.
 
-    Its handle is the last one below the next free one.
+    Its handle is the last one below the next free handle.
     """
     seed_tag = "  9\n$HANDSEED\n  5\n"
     _, _, after = text.partition(seed_tag)
@@ -140,7 +140,7 @@ def _document(
     properties: Mapping[str, str],
     spare: int = 0,
 ) -> str:
-    """The document of the entities, with room for so many ``spare`` handles after theirs."""
+    """The document of the entities, with ``spare`` handles reserved after theirs."""
     form = skeleton()
     seed = form.first_handle + len(entities) + spare
     drawn = "".join(
@@ -298,7 +298,7 @@ def skeleton() -> Skeleton:
 # The empty DXF document that every cut file is filled into.
 #
 # ``python -m sbafab.cutting.dxf_write`` regenerates it with ezdxf. Keeping it as a file means that
-# writing a cut file costs no import of ezdxf, nor does reading one back in this program's own form.
+# writing a cut file does not import ezdxf; reading one in this program's own form does not either.
 
 
 SKELETON = Path(__file__).with_name("skeleton.dxf")

@@ -1,4 +1,4 @@
-"""What is asked for where the beam begins and ends a contour, and of what holds a part."""
+"""Entry settings: how the beam begins and ends a contour, and which tabs hold a part."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Entries:
-    """How contours of a film are begun, ended and held, in mm; 0 is none.
+    """Lead-ins, overcuts and tabs of a film's contours, in mm; 0 turns one off.
 
-    ``tabs`` an outline leave ``tab_width`` of film each, so that the beam leaves out ``gap``, which
-    is wider by its ``kerf``. Lead-ins keep ``clearance`` from all but their own contour. ``key`` is
-    the design's table with these keys, for messages.
+    Each outline has ``tabs``, each ``tab_width`` of film wide; the beam skips ``gap``, which is
+    wider by its ``kerf``. Lead-ins keep ``clearance`` from everything but their own contour.
+    ``key`` is the design's table with these keys, for messages.
     """
 
     lead_in: float = 0.0
@@ -34,7 +34,7 @@ class Entries:
 
     @property
     def properties(self) -> dict[str, str]:
-        """What machine files say of it."""
+        """Text on the entries for machine files."""
         width = f"{self.tabs} an outline, {self.tab_width:g} mm wide, {self.gap:g} mm uncut"
         said = {
             "LEAD_IN": f"{self.lead_in:g} mm" if self.lead_in else "",

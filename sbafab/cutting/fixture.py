@@ -70,7 +70,7 @@ def shown(laminate: Laminate) -> Region | None:
 
 
 def _as_it_lies(platen: tuple[float, float], box: Bounds) -> tuple[float, float]:
-    """Width and length of the plate, turned where what lies on it fits in that way only."""
+    """Width and length of the plate, turned if the laminates fit only that way."""
     wide, high = box[2] - box[0], box[3] - box[1]
     width, length = platen
     turn = (wide > width or high > length) and wide <= length and high <= width

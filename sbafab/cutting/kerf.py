@@ -81,9 +81,9 @@ edge that gives way has nothing to make up for."""
 def in_chords(path: Region, role: Role | None, error: float, beam: float = 0.0) -> Region:
     """The path of a layer (None: the base plate) with chords for arcs, within ``error`` mm of them.
 
-    Outlines of chamber masks shrink, those of separator masks grow, holes open; films grow and
+    Outlines of chamber masks shrink, outlines of separator masks grow, holes open; films grow and
     round holes open by less than FINE. Straight edges stay. Arcs of the radius ``beam``, half the
-    kerf in mm, are led round corners of the part, which stay where they are.
+    kerf in mm, lead round the part's corners, which stay in place.
     """
     is_film = role is None or not role.endswith("-mask")
     fine = min(error, FINE)

@@ -1,8 +1,8 @@
-"""The film sheet as a LightBurn project: its cuts in order, and no power that anybody guessed.
+"""The film sheet as a LightBurn project: its cuts in order, without any guessed power.
 
-The format (``.lbrn2``) is not documented; what is written here is what files that LightBurn saved
-hold, and no more. It knows lines, cubic Bezier curves and ellipses, so an arc becomes Bezier curves
-of at most 45 degrees, which leave it by 4e-6 of its radius.
+The format (``.lbrn2``) is not documented; this module writes only elements found in files that
+LightBurn saved. The format has lines, cubic Bezier curves and ellipses, so an arc becomes Bezier
+curves of at most 45 degrees, which deviate from it by 4e-6 of its radius.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ ENDING = ".lbrn2"
 INDICES = {ENGRAVE: 0, CUT_INNER: 1, CUT_OUTER: 2, CUT_SHEET: 7, REFERENCE: 8}
 """LightBurn's colours: black, blue, red, magenta, grey, as in the sheet's picture."""
 CUT_MODE = "Cut"
-"""What LightBurn calls Line: the beam follows the line."""
+"""LightBurn's mode Line: the beam follows the line."""
 MOST_TURN = math.radians(45)
 POWERS = ("minPower", "maxPower", "minPower2", "maxPower2")
 PASSES = "numPasses"
-"""How often a layer is followed; LightBurn's own is once."""
+"""Number of passes of a layer; LightBurn's default is 1."""
 NO_RECIPES: Recipes = {}
 ORDER = {"Optimize_ByLayer": 0, "Optimize_ByGroup": -1, "Optimize_ByPriority": 1}
 """Layers in their order, then shapes in the order of the file."""
@@ -98,7 +98,7 @@ class LaserLayer(NamedTuple):
 
 
 def sheet_layers(used: Collection[str], recipes: Recipes) -> list[LaserLayer]:
-    """Return the layers of a sheet in their order, with power and speed where there is a recipe."""
+    """Return the layers of a sheet in their order, with power and speed if they have a recipe."""
     return [_sheet_layer(layer, recipes) for layer in INDICES if layer in used]
 
 
@@ -292,10 +292,10 @@ class Bezier(NamedTuple):
 
 @dataclass(frozen=True)
 class LaserShape:
-    """Curves one after the other on the layer of an index; of a ``circle``, those of its eighths.
+    """Consecutive curves on the layer of an index; a ``circle`` has one curve for each eighth.
 
     ``rows`` hold a path's curves from ``place``: x and y of start, both handles and end; handles of
-    a line are at its thirds, and ``is_line`` tells which are lines. Shapes that are written alike
+    a line are at its thirds, and ``is_line`` tells which are lines. Shapes with equal text
     have the same rows.
     """
 
@@ -330,7 +330,7 @@ class Project(NamedTuple):
 
     @property
     def cut_runs(self) -> list[BeamRun]:
-        """What cuts parts of a sheet, in the file's order."""
+        """The paths that cut parts of a sheet, in the file's order."""
         layers = {INDICES[layer]: layer for layer in (CUT_INNER, CUT_OUTER)}
         return [
             BeamRun(layers[shape.index], shape.curves)
@@ -422,7 +422,7 @@ def _read_path(vertices: str, primitives: str) -> _Rows:
 
 
 def _handle(text: str) -> tuple[float, float]:
-    """A control point as it stands behind its vertex. Raises ValueError where there is none."""
+    """A control point as written after its vertex. Raises ValueError if it is missing."""
     x, y = text[3:].split(text[:2] + "y")
     return float(x), float(y)
 
@@ -443,17 +443,17 @@ def _matches(pattern: re.Pattern[str], text: str) -> Iterator[tuple[str, ...]]:
 
 
 BETWEEN = (0.25, 0.5, 0.75)
-"""Of a curve, where it is looked at."""
+"""Shares of a curve at which it is sampled."""
 SURE = 0.99
-"""Share of the tolerance: what is found within it for all shapes at once needs no other look."""
+"""Share of the tolerance: shapes within it in the joint check are not checked one by one."""
 
 
 def verify_runs(path: Path, layers: Sequence[LaserLayer], expected: Sequence[LaserRun]) -> None:
     """Reads the project at ``path`` and compares it with layers and runs.
 
     Every shape is on its layer, in its order, and within TOLERANCE of its run; layers are in order,
-    the frame is not cut and no power is set but that of a recipe. Raises OutputError with what is
-    not, and where.
+    the frame is not cut and only a recipe sets power. Raises OutputError with the first deviation
+    and its place.
     """
     project = read_project(path)
     indices = {layer.layer: layer.cut_index for layer in layers}
@@ -487,9 +487,9 @@ def _check_settings(project: Project, layers: Sequence[LaserLayer]) -> None:
 
 
 def _surely_on(pairs: Sequence[tuple[LaserShape, LaserRun]]) -> list[bool]:
-    """For each shape whether all that ``_check_shape`` looks at lies within the tolerance.
+    """For each shape, True if every value that ``_check_shape`` checks is within the tolerance.
 
-    All shapes at once. Of one that is drawn otherwise, or lies off, this is left to be said there.
+    All shapes are checked at once; ``_check_shape`` reports the faults of the others.
     """
     surely = [False] * len(pairs)
     rounds = [i for i, (shape, run) in enumerate(pairs) if shape.circle and run.circle]
@@ -596,7 +596,7 @@ def _row_offs(
 
 
 def _check_shape(shape: LaserShape, edges: Sequence[Edge]) -> None:
-    """A full circle's curves may start anywhere; those of a path are its edges one by one."""
+    """A full circle's curves may start anywhere; a path's curves are its edges one by one."""
     circle = Contour(tuple(edges)).circle
     if circle is not None:
         centre, radius = circle
@@ -618,7 +618,7 @@ def _check_shape(shape: LaserShape, edges: Sequence[Edge]) -> None:
 
 
 def _offs(curve: Bezier, part: Edge) -> Iterator[tuple[float, Point]]:
-    """Return distance of ends, and of what lies between them from the edge or the arc's circle."""
+    """Return distance of ends, and of points between them, from the edge or the arc's circle."""
     yield math.dist(curve.start, part.start), curve.start
     yield math.dist(curve.end, part.end), curve.end
     if isinstance(part, Line) and curve.handles is None:

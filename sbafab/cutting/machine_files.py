@@ -1,11 +1,10 @@
-"""Film sheets in the conventions of other laser programs: colours tell what is cut, and in which
-order.
+"""Film sheets in the conventions of other laser programs: colours define the cuts and their order.
 
 RDWorks (Ruida controllers) makes a layer of each colour of a drawing; its file is the oldest DXF,
 R12, in which every entity has its colour, and polylines their arcs as bulges. Epilog's software
-takes a line for a cut where it is a hairline, 0.001 in wide, and maps red, green and blue to
-settings; its file is an SVG in millimetres. Neither has the sheet's frame, for all that is drawn is
-cut. Both are written by what is known of the programs, which have not been run.
+cuts a line if it is a hairline, 0.001 in wide, and maps red, green and blue to settings; its file
+is an SVG in millimetres. Neither file has the sheet's frame, since these programs cut every line.
+Both files follow general knowledge of the programs, which have not been run.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ from sbafab.geometry.edges import Arc, Edge, Line, Point
 from sbafab.geometry.region import chain_data, coord
 
 ENDINGS: dict[LaserProgram, str] = {"rdworks": "_rdworks.dxf", "epilog": "_epilog.svg"}
-"""What stands behind the name of a sheet in that of its machine file."""
+"""Suffix of a machine file's name, after the sheet's name."""
 RGB = {ENGRAVE: "#000000", CUT_INNER: "#0000ff", CUT_OUTER: "#ff0000", CUT_SHEET: "#ff00ff"}
 """Colours of the layers in the order of cutting, pure ones that a driver can map."""
 HAIRLINE = 0.0254
@@ -63,9 +62,9 @@ def read_machine_file(path: Path, program: LaserProgram) -> list[BeamRun]:
 
 
 def rdworks_difference(path: Path, expected: Path) -> str:
-    """Return how an RDWorks file departs from the expected one, in words; "" if it cuts the same.
+    """Return text on an RDWorks file's difference from the expected one; "" if it cuts the same.
 
-    Raises OutputError for one that cannot be read.
+    Raises OutputError if the file cannot be read.
     """
     read, runs = (read_machine_file(file, "rdworks") for file in (path, expected))
     if len(read) != len(runs):
@@ -81,9 +80,10 @@ def rdworks_difference(path: Path, expected: Path) -> str:
 
 
 def verify_machine_file(path: Path, program: LaserProgram, expected: Sequence[LaserRun]) -> None:
-    """Reads the file at ``path`` and compares it with the runs that were meant.
+    """Reads the file at ``path`` and compares it with the expected runs.
 
-    Raises OutputError with the place of what is missing, on another layer, or off by TOLERANCE.
+    Raises OutputError with the place of a run that is missing, on another layer, or off by more
+    than TOLERANCE.
     """
     read = read_machine_file(path, program)
     runs = [run for run in expected if run.layer != REFERENCE]
@@ -236,7 +236,7 @@ def _turned_over(edge: Edge, height: float) -> Edge:
 
 
 class _SvgCurve(NamedTuple):
-    """A segment of a path as svgelements has it, seen with y upwards."""
+    """A segment of a path from svgelements, with y upwards."""
 
     segment: Any
     height: float
@@ -277,7 +277,7 @@ def _read_epilog(path: Path) -> Iterator[BeamRun]:
             curves = [
                 _SvgCurve(segment, box[3])
                 for segment in segments
-                # A close line of no length closes what is closed already.
+                # A closing line of length 0 belongs to a path that is already closed.
                 if not isinstance(segment, Close)
                 or abs(segment.end - segment.start) > TOLERANCE / 10
             ]

@@ -14,7 +14,7 @@ from sbafab.geometry.region import Region
 
 ORIGIN: Point = (0.0, 0.0)
 SWEEPS = 6
-"""How often a path is looked through for crossings to undo."""
+"""Number of passes over a path to undo crossings."""
 LOOKED_AHEAD = 40
 """Contours along the path that one end of a crossing may lie from the other."""
 FEW = 20
@@ -108,9 +108,9 @@ def _undo_crossings(path: list[Contour], here: Point) -> bool:
 
 
 def _worth_a_look(stops: Sequence[Point]) -> list[bool]:
-    """For each stop whether turning a stretch after it may shorten the path, as it is now.
+    """For each stop, True if reversing a stretch after it may shorten the current path.
 
-    All stretches at once; what is told apart by less than half of ``SHORTER`` is worth a look.
+    All stretches are tested at once; a saving above half of ``SHORTER`` counts.
     """
     import numpy as np
 

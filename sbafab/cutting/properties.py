@@ -33,7 +33,7 @@ class Curves(NamedTuple):
 
 
 TRUE_ARCS = Curves()
-"""How curves are written: polylines with bulges, LINE and ARC, or polylines of short chords."""
+"""Form of written curves: polylines with bulges, LINE and ARC, or polylines of short chords."""
 
 
 UNCALIBRATED = "uncalibrated: nominal edges"
@@ -73,7 +73,7 @@ def file_properties(settings: CutSettings, material: Material, pattern: str) -> 
 def sheet_properties(
     settings: CutSettings, material: Material, sheet: str, parts: str
 ) -> dict[str, str]:
-    """Custom properties of a film sheet: ``sheet`` is "1 of 2", ``parts`` what lies on it."""
+    """Custom properties of a film sheet: ``sheet`` is "1 of 2", ``parts`` lists its parts."""
     properties = {
         **_properties(settings, material, f"sheet {sheet}", settings.kerf_width(material)),
         "PARTS": parts,
@@ -125,7 +125,7 @@ def warning_property(text: str | None) -> dict[str, str]:
 
 
 def limit_properties(lowered: Sequence[str]) -> dict[str, str]:
-    """Return a cut file's note on lowered limits: nothing where there are none."""
+    """Return a cut file's note on lowered limits; empty without any."""
     return {LIMITS: ", ".join(lowered)} if lowered else {}
 
 
@@ -224,8 +224,8 @@ COLOURS = {ENGRAVE: 7, CUT_INNER: 5, CUT_OUTER: 1, CUT_SHEET: 6, REFERENCE: 8}
 """AutoCAD colour index of every layer; REFERENCE is neither cut nor plotted."""
 
 SEAM = "SEAM"
-"""Layer of the path of a seam, which a tool follows; it lies in files of its own."""
+"""Layer of a seam's path, which a tool follows; seams have separate files."""
 SEAM_COLOUR = 3
 
 CUT_SEQUENCE = (ENGRAVE, CUT_INNER, CUT_OUTER, CUT_SHEET)
-"""What is cut first comes first: a hole cut after its outline would be cut in a loose part."""
+"""In cutting order: a hole cut after its outline would be cut in a loose part."""

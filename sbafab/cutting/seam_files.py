@@ -1,8 +1,8 @@
-"""Files of seam paths: what the middle of a tool follows, one file a seam, in order.
+"""Files of seam paths, which the middle of a tool follows: one file for each seam, in order.
 
 A path lies on the layer SEAM and nothing else is cut; the tool bonds half of its width on both
-sides of it. Coordinates are those of the layer files, mm. The file of a tool that is mounted beside
-its machine's head is for that head: shifted by minus the tool's offset, which it states.
+sides of it. Coordinates are in mm, as in the layer files. If a tool is mounted beside its machine's
+head, its file is for the head: shifted by minus the tool's offset, which the file states.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def write_seam_files(laminate: Laminate, folder: Path, settings: CutSettings) ->
 
 
 def moved(chains: Chains, by: Point) -> tuple[tuple[Edge, ...], ...]:
-    """Return chains moved by so many mm along x and y; the same ones for none."""
+    """Return chains moved by an offset in mm along x and y; the same chains for a zero offset."""
     if by == CENTRED:
         return tuple(map(tuple, chains))
     return tuple(tuple(_moved(edge, shift(*by)) for edge in chain) for chain in chains)
@@ -119,7 +119,7 @@ def _chains(drawing: ReadBack) -> tuple[tuple[Edge, ...], ...]:
 
 
 def deviation(chains: Chains, expected: Chains) -> str | None:
-    """Return how a path departs from the expected one, in words; None within a micrometre."""
+    """Return text on a path's deviation from the expected one; None within a micrometre."""
     if len(chains) != len(expected):
         return f"it has {len(chains)} paths, not {len(expected)}"
     worst: tuple[float, Point] = (0.0, (0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Film sheets: parts of a nest as one cut file a sheet, with label, cutting time and picture."""
+"""Film sheets: a nest's parts as one cut file per sheet, with label, cutting time and picture."""
 
 from __future__ import annotations
 
@@ -67,11 +67,11 @@ class SheetFile:
 
     ``number`` counts from 1 within the material, and is the nest's sheet plus one. ``counts``
     says how many parts of each design and pattern lie on it: (design, pattern, count).
-    ``unsorted_travel`` is what the head would travel in the nest's own order. ``label`` says
-    whether the sheet's label is engraved, or found no room in the border, or was not asked for.
-    ``cut_length`` has the cut that frees a roll's sheet in it; ``contours`` are those of the parts.
-    ``index_marks`` of the parts have their number engraved beside them; None if not asked for.
-    ``machine_file`` is that of another laser program than LightBurn, if one was asked for.
+    ``unsorted_travel`` is the head's travel in the nest's own order. ``label`` states whether the
+    sheet's label is engraved, did not fit the border, or was not requested. ``cut_length`` includes
+    the cut that frees a roll's sheet; ``contours`` counts the parts' contours. ``index_marks`` is
+    the number of parts with their number engraved beside them; None if not requested.
+    ``machine_file`` is the file for a laser program other than LightBurn, if requested.
     """
 
     path: str
@@ -113,9 +113,9 @@ def write_sheets(
 ) -> list[SheetFile]:
     """Writes ``sheets/<material>_<number>.dxf``, ``.lbrn2`` and ``.svg`` of every sheet.
 
-    Each file is read back: its contours are those of the nest. Whether they lie inside the border,
-    apart from each other and clear of pins is told when the whole folder is read back. Raises
-    OutputError where a file is another, OSError where it cannot be written.
+    Each file is read back and its contours are compared with the nest. The check of the whole
+    folder tests that they lie inside the border, apart from each other and clear of pins. Raises
+    OutputError if a file differs, OSError if it cannot be written.
     """
     (folder / FOLDER).mkdir(parents=True, exist_ok=True)
     total = sum(nest.sheets for nest in nests)
@@ -326,9 +326,9 @@ class _Margin(NamedTuple):
 
 
 def label(text: str, stock: Stock, length: float) -> tuple[Stroke, ...]:
-    """The strokes of a sheet's label; none where its border has no room.
+    """The strokes of a sheet's label; empty if it does not fit the border.
 
-    In one line along the lower edge if it can, else along another, else in up to three lines.
+    In one line along the lower edge if it fits, else along another, else in up to three lines.
     """
     for count in range(1, MOST_LINES + 1):
         lines = _wrapped(text, count)
@@ -381,7 +381,7 @@ def _box(ends: tuple[Point, Point]) -> Bounds:
 
 
 def _wrapped(text: str, count: int) -> list[str]:
-    """The text in at most so many lines, the longest as short as words allow."""
+    """The text in at most this number of lines, the longest as short as words allow."""
     words = text.split()
     for most in range(max(map(len, words)), len(text) + 1):
         lines = [words[0]]

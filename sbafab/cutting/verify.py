@@ -29,7 +29,7 @@ def verify_file(
     expected: Region,
     expected_properties: Mapping[str, str],
 ) -> ReadBack:
-    """Reads the file at ``path``, compares it with what was meant, and returns it.
+    """Reads the file at ``path``, compares it with the intended contours, and returns it.
 
     Raises OutputError with the file, the worst deviation and its place.
     """
@@ -90,7 +90,7 @@ def _near(region: Region, edges: Sequence[Edge]) -> Region:
 
 
 def check_datum(read: ReadBack) -> None:
-    """Raises OutputError where a layer's file has more beside its contours than the datum cross.
+    """Raises OutputError if a layer's file holds more than its contours and the datum cross.
 
     Nor may it have less: the cross is what layers are laid over each other by.
     """
@@ -136,7 +136,7 @@ def _check_sequence(read: ReadBack) -> None:
 
 
 def check_contours(region: Region, expected: Region, tolerance: float) -> None:
-    """Raises OutputError where a contour is missing, or off by more than ``tolerance`` mm."""
+    """Raises OutputError if a contour is missing, or off by more than ``tolerance`` mm."""
     for kind, ours, theirs in (
         ("holes", expected.holes, region.holes),
         ("outlines", expected.outers, region.outers),
@@ -160,7 +160,7 @@ def check_contours(region: Region, expected: Region, tolerance: float) -> None:
 def _paired(
     ours: Sequence[Contour], theirs: Sequence[Contour]
 ) -> Iterator[tuple[Contour, Contour]]:
-    """Each of our contours with that of theirs, not yet taken, whose box is most like its own."""
+    """Each of our contours with the unmatched contour of theirs whose box is most similar."""
     boxes = [contour.bounds for contour in theirs]
     rest = PointsLeft([box[:2] for box in boxes])
     for contour in ours:
