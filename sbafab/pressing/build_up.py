@@ -191,7 +191,7 @@ FEWER = "stack fewer balloons (stack.balloons)"
 
 
 def _refusal(press: Press, thickness: float, under: StackShape) -> str:
-    """Return the reason why a pad cannot give the pressure, and a remedy; empty where it can."""
+    """Return the reason why a pad cannot give the pressure, and a remedy; empty if it can."""
     estimate = pressures(press, thickness, under)
     force = press.pressure_kpa * press.platen_area
     pressed = estimate.plate / pad_modulus(press) + under.height / thickness

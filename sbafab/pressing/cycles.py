@@ -15,8 +15,8 @@ from sbafab.pressing.schedule import HANDLING_MINUTES, Schedule, minutes_closed
 APART = 5.0
 """Gap in mm between two copies in the press, ours: films flow, and hands need room."""
 CYCLE_HOURS = 8.0
-"""Hours of pressing and handling that a cycle takes at most, if the order does not say how many
-copies it takes: ours."""
+"""Most hours of pressing and handling in a cycle, if the order does not state the copies per cycle:
+ours."""
 ROUNDING = 1e-9
 
 
@@ -24,8 +24,8 @@ ROUNDING = 1e-9
 class Runs:
     """Press cycles of ``copies``, side by side at these ``places``.
 
-    A place is the offset of a laminate's frame from that of the first one, which lies at the
-    lower left; rows fill from there. The last cycle may be smaller than the others.
+    A place is the offset of a laminate's frame from the first laminate's frame, at the lower left;
+    rows fill from there. The last cycle may be smaller than the others.
     """
 
     copies: int
@@ -78,21 +78,20 @@ def press_runs(
     margin: float = 0.0,
     most: int | None = None,
 ) -> Runs:
-    """Return runs with as many copies at once as the heated area (mm) takes; ``bounds`` are those
-    of one.
+    """Return runs with as many copies at once as fit the heated area (mm).
 
-    ``margin`` mm of base plate lie round all of them; the plate lies on the platen either way.
-    Where no cycle may take more than ``most``, cycles are as equal as can be: each place costs
-    holes in the plate.
+    ``bounds`` are one copy's. ``margin`` mm of base plate surround all copies; the plate may lie
+    either way on the platen. If ``most`` limits the copies of a cycle, the cycles are as equal as
+    possible, since each place costs holes in the plate.
     Copies are equal layer by layer, so every place of the press holds the same films at every
-    height: the paper (Sec. 2) splits pressing where stacks of unlike cuts would share the pressure
-    unevenly. Unlike designs are therefore never pressed together.
+    height: the paper (Sec. 2) splits pressing if stacks of different cuts would share the pressure
+    unevenly. Different designs are therefore never pressed together.
     """
     low_x, low_y, high_x, high_y = bounds
     size = high_x - low_x, high_y - low_y
     room = platen[0] - 2 * margin, platen[1] - 2 * margin
     grids = [_grid(room, size), _grid((room[1], room[0]), size)]
-    # What is larger than the heated area breaks the rule press-fit, or is waived: one by one.
+    # A copy larger than the heated area fails press-fit, or is waived: press one at a time.
     columns, rows = max((*grids, (1, 1)), key=lambda grid: grid[0] * grid[1])
     together = min(copies, columns * rows)
     if most is not None:
@@ -159,7 +158,7 @@ def are_apart(places: tuple[Point, ...], bounds: Bounds, room: float) -> bool:
 
 @dataclass(frozen=True)
 class BatchTimes:
-    """Minutes of a batch: in the press, by hand, and both in sequence; None: nobody stated them."""
+    """Minutes of a batch: in the press, by hand, and both in sequence; None if not stated."""
 
     press: float | None
     hands: float | None
@@ -175,7 +174,7 @@ def batch_times(runs: Runs, plan: Schedule) -> BatchTimes:
     """Return the times of a batch: the press closes once a cycle; every copy needs the full hand
     work.
 
-    Nothing is taken off for hands that work while the press is closed.
+    Hand work while the press is closed is not subtracted.
     """
     pressed = plan.total_press_minutes
     return BatchTimes(
@@ -206,7 +205,7 @@ class BatchEntry(Document):
     cycles: list[int]
     """copies pressed in each cycle"""
     serials: list[str]
-    """of each copy: cycle and place"""
+    """cycle and place of each copy"""
     places_mm: list[tuple[PlainNumber, PlainNumber]] = attribute("places")
     press_minutes: PlainNumber | None
     hands_minutes: PlainNumber | None

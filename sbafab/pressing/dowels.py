@@ -108,9 +108,9 @@ class PinSetting:
 class PinHole:
     """The hole of one pin in the base plate, mm.
 
-    It is reamed from above down to a shoulder at ``depth``, give or take ``tolerance``, on which
-    the pin stands; from there ``push_out`` wide through the plate. ``lengths`` are those of the
-    pins that it takes, shortest first.
+    It is reamed from above down to a shoulder at ``depth`` +- ``tolerance``, on which the pin
+    stands; below, it is ``push_out`` wide through the plate. ``lengths`` are the lengths of pins
+    used in it, shortest first.
     """
 
     pin: str

@@ -1,4 +1,4 @@
-"""How a base plate warms in the press and cools beside it: the time-temperature line of a step."""
+"""Warming of a base plate in the press and its cooling: the time-temperature line of a step."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MELTING, START, END = "melting point", "clock starts", "clock ends"
 @dataclass(frozen=True)
 class HeatPoint:
     """A point of the line: ``edge_c`` of the plate's edge, ``after_constants`` and
-    ``after_minutes`` from closing the press; None where it is not known.
+    ``after_minutes`` from closing the press; None if unknown.
     """
 
     point: str
@@ -40,7 +40,7 @@ class HeatPoint:
 @dataclass(frozen=True)
 class Heating:
     """Parameters of the time-temperature line. ``melting_c`` is the highest melting point of the
-    structural films, ``time_constant_minutes`` the bench's; None where they are not known.
+    structural films, ``time_constant_minutes`` the bench's; None if unknown.
     """
 
     start_c: float
@@ -51,20 +51,20 @@ class Heating:
     basis: str
 
     def constants_to(self, edge_c: float) -> float:
-        """Return the time constants in which the edge of the plate comes to ``edge_c``."""
+        """Return the number of time constants until the plate's edge reaches ``edge_c``."""
         if edge_c <= self.start_c:
             return 0.0
         return math.log((self.platen_c - self.start_c) / (self.platen_c - edge_c))
 
     def edge_after(self, minutes: float) -> float | None:
-        """Return the temperature of the plate's edge so many minutes after the press closed."""
+        """Return the temperature of the plate's edge, C, ``minutes`` after the press closed."""
         tau = self.time_constant_minutes
         if tau is None:
             return None
         return self.platen_c - (self.platen_c - self.start_c) * math.exp(-minutes / tau)
 
     def line(self, minutes: float | None) -> tuple[HeatPoint, ...]:
-        """Return melting point, start and end of the clock of a step of so many minutes."""
+        """Return melting point, start and end of the clock of a step that lasts ``minutes``."""
         points = []
         if self.melting_c is not None:
             points.append(self._point(MELTING, self.melting_c))

@@ -56,7 +56,7 @@ def joined_words(words: Sequence[str]) -> str:
 
 
 def layers_in_words(layers: Sequence[int]) -> str:
-    """Return layer indices in words; never 2-3, which a spreadsheet takes for a date."""
+    """Return text for layer indices; never 2-3, which a spreadsheet reads as a date."""
     runs: list[list[int]] = []
     for index in layers:
         if runs and index == runs[-1][1] + 1:
@@ -112,9 +112,10 @@ STATED_C = 135.0
 def _minutes_of_another_temperature(
     laminate: Laminate, press: Press, parts: Sequence[AssemblyStep]
 ) -> Iterator[Caution]:
-    """Yield the warning that the paper's minutes are pressed at another temperature than the
-    paper's. Minutes that differ from the paper's, and those of films that it did not press, were
-    stated by the user, who tried them as set.
+    """Yield the warning that the paper's minutes are used at a temperature other than the paper's.
+
+    The user stated all other minutes, also for films that the paper did not press, and tried them
+    as set.
     """
     paper = Press.model_construct()
     usual = [
@@ -185,12 +186,12 @@ def minutes_closed(press: Press, step: StepName) -> float:
 class Step:
     """One closing of the press.
 
-    ``layers`` are pressed together, ``adds`` those of them that join in this step, both by layer
-    index; ``pins`` names the dowel pins that are in, ``pin_settings`` how long they are and how
-    deep they sit. ``pressure_kpa`` is the force on the whole platen, ``film_kpa`` and the others
-    what the pad makes of it (``build_up.Pressures``). ``build_up`` goes from the lower platen up.
-    ``minutes`` are None where nobody stated any for the film; they count from the start of the
-    clock in ``time_temperature``.
+    ``layers`` are pressed together and ``adds`` join in this step, both by layer index; ``pins``
+    names the inserted dowel pins, ``pin_settings`` gives their length and depth. ``pressure_kpa``
+    is the force over the whole platen; ``film_kpa`` and the others are the pressures under the pad
+    (``build_up.Pressures``). ``build_up`` goes from the lower platen up. ``minutes`` are None if
+    they are not stated for the film; they count from the start of the clock in
+    ``time_temperature``.
     """
 
     step: int
@@ -214,7 +215,7 @@ class Step:
     instructions: str
     time_temperature: tuple[HeatPoint, ...]
     reason: str = ""
-    """Why the films are pressed now; empty where they are joined in the press alone."""
+    """Why the films are pressed now; empty if they are joined in the press alone."""
 
     @property
     def stack_mm(self) -> float:
@@ -223,7 +224,7 @@ class Step:
 
     @property
     def top_mm(self) -> float:
-        """Height of the stack's top over the base plate, with all that lies under the stack."""
+        """Height of the stack's top over the base plate, including every part under the stack."""
         under = 0.0
         for item in self.build_up:
             if item.part == LAMINATE:
@@ -236,9 +237,9 @@ class Step:
 class SeamStep:
     """One seam made by a tool, counted among all steps.
 
-    ``layers`` are in hand, ``adds`` those of them that are laid in this step. ``length_mm`` is that
-    of the path that the middle of the tool follows. Temperature and speed are None where nobody
-    stated them. ``from_below``: the work is turned over, and the path mirrored.
+    ``layers`` are in the work, and ``adds`` are laid in this step. ``length_mm`` is the length of
+    the path that the middle of the tool follows. Temperature and speed are None if not stated.
+    ``from_below``: the work is turned over, and the path mirrored.
     """
 
     step: int
@@ -272,11 +273,11 @@ class FoldStep:
 
 @dataclass(frozen=True)
 class Schedule:
-    """All steps, their time, and what the technician is warned of: ``cautions``, and ``remarks`` on
-    waived rules and lowered limits.
+    """All steps, their time, and warnings for the technician.
 
-    The two totals are None where the minutes of a step are; warming up is not in them.
-    Nobody timed the work by hand of a laminate that is not ``is_timed``, so no total is stated.
+    Warnings are ``cautions``, and ``remarks`` on waived rules and lowered limits. The two totals
+    are None if the minutes of any step are None; they exclude warming up. If not ``is_timed``, the
+    hand work has not been timed, so no total is stated.
     """
 
     steps: tuple[Step, ...]
@@ -292,7 +293,7 @@ class Schedule:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Remarks and cautions, a sentence each."""
+        """Remarks and cautions, one sentence each."""
         return (*self.remarks, *(caution.sentence for caution in self.cautions))
 
 
@@ -360,7 +361,7 @@ def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,))
 
 
 def pins_by_step(laminate: Laminate, design: Design) -> list[tuple[PinSetting, ...]]:
-    """Return the pins of every press step. Raises DesignError where pins or plate do not do."""
+    """Return the pins of every press step. Raises DesignError if pins or plate do not fit."""
     press, registration = design.press, design.registration
     parts = assembly(laminate)
     heights = [build_up.footprint(laminate, part.layers).height for part in parts]
@@ -384,7 +385,7 @@ def plate_holes(laminate: Laminate, design: Design) -> dict[str, PinHole]:
 
 
 def _underlay(laminate: Laminate, part: AssemblyStep, press: Press) -> float:
-    """Return the thickness of the underlay of a step, mm; 0 where nothing is laid by hand."""
+    """Return the thickness of the underlay of a step, mm; 0 if nothing is laid by hand."""
     return press.underlay_thickness if is_laid_by_hand(laminate, part) else 0.0
 
 
@@ -458,7 +459,7 @@ def _round_pins(press: Press, setting: _Setting) -> str:
 
 
 def _items(press: Press, setting: _Setting, size: tuple[float, float]) -> Iterator[BuildUpPart]:
-    """Yield the build-up from the lower platen up; ``size`` in mm is that of the films."""
+    """Yield the build-up from the lower platen up; ``size`` is the size of the films in mm."""
     release = BuildUpPart(RELEASE, press.release_film, press.release_thickness, press.platen)
     pad = f"{press.pad_material}, {press.pad_hardness:g} Shore A"
     yield BuildUpPart(BASE_PLATE, press.plate_material, setting.plate, press.platen)
@@ -615,9 +616,7 @@ def refuse_temperature(laminate: Laminate, press: Press) -> None:
 
 
 def _refuse_bonds(laminate: Laminate, press: Press, parts: Sequence[AssemblyStep]) -> None:
-    """Raises DesignError where the press is too cold for its bonds, or too hot for those of seams
-    that are in it.
-    """
+    """Raises DesignError if the press is too cold for its bonds, or too hot for seams in it."""
     for gap in laminate.interfaces:
         ends = {gap.below.index, gap.above.index}
         if not any(ends <= set(part.layers) for part in parts):
@@ -718,7 +717,7 @@ def _unknown_films(laminate: Laminate, press: Press) -> Iterator[Caution]:
 def _other_temperatures(
     laminate: Laminate, press: Press, parts: Sequence[AssemblyStep]
 ) -> Iterator[Caution]:
-    """Yield warnings of a temperature that nobody stated minutes for, or has pressed at."""
+    """Yield warnings of a temperature without stated minutes, or at which no one has pressed."""
     if not films_without_minutes(laminate, press.timed_films):
         yield from _minutes_of_another_temperature(laminate, press, parts)
     if press.temperature_c > HOTTEST_TRIED and _is_the_papers(laminate):

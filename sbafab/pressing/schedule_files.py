@@ -61,7 +61,7 @@ class PressDocument(Document, schema="sbafab/press@1"):
 
 
 def press_json(plan: Schedule, **more: object) -> dict[str, Any]:
-    """Return ``press.json``, without seams, folds and reasons where there are none."""
+    """Return ``press.json``; empty seams, folds and reasons are left out."""
     hands = HANDLING_MINUTES if plan.is_timed else None
     document = PressDocument.of(plan, hands_minutes=hands, **more)
     for step in document["steps"]:
