@@ -55,14 +55,14 @@ def _pieces(group: ChainGroup) -> Iterable[Piece]:
 
 
 def beside(edge: Edge, distance: float) -> Point:
-    """The point ``distance`` to the left of the edge's middle (right where negative)."""
+    """The point ``distance`` to the left of the edge's middle (to the right if negative)."""
     middle = edge.at(0.5)
     nx, ny = left_normal(edge, middle)
     return middle[0] + nx * distance, middle[1] + ny * distance
 
 
 class Reach(NamedTuple):
-    """Distance along an edge's right-hand normal to the first other edge, and where that is."""
+    """Distance along an edge's right-hand normal to the first other edge, and the place there."""
 
     value: float
     at: Point

@@ -1,6 +1,6 @@
-"""The rule deck: all rules in the order they are reported, and what runs them.
+"""The rule deck: all rules in the order they are reported, and the functions that run them.
 
-A rule is a file of this folder with a ``RULE``, whose name stands in ``RuleName``, in order; or an
+A rule is a file in this folder with a ``RULE``, whose name is in ``RuleName``, in order; or an
 entry point of an installed package. A rule that cannot be loaded is an error: no design passes
 without it.
 """
@@ -72,7 +72,7 @@ def rule_names() -> tuple[str, ...]:
 
 
 def _against(weak: Sequence[str], finding: Finding) -> Finding:
-    """Return the finding with the limits that the design lowers; a rule's own waivers need none."""
+    """Return the finding with the limits that the design lowers; a rule's own waivers omit them."""
     if not weak or finding.verdict == "waived":
         return finding
     return replace(finding, message=f"{finding.message}; limits lowered: {', '.join(weak)}")

@@ -1,10 +1,10 @@
-"""facing-films: films of two balloons meet nowhere but where they are meant to bond.
+"""facing-films: films of two balloons meet only at the bonds that the design intends.
 
-The press welds any two films that face each other with neither film nor mask between them, in a
-step that it closes on both, unless their faces do not bond in it: past a smaller balloon these need
-not be neighbours. Balloons bond in their neck rings, a sheet in its
-windows, and all films on ears. Elsewhere a mask must lie between, and reach past the films' edges
-as far as between neighbours.
+The press welds any two films that face each other with neither film nor mask between them, if it
+closes on both in one step and their faces bond in that step. Past a smaller balloon the two films
+need not be neighbours. Balloons bond in their neck rings, a sheet in its windows, and all films on
+ears. Elsewhere a mask must lie between them, and reach past the films' edges as far as between
+neighbours.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def _is_ear(piece: Region, laminate: Laminate) -> bool:
 
 
 def _overhangs(gap: Interface, pins: tuple[Pin, ...], measures: Measures) -> Iterator[_Overhang]:
-    """Reach of the masks past the edges of either film where these face each other."""
+    """Reach of the masks past the edges of either film in the area of facing."""
     for edge, reach in measures.reaches(gap):
         if not pin_at(edge, pins):
             yield _Overhang(reach.value, edge.nearest(reach.at), gap)

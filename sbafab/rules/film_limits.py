@@ -23,7 +23,7 @@ SHARP = TAPER
 """Degrees: between flanks at less a point is finer than any bottom; blunter ones are corners."""
 
 ROUNDING = 1e-6
-"""mm: more than what widths are rounded by."""
+"""mm: more than the rounding of widths."""
 
 
 class _Feature(NamedTuple):

@@ -1,8 +1,8 @@
-"""Freedoms: how far each layer may lie off its place once the laminate is assembled.
+"""Freedoms: the distance each layer may lie off its place once the laminate is assembled.
 
 Layers come together in the steps of the assembly. A body is a piece of a layer, or all pieces that
-an earlier step has joined. Two pins locate a body but for the pin error and the play in its holes;
-on one pin it may also turn; a body on no pin is placed by hand on the film below it.
+an earlier step has joined. Two pins locate a body to within the pin error and the play in its
+holes; on one pin it may also turn; a body without pins is placed by hand on the film below it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sbafab.laminate.laminate import LOOSE, Laminate
 from sbafab.rules.limits import error_on_pins
 
 EARS = 'set registration.method = "ears" (drawn layers: draw ears, list their pins)'
-"""Remedy where a hand places what pins could hold."""
+"""Remedy if a hand places a body that pins could hold."""
 
 
 class Part(NamedTuple):
@@ -35,12 +35,12 @@ class Part(NamedTuple):
 
 
 class Freedom(NamedTuple):
-    """One way a body may lie off its place: by up to ``most`` mm in any direction, or, where a
-    ``centre`` is given, turned about it by up to ``most`` radians.
+    """One way a body may lie off its place: by up to ``most`` mm in any direction, or, given a
+    ``centre``, turned about it by up to ``most`` radians.
 
-    The body reaches from layer ``lowest`` to ``highest``; ``body`` tells it from others in the
-    same ``step``. ``pins`` are those that hold it. ``seam``: the name of the seam that it is the
-    path of.
+    The body reaches from layer ``lowest`` to ``highest``; ``body`` distinguishes it from others in
+    the same ``step``. ``pins`` are the pins that hold it. ``seam``: the name of the seam, if the
+    body is a seam's path.
     """
 
     step: int
@@ -85,7 +85,7 @@ class Freedoms(dict[Part, tuple[Freedom, ...]]):
         self._unshared: dict[tuple[int, ...], list[tuple[Freedom, ...]]] = {}
 
     def unshared(self, layers: tuple[int, ...]) -> list[tuple[Freedom, ...]]:
-        """Freedoms of each piece of these layers, in order, but those that all pieces share."""
+        """Freedoms of each piece of these layers, in order, without those shared by all pieces."""
         result = self._unshared.get(layers)
         if result is None:
             every = [ways for layer in layers for ways in self._of_layer[layer]]

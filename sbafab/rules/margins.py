@@ -42,8 +42,8 @@ MarginKind = Literal["bond", "overhang"]
 QUANTITIES: tuple[MarginKind, ...] = ("bond", "overhang")
 
 SHARP: Final = 30.0
-"""Degrees: a sharper corner is a bond that tapers to nothing. Blunter ones are where a strip leaves
-its pocket aslant, between two edges of one void, and no way for a leak."""
+"""Degrees: a sharper corner is a bond that tapers to nothing. At a blunter one a strip leaves its
+pocket at an angle, between two edges of one void, which cannot leak."""
 ROOM: Final = 1e-6
 """mm: far more than the rounding of the compared values."""
 
@@ -55,7 +55,7 @@ class Owner(NamedTuple):
     """Owner of an edge: a layer's seat in the interface, contour and piece of its profile.
 
     Seats are 0 below, 1 above, then the masks, then the seams, with their regions for profiles. The
-    contour is UNCUT where no cut edge ends a margin: in an overlap of two seams.
+    contour is UNCUT if a margin does not end at a cut edge: in an overlap of two seams.
     """
 
     seat: int
@@ -89,7 +89,7 @@ class Margin(NamedTuple):
 
     @property
     def is_overlap(self) -> bool:
-        """True if it is how far a seam runs into another one."""
+        """True if it is the depth by which a seam runs into another one."""
         return not self.owners[0].is_cut
 
 

@@ -75,8 +75,8 @@ class NetFault:
 class NarrowPlace:
     """The place of a net's voids in one interface that is hardest to open, and its pressure.
 
-    Of the ``width`` as drawn ``left`` mm are left at worst; ``pressure``, kPa, opens that, None
-    where no film has elastic constants.
+    ``left`` mm of the drawn ``width`` remain at worst; ``pressure``, kPa, opens that width, None
+    if no film has elastic constants.
     """
 
     net: str
@@ -337,7 +337,7 @@ class _Reading:
         return {part: tuple(names) for part, names in owners.items()}
 
     def groups(self) -> tuple[frozenset[str], ...]:
-        """The members that hang together, by part; those in no void are alone."""
+        """The connected members, by part; a member outside all voids is alone."""
         groups: dict[object, set[str]] = {}
         for home in self.homes.values():
             for row, part in home.items():
@@ -411,7 +411,7 @@ class _Reading:
             yield NetFault("leak", names, interface, layers, p, message)
 
     def dead_ends(self, ratio: float) -> Iterable[NetFault]:
-        """Yield what ends blind in the cavities of the nets."""
+        """Yield the blind ends in the cavities of the nets."""
         for number, cavity in enumerate(self.cavities):
             names = self.owners.get(self.part(number), ())
             if not names:
@@ -440,7 +440,7 @@ class _Reading:
             yield NetFault("dead-end", names, gap.index, gap.layer_indices, p, message)
 
     def strays(self) -> Iterable[NetFault]:
-        """Yield closed voids of no net, and those in a chamber interface that open outside."""
+        """Yield closed voids outside all nets, and chamber interfaces' voids that open outside."""
         is_open = {self.part_of[void] for void in self.graph.joins.get(OUTSIDE, {})}
         seen: set[int] = set()
         for number, cavity in enumerate(self.cavities):
@@ -482,7 +482,7 @@ class _Reading:
     # Places.
 
     def _ways_on(self, number: int) -> list[Terminal]:
-        """The ports, mouths and vias of a cavity, and where it reaches the outside."""
+        """The ports, mouths and vias of a cavity, and the places where it reaches the outside."""
         rows = [
             Terminal(row.at, row.width, row.is_port)
             for name in self.owners.get(self.part(number), ())
@@ -676,7 +676,7 @@ def _labels(home: Mapping[_Terminal, int | None], part: int) -> str:
 def _openings(
     narrow: Sequence[NarrowPlace], laminate: Laminate, design: Design
 ) -> Iterable[Finding]:
-    """Yield the channel that takes most pressure to open; a warning where that is not known."""
+    """Yield the channel that takes most pressure to open; a warning if its pressure is unknown."""
     limit = design.rules.channels_open_at_kpa
     known = [(place.pressure, place) for place in narrow if place.pressure is not None]
     if known:

@@ -4,7 +4,7 @@ A channel between films bonded at both sides is a long plate clamped at its edge
 pressure p it lifts by d in its middle: p = E / (1 - nu^2) / w^4 (32 t^3 d + 64/3 t d^3). The
 first term is its bending (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd ed.,
 Sec. 3: d = p w^4 / 384 D), the second its stretching: a parabola is longer than its chord by
-8 d^2 / 3 w, and a tension T in it carries p = 8 T d / w^2. The channel counts as open where d is
+8 d^2 / 3 w, and a tension T in it carries p = 8 T d / w^2. The channel counts as open if d is
 the thickness of the film beside it. Films bonded behind that film there stiffen it, so that a wide
 place between many films may be harder to open than a narrow one between two.
 """

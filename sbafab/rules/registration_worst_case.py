@@ -2,7 +2,7 @@
 
 Cut edges lie off by the cutting error, layers on pins by the pin error (paper Sec. 2), layers
 without pins by the hand's placement and turn, and seams by their tool's error of place. A seam's
-width is taken to be as exact as a cut edge; where seams overlap it does not count.
+width is taken to be as exact as a cut edge; it does not count at overlaps of seams.
 """
 
 from __future__ import annotations
@@ -187,7 +187,7 @@ def _finding(
 
 
 def _plate(failed: bool, laminate: Laminate, design: Design) -> str:
-    """Return the command for a plate that a workshop can make, where several pins hold layers."""
+    """Return the command for a plate that a workshop can make, if several pins hold layers."""
     if design.plate_machine is None or len(laminate.pins) < 2:
         return ""
     command = f"`{for_a_cnc_mill('DESIGN')}`"

@@ -1,8 +1,8 @@
 """Overlaps of seams: one ends on another or past the edge of a film, and separates two voids.
 
-Each seam lies off its path as a whole. Two of them meet in any case if one must be moved farther
-than both errors together until it leaves the other, whichever way. That is asked of two at a time,
-so that neither the number of seams nor their order matters. A seam that runs past the edge of a
+Each seam lies off its path as a whole. Two seams surely meet if, in every direction, one must move
+farther than the sum of both errors to leave the other. The test takes two seams at a time, so the
+number of seams and their order do not matter. A seam that runs past the edge of a
 film bonds it along that edge, less of it the nearer its end comes.
 """
 
@@ -78,9 +78,9 @@ def seam_ends(
 
 
 class _Voids(NamedTuple):
-    """Cavities of an interface by name, and the outer edges of its contact, but for folds.
+    """Cavities of an interface by name, and the outer edges of its contact, except folds.
 
-    Those open to the outside have one name, unless they are at an inlet.
+    Cavities open to the outside share one name, unless they are at an inlet.
     """
 
     cavities: Sequence[tuple[object, Region]]
@@ -151,7 +151,8 @@ class _Seams(NamedTuple):
     def _is_needed(self, overlap: Region, seams: Sequence[Seam]) -> bool:
         """Return True if two voids are joined when these seams no longer meet there.
 
-        Where a further seam covers the overlap, but for what it and they may lie off, none are.
+        They are not if further seams, shrunk by their errors of place and those of ``seams``, cover
+        the overlap.
         """
         further = [
             seam

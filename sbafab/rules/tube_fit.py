@@ -4,7 +4,7 @@ A channel w wide opens to a perimeter of 2 w. In it lie the tube and, along one 
 strip: the tube's half circle there is one strip's thickness farther out, so w must be pi / 2 times
 the sum of the tube's diameter and the strip's thickness. Both edges of the strip may be cut off by
 the cutting error, and a kerf that is not compensated makes it narrower by its width. Between two
-seams it is narrower by their errors of place; what only these take is a warning.
+seams it is narrower by their errors of place; a failure by these alone is a warning.
 
 A port that is a hole has its tube glued on the film round it: the tube must cover the hole as cut
 at its widest, and the film go on past the hole for a bond's width.
@@ -154,7 +154,7 @@ def _of_holes(fits: Sequence[_HoleFit]) -> Finding:
 
 
 def _on_hole(port: Port, laminate: Laminate, design: Design) -> Iterator[_HoleFit]:
-    """Yield how far the tube covers the hole, and how far film goes on round it.
+    """Yield the tube's overlap round the hole, and the width of film round it.
 
     Both are measured from the port's place, where the tube's middle is glued.
     """

@@ -30,7 +30,7 @@ STEPS_ACROSS = 4
 """Samples along the boundary within the narrowest width."""
 MOST_SAMPLES = 3000
 ROWS = 256
-"""Samples whose circles are searched for at once; bounds the memory."""
+"""Samples whose circles are searched for together; limits the memory."""
 INWARD = 1e-6
 """mm by which a sample must lie inside of another's tangent to bound its circle."""
 POCKET = 3.0
@@ -106,7 +106,7 @@ def _samples(contour: Contour, step: float) -> Iterable[tuple[Point, Point]]:
 
 
 def _circles(points: Floats, normals: Floats) -> tuple[Floats, Counts]:
-    """Return radii of the largest inner circles tangent at the samples, and what they touch."""
+    """Return radii of the largest inner circles tangent at the samples, and their partners."""
     radii = np.empty(len(points))
     partners = np.empty(len(points), dtype=np.int64)
     for first in range(0, len(points), ROWS):
@@ -128,7 +128,7 @@ def _circles(points: Floats, normals: Floats) -> tuple[Floats, Counts]:
 
 
 class Terminal(NamedTuple):
-    """A place where something goes on from a void: a port, or a way of ``width`` mm out of it."""
+    """A place that continues a void: a port, or a way of ``width`` mm out of it."""
 
     at: Point
     width: float
@@ -220,7 +220,7 @@ def _along(axis: VoidAxis) -> tuple[Floats, Floats]:
 
 
 def _from_to(axis: VoidAxis, sums: Floats, first: Counts, last: Counts) -> Floats:
-    """Return what the steps from ``first`` on to ``last`` add up to, along their contour."""
+    """Return the sum of the steps from ``first`` to ``last``, along their contour."""
     before = np.concatenate([[0.0], sums])
     starts, ends = np.array(axis.starts[:-1]), np.array(axis.starts[1:])
     contour = axis.contours[first]

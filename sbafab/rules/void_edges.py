@@ -1,4 +1,4 @@
-"""Edges of voids at worst: how much of a channel cutting, kerf and seams leave.
+"""Edges of voids at worst: the width of a channel that cutting, kerf and seams leave.
 
 A cut edge lies off by the cutting error, and by half of a kerf that is not measured. An edge of a
 seam lies off by its tool's error of place; two edges of one seam move together, and lose nothing.
@@ -83,7 +83,7 @@ class VoidEdges:
         )
 
     def _at(self, p: Point) -> list[tuple[int | None, float]]:
-        """The seams whose edges run through a point, by number, with what they may lie off."""
+        """The seams whose edges run through a point, by number, with their errors of place."""
         beside: list[tuple[int | None, float]] = [
             (number, error)
             for number, (region, error) in enumerate(self.seams)

@@ -2,7 +2,7 @@
 
 Nodes are the connected pieces of unbonded film in each interface, the places in each interface
 where one of the films is missing, the openings of each film, and the outside. The masks seal
-nothing and are not in it.
+nothing and are not part of it.
 """
 
 from __future__ import annotations
@@ -281,7 +281,7 @@ def _share_at(edge: Edge, inlet: Inlet, reach: float) -> tuple[float, float] | N
 
 
 def mouth_openings(inlet: Inlet, interface: Interface) -> list[tuple[float, float]]:
-    """Return where voids of an interface open at an inlet's mouth, from end to end.
+    """Return the openings of an interface's voids at an inlet's mouth, from end to end.
 
     Offsets from the mouth's middle in mm; an opening may reach past the mouth.
     """
