@@ -103,8 +103,8 @@ class AsBuiltFolder:
 class FolderReadBack:
     """An output folder read back and measured, without regenerating any of it.
 
-    ``findings`` are those on files, claims, rules, and on the layers of each design of a job;
-    ``problems``: where a folder of one design cuts other layers than its ``design.toml`` makes.
+    ``findings`` are on files, claims, rules, and on the layers of each design of a job;
+    ``problems``: layers of a one-design folder that differ from its ``design.toml``.
     ``designs`` is empty if a ``design.toml`` cannot be used.
     """
 

@@ -82,7 +82,7 @@ class CutPart:
 
 @dataclass(frozen=True)
 class LayerFile:
-    """A layer of the manifest with its place in the stack (from 1) and what its file cuts."""
+    """A layer of the manifest with its place in the stack (from 1) and the part its file cuts."""
 
     position: int
     claim: LayerClaim

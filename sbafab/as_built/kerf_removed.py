@@ -141,7 +141,7 @@ def _vertices(before: Edge, after: Edge, a: float, b: float) -> Iterator[_Vertex
         yield _Vertex(q, (q[0] - x, q[1] - y), straight, last)
 
 
-# Runs of chords that are meant as an arc: found where none should be, and made one again.
+# Runs of chords that stand for an arc: detected where chords are not permitted, and replaced.
 
 
 ON_CIRCLE = 1e-5

@@ -510,7 +510,7 @@ def _layout_problems(sheet_claim: SheetClaim, drawing: ReadBack, stock: Stock) -
 
 
 MARK_CLEARANCE = 0.5
-"""mm that an index mark keeps from every part; half the spacing where that is less."""
+"""mm that an index mark keeps from every part; half the spacing if that is less."""
 
 
 def _mark_clearance(sheet_claim: SheetClaim) -> float:
