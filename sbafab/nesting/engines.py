@@ -2,7 +2,7 @@
 
 Each part goes to the lowest free place. Several fixed orders are tried. Where the parts take more
 sheets than their area needs, they are tried round copies of the shapes of most area, too: a
-lattice, or an arrangement found by a beam search where few copies fill a sheet. The best result is
+lattice, or an arrangement found by a beam search if few copies fill a sheet. The best result is
 returned. Nothing is random.
 """
 
@@ -55,7 +55,7 @@ def bottom_left(
 ) -> tuple[Placement, ...]:
     """Return places for every part; each must fit the usable area.
 
-    Without ``lattices`` all sheets start empty. Raises DesignError where the pins leave no place
+    Without ``lattices`` all sheets start empty. Raises DesignError if the pins leave no place
     for one.
     """
     shapes, shape_of = _shapes(parts)
@@ -200,7 +200,7 @@ class _Filler:
     def lattices(self) -> list[dict[int, Lattice]]:
         """Return copies on a sheet, for the shapes of most area that come often enough.
 
-        They are the best lattices, and arrangements or pairs of lattices where these hold more.
+        They are the best lattices, and arrangements or pairs of lattices if these hold more.
         """
         areas = dict.fromkeys(range(len(self.grid.shapes)), 0.0)
         counts: Counter[int] = Counter()
@@ -228,7 +228,7 @@ class _Filler:
             places = (
                 (turn, shift)
                 for turn, shift in lattice.places
-                # A region is moved only where its box is near to a pin.
+                # A region is moved only if its box is near a pin.
                 if not _is_near_pins(boxes[turn], shift, stock)
                 or is_clear(placed(shape, turn, shift), stock)
             )

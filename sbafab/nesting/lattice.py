@@ -244,7 +244,7 @@ class _Rows:
     def layouts(self, box: tuple[float, float]) -> list[list[tuple[Turn, Point]]]:
         """Return the copies of the patterns that promise most, in a box from the origin.
 
-        One without copies where the box holds none.
+        Returns one layout without copies if the box is too small for any.
         """
         if box[0] < 2 * self.half_width - ROUNDING or box[1] < 2 * self.half_height - ROUNDING:
             return [[]]

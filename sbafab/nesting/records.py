@@ -27,7 +27,7 @@ class NestPart:
     """One piece that is to be cut ``count`` times.
 
     ``region`` is the path of the beam, kerf compensated, in the frame of its layer; ``design`` and
-    ``pattern`` name its source, ``piece`` its number (from 1) where the pattern has several pieces.
+    ``pattern`` name its source, ``piece`` its number (from 1) if the pattern has several pieces.
     """
 
     design: str
