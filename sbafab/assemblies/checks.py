@@ -372,7 +372,7 @@ class _Passage(NamedTuple):
 def aperture(assembled: Assembled) -> Iterator[Finding]:
     """Check that each part passes the aperture, lobes folded and all else as it is.
 
-    Folded sizes are predicted: where only the thinner, pressed laminate passes, or the paper gives
+    Folded sizes are predicted: if only the thinner, pressed laminate passes, or the paper gives
     no folded size of a part, the verdict is a warning.
     """
     hole = assembled.assembly.deploy.aperture_diameter
