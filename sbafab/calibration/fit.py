@@ -130,7 +130,7 @@ MIDDLES = {unknown.field: unknown.middle for unknown in UNKNOWNS}
 def fit(name: str, sources: Sequence[Evidence], progress: Progress, about: str = "") -> Fit:
     """Return the calibration of sources of evidence.
 
-    Raises DesignError where no curve of theirs can be fitted, or without emcee.
+    Raises DesignError if no curve of theirs can be fitted, or without emcee.
     """
     usable, left_out = usable_curves(sources)
     if not usable:

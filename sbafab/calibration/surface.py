@@ -97,7 +97,7 @@ def logarithms(curve: MeasuredCurve, factors: Factors) -> Array:
     """Return logarithms of the models' values of a curve (open set-ups, points).
 
     A state that an actuator does not reach has IMPOSSIBLE times the measured value. Raises
-    DesignError where no model gives the curve.
+    DesignError if no model gives the curve.
     """
     answer = model_values(curve, factors, shares_maps=True)
     if isinstance(answer, NoModel):
