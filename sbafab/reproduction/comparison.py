@@ -143,7 +143,7 @@ def _measured(point: ComparedPoint) -> str:
 
 
 def span(ends: Ends | None, sign: str = "", digits: int = 4) -> str:
-    """Return a range as text, or one number where its ends read alike; "" for none."""
+    """Return a range as text, or one number if its ends look the same; "" for None."""
     if ends is None:
         return ""
     low, high = (f"{end:{sign}.{digits}g}" for end in ends)

@@ -98,7 +98,7 @@ def reproduce(folder: Path) -> tuple[dict[str, list[Row]], CalibratedPaper]:
     """All rows, as ``reproduction.md`` and ``reproduction.json`` with charts in a folder, and the
     values beside the calibrated models.
 
-    Raises OutputError where the folder cannot be written.
+    Raises OutputError if the folder cannot be written.
     """
     single, three = predicted("1dof-5mm"), predicted("3dof-15mm")
     sections, by_calibration = tables(single, three), calibrated.calibrated_paper()
