@@ -77,7 +77,7 @@ the last digit, is taken as even over its range (JCGM 100:2008, 4.3.7)."""
 class StatedError:
     """The error of a curve's values as its source states it.
 
-    ``absolute``: one a value, in the curve's unit; empty where none is stated. ``relative``: of the
+    ``absolute``: one per value, in the curve's unit; empty if not stated. ``relative``: of the
     value. ``kind``: of KINDS; ``runs``: how often each value was measured; ``source``: the place
     that states it.
     """
@@ -128,7 +128,7 @@ class MeasuredActuator:
     """The actuator that was measured, as a design.
 
     ``design`` is a template's name or a design file, changed by ``changes`` (dotted key to value);
-    or ``toml`` is the text of a whole design. All are empty where no design describes it.
+    or ``toml`` is the text of a whole design. All are empty if no design describes it.
     """
 
     design: str = ""
@@ -143,7 +143,7 @@ class MeasuredActuator:
 
 class MeasuredPoint(NamedTuple):
     """A measured value, its place on the axis (None without axis), and its standard error (None
-    where the source states none).
+    if the source does not state it).
     """
 
     x: float | None
