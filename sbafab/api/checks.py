@@ -71,7 +71,7 @@ def check_folder(folder: str | Path, nets: str | Path | None = None) -> Findings
 
     Also whether the folder is what its ``design.toml`` makes (findings ``manifest-claims``,
     ``as-designed``, ``file-integrity``), and with ``nets``, a file, whether its layers join what
-    that netlist lists (``netlist``). Raises OutputError where none can be read there, DesignError
+    that netlist lists (``netlist``). Raises OutputError if none can be read there, DesignError
     for a netlist that cannot be read.
     """
     # Reading a folder back takes longer to load than the rules.

@@ -175,7 +175,7 @@ def assemble(source: str | Path | Assembly, *changes: Change, **tables: Any) -> 
     """An assembly from a template's name, a TOML file or its record: parts, designs and places.
 
     Places are mm and degrees in the frame of the part that stands on nothing. Raises DesignError
-    where a part cannot sit where it should. The templates are the paper's (Sec. 2.1).
+    if a part cannot sit where it should. The templates are the paper's (Sec. 2.1).
     """
     if isinstance(source, Assembly):
         return put_together(source)

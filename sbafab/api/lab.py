@@ -23,7 +23,7 @@ def kerf(
 ) -> Calibration:
     """The kerf in mm from a filled ``coupon.csv``, over all and along x and y.
 
-    ``instrument`` is "calliper", "scanner" or "microscope" where the table has no column of that
+    ``instrument`` is "calliper", "scanner" or "microscope" if the table has no column of that
     name; ``resolution`` mm is its least step, by default 0.01, 0.0106 (2400 dpi) or 0.001. A
     constant reading error and a scale are fitted with the kerf. Uncertainties follow the usual
     guide to their expression (JCGM 100:2008), intervals hold 95 %. Raises DesignError for a table
@@ -95,7 +95,7 @@ def report(lab: str | Path = "lab.sqlite") -> Report:
     """Evaluate all records of a lab's file: success, figures, tolerances.
 
     Units stand in the names and in ``unit``; shares come with their interval of 95 %. Raises
-    OutputError where the file cannot be read.
+    OutputError if the file cannot be read.
     """
     records, _, builds = Lab(Path(lab)).contents()
     return report_of(records, builds)

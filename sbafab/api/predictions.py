@@ -93,7 +93,7 @@ def grip(assembled: Assembled, part: str) -> tuple[Grip, Surface] | None:
 
     The surface is in mm in the part's own frame, as high as the lumen leaves room, free without
     one: lenses of two arcs of film that does not stretch (as for the paper's Sec. 5). Raises
-    DesignError where the assembly has no such part.
+    DesignError if the assembly does not have the part.
     """
     names = [placed.name for placed in assembled.parts]
     if part not in names:

@@ -81,7 +81,7 @@ def cut(
 def press(source: Source, *changes: Change, out: str | Path = "out", **tables: Any) -> Run:
     """Writes the heat-press schedule, ``press.json`` and ``press.csv``; in C, kPa, N, mm and min.
 
-    The steps are the paper's (Sec. 2). Raises DesignError where temperature, pad or pins do not
+    The steps are the paper's (Sec. 2). Raises DesignError if temperature, pad or pins do not
     suit the laminate, and OutputError.
     """
     return run(RunRequest(load(source, *changes, **tables), Path(out), ("press",)))
