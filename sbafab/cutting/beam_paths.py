@@ -89,7 +89,7 @@ def beam_runs(
 ) -> list[LaserRun]:
     """Return the beam's paths for the contours of the sheet called ``name``, in their order.
 
-    Raises DesignError with the place where a lead-in or a tab finds none.
+    Raises DesignError with the place if a lead-in or a tab finds none.
     """
     if entries.is_plain:
         return list(contour_runs(contours))

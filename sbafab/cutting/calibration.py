@@ -141,7 +141,7 @@ class Estimate:
 
     @property
     def is_vague(self) -> bool:
-        """True if the kerf may be none, or is known too badly to compensate with."""
+        """True if the kerf may be 0, or is too uncertain to compensate with."""
         return self.kerf.interval[0] <= 0 or self.kerf.half_width > WIDEST
 
     def gap(self, size: Measurement) -> float:
@@ -155,9 +155,9 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Calibration:
-    """The kerf from all sizes, and from those along x and along y where both are known.
+    """The kerf from all sizes, and from the sizes along x and along y if both are known.
 
-    ``difference``: kerf along x less that along y.
+    ``difference``: kerf along x less kerf along y.
     """
 
     overall: Estimate
@@ -226,7 +226,7 @@ def _is_other_unit(estimate: Estimate) -> bool:
 def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> None:
     """Raises DesignError naming the one size without which all others agree, if there is one.
 
-    A slip of the pen draws the common fit with it, so that kerf or unit would be blamed.
+    A slip of the pen shifts the common fit, so that kerf or unit would be blamed.
     """
     if len(measurements) < 3:
         return
@@ -408,7 +408,7 @@ def coupon_csv() -> str:
 def write_coupon(folder: Path, generator: str) -> tuple[Path, ...]:
     """Writes ``coupon.dxf``, ``.svg`` and ``.csv``, read back; never over an old one.
 
-    Raises DesignError where one exists, OutputError where the file does not read back as drawn.
+    Raises DesignError if one exists, OutputError if the file does not read back as drawn.
     """
     paths = tuple(folder / f"coupon.{ending}" for ending in ("dxf", "svg", "csv"))
     for path in paths:
@@ -446,7 +446,7 @@ LONGEST = 10_000.0
 SEPARATORS = (",", ";", "\t")
 NUMBERS = ("nominal_mm", "measured_mm")
 INSTRUMENT = "instrument"
-"""A column that may be there: what the size was measured with."""
+"""An optional column: the instrument of the measurement."""
 KINDS: dict[str, Kind] = {"outer": "outer", "window": "window", "piece": "outer"}
 """Last words of a feature; a piece fell out of a window."""
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)", re.ASCII)
@@ -456,11 +456,11 @@ _WHOLE = re.compile(r"\d+", re.ASCII)
 def read_measurements(path: Path, instrument: str = "") -> list[Measurement]:
     """The filled rows of a table with the coupon's columns; ``#`` begins a remark.
 
-    ``instrument`` is what all was measured with, unless a column of that name says so row by row.
-    Columns are parted by commas, semicolons or tabs; numbers have a decimal point or comma. A
-    spreadsheet that parts columns by semicolons leaves our commas in its first cell; that is read
-    too. Raises DesignError, also for a row whose decimal commas cannot be told from those between
-    columns.
+    ``instrument`` applies to all sizes, unless a column of that name states it row by row. Columns
+    are separated by commas, semicolons or tabs; numbers have a decimal point or comma. A
+    spreadsheet that separates columns by semicolons leaves our commas in its first cell; that is
+    read too. Raises DesignError, also if decimal commas and column separators cannot be
+    distinguished.
     """
     lines = [
         (f"{path}, line {number}", line)

@@ -25,7 +25,7 @@ CLEAR = 10 * EPSILON
 """mm between two circles from which on they surely do not touch."""
 
 JOINED = 0.002
-"""mm: ends that lie within 1 um of one corner, which is what cut files promise, are as near."""
+"""mm: largest distance of two ends within 1 um of one corner, as cut files promise."""
 CELL = 16.0
 """Width of the cells that known ends are kept in, over the distance at which they are joined."""
 
@@ -33,7 +33,7 @@ CELL = 16.0
 def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
     """Contours from loose edges in any order and sense, whose ends meet to within JOINED.
 
-    Raises OutputError at an end that has not exactly one other to go on with.
+    Raises OutputError at an end that does not meet exactly one other end.
     """
     joints = _joints([p for edge in edges for p in (edge.start, edge.end)])
     snapped: list[Edge] = []
@@ -118,7 +118,7 @@ def _between(edge: Edge, start: Point, end: Point) -> Edge:
 
 
 def check_clear(contours: Sequence[Contour], copies: Copies | None = None) -> None:
-    """Raise OutputError where an edge is drawn twice or contours touch or cross.
+    """Raise OutputError if an edge is drawn twice or contours touch or cross.
 
     ``copies`` caches the shapes of equal contours.
     """
@@ -208,9 +208,9 @@ def _check_edges(a: Edge, b: Edge, neighbours: bool) -> None:
 def nested_region(
     inner: Sequence[Contour], outer: Sequence[Contour], copies: Copies | None = None
 ) -> Region:
-    """The region with these holes and outlines, in whichever sense they were drawn.
+    """The region with these holes and outlines, drawn in either sense.
 
-    Raises OutputError for a contour whose nesting is not what its layer says.
+    Raises OutputError for a contour whose nesting contradicts its layer.
     """
     drawn = [*inner, *outer]
     copies = copies or Copies()

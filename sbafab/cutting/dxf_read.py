@@ -202,7 +202,7 @@ _PROPERTY = re.compile(
     r"  9\n\$CUSTOMPROPERTYTAG\n  1\n([^\n]*)\n  9\n\$CUSTOMPROPERTY\n  1\n([^\n]*)\n"
 )
 _UNSURE = re.compile(r"\A\s|\s\Z|[\\^%]")
-"""In a property: what a reader of DXF may take for a code, or leave out."""
+"""Characters of a property that a DXF reader may take for a code, or leave out."""
 _LOW, _HIGH = (f" 10\n{_NUMBER}\n 20\n{_NUMBER}\n",) * 2
 _EXTENTS = re.compile(
     rf"  9\n\$EXTMIN\n{_LOW} 30\n0\.0\n  9\n\$EXTMAX\n{_HIGH} 30\n0\.0\n"
@@ -261,7 +261,7 @@ def _properties(text: str, place: int) -> tuple[dict[str, str] | None, int]:
 
 @cache
 def _entity(model_space: str) -> re.Pattern[str]:
-    """One entity: kind, handle, layer and what it is drawn with."""
+    """One entity: kind, handle, layer and geometry."""
     kinds = (
         rf"AcDbPolyline\n 90\n(\d+)\n 70\n([01])\n((?: 10\n{_NUMBER}\n 20\n{_NUMBER}\n"
         rf"(?: 42\n{_NUMBER}\n)?)+)",
@@ -461,8 +461,9 @@ def _place(kind: str, drawn: Sequence[Edge]) -> str:
 
 
 def _is_short(edge: Edge) -> bool:
-    """Return True if an edge has no length: none is shorter than its chord, but for a radius below
-    0.
+    """Return True if an edge has no length.
+
+    An edge is at least as long as its chord, unless its radius is negative.
     """
     may_be = math.dist(edge.start, edge.end) < EPSILON or (
         isinstance(edge, Arc) and edge.radius < EPSILON

@@ -41,7 +41,7 @@ class Surroundings(NamedTuple):
 
     @property
     def frames(self) -> tuple[Sequence[Point], ...]:
-        """The frame as one closed run of points; none without a frame."""
+        """The frame as one closed run of points; empty without a frame."""
         if self.frame is None:
             return ()
         x, y = self.frame
@@ -271,7 +271,7 @@ def _extents(boxes: Sequence[Bounds]) -> str:
 
 @cache
 def skeleton() -> Skeleton:
-    """The packaged empty document, cut open where files differ."""
+    """The packaged empty document, split at the places where files differ."""
     text = SKELETON.read_text(encoding="utf-8")
     before_properties, base, text = text.partition("  9\n$INSBASE\n")
     before_extents, _, text = text.partition("  9\n$EXTMIN\n")

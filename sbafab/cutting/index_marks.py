@@ -1,8 +1,8 @@
 """Index marks: the number of a part's pattern, engraved into the skeleton beside it.
 
-A mark keeps 0.5 mm from every part (half the spacing, where that is less than 1 mm), so that the
-film on its two sides is together what parts leave between them by default. It stands nearer to its
-part than to any other, and never in a hole. Where the skeleton has no such room, a part gets none.
+A mark keeps 0.5 mm from every part (half the spacing, if that is less than 1 mm), so that the film
+on its two sides adds up to the default spacing of parts. It stands nearer to its part than to any
+other, and never in a hole. If the skeleton has no such room, the part gets no mark.
 """
 
 from __future__ import annotations

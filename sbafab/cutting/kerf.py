@@ -13,9 +13,9 @@ from sbafab.laminate.laminate import Laminate, Layer, Role
 
 
 def compensated_paths(laminate: Laminate, settings: CutSettings) -> dict[str, Region]:
-    """Return the path of the beam for every pattern, in chords where those are to be drawn.
+    """Return the path of the beam for every pattern, in chords if the cut files are in chords.
 
-    Raises DesignError where the kerf leaves none.
+    Raises DesignError if the kerf leaves no path.
     """
     return {
         pattern: _compensated(layers[0], laminate.as_cut(layers[0]), settings)
@@ -43,7 +43,7 @@ def compensate(region: Region, kerf: Kerf) -> Region:
 
     ``kerf``: full width in mm, or that along x and along y. Of one width arcs stay arcs; of two
     they are followed within 0.1 um, and straight edges stay straight. Raises DesignError with the
-    place where a contour vanishes, splits or merges.
+    place if a contour vanishes, splits or merges.
     """
     if widths(kerf) == (0.0, 0.0):
         return region

@@ -40,8 +40,8 @@ def write_layer_files(
 
     ``paths`` holds the beam's path for every pattern. The name of a compensated file ends in its
     kerf: ``layers/001_TPE_base_kerf0.12.dxf``. A folded film has one file, its lowest
-    layer's. Raises OutputError where a file does not read
-    back as its path, OSError where it cannot be written.
+    layer's. Raises OutputError if a file does not read
+    back as its path, OSError if it cannot be written.
     """
     written: dict[int, CutFile] = {}
     (folder / FOLDER).mkdir(parents=True, exist_ok=True)

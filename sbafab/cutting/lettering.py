@@ -68,7 +68,7 @@ GLYPHS = {
 def strokes(text: str, at: Point, height: float) -> tuple[Stroke, ...]:
     """The strokes of a line of text, its lower left corner ``at``, capitals ``height`` mm high.
 
-    Small letters become capitals; what has no glyph leaves a gap.
+    Small letters become capitals; a character without a glyph leaves a gap.
     """
     step = height / CAP_HEIGHT
     return tuple(

@@ -114,7 +114,7 @@ def _sheet_layer(layer: str, recipes: Recipes) -> LaserLayer:
 
 
 def advice_of(settings: CutSettings, material: Material) -> str:
-    """Return what the user must know of a film's project: which powers are set, and from where."""
+    """Return the note for the user on a film's project: which powers are set, and their source."""
     if settings.machine is None:
         return ADVICE
     recipes = settings.recipes.get(material, NO_RECIPES)

@@ -52,7 +52,7 @@ def machine_text(program: LaserProgram, runs: Sequence[LaserRun], size: Point, t
 
 
 def read_machine_file(path: Path, program: LaserProgram) -> list[BeamRun]:
-    """Return what a machine file has the beam follow, in its order. Raises OutputError."""
+    """Return the beam's runs in a machine file, in its order. Raises OutputError."""
     try:
         return [*(_read_rdworks(path) if program == "rdworks" else _read_epilog(path))]
     except OutputError as error:

@@ -15,7 +15,7 @@ from sbafab.geometry.offset import Kerf, widths
 from sbafab.laminate.films import PTFE_WARNING, Material
 
 Recipes = Mapping[Operation, Recipe]
-"""Recipes of a film on the machine, by what they do."""
+"""Recipes of a film on the machine, by operation."""
 LaserProgram = Literal["rdworks", "epilog"]
 """Laser programs beside LightBurn that a sheet's machine file is for."""
 DxfProfile = Literal["bulges", "arcs", "chords"]
@@ -84,7 +84,7 @@ def sheet_properties(
 def fixture_properties(settings: CutSettings, notes: Sequence[str] = ()) -> dict[str, str]:
     """Custom properties of the base plate's cut file; its edges are nominal.
 
-    ``notes`` are what a shop must know of its holes.
+    ``notes`` inform a workshop about its holes.
     """
     properties = _properties(settings, "plate", "fixture", None)
     return {**properties, "HOLES": " / ".join(notes)} if notes else properties
@@ -137,9 +137,9 @@ def kerf_properties(kerf: Kerf | None) -> dict[str, str]:
 
 
 def kerf_of(properties: Mapping[str, str]) -> Kerf | None:
-    """The kerf that a file says it is compensated for; None for nominal edges.
+    """The kerf that a file is compensated for, as it states; None for nominal edges.
 
-    Raises OutputError where it says neither.
+    Raises OutputError if it states neither.
     """
     state, width = properties.get("KERF_STATE"), properties.get("KERF_WIDTH")
     if (state, width) == (UNCALIBRATED, "none"):
@@ -192,9 +192,9 @@ def curves_property(text: str | None) -> dict[str, str]:
 
 
 def chord_error_of(properties: Mapping[str, str]) -> float:
-    """The sagitta in mm within which a file says its chords stay; 0 where it claims true arcs.
+    """The sagitta in mm that a file states for its chords; 0 if it claims true arcs.
 
-    Raises OutputError where the property cannot be understood.
+    Raises OutputError if the property cannot be understood.
     """
     text = properties.get("CURVES")
     if text is None:

@@ -56,8 +56,8 @@ def seam_properties(seam: Seam, settings: CutSettings) -> dict[str, str]:
 
 
 def write_seam_files(laminate: Laminate, folder: Path, settings: CutSettings) -> None:
-    """Writes the path of every seam under ``folder``. Raises OutputError where a file does not
-    read back as its path, OSError where it cannot be written.
+    """Writes the path of every seam under ``folder``. Raises OutputError if a file does not
+    read back as its path, OSError if it cannot be written.
     """
     for seam in laminate.seams:
         path = folder / seam_path(seam)
@@ -91,7 +91,7 @@ def offset_text(offset: Point) -> str:
 
 
 def shift_words(tool: str, offset: Point) -> str:
-    """Return that the files of a tool are shifted, and by how much."""
+    """Return the sentence that the files of a tool are shifted, with the distance."""
     x, y = offset
     return f"files of the {tool} are shifted by {0.0 - x:.2f}, {0.0 - y:.2f} mm"
 
@@ -99,7 +99,7 @@ def shift_words(tool: str, offset: Point) -> str:
 def read_seam(path: Path) -> tuple[tuple[tuple[Edge, ...], ...], dict[str, str]]:
     """Return the chains of a seam's file and its custom properties.
 
-    Raises OutputError where it holds anything else, or no path.
+    Raises OutputError if the file holds anything else, or no path.
     """
     drawing = read_profile(path)
     strangers = [layer for layer, _ in drawing.strokes if layer not in (SEAM, REFERENCE)]

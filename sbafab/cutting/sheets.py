@@ -192,7 +192,7 @@ def _write_sheet(
 
 
 class _Layout(NamedTuple):
-    """A sheet of a nest: its contours in cutting order, what surrounds them, and their entries."""
+    """A sheet of a nest: its contours in cutting order, its surroundings, and its entries."""
 
     nest: Nest
     sheet: int
@@ -204,9 +204,9 @@ class _Layout(NamedTuple):
 def _write_project(
     path: Path, layout: _Layout, settings: CutSettings, properties: Mapping[str, str]
 ) -> list[LaserRun]:
-    """Write a sheet's LightBurn project, with lead-ins, overcuts and tabs where asked for.
+    """Write a sheet's LightBurn project, with lead-ins, overcuts and tabs if requested.
 
-    Returns what it has the beam follow, in its order.
+    Returns the beam's runs in it, in order.
     """
     material, around = layout.nest.material, layout.around
     entries = layout.entries
@@ -225,7 +225,7 @@ def _write_project(
 def _write_machine_file(
     sheet: Path, layout: _Layout, program: LaserProgram | None, runs: Sequence[LaserRun], title: str
 ) -> str | None:
-    """Write and read back the file of a sheet for another laser program, if one is asked for.
+    """Write and read back the file of a sheet for another laser program, if requested.
 
     Returns its path in the output folder.
     """
@@ -241,13 +241,13 @@ def _write_machine_file(
 
 
 def parts_cut(path: Path, program: LaserProgram) -> list[BeamRun]:
-    """Return what a machine file cuts of the parts."""
+    """Return the runs of a machine file that cut the parts."""
     runs = read_machine_file(path, program)
     return [run for run in runs if run.layer in (CUT_INNER, CUT_OUTER)]
 
 
 def check_cuts(path: Path, cuts: Sequence[BeamRun], region: Region, entries: Entries) -> None:
-    """Raises OutputError with the file where its cuts are not the region's contours as asked."""
+    """Raises OutputError with the file if its cuts differ from the requested contours."""
     try:
         check_beam_runs(cuts, region, entries)
     except OutputError as error:
@@ -413,7 +413,7 @@ STROKE = 0.1
 def sheet_svg(
     contours: Sequence[Contour], sheet: Surroundings, width: float, height: float, title: str
 ) -> str:
-    """The contours in the order given, with what surrounds them, on a page of this size in mm.
+    """The contours in the order given, with their surroundings, on a page of this size in mm.
 
     The page's lower left corner is the origin; true arcs, coordinates without transforms.
     """

@@ -47,9 +47,9 @@ def verify_file(
 
 
 def check_surroundings(read: ReadBack, expected: Surroundings) -> None:
-    """Compares what a sheet has beside its parts: engraving in the waste, parting cut, frame.
+    """Compares a sheet's lines beside its parts: engraving in the waste, parting cut, frame.
 
-    Raises OutputError with the layer and place of what differs, or of engraving inside a part.
+    Raises OutputError with the layer and place of a difference, or of engraving inside a part.
     """
     for layer, runs in (
         (ENGRAVE, expected.engraved),
@@ -92,7 +92,7 @@ def _near(region: Region, edges: Sequence[Edge]) -> Region:
 def check_datum(read: ReadBack) -> None:
     """Raises OutputError if a layer's file holds more than its contours and the datum cross.
 
-    Nor may it have less: the cross is what layers are laid over each other by.
+    The cross must be present: layers are aligned by it.
     """
     arm = DATUM_ARM
     expected = [((-arm, 0.0), (arm, 0.0)), ((0.0, -arm), (0.0, arm))]
