@@ -49,7 +49,7 @@ class BuildUpPart:
 class StackShape:
     """Shape of the stacks under the pad: their height, area and length of rim, mm.
 
-    ``below`` is how much lower the lowest bond is than the highest: by the masks over it.
+    ``below`` is the height of the highest bond above the lowest, due to the masks over the latter.
     """
 
     height: float
@@ -77,7 +77,7 @@ def gent_modulus(shore_a: float) -> float:
 
     A. N. Gent, On the relation between indentation hardness and Young's modulus, Trans. Inst.
     Rubber Ind. 34 (1958) 46-57; its abstract says the relation with Shore hardness is approximate.
-    The numbers are those that other programs quote of it (the paper itself was not opened). Below
+    The numbers are quoted from other programs (the paper itself was not opened). Below
     40 degrees it is extrapolated past its abstract's claim, and for a sponge it is an order.
     """
     return 1000 * 0.0981 * (56 + 7.62336 * shore_a) / (0.137505 * (254 - 2.54 * shore_a))
@@ -129,7 +129,7 @@ def column_modulus(press: Press, thickness: float, under: StackShape) -> float:
 
 
 def pressures(press: Press, thickness: float, under: StackShape) -> Pressures:
-    """Return the pressures on a stack by that on the whole platen, in equilibrium with the force.
+    """Return the pressures on a stack from the platen's pressure, in equilibrium with the force.
 
     Near the edge the pad spans from the stack to the plate, as long as a soft half-space does
     under its pressure (a gap of width w closes by about 2 p w / E), and half of what it carries
@@ -154,7 +154,7 @@ def pad_thickness(press: Press, stacks: Sequence[StackShape]) -> float:
     """Return the pad's thickness in mm: the setting's, or the thinnest sold, or pile, that is even
     enough.
 
-    Raises DesignError where the set-up cannot give the pressure on the platen.
+    Raises DesignError if the set-up cannot give the pressure on the platen.
     """
     if press.pad_material == "silicone sponge" and press.pad_hardness > HARDEST_SPONGE:
         raise DesignError(

@@ -126,7 +126,7 @@ def design_runs(design: Design, laminate: Laminate) -> Runs:
 def _copies_by_hours(design: Design, laminate: Laminate) -> int:
     """Return the number of copies that one person makes in a cycle of CYCLE_HOURS, at least one.
 
-    Minutes that are not stated for the film count as none: the press may then take longer.
+    Minutes that are not stated for the film count as 0: the press may then take longer.
     """
     press = design.press
     pressing = 0.0
@@ -189,7 +189,7 @@ def most_together(laminate: Laminate, platen: tuple[float, float]) -> int:
 
 
 class PatternEntry(Document):
-    """Layers of one shape: how many each copy has, and each cycle."""
+    """Layers of one shape: their number in each copy, and in each cycle."""
 
     pattern: str
     each: int

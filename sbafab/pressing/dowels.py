@@ -5,7 +5,7 @@ too deep, and its height over the plate is its length less the hole's depth. A n
 on through the plate, so that it is pushed out from below.
 
 Lengths, diameters and chamfers: ISO 8734:1997 (hardened) and ISO 2338:1997 (unhardened, m6 or h8:
-order m6). The standards themselves were not opened. Held against the tables of FreeCAD's workbench
+order m6). The standards themselves were not opened. Compared with the tables of FreeCAD's workbench
 for fasteners (FsData/iso8734*.csv, iso2338*.csv), all equal; against a table of ISO 8734 in the
 public part library of geop, equal from 1.5 mm up; chamfers of ISO 8734 against a transcription of
 its Table 1 in tscircuit's modelprinter, equal.
@@ -173,13 +173,13 @@ def settings_by_step(
     stock: Sequence[float],
     plate: float | None,
 ) -> list[tuple[PinSetting, ...]]:
-    """Return the pins of every step, given the height of its stack's top over the plate in mm, all
-    that lies under the stack included, and the pins that are in.
+    """Return the pins of every step, given its inserted pins and the height of its stack's top, mm.
 
-    Holes of one diameter have one depth, and a step with a higher stack takes longer pins. Of all
-    depths that a plate takes (``plate`` mm thick, or the thinnest sold that takes any) the one is
-    chosen with which pins stand least over their stacks. Even the shortest pin in the deepest hole
-    stands over its stack by its chamfer. Raises DesignError where no pin is long enough, or the
+    The height is over the plate and includes every part under the stack. Holes of one diameter have
+    one depth, and a step with a higher stack needs longer pins. Of all depths that fit a plate
+    (``plate`` mm thick, or the thinnest sold that fits any) the chosen one lets pins stand least
+    over their stacks. Even the shortest pin in the deepest hole
+    stands over its stack by its chamfer. Raises DesignError if no pin is long enough, or the
     plate too thin.
     """
     tops: dict[float, list[float]] = {}
@@ -285,7 +285,7 @@ def _thickness(choices: Mapping[float, Sequence[_Choice]], thickness: float | No
 
 
 def _best(choices: Sequence[_Choice], plate: float) -> _Choice:
-    """Return the depth, of those that the plate takes, with which the pins stand out least."""
+    """Return the depth, among those that fit the plate, at which the pins stand out least."""
     fitting = [choice for choice in choices if choice.depth + FLOOR <= plate + ROUNDING]
     return min(fitting, key=lambda choice: (choice.out, choice.depth))
 
@@ -314,8 +314,8 @@ def hole_notes(
 ) -> tuple[str, ...]:
     """Return the notes on the plate's holes for a workshop, a line each, in letters a plotter has.
 
-    ``pins`` are all of a laminate; those that no step uses need no shoulder. The only pin of a
-    plate needs no more than a reamed hole, wherever it is.
+    ``pins`` are all of a laminate; pins that no step uses do not need a shoulder. The only pin of
+    a plate needs just a reamed hole, wherever it is.
     """
     sizes = dict.fromkeys(
         (pin.diameter, replace(holes[pin.name], pin="") if pin.name in holes else None)

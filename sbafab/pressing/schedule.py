@@ -134,7 +134,7 @@ def _minutes_of_another_temperature(
 
 
 def _is_the_papers(laminate: Laminate) -> bool:
-    """Return True if a film is the paper's, so that what it tried in the press bears on it."""
+    """Return True if a film is the paper's, so that the paper's press trials apply to it."""
     films = {layer.film for layer in pressed_layers(laminate)}
     return any(film.is_a(PAPER_PRODUCT, PAPER_THICKNESS) for film in films)
 
@@ -302,8 +302,8 @@ def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,))
 
     Flash bonds hold layers in place on their pins. Full bonds are pressed without any, as in the
     paper; with ears a flash bond on the pins comes before each. Raises DesignError at a temperature
-    that would not bond the films or is too high for one of them or the pad, and where pad, pins
-    or plate do not do for the laminate. ``together`` are the laminates that lie in the press at
+    that would not bond the films or is too high for one of them or the pad, and if pad, pins
+    or plate do not fit the laminate. ``together`` are the laminates that lie in the press at
     once, one number for each size of cycle, the largest first: they share the force.
     """
     press = design.press
