@@ -33,7 +33,7 @@ BESIDE = 1e-5
 
 
 WIDEST = 3.0
-"""Times as wide as the narrowest are places that are looked at where films are not known."""
+"""Without known films, places up to this many times as wide as the narrowest are examined."""
 
 
 class OpeningPlace(NamedTuple):
@@ -152,7 +152,7 @@ class _Side(NamedTuple):
 
 
 def _pressure(sides: Sequence[_Side], width: Width) -> float | None:
-    """Return the kPa that lift either side; the more of both where bonds behind it end."""
+    """Return the kPa that lift either side; the larger of both if bonds behind it end."""
     if width.value <= TOUCH:
         return math.inf
     (x, y), (u, v) = width.start, width.end

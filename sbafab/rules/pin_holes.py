@@ -62,7 +62,7 @@ def _idle(laminate: Laminate) -> Iterator[_Miss]:
 
 
 def _unholed(laminate: Laminate) -> Iterator[_Miss]:
-    """Layers that lack a hole at a tooling pin where others of their kind have one."""
+    """Layers that lack a hole at a tooling pin although others of their kind have one."""
     for pin in tooling_pins(laminate):
         for roles in ON_ONE_PIN:
             holed: dict[bool, list[Layer]] = {True: [], False: []}

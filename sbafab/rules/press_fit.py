@@ -1,7 +1,7 @@
 """press-fit: the laminate fits the heated area; a warning for untested heights and press minutes,
 and for a film that is not an elastomer.
 
-Heights are untested above ``validated_balloons``; minutes where no kit or design states them for a
+Heights are untested above ``validated_balloons``; minutes if no kit or design states them for a
 film.
 """
 

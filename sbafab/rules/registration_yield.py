@@ -198,7 +198,7 @@ Z95 = 1.959963984540054
 BATCH = 5_000
 """Builds drawn at a time, which bounds the memory."""
 HALF_INTERVAL = 0.005
-"""Half the interval's width at most, where the design gives no number of builds: then the share of
+"""Half the interval's width at most, if the design gives no number of builds: then the share of
 other builds lies within one percentage point of it."""
 
 
@@ -371,7 +371,7 @@ def _counted(
     measures: Measures,
     seed: int,
 ) -> Yield:
-    """Draw the builds, in batches, and count those in which all rows keep room."""
+    """Draw the builds, in batches, and count the builds in which no row is short."""
     design = measures.design
     errors, drawn_rows = _drawn_errors(rows.kinds, measures)
     places = [np.searchsorted(indices, of_kind.interfaces) for of_kind in errors]

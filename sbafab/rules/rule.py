@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class Explanation(NamedTuple):
-    """The condition that ``holds`` where a rule passes, ``why`` it matters, how to ``mend`` it.
+    """The condition that ``holds`` if a rule passes, ``why`` it matters, how to ``mend`` it.
 
     ``keys`` of a design file set the limit or the measured value.
     """
