@@ -283,7 +283,7 @@ def property_problems(
 
 
 def bare_problem(files: str, has_units: bool, *layers: int) -> Problem:
-    """Return a warning on files without custom properties, as formats before R2004 have none."""
+    """Return a warning on files without custom properties: formats before R2004 cannot hold any."""
     lost = "custom properties" if has_units else "custom properties and no units"
     message = (
         f"{files} carry no {lost}: save as DXF R2004 or later to keep them; kerf, waivers and "

@@ -584,7 +584,7 @@ def _number_problems(sheet: CutSheet, drawing: ReadBack) -> list[Problem]:
 def _machine_problems(
     folder: Path, sheet_claim: SheetClaim, region: Region, design: Design
 ) -> list[Problem]:
-    """Return differences of a sheet's machine files from what it cuts, with lead-ins and tabs."""
+    """Return differences of a sheet's machine files from its cuts, with lead-ins and tabs."""
     asked = entries(design).get(sheet_claim.material, PLAIN)
     files: list[tuple[str, Callable[[Path], Sequence[BeamRun]]]] = []
     if not asked.is_plain:
