@@ -80,8 +80,8 @@ def bottom_left(
 class _Way:
     """A way to fill: the order of the parts, and the share of their height that counts as low.
 
-    Sheets start with a lattice of the shape of most area left, of those that have one; with
-    ``whole_only`` only if it fills.
+    Sheets start with a lattice of the shape with the largest remaining area that has a lattice;
+    with ``whole_only`` only if it fills the sheet.
     """
 
     order: tuple[int, ...]
@@ -237,7 +237,7 @@ class _Filler:
     def _arrangement(self, shape: int) -> Lattice:
         """Return copies of a shape, found by a beam search; none if many fit a sheet.
 
-        A step puts a copy at an extreme free place. Sheets that leave most places free go on.
+        Each step puts a copy at an extreme free place and keeps the sheets with most free places.
         """
         forms = [form for form in self.grid.forms if form.shape == shape]
         sheets = [_Arrangement(tuple(self.empty[form.number] for form in forms))]
@@ -722,7 +722,7 @@ class Grid:
 
 
 def strike(free: Cells, clear: Cells, form: TurnedShape, place: tuple[int, int]) -> None:
-    """Remove from a form's free places those that are not ``clear`` of a form at ``place``."""
+    """Remove a form's free places that are not ``clear`` of a form at ``place``."""
     row, column = (at - size + 1 for at, size in zip(place, form.cells.shape, strict=True))
     rows = slice(max(0, row), max(0, row + clear.shape[0]))
     columns = slice(max(0, column), max(0, column + clear.shape[1]))

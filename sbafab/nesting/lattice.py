@@ -1,9 +1,9 @@
 """Lattices of one shape on a film sheet: rows of copies, straight, offset, or turned by half.
 
-Copies are apart if outlines grown by half the spacing do not meet. How near two copies come along
-an axis follows from envelopes: the front of one, as a function of the other coordinate, less the
-back of the other, where that is greatest. Lattices are ranked by a table of these distances and
-laid by the distances themselves.
+Copies are apart if outlines grown by half the spacing do not meet. The least distance of two copies
+along an axis follows from envelopes: it is the maximum, over the other coordinate, of the front of
+one less the back of the other. Lattices are ranked by a table of these distances and laid by the
+exact distances.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ TABLE = 192
 MOST_ROWS = 60
 """Rows that are counted to rank a lattice."""
 PROMISING = 16
-"""Lattices that are laid, of those that rank first."""
+"""Number of best-ranked lattices that are laid."""
 NEVER = -1e9
 """mm: what need not lie above at all."""
 FEW = 40
@@ -403,7 +403,7 @@ def _sides(polygon: Numbers) -> _Sides:
 
 
 def _slides(first: _Sides, second: _Sides, offsets: Numbers) -> Numbers:
-    """Return how far along the axis the second polygon must lie to clear the first.
+    """Return the distance along the axis at which the second polygon clears the first.
 
     It is moved across by each offset; -inf where they then pass each other.
     """

@@ -129,7 +129,7 @@ def parts_of(
     """Return every piece of every pattern, by pattern in stacking order.
 
     ``paths`` holds each pattern's path of the beam, kerf compensated; ``spares`` returns
-    how many more of a pattern are cut than the ``copies`` need. Pieces of one pattern that differ
+    the number of a pattern's spare pieces beyond the ``copies``. Pieces of one pattern that differ
     only in their place are one part, named after the first of them.
     """
     parts: list[NestPart] = []
