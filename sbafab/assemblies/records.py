@@ -1,6 +1,6 @@
 """Records of an assembly file: parts, joints, places that the whole must fit, and limits.
 
-Defaults are the paper's (Sec. 2.1) where it gives a figure; else ours, and the field says so.
+Defaults are the paper's (Sec. 2.1) if it gives a figure; else ours, and the field says so.
 Lengths are mm, angles degrees.
 """
 
