@@ -175,7 +175,7 @@ def film_of(curve: MeasuredCurve) -> str:
 
 
 def sampled_curve(curve: MeasuredCurve, surface: ValueSurface) -> SampledCurve:
-    """Return a curve as the posterior takes it."""
+    """Return a curve in the form for the posterior."""
     fields = [unknown.field for unknown in UNKNOWNS]
     term = term_of(curve)
     return SampledCurve(

@@ -82,8 +82,7 @@ def model_values(
     """Return the values of the models at a curve's points, or why there are none.
 
     ``factors`` come from a calibration; by default the models use none. For an open set-up, every
-    assumption that matters gives one series. ``shares_maps`` is for fits
-    that ask for many factors.
+    assumption that matters gives one series. ``shares_maps`` is for fits with many factors.
     """
     answer = ANSWERS.get(curve.quantity)
     if answer is None:
@@ -108,7 +107,7 @@ WITHOUT_MODEL = {
 
 
 def _text(measured: MeasuredActuator) -> str:
-    """Return what describes an actuator, as a key of caches."""
+    """Return the description of an actuator, as a key of caches."""
     return json.dumps([measured.design, dict(measured.changes), measured.toml], sort_keys=True)
 
 

@@ -35,7 +35,7 @@ SEED = 20220085
 
 
 class SampledCurve(NamedTuple):
-    """A curve as the posterior takes it: its surface, logarithms of the measured values and their
+    """A curve for the posterior: its surface, logarithms of the measured values and their
     standard errors, (points,), the test that it comes from, the number of its quantity's group in
     GROUPS, and the column in UNKNOWNS of the unknown that its values have as a term (-1: none).
     """
