@@ -72,7 +72,7 @@ def compare(
 
 def compare_calibrated(evidence: Evidence, calibration: ModelCalibration) -> list[ComparedCurve]:
     """Return the curves of a source beside the calibrated models and their 90 % intervals, which
-    span what the source leaves open.
+    span the set-ups that the source leaves open.
     """
     compared = []
     for curve in evidence.curves:

@@ -231,7 +231,7 @@ def strokes() -> Iterator[Row]:
 
 
 def press_factor() -> float:
-    """Return what the press left of the films of the 3-DoF, if its masks kept their thickness."""
+    """Return pressed over nominal film thickness of the 3-DoF, if its masks kept theirs."""
     folded = _films()
     return (paper.FLAT_HEIGHT.value - folded.solid) / folded.molten
 
