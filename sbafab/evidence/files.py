@@ -269,9 +269,9 @@ def read_csv(path: Path) -> Evidence:
     """Return the curves of a table with some of COLUMNS; the file's name is their id and citation.
 
     Columns are separated by commas, semicolons or tabs, the latter two also with decimal commas.
-    Rows of one ``curve`` follow each other or not; without that column the quantity parts them. A
-    cell that says something of the whole curve stands in any of its rows. Raises DesignError with
-    the line.
+    Rows of one ``curve`` need not be adjacent; without that column the quantity separates curves. A
+    cell that applies to the whole curve may be in any of its rows. Raises DesignError with the
+    line.
     """
     rows_by_curve: dict[str, list[TableRow]] = {}
     for where, row in _rows(path):

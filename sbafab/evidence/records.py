@@ -155,10 +155,10 @@ class MeasuredPoint(NamedTuple):
 class MeasuredCurve:
     """Values of one quantity by one set-up.
 
-    ``place``: figure and section of the source. ``x`` is empty where ``x_name`` is; else it has one
-    number a value. ``comparable`` False: no prediction may be held against it or fitted to it, for
-    ``reason``. Curves of a ``group`` come from one test, so that a fit which holds one back holds
-    back all. ``unknown``: sentences on what the source does not say.
+    ``place``: figure and section of the source. ``x`` is empty if ``x_name`` is; else it has one
+    number per value. ``comparable`` False: no prediction may be compared with it or fitted to it,
+    for ``reason``. Curves of a ``group`` come from one test, so a fit that leaves one out leaves
+    all of them out. ``unknown``: sentences on facts that the source does not state.
     """
 
     id: str
