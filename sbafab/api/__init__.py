@@ -97,11 +97,10 @@ MODULES = {
     "models.stack_batch": ("StackBatch",),
     "rules.finding": ("Findings",),
 }
-"""Functions and records by their module, which is loaded when first asked for one of them;
-``api.designs`` has the rest.
+"""Functions and records by module; a module is loaded on first use. ``api.designs`` has the rest.
 
-So a script that builds laminates loads no model, and a page that runs Python in a browser may lack
-numpy.
+A script that builds laminates therefore loads no model, and a page that runs Python in a browser
+may lack numpy.
 """
 
 

@@ -27,9 +27,9 @@ def check(
 ) -> Findings:
     """Check a design with the rule deck; an assembly also between its parts.
 
-    Each finding has its limit and worst measured value in its own ``unit``. ``progress`` is told
-    each rule; what it raises ends the check. Raises DesignError for what cannot be built. Limits
-    are the paper's (Sec. 2) where it gives one, else ours.
+    Each finding has its limit and worst measured value in its own ``unit``. ``progress`` is called
+    with each rule; an exception from it ends the check. Raises DesignError if the design cannot be
+    built. Limits are the paper's (Sec. 2) if it gives one, else ours.
     """
     # A job takes models, hence numpy; a page without numpy has the rules of a design.
     from sbafab.output.job import check_job
@@ -67,12 +67,12 @@ def nets_of(source: Source, *changes: Change, **tables: Any) -> NetMap:
 
 
 def check_folder(folder: str | Path, nets: str | Path | None = None) -> Findings:
-    """Check the cut files of an output folder as they lie on disk with the rule deck.
+    """Check the cut files of an output folder on disk with the rule deck.
 
-    Also whether the folder is what its ``design.toml`` makes (findings ``manifest-claims``,
-    ``as-designed``, ``file-integrity``), and with ``nets``, a file, whether its layers join what
-    that netlist lists (``netlist``). Raises OutputError if none can be read there, DesignError
-    for a netlist that cannot be read.
+    Also checks that the folder matches its ``design.toml`` (findings ``manifest-claims``,
+    ``as-designed``, ``file-integrity``), and with ``nets``, a file, that its layers connect as that
+    netlist lists (``netlist``). Raises OutputError if the folder cannot be read, DesignError if the
+    netlist cannot be read.
     """
     # Reading a folder back takes longer to load than the rules.
     from sbafab.runs.check_folder import check_folder as read_and_check

@@ -46,9 +46,10 @@ Returned = TypeVar("Returned")
 
 
 def command(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
-    """Return a function with the name of a command, whose keywords may be tables of a design too:
-    numbers and arrays of numpy become Python's, and a misspelt keyword is told the argument that it
-    is most like. Raises DesignError.
+    """Return a command's function that also accepts tables of a design as keywords.
+
+    NumPy numbers and arrays become Python's. Raises DesignError for a misspelt keyword, with the
+    most similar argument.
     """
     arguments = list(signature(function).parameters)
 
@@ -174,7 +175,7 @@ def read_laminate(path: str | Path) -> Laminate:
 def assemble(source: str | Path | Assembly, *changes: Change, **tables: Any) -> Assembled:
     """An assembly from a template's name, a TOML file or its record: parts, designs and places.
 
-    Places are mm and degrees in the frame of the part that stands on nothing. Raises DesignError
+    Places are mm and degrees in the root part's frame. Raises DesignError
     if a part cannot sit where it should. The templates are the paper's (Sec. 2.1).
     """
     if isinstance(source, Assembly):

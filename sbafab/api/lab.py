@@ -26,8 +26,8 @@ def kerf(
     ``instrument`` is "calliper", "scanner" or "microscope" if the table has no column of that
     name; ``resolution`` mm is its least step, by default 0.01, 0.0106 (2400 dpi) or 0.001. A
     constant reading error and a scale are fitted with the kerf. Uncertainties follow the usual
-    guide to their expression (JCGM 100:2008), intervals hold 95 %. Raises DesignError for a table
-    that can be read in two ways, for a slip in it, and for what no beam cuts.
+    guide to their expression (JCGM 100:2008), intervals hold 95 %. Raises DesignError for an
+    ambiguous table, for a slip in it, and for an implausible kerf.
     """
     return calibrated(read_measurements(Path(measurements), instrument), resolution)
 
@@ -94,7 +94,7 @@ def record_sheet(source: Source, *changes: Change) -> tuple[RecordTable, ...]:
 def report(lab: str | Path = "lab.sqlite") -> Report:
     """Evaluate all records of a lab's file: success, figures, tolerances.
 
-    Units stand in the names and in ``unit``; shares come with their interval of 95 %. Raises
+    Units are in the names and in ``unit``; shares come with their 95 % interval. Raises
     OutputError if the file cannot be read.
     """
     records, _, builds = Lab(Path(lab)).contents()

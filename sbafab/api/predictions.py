@@ -78,11 +78,11 @@ def predict_assembly(
     pause: Callable[[], None] | None = None,
     **tables: Any,
 ) -> AssemblyPrediction:
-    """Predict the inflated parts of an assembly: reach, load, grip, and what they then touch.
+    """Predict the inflated parts of an assembly: reach, load, grip, and contacts.
 
     All actuators are at ``pressure_kpa``, and ``load_g`` g hangs across their tips; the paper's
     marble by default (Sec. 5). ``pause`` is called between parts of the work, which takes seconds;
-    what it raises ends it. Raises DesignError for pressures that the models do not reach.
+    an exception from it ends the work. Raises DesignError for pressures beyond the models' range.
     """
     assembled = source if isinstance(source, Assembled) else assemble(source, *changes, **tables)
     return predict_assembled(assembled, pressure_kpa, load_g, pause or (lambda: None))
@@ -140,14 +140,16 @@ def motion(
     pressures: Sequence[float] | None = None,
     **load: Any,
 ) -> Motion:
-    """A stack that is fed through tubes, to call ``motion.step(dt, pressures=...)`` with pressures
-    (kPa) at the valves, or ``motion.step(dt, flows=...)`` with flows (ul/s) of the pumps.
+    """A stack that is fed through tubes, over time.
+
+    Call ``motion.step(dt, pressures=...)`` with pressures (kPa) at the valves, or
+    ``motion.step(dt, flows=...)`` with flows (ul/s) of the pumps.
 
     ``length`` and inner ``diameter`` of each chamber's tube are mm (the default is the paper's
     tube, Sec. 2); ``fluid`` is air or water; ``dead_volume`` are ul between pump and tube
     (syringe, valve, fittings), ``delay`` s until they act; ``pressures`` (kPa, by default 0) are
-    those to begin with; ``load`` is what ``stack.pose`` takes beside pressures. Flow is laminar
-    (Poiseuille) or turbulent (Blasius), air isothermal. Raises DesignError.
+    the initial ones; ``load`` holds the arguments of ``stack.pose`` other than pressures. Flow is
+    laminar (Poiseuille) or turbulent (Blasius), air isothermal. Raises DesignError.
     """
     if fluid not in FLUIDS:
         raise DesignError(f'fluid = "{fluid}" must be one of {", ".join(sorted(FLUIDS))}')
