@@ -89,7 +89,7 @@ def beam_runs(
 ) -> list[LaserRun]:
     """Return the beam's paths for the contours of the sheet called ``name``, in their order.
 
-    Raises DesignError with the place if a lead-in or a tab finds none.
+    Raises DesignError with the place if a lead-in or a tab does not fit.
     """
     if entries.is_plain:
         return list(contour_runs(contours))
@@ -264,7 +264,7 @@ def _lead_in(lap: _Lap, entries: Entries, waste: _Waste, name: str) -> tuple[flo
 
 
 def _tabs(lap: _Lap, start: float, entries: Entries, name: str) -> list[float]:
-    """The middles of an outline's tabs, in the order of cutting; evenly spread where it can be."""
+    """The middles of an outline's tabs, in the order of cutting; evenly spread if possible."""
     gap, pitch = entries.gap, lap.length / entries.tabs
     # A gap's width from a corner, from the start and the overcut, and from another tab.
     first, last = start + entries.overcut + 1.5 * gap, start + lap.length - 1.5 * gap

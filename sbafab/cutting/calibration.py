@@ -45,7 +45,7 @@ WORST_SCALE = 0.1
 LARGEST_SLIP = 0.25
 """mm; more than twice the largest error of laser cutting (paper, Sec. 2) is a slip of the pen."""
 MOST_SUSPECTS = 20
-"""Sizes that are tried as the one slip, those farthest from the middle one first."""
+"""Sizes that are tried as the one slip, starting with the farthest from the middle one."""
 WIDEST = 0.05
 """mm; half the largest error of laser cutting: a kerf known no better deserves a warning."""
 
@@ -259,7 +259,7 @@ def _fitted(measurements: Sequence[Measurement], resolution: float) -> Estimate:
     columns = np.array([[size.sign] for size in measurements], dtype=float)
     along_x = np.array([size.along_x for size in measurements], dtype=float)[:, None]
     is_read_by = [[size.instrument == name for name in instruments] for size in measurements]
-    # The last two are small: a few sizes tell more where they are taken to be none.
+    # The last two are small: with few sizes the fit is better if they are taken as 0.
     blocks = {
         "offsets": (np.array(is_read_by, dtype=float), 1),
         "scale": (nominal[:, None], 1),

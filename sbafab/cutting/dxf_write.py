@@ -58,7 +58,7 @@ class _Entity(NamedTuple):
 
 
 class Skeleton(NamedTuple):
-    """The empty document, cut open where a file differs from another."""
+    """The empty document, split at the places where files differ."""
 
     before_properties: str
     before_extents: str

@@ -40,7 +40,7 @@ def fixture(
 def whole_plate(
     laminate: Laminate, platen: tuple[float, float], places: Sequence[Point] = ONE
 ) -> Region:
-    """The base plate in the layers' own frame, plain where the laminate has no pins."""
+    """The base plate in the layers' own frame, without holes if the laminate has no pins."""
     x0, y0 = plate_corner(laminate, platen, places)
     width, length = _as_it_lies(platen, _lying(laminate, places))
     x1, y1 = x0 + width, y0 + length
@@ -51,7 +51,7 @@ def whole_plate(
 def plate_corner(
     laminate: Laminate, platen: tuple[float, float], places: Sequence[Point] = ONE
 ) -> Point:
-    """The plate's corner of least x and y, to 0.1 mm: where its holes are measured from."""
+    """The plate's corner of least x and y, to 0.1 mm: the origin of its holes' coordinates."""
     box = low_x, low_y, high_x, high_y = _lying(laminate, places)
     width, length = _as_it_lies(platen, box)
     return round((low_x + high_x - width) / 2, 1), round((low_y + high_y - length) / 2, 1)
