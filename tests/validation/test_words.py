@@ -40,6 +40,7 @@ def _answers(folder: Path) -> dict[str, Any]:
     }
 
 
+@pytest.mark.long
 def test_no_program_reads_the_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     usual = _answers(tmp_path / "usual")
     assert usual["main"]
