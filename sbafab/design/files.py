@@ -91,7 +91,8 @@ def sentence(
     # Alternatives of a union put their own name in the location; the file has only keys.
     where = [_plain(part) for part in first["loc"] if not _is_alternative(part)]
     field = (prefix + ".".join(where)).rstrip(".")
-    for name in (field, where[0] if where else "", f'{field} = "{first["input"]}"'):
+    value = first["input"] if isinstance(first["input"], str) else ""
+    for name in (field, where[0] if where else "", f'{field} = "{value}"'):
         for key, words in REMOVED.items():
             if fnmatchcase(name, key):
                 return f"{name} {words}"

@@ -477,6 +477,8 @@ def _commands(text: str) -> Iterator[str]:
     """
     if text.strip(WHITE) in ("", "none"):
         return
+    # A move and a closing beside each segment at most.
+    refuse_more_than_limit(sum(1 for _ in _COMMANDS.finditer(text)) // 3)
     start, *rest = _COMMANDS.split(text)
     letters, bodies = rest[::2], rest[1::2]
     if start.strip(WHITE) or not letters or letters[0] not in "Mm":

@@ -79,14 +79,14 @@ BOMBS: dict[str, tuple[Callable[[], str], str]] = {
     "deep.svg": (lambda: svg("<g>" * 1900 + "</g>" * 1900), "no closed path"),
     "closings.svg": (lambda: svg(f'<path d="M0 0{"z" * SIZE}"/>'), "more than 5000 edges"),
     "path.svg": (lambda: svg(f'<path d="M0 0{"L1 1" * (SIZE // 4)}"/>'), "more than 5000 edges"),
-    "style.svg": (lambda: svg(f"<style>{'a{b:c}' * (SIZE // 6)}</style>"), "long style sheet"),
+    "style.svg": (lambda: svg(f"<style>{'a{b:c}' * (SIZE // 6)}</style>"), "in a style sheet"),
     "turns.svg": (
         lambda: svg(f'<path transform="{"rotate(1)" * (SIZE // 9)}" d="M0 0L1 1"/>'),
         "very long transform",
     ),
     "far.svg": (lambda: svg('<circle r="1e308"/>'), "has a coordinate of x 1e+308"),
     "star.svg": (lambda: svg(f'<polygon points="{star(499)}"/>'), "crosses or touches itself"),
-    "clones.svg": (lambda: svg('<use href="#a"/>' * 9), "unlink it"),
+    "clones.svg": (lambda: svg('<use href="#a"/>' * 9), "clones unlinked"),
 }
 
 

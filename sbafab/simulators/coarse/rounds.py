@@ -136,7 +136,8 @@ def pocket_radii(laminate: Laminate) -> list[float]:
     radii = []
     for gap in laminate.interfaces:
         if gap.kind == "chamber":
-            for contour in gap.mask.outers:
+            # Seams bound a chamber without a mask.
+            for contour in (gap.mask if gap.masks else gap.unbonded).outers:
                 low_x, bottom, right, top = contour.bounds
                 radii.append(min(right - low_x, top - bottom) / 2)
     return radii
