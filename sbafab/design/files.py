@@ -137,7 +137,7 @@ def _allowed(problem: Any) -> str:
     }
     if kind == "literal_error":
         near = difflib.get_close_matches(
-            str(problem["input"]), re.findall("'([^']*)'", context["expected"]), 1
+            shown(problem["input"]).strip("'"), re.findall("'([^']*)'", context["expected"]), 1
         )
         hint = f"; did you mean {near[0]}?" if near else ""
         return f"must be {context['expected']}{hint}"
@@ -329,12 +329,16 @@ def toml_tables(text: str, path: str | Path) -> dict[str, Any]:
         # The parser names no key, but its line shows it.
         number = _AT_LINE.search(reason)
         line = text.split("\n")[int(number[1]) - 1] if number else text.rstrip().split("\n")[-1]
-        quotes = _UNQUOTED.fullmatch(line)
+        quotes = _UNQUOTED.fullmatch(line) if len(line) < LONGEST_LINE else None
         hint = f'; a value with a unit stands in quotes: "{quotes[1]}"' if quotes else ""
         raise DesignError(
             f"{path} is not valid TOML: {reason[:1].lower()}{reason[1:]}, "
             f"{shown(line.strip())}{hint}"
         ) from None
+
+
+LONGEST_LINE = 120
+"""Letters of a line that a message repeats."""
 
 
 @lru_cache(maxsize=8)
