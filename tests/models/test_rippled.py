@@ -155,6 +155,7 @@ def test_narrow_pockets_unlike_films_and_other_laws_are_as_before() -> None:
         rippled(WIDE, [1.0, 0.0])
 
 
+@pytest.mark.long
 def test_between_plates_force_and_volume_are_slopes_of_one_energy() -> None:
     """Of W(p, h), beside a smaller share of what waves themselves keep (see ``balloon_map``)."""
     p, h, step = np.array([0.4, 1.5, 6.0]), np.array([1.0, 2.0, 3.0]), 1e-4
@@ -170,6 +171,7 @@ def test_between_plates_force_and_volume_are_slopes_of_one_energy() -> None:
     assert found.volume == pytest.approx(volume, rel=0.03)
 
 
+@pytest.mark.long
 def test_free_heights_of_the_map_are_those_with_waves() -> None:
     p = np.array([0.5, 1.0, 3.0, 8.0])
     assert (free_shapes(INNER, p).height > 1.005 * inflate(INNER, p).height).all()

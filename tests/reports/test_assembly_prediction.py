@@ -195,6 +195,7 @@ def reach(pressure: float) -> float:
     return max(float(rims.max()), top)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("room", "meets"), [pytest.param(10.5, False, marks=pytest.mark.long), (8.0, True)]
 )

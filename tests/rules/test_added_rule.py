@@ -60,6 +60,7 @@ def test_the_rule_of_the_page_is_one_of_the_deck(site: Path, tmp_path: Path) -> 
     assert '"bed-size"' in runs[7].stdout
 
 
+@pytest.mark.long
 def test_rows_of_a_sweep_know_which_packages_measured_them(
     site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -187,6 +187,7 @@ def test_pictures_have_one_scale() -> None:
     assert small < large
 
 
+@pytest.mark.long
 def test_pictures_go_to_the_pressure_that_is_compared() -> None:
     """As far as predict: the paper's pockets burst at 367 kPa."""
     designs = (sbafab.load("1dof-5mm", stack={"balloons": balloons}) for balloons in (1, 2))

@@ -303,6 +303,7 @@ def test_a_stroke_is_not_met_by_what_predict_says_is_less(tmp_path: Path) -> Non
     assert sbafab.predict(target).value("reference_stroke") < 20
 
 
+@pytest.mark.long
 def test_find_refuses_what_predict_leaves_out() -> None:
     """Another film has no reference stroke, and none rises where it would be 15 % longer."""
     film = {"product": "TPU", "thickness": 0.1, "modulus": 20, "poisson": 0.45}
@@ -415,6 +416,7 @@ def test_a_bound_is_shown_beside_its_median(tmp_path: Path) -> None:
     assert f"height {row['median']:.4g} mm ({shown}); at most 1.5 mm" in ended.output
 
 
+@pytest.mark.long
 def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:
     asked = ["find", "1dof-5mm", "--min", "force@200mm@1kPa=1", "--tries", "6"]
     asked += ["--free", "chamber.diameter=5:5.1:0.1"]
@@ -538,6 +540,7 @@ def test_keys_are_freed_and_fixed_by_name() -> None:
             read_free(design, free, fixed)
 
 
+@pytest.mark.long
 def test_a_search_by_optuna_that_is_stopped_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -670,6 +673,7 @@ def test_the_reason_that_holds_for_most_is_given_and_not_that_of_the_smallest() 
     assert "(so 4 of 5 tried)" in str(refused.value)
 
 
+@pytest.mark.long
 def test_a_figure_is_that_of_predict_above_the_pressure_of_usual_maps() -> None:
     """110 kPa: up to there a map is made without being asked."""
     design = sbafab.load("3dof-15mm", films={"tpe": TPU})
@@ -704,6 +708,7 @@ def test_what_holds_in_the_median_is_said_to(sure: list[str], tmp_path: Path) ->
     assert ("meets the requirement. Next" in ended) == bool(sure)
 
 
+@pytest.mark.long
 def test_a_range_of_one_value_is_widened_and_more_pressure_named(tmp_path: Path) -> None:
     asked = ["find", "1dof-5mm", "--min", "force@2mm@10kPa=9", "--free", "stack.balloons=7:7:1"]
     asked += ["--free", "chamber.diameter=9:9:0.5", "--set", "models.calibration=none"]
