@@ -26,7 +26,7 @@ from sbafab.geometry.edges import Edge, edge_from_bulge
 from sbafab.geometry.region import Region, centroid
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.checked import cut_settings
-from sbafab.rules import pressure_rating, registration_yield
+from sbafab.rules import registration_yield
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import TOLERANCE
@@ -213,16 +213,13 @@ def as_cut(laminate: Laminate, paths: Mapping[str, Region], settings: CutSetting
 
 
 def _first_failure(laminate: Laminate, design: Design) -> Finding | None:
-    """Return the first failure that is not waived, or None.
-
-    Yield and burst pressure are left out: chords move no edge far enough, and both take long.
-    """
+    """Return the first failure that is not waived, without the yield, or None."""
     measures = Measures(laminate, design)
     return next(
         (
             finding
             for rule in RULES
-            if rule.name not in (registration_yield.NAME, pressure_rating.NAME)
+            if rule.name != registration_yield.NAME
             for finding in run_rule(rule, measures)
             if finding.verdict == "fail"
         ),

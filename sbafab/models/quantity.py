@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 from enum import Enum, StrEnum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 from sbafab.errors import DesignError
 
@@ -18,8 +18,8 @@ class Conditions(NamedTuple):
     ``kpa`` gauge, a vacuum below 0; ``share`` of the reference stroke, of a pocket's length by
     which it is shorter, or of the free bend; ``chambers`` pressurised, the others empty or flat;
     ``angle`` of a bend in degrees; ``volume`` in ul a balloon; ``flow`` in ml/min; ``tube`` its
-    diameter in mm; ``hinges`` in a row. ``of`` names one chamber of several, "sba" one actuator of
-    several side by side, or "pouch" one pouch of several.
+    diameter in mm; ``hinges`` in a row. ``of`` names one chamber of several; ``each`` is "sba" for
+    one actuator of several side by side, "pouch" for one pouch of several.
     """
 
     kpa: float | None = None
@@ -246,91 +246,56 @@ def chamber_count(number: int) -> str:
 
 
 class ModelId(StrEnum):
-    """Models of figures, by their ids for programs."""
+    """Models of figures: ids for programs, and ``words``, the name without factors."""
 
-    GEOMETRY = "geometry"
-    FILMS = "films"
-    FILM_MASS = "film-mass"
-    TUBE_AND_FILMS = "tube-and-films"
-    LENS = "lens"
-    CYLINDER = "cylinder"
-    FOLDED_LOBES = "folded-lobes"
-    HALF_PERIMETER = "half-perimeter"
-    FILM_STRESS = "film-stress"
-    SCALED_HEIGHT = "scaled-height"
-    LARGEST_VOLUME = "largest-volume"
-    EQ_4 = "eq-4"
-    EQS_1_TO_3 = "eqs-1-to-3"
-    LENS_STROKE = "lens-stroke"
-    WORK_ON_EQ_4 = "work-on-eq-4"
-    WORK_ON_EQS_1_TO_3 = "work-on-eqs-1-to-3"
-    WORK_ON_LENS = "work-on-lens"
-    VOLUME_OVER_FLOW = "volume-over-flow"
-    EQ_4_OVER_FLOW = "eq-4-over-flow"
-    LENS_OVER_FLOW = "lens-over-flow"
-    P_V_EQ_4 = "p-v-eq-4"
-    P_V_LENS = "p-v-lens"
-    POWER = "power"
-    CONSTANT_CURVATURE = "constant-curvature"
-    CURVATURE_OVER_FLOW = "curvature-over-flow"
-    CANTILEVER = "cantilever"
-    FLAT_PLATES = "flat-plates"
-    ELASTIC_BALLOON = "elastic-balloon"
-    ELASTIC_STACK = "elastic-stack"
-    STACK_IN_TIME = "stack-in-time"
-    STACK_SHUT = "stack-shut"
-    POUCH_MOTOR = "pouch-motor"
-    POUCH_HINGE = "pouch-hinge"
-    INFLATED_BEAM = "inflated-beam"
-    LAMINAR_JAMMING = "laminar-jamming"
-    TEXTILE_POUCHES = "textile-pouches"
+    words: str
 
-    @property
-    def words(self) -> str:
-        """The model's name, without its factors."""
-        return _MODELS[self]
+    def __new__(cls, key: str, words: str) -> Self:
+        member = str.__new__(cls, key)
+        member._value_, member.words = key, words
+        return member
+
+    GEOMETRY = "geometry", "plain geometry"
+    FILMS = "films", "sum of the films"
+    FILM_MASS = "film-mass", "area x thickness x density"
+    TUBE_AND_FILMS = "tube-and-films", "tube and films"
+    LENS = "lens", "lens of two arcs"
+    CYLINDER = "cylinder", "cylinder of unstretched film"
+    FOLDED_LOBES = "folded-lobes", "three lobes as chords of a circle"
+    HALF_PERIMETER = "half-perimeter", "half the perimeter"
+    FILM_STRESS = "film-stress", "film stress in proportion"
+    SCALED_HEIGHT = "scaled-height", "the paper's height, scaled"
+    LARGEST_VOLUME = "largest-volume", "the largest volume"
+    EQ_4 = "eq-4", "Eq. 4"
+    EQS_1_TO_3 = "eqs-1-to-3", "Eqs. 1-3"
+    LENS_STROKE = "lens-stroke", "the lens of two arcs"
+    WORK_ON_EQ_4 = "work-on-eq-4", "virtual work on Eq. 4"
+    WORK_ON_EQS_1_TO_3 = "work-on-eqs-1-to-3", "virtual work on Eqs. 1-3"
+    WORK_ON_LENS = "work-on-lens", "virtual work on the lens of two arcs"
+    VOLUME_OVER_FLOW = "volume-over-flow", "volume over flow"
+    EQ_4_OVER_FLOW = "eq-4-over-flow", "Eq. 4 over flow"
+    LENS_OVER_FLOW = "lens-over-flow", "the lens of two arcs over flow"
+    P_V_EQ_4 = "p-v-eq-4", "p v with Eq. 4"
+    P_V_LENS = "p-v-lens", "p v with the lens of two arcs"
+    POWER = "power", "F v / m"
+    CONSTANT_CURVATURE = "constant-curvature", "constant curvature"
+    CURVATURE_OVER_FLOW = "curvature-over-flow", "constant curvature, Eq. 4 over flow"
+    CANTILEVER = "cantilever", "3 E I / l^3"
+    FLAT_PLATES = "flat-plates", "pressure x pocket area"
+    ELASTIC_BALLOON = "elastic-balloon", "elastic balloon"
+    ELASTIC_STACK = "elastic-stack", "elastic stack"
+    STACK_IN_TIME = "stack-in-time", "elastic stack in time"
+    STACK_SHUT = "stack-shut", "elastic stack, chambers shut"
+    POUCH_MOTOR = "pouch-motor", "pouch motor"
+    POUCH_HINGE = "pouch-hinge", "pouch hinge"
+    INFLATED_BEAM = "inflated-beam", "inflated beam"
+    LAMINAR_JAMMING = "laminar-jamming", "laminar jamming"
+    TEXTILE_POUCHES = (
+        "textile-pouches",
+        "pressure x pocket area; textile pouches pushed with 0.18 of it at 230 kPa",
+    )
 
 
-_MODELS = {
-    ModelId.GEOMETRY: "plain geometry",
-    ModelId.FILMS: "sum of the films",
-    ModelId.FILM_MASS: "area x thickness x density",
-    ModelId.TUBE_AND_FILMS: "tube and films",
-    ModelId.LENS: "lens of two arcs",
-    ModelId.CYLINDER: "cylinder of unstretched film",
-    ModelId.FOLDED_LOBES: "three lobes as chords of a circle",
-    ModelId.HALF_PERIMETER: "half the perimeter",
-    ModelId.FILM_STRESS: "film stress in proportion",
-    ModelId.SCALED_HEIGHT: "the paper's height, scaled",
-    ModelId.LARGEST_VOLUME: "the largest volume",
-    ModelId.EQ_4: "Eq. 4",
-    ModelId.EQS_1_TO_3: "Eqs. 1-3",
-    ModelId.LENS_STROKE: "the lens of two arcs",
-    ModelId.WORK_ON_EQ_4: "virtual work on Eq. 4",
-    ModelId.WORK_ON_EQS_1_TO_3: "virtual work on Eqs. 1-3",
-    ModelId.WORK_ON_LENS: "virtual work on the lens of two arcs",
-    ModelId.VOLUME_OVER_FLOW: "volume over flow",
-    ModelId.EQ_4_OVER_FLOW: "Eq. 4 over flow",
-    ModelId.LENS_OVER_FLOW: "the lens of two arcs over flow",
-    ModelId.P_V_EQ_4: "p v with Eq. 4",
-    ModelId.P_V_LENS: "p v with the lens of two arcs",
-    ModelId.POWER: "F v / m",
-    ModelId.CONSTANT_CURVATURE: "constant curvature",
-    ModelId.CURVATURE_OVER_FLOW: "constant curvature, Eq. 4 over flow",
-    ModelId.CANTILEVER: "3 E I / l^3",
-    ModelId.FLAT_PLATES: "pressure x pocket area",
-    ModelId.ELASTIC_BALLOON: "elastic balloon",
-    ModelId.ELASTIC_STACK: "elastic stack",
-    ModelId.STACK_IN_TIME: "elastic stack in time",
-    ModelId.STACK_SHUT: "elastic stack, chambers shut",
-    ModelId.POUCH_MOTOR: "pouch motor",
-    ModelId.POUCH_HINGE: "pouch hinge",
-    ModelId.INFLATED_BEAM: "inflated beam",
-    ModelId.LAMINAR_JAMMING: "laminar jamming",
-    ModelId.TEXTILE_POUCHES: (
-        "pressure x pocket area; textile pouches pushed with 0.18 of it at 230 kPa"
-    ),
-}
 WORK_ON = {
     ModelId.EQ_4: ModelId.WORK_ON_EQ_4,
     ModelId.EQS_1_TO_3: ModelId.WORK_ON_EQS_1_TO_3,

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from sbafab.geometry.contour import Contour
-from sbafab.geometry.edges import Arc
+from sbafab.geometry.edges import Arc, Point
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union
 from sbafab.geometry.width import (
     Boundary,
@@ -17,6 +17,7 @@ from sbafab.geometry.width import (
     _along_each_other,
     _may_face,
     _side,
+    inscribed_disc,
     least_gap,
     least_width,
 )
@@ -305,3 +306,29 @@ def test_across_a_ring_lies_what_every_foot_tells(monkeypatch: pytest.MonkeyPatc
         assert segments[0] == segments[1]
         offered += len(segments[0])
     assert offered > 300
+
+
+def _ring(count: int) -> Region:
+    """A disc of radius 3 in chords, whose inscribed disc has the apothem."""
+    turns = (math.tau * n / count for n in range(count))
+    return polygon([(3 * math.cos(turn), 3 * math.sin(turn)) for turn in turns])
+
+
+@pytest.mark.parametrize(
+    ("region", "radius", "centre"),
+    [
+        (union([disc((0, 0), 2), disc((9, 0), 3)]), 3.0, (9.0, 0.0)),
+        (rectangle((0, 0), (4, 4)), 2.0, (2.0, 2.0)),
+        (polygon([(0, 0), (3, 0), (0, 4)]), 1.0, (1.0, 1.0)),
+        (stadium((5, 5), 3, 11), 1.5, None),
+        (disc((0, 0), 5) - disc((0, 0), 1), 2.0, None),
+        (disc((0, 0), 5) - disc((2, 0), 1), 3.0, (-2.0, 0.0)),
+        (_ring(4000), 3 * math.cos(math.pi / 4000), (0.0, 0.0)),
+    ],
+)
+def test_the_inscribed_disc_by_hand(region: Region, radius: float, centre: Point | None) -> None:
+    found = inscribed_disc(region)
+    assert found.radius == pytest.approx(radius, rel=1e-4)
+    assert found.radius <= radius + 1e-9
+    if centre is not None:
+        assert found.centre == pytest.approx(centre, abs=3e-2)
