@@ -250,7 +250,7 @@ class ModelId(StrEnum):
 
     words: str
 
-    def __new__(cls, key: str, words: str) -> Self:
+    def __new__(cls, key: str, words: str = "") -> Self:
         member = str.__new__(cls, key)
         member._value_, member.words = key, words
         return member

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import re
+from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
@@ -135,13 +136,13 @@ class LabRow(BaseModel):
         groups = {name: self.group(name) for name in self.GROUPS}
         return {**self.model_dump(exclude=grouped), **groups}
 
+    @abstractmethod
     def conflict(self, stored: Self) -> str:
         """Return a sentence if this row repeats or contradicts one of the same attempt, or ""."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _problems(self) -> Iterator[str]:
         """Yield sentences on fields that need another field."""
-        raise NotImplementedError
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
