@@ -23,7 +23,7 @@ from sbafab.laminate.laminate import Interface, Laminate
 
 RADIUS = 2.5
 """Pocket diameter in the burst tests, mm."""
-NOT_BURST = "nobody has burst such a film; burst one actuator"
+NOT_BURST = "no burst test of this film is known; burst one actuator"
 ROUND = 1.05
 """Largest area of a round pocket without its strips, relative to its largest disc; ours. Others
 count as infinitely long cylinders."""

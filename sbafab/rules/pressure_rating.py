@@ -30,7 +30,7 @@ def check(measures: Measures) -> list[Finding]:
         return [_passed(f"not compared: {NOT_BURST}, and state {KEY}")]
     if estimate is None:
         remedy = "burst one actuator, and divide its pressure by the safety factor"
-        message = f"{remedy}: {NOT_BURST}, so that nobody can say whether {working:g} kPa is safe"
+        message = f"{remedy}: {NOT_BURST}; whether {working:g} kPa is safe is not known"
         return [Finding(NAME, "warn", None, None, "kPa", Place(), message, remedy=remedy)]
     return [_compared(estimate, working, factor, stated is not None)]
 
@@ -68,8 +68,8 @@ RULE = Rule(
     NAME,
     check,
     Explanation(
-        "the estimated burst pressure is the working pressure times the safety factor; a film that "
-        "nobody has burst is not compared, and warned of where a working pressure is stated",
+        "the estimated burst pressure is at least the working pressure times the safety factor; a "
+        "film without a burst test is not compared, and warned of if a working pressure is stated",
         "A film under too much pressure bursts, or its bonds peel, at first use or after many.",
         "Work at less pressure, take smaller pockets or a thicker film.",
         (KEY, "acceptance.safety_factor", "chamber.diameter", "films.tpe.thickness"),

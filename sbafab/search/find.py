@@ -350,7 +350,7 @@ def _commonest_reason(space: SearchSpace) -> str:
     counts = Counter(trial.refused_at for trial in refused)
     nearest = max(refused, key=lambda trial: counts[trial.refused_at])
     count = counts[nearest.refused_at]
-    return f"no design could be made: {nearest.refused} (so {count} of {len(refused)} tried)"
+    return f"no design could be made: {nearest.refused} ({count} of the {len(refused)} tried)"
 
 
 # The diagnosis of a search: binding constraints, tight rules, range ends, the Pareto front.

@@ -211,7 +211,7 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(
 
 
 def test_a_picture_goes_to_the_pressures_of_predict(tmp_path: Path) -> None:
-    """A film that nobody has burst to 1000 kPa, the paper's to its burst pressure."""
+    """A film without a burst test to 1000 kPa, the paper's to its burst pressure."""
     film = ["product=TPU 85A", "thickness=0.1", "modulus=20", "poisson=0.45"]
     tpu = [part for word in film for part in ("--set", f"films.tpe.{word}")]
     drawn = ["--set", "stack.balloons=2", "--width", "100", "--to", str(tmp_path / "a.png")]

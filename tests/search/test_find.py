@@ -670,7 +670,7 @@ def test_the_reason_that_holds_for_most_is_given_and_not_that_of_the_smallest() 
             best="width",
         )
     assert "longer" in str(refused.value)
-    assert "(so 4 of 5 tried)" in str(refused.value)
+    assert "(4 of the 5 tried)" in str(refused.value)
 
 
 @pytest.mark.long

@@ -175,13 +175,13 @@ def proof(work: Work) -> Proof:
     if estimate is None and kit_pressure != USUAL_PROOF:
         return Proof(
             kit_pressure,
-            f"{forces}; nobody has burst this film, and {kit_pressure:g} kPa is what "
+            f"{forces}; no burst test of this film is known, and {kit_pressure:g} kPa is what "
             "acceptance.proof_pressure_kpa states",
         )
     if estimate is None:
         return Proof(
             None,
-            f"{forces}; nobody has burst this film. Burst one actuator, write down "
+            f"{forces}; no burst test of this film is known. Burst one actuator, write down "
             f"the pressure, ________ kPa, and proof test the others at {SHARE:.0%} of it",
         )
     most = math.floor(SHARE * estimate.kpa / STEP) * STEP
