@@ -235,6 +235,14 @@ def test_circles_have_a_diameter_and_any_outline_goes_on_as_points(sketch: Sketc
     assert after == pytest.approx(before, abs=1e-4)
 
 
+def test_a_selected_number_stays_selected_when_the_table_is_drawn_again(sketch: Sketch) -> None:
+    field = sketch.page.get_by_label("Point 1, x, mm", exact=True)
+    field.select_text()
+    sketch.page.evaluate("studio.drawing.fill()")
+    sketch.page.keyboard.type("-21")
+    assert field.input_value() == "-21"
+
+
 def test_edges_of_the_sketch_are_those_of_closed_formulas(sketch: Sketch) -> None:
     worst = sketch.page.evaluate(
         """async () => {

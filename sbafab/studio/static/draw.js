@@ -283,7 +283,7 @@ export class Draw {
   }
   fill() {
     if (!this.shape) { this.side.replaceChildren(el("p", { class: "fallback" }, "This design names no shape yet.")); return; }
-    const kind = kindOf(this.shape), focused = document.activeElement?.dataset?.field, { scrollTop } = this.side;
+    const kind = kindOf(this.shape), before = document.activeElement, focused = before?.dataset?.field, { scrollTop } = this.side;
     for (const [name, button] of Object.entries(this.tools)) button.disabled = !hasCorners(this.shape) || (name !== "add" && this.corner === null);
     const bent = hasCorners(this.shape) && this.corner !== null && corners(this.shape)[this.corner]?.b;
     this.tools.arc.textContent = bent ? "Straighten" : "Arc";
@@ -291,7 +291,12 @@ export class Draw {
     this.side.replaceChildren(el("p", { class: "draw-why", role: "alert", hidden: true }), el("div", {}, el("h3", {}, `${this.name}: ${KINDS[kind].toLowerCase()}`), this.joints.renaming(), ...(hasCorners(this.shape) ? this.table() : this.sizes(kind)), ...this.placing()), el("div", {}, ...this.uses(), el("p", { class: "keys" }, HELP)));
     this.warn();
     this.side.scrollTop = scrollTop;
-    if (focused) this.side.querySelector(`[data-field="${focused}"]`)?.focus();
+    const now = focused && this.side.querySelector(`[data-field="${focused}"]`);
+    if (now) {
+      // What was selected stays selected, so that the next key replaces it.
+      now.focus();
+      now.setSelectionRange(before.selectionStart, before.selectionEnd === before.value.length ? now.value.length : before.selectionEnd);
+    }
     this.side.querySelector("tr[aria-current]")?.scrollIntoView({ block: "nearest" });
   }
   field(id, label, value, send, { least = -Infinity, digits = 6 } = {}) {
