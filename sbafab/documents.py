@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import ast
+import functools
+import inspect
+import textwrap
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
@@ -11,18 +16,64 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    GetJsonSchemaHandler,
     TypeAdapter,
     WithJsonSchema,
 )
 
 
-class Document(BaseModel):
+class Described(BaseModel):
+    """A table whose schema describes each key by its docstring.
+
+    A validator is built when the first table is read, and docstrings of keys are read when a schema
+    is requested: a command needs some of the tables only. So a default that is a table is made by
+    ``model_construct()``, which needs no validator.
+    """
+
+    model_config = ConfigDict(defer_build=True)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> Any:
+        for field in cls.model_fields.values():
+            if isinstance(field.default, BaseModel):
+                # Pydantic before 2.14 writes a default including parts that its record has not
+                # built yet.
+                type(field.default).model_rebuild()
+        schema = handler(core)
+        keys = handler.resolve_ref_schema(schema).get("properties", {})
+        for record in cls.__mro__[: cls.__mro__.index(Described)]:
+            if issubclass(record, Described):
+                for name, description in _descriptions(record):
+                    key = cls.model_fields[name].alias or name
+                    keys.get(key, {}).setdefault("description", description)
+        return schema
+
+
+@functools.cache
+def _descriptions(record: type[Described]) -> tuple[tuple[str, str], ...]:
+    """The keys of a record, without inherited ones, and their docstrings.
+
+    Python parses the whole module to find a class, and many records inherit the same.
+    """
+    (body,) = ast.parse(textwrap.dedent(inspect.getsource(record))).body
+    assert isinstance(body, ast.ClassDef)
+    descriptions = []
+    for key, description in pairwise(body.body):
+        if isinstance(key, ast.AnnAssign) and isinstance(key.target, ast.Name):
+            match description:
+                case ast.Expr(value=ast.Constant(value=str(text))):
+                    if key.target.id in record.model_fields:
+                        descriptions.append((key.target.id, inspect.cleandoc(text)))
+    return tuple(descriptions)
+
+
+class Document(Described):
     """A document, or a table of one: its keys are the fields, which their docstrings describe.
 
     A key with a default may be missing.
     """
 
-    model_config = ConfigDict(from_attributes=True, use_attribute_docstrings=True, defer_build=True)
+    model_config = ConfigDict(from_attributes=True)
 
     SCHEMA: ClassVar[str]
     """Id of a document that is written by itself."""
