@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import cycle
 from typing import NamedTuple
 
 from sbafab.geometry.region import coord
@@ -109,28 +110,41 @@ def chart_svg(title: str, panels: Sequence[Panel], in_row: int = 1000) -> str:
     """Return the panels under one title, this many in a row."""
     elements, width, height = [draw.text((3.0, 6.0), title, size=4.0, bold=True)], 0.0, 0.0
     for first in range(0, len(panels), in_row):
-        drawn, end, below = _row(panels[first : first + in_row], first + 1)
-        if first:
-            drawn = [f'<g transform="translate(0 {coord(height)})">', *drawn, "</g>"]
-        elements += drawn
+        end = below = 0.0
+        drawn: list[str] = []
+        for place, panel in enumerate(panels[first : first + in_row], start=first + 1):
+            parts, end, high = _panel(panel, place, end)
+            drawn += parts
+            below = max(below, high)
+        elements.append(f'<g transform="translate(0 {coord(height)})">{"".join(drawn)}</g>')
         width, height = max(width, end), height + below
     return draw.document(width, height, title, elements)
 
 
-def _row(panels: Sequence[Panel], first: int) -> tuple[list[str], float, float]:
-    """Return the elements of panels beside each other from number ``first`` on; width, height."""
-    elements: list[str] = []
-    end, height = 0.0, 0.0
-    for place, panel in enumerate(panels, start=first):
-        plot = _plot(panel, end)
-        elements += [*_axes(plot, place), *_bars(plot, place), *_specks(plot, place)]
-        elements += [*_curves(plot, place), *_points(plot, place)]
-        rows = list(_key(panel))
-        elements += [_key_row(plot, number, row) for number, row in enumerate(rows)]
-        words = max((draw.text_width(row.label, draw.SMALL) for row in rows), default=0.0)
-        end = plot.left + max(AXES[0], SIGN + 2 + words) + RIM
-        height = max(height, HEAD + AXES[1] + FOOT + ROW * len(rows) + 1)
-    return elements, end, height
+def _panel(panel: Panel, place: int, begin: float) -> tuple[list[str], float, float]:
+    """Return the elements of panel number ``place``, its right end and its height.
+
+    What belongs to a label is the group ``bars<place>.<number>``, ``curve...`` and so on.
+    """
+    plot = _plot(panel, begin)
+    elements = list(_axes(plot, place))
+    rows = 0
+    widest = AXES[0]
+    for kind, draw_items in (
+        ("bars", _bars(plot)),
+        ("specks", _specks(plot)),
+        ("curve", _curves(plot)),
+        ("points", _points(plot)),
+    ):
+        for number, (label, sign, shapes) in enumerate(draw_items, start=1):
+            elements.append(f'<g id="{kind}{place}.{number}">{shapes}</g>')
+            if label:
+                x, y = plot.left, HEAD + AXES[1] + FOOT + ROW * (rows + 0.5)
+                elements.append(f'<g transform="translate({coord(x)} {coord(y)})">{sign}</g>')
+                elements.append(draw.text((x + SIGN + 2, y + 0.9), label, size=draw.SMALL))
+                widest = max(widest, SIGN + 2 + draw.text_width(label, draw.SMALL))
+                rows += 1
+    return elements, plot.left + widest + RIM, HEAD + AXES[1] + FOOT + ROW * rows + 1
 
 
 class _Scale(NamedTuple):
@@ -225,23 +239,13 @@ def _axes(plot: _Plot, place: int) -> Iterator[str]:
     yield draw.text(at, panel.y_label, anchor="middle", turned=True)
 
 
-def _pens(panel: Panel) -> Iterator[tuple[str, str]]:
-    """Yield the colour of each curve, and the attributes that draw it."""
-    drawn = 0
-    for curve in panel.curves:
-        colour, dashes, width = REFERENCE, "0.7 0.7", "0.35"
-        if not curve.is_reference:
-            colour, dashes = COLOURS[drawn % len(COLOURS)], DASHES[drawn % len(DASHES)]
-            drawn, width = drawn + 1, "0.6"
-        dashed = f' stroke-dasharray="{dashes}"' if dashes else ""
-        pen = f'fill="none" stroke="{colour}" stroke-width="{width}" stroke-linejoin="round"'
-        yield colour, f"{pen}{dashed}"
+_Items = Iterator[tuple[str, str, str]]
+"""Labels, each with its sign in the key, ``SIGN`` long from (0, 0), and all that is drawn."""
 
 
-def _bars(plot: _Plot, place: int) -> Iterator[str]:
-    """Yield the bars of a label in panel number ``place`` as a group ``bars<place>.<number>``."""
+def _bars(plot: _Plot) -> _Items:
     below = [0] * len(plot.panel.names)
-    for number, bars in enumerate(plot.panel.bars, start=1):
+    for bars in plot.panel.bars:
         boxes = ""
         for name, (base, count) in enumerate(zip(below, bars.y, strict=True)):
             if count:
@@ -249,46 +253,45 @@ def _bars(plot: _Plot, place: int) -> Iterator[str]:
                 right, high = plot.at(name + BAR, base + count)
                 boxes += draw.box((left, high), (right, low), fill=bars.colour)
         below = [a + b for a, b in zip(below, bars.y, strict=True)]
-        yield f'<g id="bars{place}.{number}">{boxes}</g>'
+        yield bars.label, draw.path(f"M0 0h{SIGN:g}", draw.style(bars.colour, 2.4)), boxes
 
 
-def _specks(plot: _Plot, place: int) -> Iterator[str]:
-    """Yield the specks of a label in panel number ``place``, ``specks<place>.<number>``."""
-    for number, specks in enumerate(plot.panel.specks, start=1):
+def _specks(plot: _Plot) -> _Items:
+    for specks in plot.panel.specks:
         middles = (plot.at(*pair) for pair in zip(specks.x, specks.y, strict=True))
         # In a sweep of many designs most specks coincide.
         places = dict.fromkeys(
             (round(x * SPECK_GRID) / SPECK_GRID, round(y * SPECK_GRID) / SPECK_GRID)
             for x, y in middles
         )
-        yield f'<g id="specks{place}.{number}">{_speck_path(specks, places)}</g>'
+        mark, look = SPECKS[specks.mark], f'fill="{specks.colour}"'
+        sign = draw.path(f"M{SIGN / 2} 0{mark}", look)
+        data = "".join(f"M{coord(x)} {coord(y)}{mark}" for x, y in places)
+        yield specks.label, sign, draw.path(data, look)
 
 
-def _speck_path(specks: ChartSpecks, places: Iterable[tuple[float, float]]) -> str:
-    data = "".join(f"M{coord(x)} {coord(y)}{SPECKS[specks.mark]}" for x, y in places)
-    return f'<path d="{data}" fill="{specks.colour}"/>'
-
-
-def _curves(plot: _Plot, place: int) -> Iterator[str]:
-    """Yield each curve of panel number ``place`` as a group ``curve<place>.<number>``."""
-    pairs = zip(plot.panel.curves, _pens(plot.panel), strict=True)
-    for number, (curve, (colour, pen)) in enumerate(pairs, start=1):
+def _curves(plot: _Plot) -> _Items:
+    drawn = 0
+    for curve in plot.panel.curves:
+        colour, dashes, width = REFERENCE, "0.7 0.7", 0.35
+        if not curve.is_reference:
+            colour, dashes = COLOURS[drawn % len(COLOURS)], DASHES[drawn % len(DASHES)]
+            drawn, width = drawn + 1, 0.6
+        pen = draw.style(colour, width, dashes=dashes) + ' stroke-linejoin="round"'
         data, dots, command = "", "", "M"
         for x, y in zip(curve.x, curve.y, strict=True):
             if not (math.isfinite(x) and math.isfinite(y)):
                 command = "M"
                 continue
-            across, down = map(coord, plot.at(x, y))
-            data += f"{command}{across} {down}"
+            at = plot.at(x, y)
+            data += f"{command}{coord(at[0])} {coord(at[1])}"
             command = "L"
-            if curve.dotted:
-                dots += f'<circle cx="{across}" cy="{down}" r="0.55" fill="{colour}"/>'
-        yield f'<g id="curve{place}.{number}"><path d="{data}" {pen}/>{dots}</g>'
+            dots += draw.circle(at, 0.55, f'fill="{colour}"') if curve.dotted else ""
+        yield curve.label, draw.path(f"M0 0h{SIGN:g}", pen), draw.path(data, pen) + dots
 
 
-def _points(plot: _Plot, place: int) -> Iterator[str]:
-    """Yield measured points of panel number ``place`` as groups ``points<place>.<number>``."""
-    for number, points in enumerate(plot.panel.points, start=1):
+def _points(plot: _Plot) -> _Items:
+    for points, shape in zip(plot.panel.points, cycle(MARKERS)):
         bars, marks = "", ""
         for x, y, error in zip(points.x, points.y, points.error, strict=True):
             if error:
@@ -297,49 +300,14 @@ def _points(plot: _Plot, place: int) -> Iterator[str]:
                 for end in (low, high):
                     cap = [(across - 1.2, end), (across + 1.2, end)]
                     marks += draw.line(cap, colour="#000000", width=0.3)
-            marks += _marker(number, plot.at(x, y))
-        yield f'<g id="points{place}.{number}"><g class="errors">{bars}</g>{marks}</g>'
+            marks += _marker(shape, plot.at(x, y))
+        yield points.label, _marker(shape, (SIGN / 2, 0.0)), f'<g class="errors">{bars}</g>{marks}'
 
 
-def _marker(number: int, at: tuple[float, float]) -> str:
+def _marker(shape: str, at: tuple[float, float]) -> str:
+    look = draw.style("#000000", 0.3, fill="#ffffff")
     x, y = map(coord, at)
-    shape = MARKERS[(number - 1) % len(MARKERS)]
-    pen = 'fill="#ffffff" stroke="#000000" stroke-width="0.3"'
-    return f'<path d="{shape}" transform="translate({x} {y})" {pen}/>'
-
-
-class _KeyRow(NamedTuple):
-    """A label with the pen of its curve, or its specks, or else the number of its points."""
-
-    label: str
-    pen: str
-    number: int = 0
-    specks: ChartSpecks | None = None
-
-
-def _key(panel: Panel) -> Iterator[_KeyRow]:
-    for bars in panel.bars:
-        yield _KeyRow(bars.label, f'stroke="{bars.colour}" stroke-width="2.4"')
-    for specks in panel.specks:
-        yield _KeyRow(specks.label, "", specks=specks)
-    for curve, (_, pen) in zip(panel.curves, _pens(panel), strict=True):
-        if curve.label:
-            yield _KeyRow(curve.label, pen)
-    for number, points in enumerate(panel.points, start=1):
-        if points.label:
-            yield _KeyRow(points.label, "", number)
-
-
-def _key_row(plot: _Plot, number: int, row: _KeyRow) -> str:
-    """Return a row of the key: a piece of the curve or a marker, and the label."""
-    x, y = plot.left, HEAD + AXES[1] + FOOT + ROW * (number + 0.5)
-    if row.pen:
-        sign = f'<path d="M{coord(x)} {coord(y)}h{SIGN:g}" {row.pen}/>'
-    elif row.specks:
-        sign = _speck_path(row.specks, [(x + SIGN / 2, y)])
-    else:
-        sign = _marker(row.number, (x + SIGN / 2, y))
-    return sign + draw.text((x + SIGN + 2, y + 0.9), row.label, size=draw.SMALL)
+    return draw.path(shape, f'transform="translate({x} {y})" {look}')
 
 
 # A predicted relation as a chart, with the paper's measurements.

@@ -13,7 +13,7 @@ from typing import Literal
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Point
 from sbafab.geometry.region import Region, coord, section
-from sbafab.laminate.films import MASKS, Film, Ink, ink
+from sbafab.laminate.films import MASKS, Film, ink
 from sbafab.laminate.laminate import Inlet, Laminate, Layer
 from sbafab.markup import escape
 
@@ -23,56 +23,41 @@ TEXT = 3.0
 SMALL = 2.6
 THIN = 0.15
 ARROW = 1.7
+KEY_SIGN = 7.6
+"""mm from the sign of a legend's row to its words."""
 TIMES = "\u00d7"
 DARK = "#1a1a1a"
 GREY = "#5a5a5a"
 BOND = "#2a7ab9"
 FONT = "Helvetica, Arial, 'Liberation Sans', sans-serif"
+FOLD = "fold: the film goes on in its other half"
+HATCHES = "PTFE", "mask2", "mask3"
+"""Patterns of the masks' inks."""
 
 
 def document(width: float, height: float, title: str, elements: Iterable[str]) -> str:
     """A whole SVG file, ``width`` x ``height`` mm, on white."""
     w, h = coord(width), coord(height)
     drawn = "\n".join(elements)
-    return "\n".join(
-        [
-            '<?xml version="1.0" encoding="UTF-8"?>',
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{w}mm" height="{h}mm" '
-            f'viewBox="0 0 {w} {h}" font-family="{FONT}" font-size="{TEXT}" fill="{DARK}">',
-            f"<title>{escape(title)}</title>",
-            _definitions(drawn),
-            f'<rect width="{w}" height="{h}" fill="#ffffff"/>',
-            drawn,
-            "</svg>",
-            "",
-        ]
+    hatches = [
+        f'<pattern id="{name}" patternUnits="userSpaceOnUse" width="1.2" height="1.2" '
+        f'patternTransform="rotate(45)"><rect width="1.2" height="1.2" fill="{colours.fill}"/>'
+        f'<rect width="0.16" height="1.2" fill="{colours.line}" fill-opacity="0.55"/></pattern>'
+        for name, colours in zip(HATCHES, MASKS, strict=True)
+        if f"url(#{name})" in drawn
+    ]
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n'
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{w}mm" height="{h}mm" '
+        f'viewBox="0 0 {w} {h}" font-family="{FONT}" font-size="{TEXT}" fill="{DARK}">\n'
+        f"<title>{escape(title)}</title>\n<defs>{''.join(hatches)}</defs>\n"
+        f'<rect width="{w}" height="{h}" fill="#ffffff"/>\n{drawn}\n</svg>\n'
     )
 
 
 def film_fill(film: Film) -> str:
     """Return the fill of a film: masks are hatched, so that a grey print still shows them."""
-    return f"url(#{_hatch_id(film.shade % len(MASKS))})" if film.is_mask else ink(film).fill
-
-
-def _hatch_id(shade: int) -> str:
-    return f"mask{shade + 1}" if shade else "PTFE"
-
-
-def _definitions(drawn: str) -> str:
-    """The hatch of PTFE, and of further masks in the drawing."""
-    hatches = {_hatch_id(shade): colours for shade, colours in enumerate(MASKS)}
-    used = [
-        _hatch(n, colours) for n, colours in hatches.items() if n == "PTFE" or f"url(#{n})" in drawn
-    ]
-    return f"<defs>{''.join(used)}</defs>"
-
-
-def _hatch(name: str, colours: Ink) -> str:
-    return (
-        f'<pattern id="{name}" patternUnits="userSpaceOnUse" width="1.2" height="1.2" '
-        f'patternTransform="rotate(45)"><rect width="1.2" height="1.2" fill="{colours.fill}"/>'
-        f'<rect width="0.16" height="1.2" fill="{colours.line}" fill-opacity="0.55"/></pattern>'
-    )
+    return f"url(#{HATCHES[film.shade % len(MASKS)]})" if film.is_mask else ink(film).fill
 
 
 def text(
@@ -101,24 +86,39 @@ def text_width(words: str, size: float = TEXT) -> float:
     return size * (0.58 * (len(words) - narrow) + 0.34 * narrow)
 
 
-def line(points: Sequence[Point], *, colour: str = DARK, width: float = THIN) -> str:
-    path = "M" + "L".join(f"{coord(x)} {coord(y)}" for x, y in points)
-    return f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{coord(width)}"/>'
+def style(
+    stroke: str = "none", width: float = THIN, *, fill: str = "none", dashes: str = ""
+) -> str:
+    """The attributes that fill and stroke a shape; holes stay open by the even-odd rule."""
+    extra = ' fill-rule="evenodd"' if fill != "none" else ""
+    extra += f' stroke-dasharray="{dashes}"' if dashes else ""
+    return f'fill="{fill}" stroke="{stroke}" stroke-width="{coord(width)}"{extra}'
 
 
 def seam_styles(width: float, thin: float = THIN, is_round: bool = True) -> tuple[str, str]:
     """Return the attributes of a seam's bond, ``width`` wide, and of the tool's path over it."""
     ends = "round" if is_round else "butt"
-    return (
-        f'fill="none" stroke="{BOND}" stroke-opacity="0.4" stroke-width="{coord(width)}" '
-        f'stroke-linecap="{ends}" stroke-linejoin="round"',
-        f'fill="none" stroke="{DARK}" stroke-width="{coord(thin)}"',
-    )
+    joints = f'stroke-opacity="0.4" stroke-linecap="{ends}" stroke-linejoin="round"'
+    return f"{style(BOND, width)} {joints}", style(DARK, thin)
 
 
 def fold_style() -> str:
     """Return the attributes of a fold's line: dash and dot."""
-    return f'fill="none" stroke="{DARK}" stroke-width="0.35" stroke-dasharray="2.6 0.7 0.5 0.7"'
+    return style(DARK, 0.35, dashes="2.6 0.7 0.5 0.7")
+
+
+def path(data: str, look: str) -> str:
+    """A path; ``look`` are its attributes."""
+    return f'<path d="{data}" {look}/>'
+
+
+def line(points: Sequence[Point], *, colour: str = DARK, width: float = THIN) -> str:
+    data = "M" + "L".join(f"{coord(x)} {coord(y)}" for x, y in points)
+    return path(data, style(colour, width))
+
+
+def circle(centre: Point, radius: float, look: str) -> str:
+    return f'<circle cx="{coord(centre[0])}" cy="{coord(centre[1])}" r="{coord(radius)}" {look}/>'
 
 
 def box(low: Point, high: Point, *, fill: str, stroke: str = "none", width: float = THIN) -> str:
@@ -128,6 +128,23 @@ def box(low: Point, high: Point, *, fill: str, stroke: str = "none", width: floa
         f'height="{coord(high[1] - low[1])}" fill="{fill}" stroke="{stroke}" '
         f'stroke-width="{coord(width)}"/>'
     )
+
+
+def swatch(fill: str, stroke: str = GREY) -> str:
+    """The sign of a fill in a legend."""
+    return box((0.0, -2.6), (6.0, 0.6), fill=fill, stroke=stroke)
+
+
+def strokes(looks: Iterable[str]) -> str:
+    """The sign of lines in a legend, which lie on each other."""
+    return "".join(path("M0 -1h6", look) for look in looks)
+
+
+def key(at: Point, sign: str, words: str) -> str:
+    """A row of a legend, whose baseline begins at a point: a sign drawn at (0, 0), and words."""
+    x, y = at
+    moved = f'<g transform="translate({coord(x)} {coord(y)})">{sign}</g>'
+    return moved + text((x + KEY_SIGN, y), words)
 
 
 def arrow(tip: Point, toward: Point) -> str:
@@ -174,11 +191,7 @@ def dimension(a: Point, b: Point, words: str, away: Point, distance: float) -> l
 
 def leader(feature: Point, elbow: Point, label: Point, *, dot: bool = True) -> list[str]:
     """A leader line from a feature by an elbow to a label; a dot or an arrow on the feature."""
-    end = (
-        f'<circle cx="{coord(feature[0])}" cy="{coord(feature[1])}" r="0.45" fill="{DARK}"/>'
-        if dot
-        else arrow(feature, _unit(elbow, feature))
-    )
+    end = circle(feature, 0.45, style(fill=DARK)) if dot else arrow(feature, _unit(elbow, feature))
     return [line([feature, elbow, label], colour=GREY), end]
 
 

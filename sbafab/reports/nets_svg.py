@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from itertools import cycle
 
-from sbafab.geometry.region import Region, coord, path_data
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Region, path_data
 from sbafab.laminate.laminate import Laminate
 from sbafab.markup import escape
 from sbafab.reports import drawing as draw
@@ -21,7 +22,8 @@ Okabe and K. Ito (2008) chose to be distinct in colour blindness."""
 NO_NET = "#bbbbbb"
 FAULT = "#c00000"
 WIDE = 180.0
-MOST_COLUMNS = 3
+MOST_COLUMNS, KEYS = 3, 6
+"""Plans and rows of the key beside each other."""
 GAP, HEAD, ROW = 4.0, 7.0, 5.0
 RADIUS = 2.2
 
@@ -57,16 +59,13 @@ class NetMap:
 
 def net_map(laminate: Laminate, found: Connectivity) -> NetMap:
     """Return the areas of the voids by interface, bottom to top, in the colours of their nets."""
-    names = [net.name for net in declared(laminate)]
-    colours = {name: COLOURS[number % len(COLOURS)] for number, name in enumerate(names)}
+    colours = dict(zip((net.name for net in declared(laminate)), cycle(COLOURS)))
     areas = []
     for cavity, owners in zip(found.cavities, found.owners, strict=True):
-        gap = laminate.interfaces[cavity.interface - 1]
+        layers = laminate.interfaces[cavity.interface - 1].layer_indices
         name = owners[0] if owners else ""
         colour = colours.get(name, NO_NET)
-        areas.append(
-            NetArea(name, owners, cavity.interface, gap.layer_indices, colour, cavity.region)
-        )
+        areas.append(NetArea(name, owners, cavity.interface, layers, colour, cavity.region))
     return NetMap(colours, tuple(areas), found.faults)
 
 
@@ -79,64 +78,54 @@ def nets_svg(laminate: Laminate, found: Connectivity) -> str:
     cell = (WIDE - (columns + 1) * GAP) / columns
     scale = cell / (high_x - low_x)
     height = (high_y - low_y) * scale
-    rows = math.ceil(len(numbers) / columns)
     elements: list[str] = []
     for place, number in enumerate(numbers):
         row, column = divmod(place, columns)
         x, y = GAP + column * (cell + GAP), row * (height + HEAD + GAP) + HEAD
-        to_page = f"matrix({scale:.6g} 0 0 {-scale:.6g} {x - low_x * scale:.6g} "
-        to_page += f"{y + high_y * scale:.6g})"
+        to_page = scale, 0, 0, -scale, x - low_x * scale, y + high_y * scale
         elements += _plan(laminate, shown, number, (x, y), to_page)
         for count, fault in enumerate(shown.faults, start=1):
             if number in _levels(laminate, fault):
                 at = x + (fault.at[0] - low_x) * scale, y + (high_y - fault.at[1]) * scale
-                elements += _mark(count, at)
-    top = rows * (height + HEAD + GAP) + ROW
+                above = at[0], at[1] - RADIUS - 0.8
+                elements.append(draw.circle(at, RADIUS, draw.style(FAULT, 0.6)))
+                elements.append(draw.text(above, str(count), anchor="middle", bold=True))
+    top = math.ceil(len(numbers) / columns) * (height + HEAD + GAP) + ROW
     keys = [*shown.colours.items(), ("no net", NO_NET)]
     for place, (name, colour) in enumerate(keys):
-        row, column = divmod(place, 6)
-        x, y = GAP + column * (WIDE - 2 * GAP) / 6, top + row * ROW
-        elements.append(draw.box((x, y - 3), (x + 4, y), fill=colour, stroke="none", width=0.0))
-        elements.append(draw.text((x + 5.5, y), name))
-    end = top + math.ceil(len(keys) / 6) * ROW
+        row, column = divmod(place, KEYS)
+        at = GAP + column * (WIDE - 2 * GAP) / KEYS, top + row * ROW
+        elements.append(draw.key(at, draw.swatch(colour, "none"), name))
+    end = top + math.ceil(len(keys) / KEYS) * ROW
     return draw.document(WIDE, end, f"{laminate.name}: nets", elements)
 
 
-def _levels(laminate: Laminate, fault: NetFault) -> tuple[int, ...]:
+def _levels(laminate: Laminate, fault: NetFault) -> list[int]:
     """The interfaces at which a fault is drawn: its own, or those beside its layer."""
     if fault.interface is not None:
-        return (fault.interface,)
+        return [fault.interface]
     gaps = laminate.interfaces
-    return tuple(g.index for g in gaps if {g.below.index, g.above.index} & {*fault.layers})
+    return [gap.index for gap in gaps if {gap.below.index, gap.above.index} & {*fault.layers}]
 
 
 def _plan(
-    laminate: Laminate, shown: NetMap, number: int, corner: tuple[float, float], to_page: str
-) -> Sequence[str]:
+    laminate: Laminate, shown: NetMap, number: int, corner: Point, to_page: Sequence[float]
+) -> list[str]:
     gap = laminate.interfaces[number - 1]
-    areas = [area for area in shown.areas if area.interface == number]
-    # A void of two nets is filled in one colour and outlined in the other.
-    edges = [shown.colours[area.nets[1]] if area.nets[1:] else "none" for area in areas]
-    drawn = [
-        f'<path d="{area.path}" fill="{area.colour}" fill-rule="evenodd" stroke="{edge}" '
-        f'stroke-width="0.4"><title>{escape(" and ".join(area.nets) or "no net")}</title></path>'
-        for area, edge in zip(areas, edges, strict=True)
-    ]
+    drawn = []
+    for area in shown.areas:
+        if area.interface == number:
+            # A void of two nets is filled in one colour and outlined in the other.
+            edge = shown.colours[area.nets[1]] if area.nets[1:] else "none"
+            look = draw.style(edge, 0.4, fill=area.colour)
+            title = escape(" and ".join(area.nets) or "no net")
+            drawn.append(f'<path d="{area.path}" {look}><title>{title}</title></path>')
+    matrix = " ".join(f"{part:.6g}" for part in to_page)
     title = f"interface {number}: layers {gap.below.index} and {gap.above.index}"
     return [
         draw.text((corner[0], corner[1] - 2), title),
-        f'<g transform="{to_page}" stroke-width="0.1">',
-        f'<path d="{path_data(gap.contact)}" fill="#f4f4f4" stroke="{draw.GREY}" '
-        'fill-rule="evenodd"/>',
+        f'<g transform="matrix({matrix})">',
+        draw.path(path_data(gap.contact), draw.style(draw.GREY, 0.1, fill="#f4f4f4")),
         *drawn,
         "</g>",
-    ]
-
-
-def _mark(count: int, at: tuple[float, float]) -> Sequence[str]:
-    anchor: Literal["middle"] = "middle"
-    return [
-        f'<circle cx="{coord(at[0])}" cy="{coord(at[1])}" r="{RADIUS}" fill="none" '
-        f'stroke="{FAULT}" stroke-width="0.6"/>',
-        draw.text((at[0], at[1] - RADIUS - 0.8), str(count), anchor=anchor, bold=True),
     ]

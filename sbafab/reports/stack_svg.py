@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Interval, coord, section
 from sbafab.laminate.assembly import assembly
-from sbafab.laminate.films import Film, ink
-from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer, Pin
+from sbafab.laminate.films import ink
+from sbafab.laminate.laminate import Interface, Laminate, Layer, Pin
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import BOND, length
 
-# The dowel pins that the section cuts: the layers each passes through, and its press steps.
+MOST_BALLOONS = 4
+"""Most balloons shown in full."""
+BEYOND_LUMEN = 3.25
+Spans = Sequence[Interval]
 
 
-@dataclass(frozen=True)
-class Rod:
+class Rod(NamedTuple):
     """A pin in the plane of the section, from ``span`` start to end.
 
     It holds the layers ``stacks``, the lowest and highest index of each stack pressed by itself,
@@ -29,8 +32,8 @@ class Rod:
 
     name: str
     span: Interval
-    stacks: tuple[tuple[int, int], ...]
-    steps: tuple[int, ...]
+    stacks: Sequence[tuple[int, int]]
+    steps: Sequence[int]
 
     @property
     def middle(self) -> float:
@@ -42,62 +45,18 @@ class Rod:
         return f"pin {self.name}, step{many} {', '.join(map(str, self.steps))}"
 
 
-def rods(laminate: Laminate, origin: Point, direction: Point) -> tuple[Rod, ...]:
-    """The pins that a vertical plane meets, in the laminate's order; places from ``origin``."""
-    pin_rods = []
-    for pin in laminate.pins:
-        dx, dy = pin.centre[0] - origin[0], pin.centre[1] - origin[1]
-        along, aside = dx * direction[0] + dy * direction[1], dx * direction[1] - dy * direction[0]
-        radius = pin.diameter / 2
-        if abs(aside) < radius:
-            half = math.sqrt(radius**2 - aside**2)
-            stacks, steps = _stands(laminate, pin)
-            pin_rods.append(Rod(pin.name, (along - half, along + half), stacks, steps))
-    return tuple(rod for rod in pin_rods if rod.stacks)
-
-
-def _stands(laminate: Laminate, pin: Pin) -> tuple[tuple[tuple[int, int], ...], tuple[int, ...]]:
-    """Lowest and highest layer that the pin holds, stack by stack, and the steps."""
-    pinned = {
-        layer.index
-        for layers in laminate.patterns.values()
-        if pin in laminate.pins_holding(layers[0])
-        for layer in layers
-    }
-    steps = [step for step in assembly(laminate) if pin in step.pins]
-    spans = [
-        (min(joined), max(joined)) for step in steps if (joined := pinned.intersection(step.layers))
-    ]
-    whole = [
-        span
-        for span in dict.fromkeys(spans)
-        if not any(a <= span[0] and span[1] <= b for a, b in spans if (a, b) != span)
-    ]
-    return tuple(whole), tuple(step.number for step in steps)
-
-
-# The section through one chamber: which layers it shows and where each is cut.
-
-
-MOST_BALLOONS = 4
-"""Most balloons shown in full."""
-BEYOND_LUMEN = 3.25
-
-
-@dataclass(frozen=True)
-class SectionSlab:
+class SectionSlab(NamedTuple):
     """A layer cut by the plane: the spans with film."""
 
     layer: Layer
-    spans: tuple[Interval, ...]
+    spans: Spans
 
 
-@dataclass(frozen=True)
-class Joint:
+class Joint(NamedTuple):
     """An interface cut by the plane: the spans where the films are bonded."""
 
     interface: Interface
-    spans: tuple[Interval, ...]
+    spans: Spans
 
     @property
     def layer(self) -> int:
@@ -106,8 +65,7 @@ class Joint:
         return masks[0].index if masks else self.interface.above.index
 
 
-@dataclass(frozen=True)
-class FoldEnd:
+class FoldEnd(NamedTuple):
     """A fold cut by the plane, at ``s`` along it; its film is on the far or the near side."""
 
     lower: Layer
@@ -127,8 +85,8 @@ class StackSection:
     """
 
     chamber: str
-    slabs: tuple[SectionSlab, ...]
-    joints: tuple[Joint, ...]
+    slabs: Sequence[SectionSlab]
+    joints: Sequence[Joint]
     low: float
     high: float
     cropped: bool
@@ -136,9 +94,9 @@ class StackSection:
     tab: Interval | None
     hidden: int
     break_above: int
-    rods: tuple[Rod, ...]
-    folds: tuple[FoldEnd, ...] = ()
-    is_bored: bool = True
+    rods: Sequence[Rod]
+    folds: Sequence[FoldEnd]
+    is_bored: bool
 
 
 def chamber_section(laminate: Laminate) -> StackSection:
@@ -150,7 +108,7 @@ def chamber_section(laminate: Laminate) -> StackSection:
     inlet = next((candidate for candidate in laminate.inlets if candidate.chamber == name), None)
     direction = inlet.direction if inlet else (1.0, 0.0)
     layers, hidden, break_above = _shown(laminate)
-    lumen = -(origin[0] * direction[0] + origin[1] * direction[1]) if laminate.lumen else None
+    lumen = -_along(origin, (0.0, 0.0), direction) if laminate.lumen else None
     patterns = {layer.pattern: layer.profile for layer in layers}
     if not any(section(region, origin, direction) for region in patterns.values()):
         # The chamber lies outside every layer: rule sealing reports it, the picture shows the
@@ -162,29 +120,92 @@ def chamber_section(laminate: Laminate) -> StackSection:
     low, high = min(ends), max(ends)
     crop = low if lumen is None else max(low, lumen - (laminate.lumen or 0) / 2 - BEYOND_LUMEN)
     shown = {layer.index for layer in layers}
-    joints = [
-        Joint(interface, _clipped(section(interface.bond, origin, direction), crop))
-        for interface in laminate.interfaces
-        if (interface.masks or interface.seams)
-        and shown.issuperset(mask.index for mask in interface.masks)
-        and (interface.masks or shown.issuperset(interface.layer_indices))
-    ]
     slabs = [SectionSlab(layer, _clipped(cuts[layer.pattern], crop)) for layer in layers]
+    mouth = _along(inlet.mouth, origin, direction) if inlet else 0.0
     return StackSection(
         name,
-        tuple(slabs),
-        tuple(joints),
+        slabs,
+        [
+            Joint(gap, _clipped(section(gap.bond, origin, direction), crop))
+            for gap in laminate.interfaces
+            if (gap.masks or gap.seams)
+            and shown.issuperset([mask.index for mask in gap.masks] or gap.layer_indices)
+        ],
         crop,
         high,
         crop > low,
         lumen,
-        _tab(inlet, origin) if inlet else None,
+        (mouth - inlet.length, mouth) if inlet else None,
         hidden,
         break_above,
-        tuple(rod for rod in rods(laminate, origin, direction) if rod.span[0] > crop),
-        tuple(_fold_ends(laminate, slabs, origin, direction)),
+        [rod for rod in _rods(laminate, origin, direction) if rod.span[0] > crop],
+        list(_fold_ends(laminate, slabs, origin, direction)),
         bool(laminate.bores),
     )
+
+
+def _along(p: Point, origin: Point, direction: Point) -> float:
+    return (p[0] - origin[0]) * direction[0] + (p[1] - origin[1]) * direction[1]
+
+
+def _axis(laminate: Laminate) -> tuple[str, Point]:
+    """The name and place of the first chamber's axis, or of the first port."""
+    if not laminate.chambers:
+        port = laminate.ports[0]
+        return port.name, port.at
+    chamber = laminate.chambers[0]
+    bored = (bore.centre for bore in laminate.bores if bore.chamber == chamber.name)
+    return chamber.name, next(bored, chamber.centres[0])
+
+
+def _shown(laminate: Laminate) -> tuple[Sequence[Layer], int, int]:
+    """The layers to show, the number of balloons left out, and the layer above which they are."""
+    count = laminate.balloons
+    if count <= MOST_BALLOONS:
+        return laminate.layers, 0, 0
+    bottom = [layer for layer in laminate.layers if layer.balloon is None or layer.balloon <= 2]
+    top = [
+        layer
+        for layer in laminate.layers
+        if layer.balloon == count or (layer.balloon == count - 1 and layer.role == "separator-mask")
+    ]
+    return (*bottom, *top), count - 3, bottom[-1].index
+
+
+def _clipped(spans: Spans, low: float) -> Spans:
+    return tuple((max(start, low), end) for start, end in spans if end > low)
+
+
+def _rods(laminate: Laminate, origin: Point, direction: Point) -> Iterator[Rod]:
+    """Yield the pins that hold layers and that the plane meets, in the laminate's order."""
+    u, v = direction
+    for pin in laminate.pins:
+        along, aside = _along(pin.centre, origin, direction), _along(pin.centre, origin, (v, -u))
+        radius = pin.diameter / 2
+        stacks, steps = _stands(laminate, pin)
+        if abs(aside) < radius and stacks:
+            half = math.sqrt(radius**2 - aside**2)
+            yield Rod(pin.name, (along - half, along + half), stacks, steps)
+
+
+def _stands(laminate: Laminate, pin: Pin) -> tuple[Sequence[tuple[int, int]], Sequence[int]]:
+    """Lowest and highest layer that the pin holds, stack by stack, and the steps."""
+    pinned = {
+        layer.index
+        for layers in laminate.patterns.values()
+        if pin in laminate.pins_holding(layers[0])
+        for layer in layers
+    }
+    steps = [step for step in assembly(laminate) if pin in step.pins]
+    spans = [
+        (min(joined), max(joined)) for step in steps if (joined := pinned.intersection(step.layers))
+    ]
+    whole = [
+        span
+        for span in dict.fromkeys(spans)
+        if not any(a <= span[0] and span[1] <= b for a, b in spans if (a, b) != span)
+    ]
+    return tuple(whole), [step.number for step in steps]
 
 
 def _fold_ends(
@@ -204,47 +225,16 @@ def _fold_ends(
                 yield FoldEnd(*both, s, abs(start - s) < 1e-6)
 
 
-def _axis(laminate: Laminate) -> tuple[str, Point]:
-    """The name and place of the first chamber's axis, or of the first port."""
-    if not laminate.chambers:
-        port = laminate.ports[0]
-        return port.name, port.at
-    chamber = laminate.chambers[0]
-    bored = (bore.centre for bore in laminate.bores if bore.chamber == chamber.name)
-    return chamber.name, next(bored, chamber.centres[0])
-
-
-def _tab(inlet: Inlet, origin: Point) -> Interval:
-    (x, y), (u, v) = inlet.mouth, inlet.direction
-    mouth = (x - origin[0]) * u + (y - origin[1]) * v
-    return mouth - inlet.length, mouth
-
-
-def _shown(laminate: Laminate) -> tuple[tuple[Layer, ...], int, int]:
-    """The layers to show, the number of balloons left out, and the layer above which they are."""
-    count = laminate.balloons
-    if count <= MOST_BALLOONS:
-        return laminate.layers, 0, 0
-    bottom = [layer for layer in laminate.layers if layer.balloon is None or layer.balloon <= 2]
-    top = [
-        layer
-        for layer in laminate.layers
-        if layer.balloon == count or (layer.balloon == count - 1 and layer.role == "separator-mask")
-    ]
-    return (*bottom, *top), count - 3, bottom[-1].index
-
-
-def _clipped(spans: Sequence[Interval], low: float) -> tuple[Interval, ...]:
-    return tuple((max(start, low), end) for start, end in spans if end > low)
-
-
-def opening(spans: Sequence[Interval], at: float) -> Interval | None:
+def opening(spans: Spans, at: float) -> Interval | None:
     """The opening between two spans that holds ``at``; None if ``at`` is covered or outside."""
     before = [end for _, end in spans if end <= at]
     after = [start for start, _ in spans if start >= at]
     if not before or not after or any(start < at < end for start, end in spans):
         return None
     return max(before), min(after)
+
+
+# The section on its page.
 
 
 PAGE_WIDTH = 297.0
@@ -263,151 +253,71 @@ SEAM = 1.0
 PAST = 2.0
 """Length by which a pin's axis extends past its ends, mm."""
 
-SectionDimension = tuple[Interval, str]
-"""A stretch of the section to dimension, and its name (may be empty)."""
 
-
-@dataclass(frozen=True)
 class StackView:
-    """The place of the section on the page."""
+    """The place of the section on the page: ``across`` and ``up`` are page mm per mm of it."""
 
-    section: StackSection
-    across: float
-    factor: int
-    height: float
-
-    @property
-    def up(self) -> float:
-        """Page mm per mm of laminate height."""
-        return self.across * self.factor
+    def __init__(self, section: StackSection) -> None:
+        self.section = section
+        self.across = (PAGE_WIDTH - LEFT - RIGHT) / (section.high - section.low)
+        films = [slab.layer.film.thickness for slab in section.slabs]
+        most = min(TALLEST / sum(films), TALLEST_FILM / max(films)) / self.across
+        self.factor = max(step for step in EXAGGERATIONS if step <= max(most, 1.0))
+        self.up = self.across * self.factor
+        self.height = sum(films) * self.up + (BREAK if section.hidden else 0.0)
 
     def x(self, s: float) -> float:
         return LEFT + (s - self.section.low) * self.across
 
     def y(self, z: float, index: int) -> float:
         """Page height of ``z`` in the layer with this index."""
-        return HEAD + self.height - (z - self._left_out(index)) * self.up - self._lift(index)
+        is_above = self.section.hidden and index > self.section.break_above
+        return HEAD + self.height - z * self.up + (self._drop if is_above else 0.0)
 
-    def _left_out(self, index: int) -> float:
-        """Height of the layers the break leaves out below a layer."""
-        if not self.section.hidden or index <= self.section.break_above:
-            return 0.0
-        below = [
-            slab for slab in self.section.slabs if slab.layer.index <= self.section.break_above
+    @cached_property
+    def _drop(self) -> float:
+        """Page mm by which layers above the break are lower than to scale."""
+        layers = [slab.layer for slab in self.section.slabs]
+        last, above = next(
+            (a, b) for a, b in pairwise(layers) if b.index > self.section.break_above
+        )
+        return (above.z - last.z - last.film.thickness) * self.up - BREAK
+
+    def bottom(self, layer: Layer, inset: float = 0.0) -> float:
+        return self.y(layer.z + inset, layer.index)
+
+    def top(self, layer: Layer, inset: float = 0.0) -> float:
+        return self.y(layer.z + layer.film.thickness - inset, layer.index)
+
+    def boxes(
+        self, spans: Spans, top: float, bottom: float, fill: str, stroke: str = "none"
+    ) -> list[str]:
+        return [
+            draw.box((self.x(start), top), (self.x(end), bottom), fill=fill, stroke=stroke)
+            for start, end in spans
         ]
-        above = self.section.slabs[len(below)].layer
-        last = below[-1].layer
-        return above.z - last.z - last.film.thickness
-
-    def _lift(self, index: int) -> float:
-        return BREAK if self.section.hidden and index > self.section.break_above else 0.0
 
 
 def stack_svg(laminate: Laminate) -> str:
     """The section through the first chamber in the plane of its inlet, labelled, on A4."""
-    view = _view(chamber_section(laminate))
+    section = chamber_section(laminate)
+    view = StackView(section)
     page = view.height + HEAD + FOOT
+    seams = [joint for joint in section.joints if not joint.interface.masks]
     elements = [
         *_heading(laminate, view),
-        *(part for rod in view.section.rods for part in _rod(rod, view)),
-        *(part for joint in view.section.joints for part in _joint(joint, view)),
-        *(part for slab in view.section.slabs for part in _slab(slab, view)),
-        *(part for joint in view.section.joints for part in _seam(joint, view)),
-        *(part for fold in view.section.folds for part in _fold(fold, view)),
+        *(part for rod in section.rods for part in _rod(rod, view)),
+        *(part for joint in section.joints if joint not in seams for part in _bond(joint, view)),
+        *(part for slab in section.slabs for part in _slab(slab, view)),
+        *(part for joint in seams for part in _bond(joint, view)),
+        *(part for fold in section.folds for part in _fold(fold, view)),
         *_breaks(view),
         *_dimensions_above(view),
         *_dimensions_below(view),
         *_labels(view),
-        *_legend(view, page),
+        *_legend(section, page),
     ]
     return draw.document(PAGE_WIDTH, page, f"{laminate.name}: section", elements)
-
-
-def _view(section: StackSection) -> StackView:
-    across = (PAGE_WIDTH - LEFT - RIGHT) / (section.high - section.low)
-    thickness = sum(slab.layer.film.thickness for slab in section.slabs)
-    thickest = max(slab.layer.film.thickness for slab in section.slabs)
-    most = min(TALLEST / thickness, TALLEST_FILM / thickest) / across
-    factor = max(step for step in EXAGGERATIONS if step <= max(most, 1.0))
-    height = thickness * across * factor + (BREAK if section.hidden else 0.0)
-    return StackView(section, across, factor, height)
-
-
-def _slab(slab: SectionSlab, view: StackView) -> list[str]:
-    layer = slab.layer
-    line = ink(layer.film).line
-    inset = SLIT * layer.film.thickness if layer.is_mask else 0.0
-    bottom = view.y(layer.z + inset, layer.index)
-    top = view.y(layer.z + layer.film.thickness - inset, layer.index)
-    fill = draw.film_fill(layer.film)
-    return [
-        draw.box((view.x(start), top), (view.x(end), bottom), fill=fill, stroke=line)
-        for start, end in slab.spans
-    ]
-
-
-def _joint(joint: Joint, view: StackView) -> list[str]:
-    interface, index = joint.interface, joint.layer
-    if not interface.masks:
-        return []
-    bottom, top = view.y(interface.z, index), view.y(interface.z + interface.gap, index)
-    return [
-        draw.box((view.x(start), top), (view.x(end), bottom), fill=BOND)
-        for start, end in joint.spans
-    ]
-
-
-def _seam(joint: Joint, view: StackView) -> list[str]:
-    """The bonds of a gap without masks, over the line on which the films lie on each other."""
-    if joint.interface.masks:
-        return []
-    y = view.y(joint.interface.z, joint.layer)
-    return [
-        draw.box((view.x(start), y - SEAM / 2), (view.x(end), y + SEAM / 2), fill=BOND)
-        for start, end in joint.spans
-    ]
-
-
-def _fold(fold: FoldEnd, view: StackView) -> list[str]:
-    """The film that continues from one half to the other, and the line of the fold."""
-    x, away = view.x(fold.s), -1.0 if fold.is_ahead else 1.0
-    bottom = view.y(fold.lower.z, fold.lower.index)
-    top = view.y(fold.upper.z + fold.upper.film.thickness, fold.upper.index)
-    inner = fold.lower.film.thickness * view.up
-    outer = (bottom - top) / 2
-    low, high = coord(bottom), coord(top)
-    turn = int(away > 0)
-    data = (
-        f"M{coord(x)} {low}A{coord(outer)} {coord(outer)} 0 0 {1 - turn} {coord(x)} {high}"
-        f"V{coord(top + inner)}"
-    )
-    hollow = outer - inner
-    if hollow > 1e-6:
-        data += f"A{coord(hollow)} {coord(hollow)} 0 0 {turn} {coord(x)} {coord(bottom - inner)}"
-    film = fold.lower.film
-    ends = f"M{coord(x)} {coord(top - PAST)}V{coord(bottom + PAST)}"
-    return [
-        f'<path d="{data}Z" fill="{draw.film_fill(film)}" stroke="{ink(film).line}" '
-        f'stroke-width="{draw.THIN}"/>',
-        f'<path d="{ends}" {draw.fold_style()}/>',
-    ]
-
-
-def _rod(rod: Rod, view: StackView) -> list[str]:
-    """A dowel pin behind the films, stack by stack, and its axis; nothing across the break."""
-    parts: list[str] = []
-    x = view.x(rod.middle)
-    for lowest, highest in rod.stacks:
-        layers = [s.layer for s in view.section.slabs if lowest <= s.layer.index <= highest]
-        below = [layer for layer in layers if layer.index <= view.section.break_above]
-        above = [layer for layer in layers if layer.index > view.section.break_above]
-        for run in filter(None, (below, above)):
-            bottom = view.y(run[0].z, run[0].index)
-            top = view.y(run[-1].z + run[-1].film.thickness, run[-1].index)
-            low, high = (view.x(rod.span[0]), top), (view.x(rod.span[1]), bottom)
-            parts.append(draw.box(low, high, fill=STEEL, stroke=draw.GREY))
-            parts.append(draw.line([(x, top - PAST), (x, bottom + PAST)], colour=draw.GREY))
-    return parts
 
 
 def _heading(laminate: Laminate, view: StackView) -> list[str]:
@@ -427,34 +337,77 @@ def _heading(laminate: Laminate, view: StackView) -> list[str]:
     ]
 
 
+def _slab(slab: SectionSlab, view: StackView) -> list[str]:
+    layer = slab.layer
+    inset = SLIT * layer.film.thickness if layer.is_mask else 0.0
+    ends = view.top(layer, inset), view.bottom(layer, inset)
+    return view.boxes(slab.spans, *ends, draw.film_fill(layer.film), ink(layer.film).line)
+
+
+def _bond(joint: Joint, view: StackView) -> list[str]:
+    """The bonds in a gap; without masks, over the line on which the films lie on each other."""
+    gap = joint.interface
+    half = 0.0 if gap.masks else SEAM / 2
+    top, bottom = (view.y(z, joint.layer) for z in (gap.z + gap.gap * bool(gap.masks), gap.z))
+    return view.boxes(joint.spans, top - half, bottom + half, BOND)
+
+
+def _fold(fold: FoldEnd, view: StackView) -> list[str]:
+    """The film that continues from one half to the other, and the line of the fold."""
+    film, turn = fold.lower.film, int(not fold.is_ahead)
+    bottom, top = view.bottom(fold.lower), view.top(fold.upper)
+    thick, outer = film.thickness * view.up, (bottom - top) / 2
+    x, low, high = map(coord, (view.x(fold.s), bottom, top))
+    data = (
+        f"M{x} {low}A{coord(outer)} {coord(outer)} 0 0 {1 - turn} {x} {high}V{coord(top + thick)}"
+    )
+    if outer - thick > 1e-6:
+        hollow = coord(outer - thick)
+        data += f"A{hollow} {hollow} 0 0 {turn} {x} {coord(bottom - thick)}"
+    return [
+        draw.path(f"{data}Z", draw.style(ink(film).line, fill=draw.film_fill(film))),
+        draw.path(f"M{x} {coord(top - PAST)}V{coord(bottom + PAST)}", draw.fold_style()),
+    ]
+
+
+def _rod(rod: Rod, view: StackView) -> list[str]:
+    """A dowel pin behind the films, stack by stack, and its axis; nothing across the break."""
+    parts: list[str] = []
+    x = view.x(rod.middle)
+    for lowest, highest in rod.stacks:
+        layers = [s.layer for s in view.section.slabs if lowest <= s.layer.index <= highest]
+        below = [layer for layer in layers if layer.index <= view.section.break_above]
+        for run in filter(None, (below, layers[len(below) :])):
+            top, bottom = view.top(run[-1]), view.bottom(run[0])
+            parts += view.boxes([rod.span], top, bottom, STEEL, draw.GREY)
+            parts.append(draw.line([(x, top - PAST), (x, bottom + PAST)], colour=draw.GREY))
+    return parts
+
+
 def _breaks(view: StackView) -> list[str]:
     section = view.section
     parts: list[str] = []
     if section.hidden:
-        last = next(s.layer for s in section.slabs if s.layer.index == section.break_above)
-        base = view.y(last.z + last.film.thickness, last.index)
+        below = [s for s in section.slabs if s.layer.index <= section.break_above]
+        above = section.slabs[len(below) :]
+        base = view.top(below[-1].layer)
         x0 = view.x(section.low) - (0.0 if section.cropped else 3.0)
-        right = view.x(_reach(section)) + 3.0
+        right = view.x(max(end for slab in above for _, end in slab.spans)) + 3.0
         for y in (base - 1.6, base - BREAK + 1.6):
             parts.append(_wave((x0, y), (right, y)))
-        noun = "balloon" if section.hidden == 1 else "balloons"
-        words = f"\u2026 {section.hidden} more {noun} \u2026"
+        words = f"\u2026 {section.hidden} more balloon{'s' * (section.hidden > 1)} \u2026"
         middle = ((x0 + right) / 2, base - BREAK / 2 + 1.0)
         parts.append(draw.text(middle, words, anchor="middle"))
     if section.cropped:
-        x = view.x(section.low)
-        parts.append(_wave((x, HEAD - 2.0), (x, HEAD + view.height + 2.0), white=1.5))
+        x, top, bottom = view.x(section.low), HEAD - 2.0, HEAD + view.height + 2.0
+        # White hides the straight edges beside the line.
+        parts.append(draw.box((x - 1.5, top), (x, bottom), fill="#ffffff"))
+        parts.append(_wave((x, top), (x, bottom)))
     return parts
 
 
-def _reach(section: StackSection) -> float:
-    """Return the shift of the layers above the break toward the inlet."""
-    above = [s for s in section.slabs if s.layer.index > section.break_above]
-    return max(end for slab in above for _, end in slab.spans)
-
-
-def _wave(start: Point, end: Point, white: float = 0.0) -> str:
-    """A wavy break line, with a white band beside it that hides straight edges."""
+def _wave(start: Point, end: Point) -> str:
+    """A wavy break line."""
     away = math.dist(start, end)
     steps = max(8, round(away))
     (x0, y0), (u, v) = start, ((end[0] - start[0]) / away, (end[1] - start[1]) / away)
@@ -462,33 +415,29 @@ def _wave(start: Point, end: Point, white: float = 0.0) -> str:
     for i in range(steps + 1):
         along, sway = away * i / steps, 0.5 * math.sin(math.tau * i / 8)
         points.append((x0 + along * u + sway * v, y0 + along * v - sway * u))
-    curve = draw.line(points, colour=draw.GREY, width=0.2)
-    if not white:
-        return curve
-    return draw.box((x0 - white, y0), (x0, end[1]), fill="#ffffff") + curve
+    return draw.line(points, colour=draw.GREY, width=0.2)
 
 
 def _dimensions_above(view: StackView) -> list[str]:
     """Over the top balloon: chamber, the bonds beside it, the lumen, and the whole width."""
-    cap = view.section.slabs[-1]
-    chambers = [j for j in view.section.joints if j.interface.kind == "chamber"]
+    section, cap = view.section, view.section.slabs[-1]
+    chambers = [joint for joint in section.joints if joint.interface.kind == "chamber"]
     if not chambers:
         return []
     spans = chambers[-1].spans
-    top = view.y(cap.layer.z + cap.layer.film.thickness, cap.layer.index)
     measured: list[Interval] = []
     pocket = opening(spans, 0.0)
     if pocket is not None:
         measured = [span for span in spans if span[1] == pocket[0] or span[0] == pocket[1]]
         measured.append(pocket)
-    if view.section.lumen is not None:
-        through = opening(cap.spans, view.section.lumen)
-        measured += [through] if through else []
-    shown = [span for span in measured if span[0] > view.section.low or not view.section.cropped]
-    parts, rows = _levels(view, [(span, "") for span in shown], top, (0.0, -1.0))
-    if not view.section.cropped:
+    through = None if section.lumen is None else opening(cap.spans, section.lumen)
+    measured += [through] if through else []
+    shown = [span for span in measured if span[0] > section.low or not section.cropped]
+    top = view.top(cap.layer)
+    parts, rows = _rows(view, [(span, "") for span in shown], top, (0.0, -1.0))
+    if not section.cropped:
         whole = cap.spans[0][0], cap.spans[-1][1]
-        parts += _level(view, (whole, ""), top, (0.0, -1.0), ROW_STEP * (rows + 1) + 1.0)
+        parts += _dimension(view, whole, "", top, (0.0, -1.0), ROW_STEP * (rows + 1) + 1.0)
     return parts
 
 
@@ -497,115 +446,73 @@ def _dimensions_below(view: StackView) -> list[str]:
     section = view.section
     if section.tab is None:
         return []
-    lowest = section.slabs[0].layer
-    bottom = view.y(lowest.z, lowest.index)
     mouth = section.tab[1]
-    measured: list[SectionDimension] = [(section.tab, "tab")]
+    measured = [(section.tab, "tab")]
     masks = [slab for slab in section.slabs if slab.layer.role == "chamber-mask" and slab.spans]
     reach = max((slab.spans[-1][1] for slab in masks), default=mouth)
     if reach - mouth > 1e-3:
         tail = any(rod.middle > mouth for rod in section.rods)
         measured.append(((mouth, reach), "tail" if tail else "overhang"))
-    return _levels(view, measured, bottom, (0.0, 1.0))[0]
+    return _rows(view, measured, view.bottom(section.slabs[0].layer), (0.0, 1.0))[0]
 
 
-def _levels(
-    view: StackView, measured: Sequence[SectionDimension], y: float, away: Point
+def _rows(
+    view: StackView, measured: Sequence[tuple[Interval, str]], y: float, away: Point
 ) -> tuple[list[str], int]:
-    """Dimensions in as few rows as keep their words apart, and how many rows that took."""
+    """Named dimensions in as few rows as keep their words apart, and how many rows that took."""
     rows: list[list[Interval]] = []
     parts: list[str] = []
     for span, name in measured:
         middle = view.x((span[0] + span[1]) / 2)
-        half = draw.text_width(_words(span, name)) / 2 + 0.5
-        taken = middle - half, middle + half
-        free = [not any(a < taken[1] and taken[0] < b for a, b in row) for row in rows]
-        row = free.index(True) if True in free else len(rows)
-        if row == len(rows):
-            rows.append([])
-        rows[row].append(taken)
-        parts += _level(view, (span, name), y, away, ROW_STEP * (row + 1))
+        half = draw.text_width(_words(name, span)) / 2 + 0.5
+        low, high = middle - half, middle + half
+        free = (n for n, row in enumerate(rows) if not any(a < high and low < b for a, b in row))
+        row = next(free, len(rows))
+        rows[row:] = rows[row:] or [[]]
+        rows[row].append((low, high))
+        parts += _dimension(view, span, name, y, away, ROW_STEP * (row + 1))
     return parts, len(rows)
 
 
-def _level(
-    view: StackView, measured: SectionDimension, y: float, away: Point, distance: float
+def _dimension(
+    view: StackView, span: Interval, name: str, y: float, away: Point, distance: float
 ) -> list[str]:
-    (start, end), name = measured
-    words = _words((start, end), name)
-    return draw.dimension((view.x(start), y), (view.x(end), y), words, away, distance)
+    start, end = (view.x(s) for s in span)
+    return draw.dimension((start, y), (end, y), _words(name, span), away, distance)
 
 
-def _words(span: Interval, name: str) -> str:
+def _words(name: str, span: Interval) -> str:
     return f"{name} {length(span[1] - span[0])}".strip()
 
 
-def _labels(view: StackView) -> list[str]:
-    """Layer names at the right, features at the left, each with a leader."""
-    low, high = HEAD - 4.0, HEAD + view.height + 6.0
-    right = view.x(view.section.high) + 5.0
-    parts: list[str] = []
-    for labels, x, side in (
-        (layer_labels(view.section) + pin_labels(view.section, True), right, 1),
-        (feature_labels(view.section) + pin_labels(view.section, False), LEFT - 6.0, -1),
-    ):
-        placed = sorted((view.y(label.z, label.layer), label) for label in labels)
-        rows = draw.spread([y for y, _ in placed], 5.2, low, high)
-        for (y, label), row in zip(placed, rows, strict=True):
-            parts += _label(label, (view.x(label.s), y), (x, row), side)
-    return parts
-
-
-def _label(label: StackLabel, feature: Point, at: Point, side: int) -> list[str]:
-    x, row = at
-    elbow = (x - 2.2 * side, row)
-    anchor: draw.Anchor = "start" if side > 0 else "end"
-    colour = ink(label.film).line if label.film else draw.DARK
-    return [
-        *draw.leader(feature, elbow, (x - 0.6 * side, row)),
-        draw.text((x + 0.4 * side, row + 1.05), label.words, anchor=anchor, colour=colour),
+def _legend(section: StackSection, page: float) -> Iterator[str]:
+    films = dict.fromkeys(slab.layer.film for slab in section.slabs)
+    signs = [
+        (draw.swatch(draw.film_fill(film)), f"{film.material} film, {coord(film.thickness)}")
+        for film in films
     ]
-
-
-def _legend(view: StackView, page: float) -> list[str]:
-    y = page - 10.0
-    films = dict.fromkeys(slab.layer.film for slab in view.section.slabs)
-    entries = [
-        (f"{film.material} film, {coord(film.thickness)}", draw.film_fill(film)) for film in films
-    ]
-    gaps = [joint.interface for joint in view.section.joints]
+    gaps = [joint.interface for joint in section.joints]
     if not gaps or any(gap.masks for gap in gaps):
-        entries.append((f"bond: the gap filled with {_bonding(films)}", BOND))
-        entries.append(("unbonded: drawn as a slit beside the mask", "#ffffff"))
-    if any(joint.spans and not joint.interface.masks for joint in view.section.joints):
-        entries.append(("bond of a seam, drawn over the line between the films", BOND))
-    if view.section.rods:
-        entries.append(("dowel pin", STEEL))
-    parts: list[str] = []
-    x = 10.0
-    for words, fill in entries:
-        width = 7.6 + draw.text_width(words) + 7.0
-        if x + width - 7.0 > PAGE_WIDTH - 5.0:
+        structural = [film.material for film in films if not film.is_mask]
+        flows = structural[0] if len(structural) == 1 else "the film that melts"
+        signs.append((draw.swatch(BOND), f"bond: the gap filled with {flows}"))
+        signs.append((draw.swatch("#ffffff"), "unbonded: drawn as a slit beside the mask"))
+    if any(joint.spans and not joint.interface.masks for joint in section.joints):
+        signs.append((draw.swatch(BOND), "bond of a seam, drawn over the line between the films"))
+    if section.rods:
+        signs.append((draw.swatch(STEEL), "dowel pin"))
+    if section.folds:
+        signs.append((draw.strokes([draw.fold_style()]), draw.FOLD))
+    x, y = 10.0, page - 10.0
+    for sign, words in signs:
+        width = draw.KEY_SIGN + draw.text_width(words)
+        if x + width > PAGE_WIDTH - 5.0:
             x, y = 10.0, y + 5.0
-        parts.append(draw.box((x, y - 2.6), (x + 6.0, y + 0.6), fill=fill, stroke=draw.GREY))
-        parts.append(draw.text((x + 7.6, y), words))
-        x += width
-    if view.section.folds:
-        words = "fold: the film goes on in its other half"
-        if x + 7.6 + draw.text_width(words) > PAGE_WIDTH - 5.0:
-            x, y = 10.0, y + 5.0
-        parts.append(f'<path d="M{coord(x)} {coord(y - 1.0)}h6" {draw.fold_style()}/>')
-        parts.append(draw.text((x + 7.6, y), words))
-    return parts
+        yield draw.key((x, y), sign, words)
+        x += width + 7.0
 
 
-def _bonding(films: Iterable[Film]) -> str:
-    """Return the material that flows into a gap: the structural film if it is the only one."""
-    structural = [film.material for film in films if not film.is_mask]
-    return structural[0] if len(structural) == 1 else "the film that melts"
-
-
-# Targets of the section's leaders, measured on the section itself.
+# Labels at the sides, each with a leader to what it names.
 
 
 class StackLabel(NamedTuple):
@@ -615,50 +522,61 @@ class StackLabel(NamedTuple):
     s: float
     z: float
     layer: int
-    film: Film | None = None
+    colour: str = draw.DARK
 
 
-def layer_labels(section: StackSection) -> list[StackLabel]:
-    """Number and role of every layer shown, pointing near its end at the inlet's side."""
-    base_end = max(slab.spans[-1][1] for slab in section.slabs if not slab.layer.is_mask)
-    labels = []
-    for slab in section.slabs:
-        if not slab.spans:
-            continue
-        end = slab.spans[-1][1]
-        words = f"{slab.layer.index} {slab.layer.role.replace('-', ' ')}"
-        if slab.layer.role == "chamber-mask" and end > base_end:
-            words += ", inlet strip"
-        placed_label = _in_slab(words, end - min(0.2, 0.25 * (end - slab.spans[-1][0])), slab)
-        labels.append(placed_label._replace(film=slab.layer.film))
-    return labels
-
-
-def pin_labels(section: StackSection, beyond_tab: bool) -> list[StackLabel]:
-    """Name and press steps of the pins on this side of the tab's end, or beyond it."""
+def _labels(view: StackView) -> list[str]:
+    """Layer names at the right, features at the left, each with a leader."""
+    section = view.section
+    low, high = HEAD - 4.0, HEAD + view.height + 6.0
     mouth = section.tab[1] if section.tab else section.high
     slabs = {slab.layer.index: slab for slab in section.slabs}
-    return [
-        _in_slab(rod.words, rod.middle, slabs[rod.stacks[-1][1]])
-        for rod in section.rods
-        if (rod.middle > mouth) == beyond_tab
-    ]
+    pins: tuple[list[StackLabel], list[StackLabel]] = ([], [])
+    for rod in section.rods:
+        pins[rod.middle > mouth].append(_in_slab(rod.words, rod.middle, slabs[rod.stacks[-1][1]]))
+    parts: list[str] = []
+    for labels, x, side in (
+        ([*_layer_labels(section), *pins[1]], view.x(section.high) + 5.0, 1),
+        ([*_feature_labels(section), *pins[0]], LEFT - 6.0, -1),
+    ):
+        placed = sorted((view.y(label.z, label.layer), label) for label in labels)
+        rows = draw.spread([y for y, _ in placed], 5.2, low, high)
+        anchor: draw.Anchor = "start" if side > 0 else "end"
+        for (y, label), row in zip(placed, rows, strict=True):
+            parts += draw.leader((view.x(label.s), y), (x - 2.2 * side, row), (x - 0.6 * side, row))
+            at = x + 0.4 * side, row + 1.05
+            parts.append(draw.text(at, label.words, anchor=anchor, colour=label.colour))
+    return parts
 
 
-def feature_labels(section: StackSection) -> list[StackLabel]:
+def _layer_labels(section: StackSection) -> Iterator[StackLabel]:
+    """Number and role of every layer shown, pointing near its end at the inlet's side."""
+    base_end = max(slab.spans[-1][1] for slab in section.slabs if not slab.layer.is_mask)
+    for slab in section.slabs:
+        if slab.spans:
+            start, end = slab.spans[-1]
+            words = f"{slab.layer.index} {slab.layer.role.replace('-', ' ')}"
+            if slab.layer.role == "chamber-mask" and end > base_end:
+                words += ", inlet strip"
+            label = _in_slab(words, end - min(0.2, 0.25 * (end - start)), slab)
+            yield label._replace(colour=ink(slab.layer.film).line)
+
+
+def _feature_labels(section: StackSection) -> list[StackLabel]:
     """Bond, neck ring, overhang, bore, pocket and lumen, where the section has them."""
+    cap = section.slabs[-1]
     features = [
-        _bond(section),
+        _bond_beside(section),
         _pocket(section),
         _neck_ring(section),
         _overhang(section),
-        _bore(section),
-        _lumen(section),
+        next(filter(None, (_bore(section, slab) for slab in section.slabs)), None),
+        None if section.lumen is None else _through("lumen ⌀", section.lumen, cap),
     ]
     return [label for label in features if label is not None]
 
 
-def _joints(section: StackSection, kind: str) -> list[Joint]:
+def _bonds(section: StackSection, kind: str) -> list[Joint]:
     return [joint for joint in section.joints if joint.interface.kind == kind and joint.spans]
 
 
@@ -667,24 +585,26 @@ def _in_gap(words: str, s: float, joint: Joint) -> StackLabel:
     return StackLabel(words, s, interface.z + interface.gap / 2, joint.layer)
 
 
-def _bond(section: StackSection) -> StackLabel | None:
+def _in_slab(words: str, s: float, slab: SectionSlab) -> StackLabel:
+    layer = slab.layer
+    return StackLabel(words, s, layer.z + layer.film.thickness / 2, layer.index)
+
+
+def _bond_beside(section: StackSection) -> StackLabel | None:
     """The bonded ring beside the bottom pocket, on the side away from the inlet."""
-    for joint in _joints(section, "chamber"):
+    for joint in _bonds(section, "chamber"):
         beside = [span for span in joint.spans if span[1] < 0]
         if beside:
-            start, end = beside[-1]
-            return _in_gap(f"bond {length(end - start)}", (start + end) / 2, joint)
+            return _in_gap(_words("bond", beside[-1]), sum(beside[-1]) / 2, joint)
     return None
 
 
 def _pocket(section: StackSection) -> StackLabel | None:
     """The pocket of the second balloon, or of the only one (open toward its inlet)."""
-    joints = _joints(section, "chamber")[:2]
-    for joint in reversed(joints):
+    for joint in reversed(_bonds(section, "chamber")[:2]):
         pocket = opening(joint.spans, 0.0)
         if pocket is not None:
-            words = f"chamber pocket {length(pocket[1] - pocket[0])}"
-            return _in_gap(words, 0.6 * pocket[0], joint)
+            return _in_gap(_words("chamber pocket", pocket), 0.6 * pocket[0], joint)
         before = [end for _, end in joint.spans if end < 0]
         if before:
             return _in_gap("chamber pocket", 0.6 * max(before), joint)
@@ -693,14 +613,13 @@ def _pocket(section: StackSection) -> StackLabel | None:
 
 def _neck_ring(section: StackSection) -> StackLabel | None:
     """The bond beside the bore that carries one balloon on the next, or a sheet's window."""
-    for joint in _joints(section, "separator"):
-        for start, end in joint.spans:
-            if start < 0 < end:
-                return _in_gap(f"window, bond {length(end - start)}", (start + end) / 2, joint)
+    for joint in _bonds(section, "separator"):
+        for span in joint.spans:
+            if span[0] < 0 < span[1]:
+                return _in_gap(_words("window, bond", span), sum(span) / 2, joint)
         beside = [span for span in joint.spans if span[1] <= 0]
         if beside:
-            start, end = max(beside)
-            return _in_gap(f"neck ring, bond {length(end - start)}", (start + end) / 2, joint)
+            return _in_gap(_words("neck ring, bond", max(beside)), sum(max(beside)) / 2, joint)
     return None
 
 
@@ -709,33 +628,19 @@ def _overhang(section: StackSection) -> StackLabel | None:
     for mask, wall in pairwise(section.slabs):
         if mask.layer.role != "separator-mask" or not mask.spans or not wall.spans:
             continue
-        start, end = mask.spans[0][0], wall.spans[0][0]
+        span = mask.spans[0][0], wall.spans[0][0]
         if section.cropped:
-            start, end = wall.spans[-1][1], mask.spans[-1][1]
-        if end - start > 1e-3:
-            return _in_slab(f"overhang {length(end - start)}", (start + end) / 2, mask)
+            span = wall.spans[-1][1], mask.spans[-1][1]
+        if span[1] - span[0] > 1e-3:
+            return _in_slab(_words("overhang", span), sum(span) / 2, mask)
     return None
 
 
-def _bore(section: StackSection) -> StackLabel | None:
-    for slab in section.slabs:
-        through = opening(slab.spans, 0.0)
-        if not slab.layer.is_mask and through is not None:
-            name = "bore ⌀" if section.is_bored else "opening "
-            return _in_slab(f"{name}{length(through[1] - through[0])}", 0.0, slab)
-    return None
+def _bore(section: StackSection, slab: SectionSlab) -> StackLabel | None:
+    name = "bore ⌀" if section.is_bored else "opening "
+    return None if slab.layer.is_mask else _through(name, 0.0, slab)
 
 
-def _lumen(section: StackSection) -> StackLabel | None:
-    if section.lumen is None:
-        return None
-    cap = section.slabs[-1]
-    through = opening(cap.spans, section.lumen)
-    if through is None:
-        return None
-    return _in_slab(f"lumen ⌀{length(through[1] - through[0])}", section.lumen, cap)
-
-
-def _in_slab(words: str, s: float, slab: SectionSlab) -> StackLabel:
-    layer = slab.layer
-    return StackLabel(words, s, layer.z + layer.film.thickness / 2, layer.index)
+def _through(name: str, at: float, slab: SectionSlab) -> StackLabel | None:
+    through = opening(slab.spans, at)
+    return through and _in_slab(f"{name}{length(through[1] - through[0])}", at, slab)
