@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-import time
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
 import sbafab
+from sbafab.process import ignore_progress
+from sbafab.simulators.simulator import SimulationRequest
 
 DESIGN = "3dof-15mm"
 KPA = 5.0
@@ -28,33 +30,35 @@ def sofa() -> Stepped | None:
     """Scene A, every film as a shell; None where runSofa is not there."""
     if shutil.which("runSofa") is None:
         return None
-    from sbafab.simulators.sofa.run import USUAL, SofaJob, simulate
+    from sbafab.simulators.sofa.run import SECONDS, run
     from sbafab.simulators.sofa.scenes import DT
 
     laminate = sbafab.build(DESIGN)
-    pressures = {chamber.name: KPA for chamber in laminate.chambers}
     taken = []
     for seconds in (SHORT, LONG):
         with tempfile.TemporaryDirectory() as place:
             began = os.times().children_user
-            simulate(laminate, Path(place), pressures, SofaJob("shell", seconds))
+            run(laminate, SimulationRequest(KPA, seconds=seconds), Path(place), ignore_progress)
             taken.append(os.times().children_user - began)
-    return Stepped((taken[1] - taken[0]) / round((LONG - SHORT) / DT), round(USUAL.seconds / DT))
+    return Stepped((taken[1] - taken[0]) / round((LONG - SHORT) / DT), round(SECONDS / DT))
 
 
 def mujoco(sectors: int) -> Stepped | None:
     """Its flexes with rings of so many nodes; None where the package is not there."""
-    from sbafab.errors import OutputError
-    from sbafab.simulators.mujoco.run import LEAST_TIME, SECONDS, find_mujoco, simulate
-
-    try:
-        find_mujoco()
-    except OutputError:
+    if find_spec("mujoco") is None:
         return None
+    from sbafab.simulators.mujoco.model import DT
+    from sbafab.simulators.mujoco.run import LEAST_TIME, SECONDS, run
+
     laminate = sbafab.build(DESIGN)
-    pressures = {chamber.name: KPA for chamber in laminate.chambers}
     with tempfile.TemporaryDirectory() as place:
-        began = time.process_time()
-        done = simulate(laminate, Path(place), pressures, LEAST_TIME, sectors=sectors)
-        each = (time.process_time() - began) / done.steps
-    return Stepped(each, round(SECONDS / LEAST_TIME * done.steps))
+        began = os.times().children_user
+        run(
+            laminate,
+            SimulationRequest(KPA, seconds=LEAST_TIME),
+            Path(place),
+            ignore_progress,
+            sectors,
+        )
+        each = (os.times().children_user - began) / round(LEAST_TIME / DT)
+    return Stepped(each, round(SECONDS / DT))

@@ -30,8 +30,8 @@ from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
 from sbafab.process import Progress
 from sbafab.simulators.calculix.deck import JOB, RING, DeckSettings, Procedure, deck_settings
 from sbafab.simulators.calculix.results import SAME_TIME, read_frd
-from sbafab.simulators.calculix.run import DIVERGED, History, deck_mesh, simulate
-from sbafab.simulators.simulator import SimulationRequest
+from sbafab.simulators.calculix.run import DIVERGED, deck_mesh, simulate
+from sbafab.simulators.simulator import Result, SimulationRequest
 
 COMMAND = "python -m docs.scripts.drawn_runs"
 NAME = "drawn_decks"
@@ -112,14 +112,14 @@ REACHED = (
 )
 
 
-def run_deck(name: str, folder: Path) -> History:
+def run_deck(name: str, folder: Path) -> Result:
     """Return the history of a template's deck; its files stay in ``folder``."""
     case = DECKS[name]
     settings = _settings(name, case.pressure, "static", outputs=case.outputs)
     return _run(name, settings, folder, lambda *_: None)
 
 
-def run_furthest(name: str, folder: Path) -> History | None:
+def run_furthest(name: str, folder: Path) -> Result | None:
     """Return the history on the way to a working pressure, as far as its time goes; None without
     a result.
     """
@@ -140,7 +140,7 @@ def _settings(
     return replace(settings, outputs=outputs, ramp=ramp)
 
 
-def _run(name: str, settings: DeckSettings, folder: Path, progress: Progress) -> History:
+def _run(name: str, settings: DeckSettings, folder: Path, progress: Progress) -> Result:
     case = DECKS[name]
     mesh = MeshSettings(h=case.h, symmetry=case.symmetry, gaps=settings.has_vacuum)
     return simulate(sbafab.build(name), mesh, settings, folder, HOUR, progress)
@@ -161,7 +161,7 @@ def stop_after(seconds: float) -> Progress:
     return look
 
 
-def kinetic_shares(name: str, history: History, folder: Path) -> dict[int, float]:
+def kinetic_shares(name: str, history: Result, folder: Path) -> dict[int, float]:
     """Return the part of kinetic energy in that of each state, in percent, 0 of a static run; one
     that was stopped may not have written its last.
     """
@@ -181,7 +181,7 @@ def kinetic_shares(name: str, history: History, folder: Path) -> dict[int, float
     return shares
 
 
-def row_of(name: str, history: History) -> list[str]:
+def row_of(name: str, history: Result) -> list[str]:
     """Return the table's row of a run, from its last state."""
     case, last = DECKS[name], history.states[-1]
     kilopascals = max(last.pressures.values(), key=abs)
@@ -197,7 +197,7 @@ def row_of(name: str, history: History) -> list[str]:
     ]
 
 
-def furthest_row(name: str, history: History | None, folder: Path) -> list[str]:
+def furthest_row(name: str, history: Result | None, folder: Path) -> list[str]:
     """Return the row of a run to a working pressure: the last result, and what ended it and why.
 
     Results in which films still fly are none.
@@ -218,7 +218,7 @@ def furthest_row(name: str, history: History | None, folder: Path) -> list[str]:
     return [name, f"{pressure:g}", reached, *figures, f"{shares[last]:.2g}", ended]
 
 
-def array_rises(history: History, folder: Path) -> Table:
+def array_rises(history: Result, folder: Path) -> Table:
     """Return the array's rise on the way, and how far its bonds then lie off a plane."""
     case = DECKS["array"]
     mesh = deck_mesh(sbafab.build("array"), MeshSettings(h=case.h, symmetry=case.symmetry))

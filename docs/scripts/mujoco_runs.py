@@ -14,7 +14,9 @@ from pathlib import Path
 import sbafab
 from docs.scripts.measured import Record, keep, record, texts, versions
 from docs.scripts.tables import Table
-from sbafab.simulators.mujoco.run import MujocoRun, simulate
+from sbafab.process import ignore_progress
+from sbafab.simulators.mujoco.run import run
+from sbafab.simulators.simulator import Result, SimulationRequest
 
 COMMAND = "python -m docs.scripts.mujoco_runs"
 RINGS = (8, 16, 24, 32)
@@ -33,13 +35,14 @@ POSES = (
 
 
 @cache
-def inflated(design: tuple[str, ...], pressures: tuple[float, ...], ring: int) -> MujocoRun:
+def inflated(design: tuple[str, ...], pressures: tuple[float, ...], ring: int) -> Result:
     """A run of the usual length; pressures in kPa by chamber."""
     laminate = sbafab.build(*design)
     names = [chamber.name for chamber in laminate.chambers]
     told = dict(zip(names, pressures, strict=True))
     with tempfile.TemporaryDirectory() as folder:
-        return simulate(laminate, Path(folder), told, sectors=ring)
+        request = SimulationRequest(chambers=told)
+        return run(laminate, request, Path(folder), ignore_progress, ring)
 
 
 def stroke(balloons: int, kpa: float, ring: int) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import resource
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -20,10 +20,12 @@ import sbafab
 from docs.scripts.axisymmetric import MeridianSection, axisymmetric_strokes
 from docs.scripts.measured import Record, keep
 from docs.scripts.tables import Table
-from sbafab.simulators.coarse.shell import CoarseActuator
+from sbafab.process import ignore_progress
+from sbafab.simulators.coarse import CoarseActuator
+from sbafab.simulators.simulator import Result, SimulationRequest
 from sbafab.simulators.sofa import scenes as scene_files
 from sbafab.simulators.sofa import shell
-from sbafab.simulators.sofa.run import SofaJob, SofaRun, simulate
+from sbafab.simulators.sofa.run import run
 
 COMMAND = "python -m docs.scripts.sofa_runs"
 PROGRAMS = {"SOFA": "25.06", "CalculiX": "2.20"}
@@ -31,6 +33,7 @@ NAME = "3dof-15mm"
 PRESSURES = (1.0, 2.0, 5.0, 10.0)
 CHAMBERS = ("chamber1", "chamber2", "chamber3")
 INNER = MeridianSection(neck=2.5, bore=1.0)
+STEP = {"frames": scene_files.FRAMES_DT}
 SECONDS = {"shell": 10.0, "frames": 4.0, "volume": 5.0, "beam": 6.0}
 CALCULIX = {1.0: 2.17, 2.0: 2.77, 5.0: 3.73, 10.0: 4.59}
 """Stroke in mm of three balloons on one axis: sbafab simulate 1dof-5mm --set stack.balloons=3
@@ -66,22 +69,27 @@ OTHERS: dict[str, Posed | None] = {"CalculiX, 15 sections": section, "fast stack
 
 
 def ran(
-    pressures: Sequence[float], scene: str = "shell", design: Sequence[str] = (NAME,), **job: object
-) -> tuple[SofaRun, float]:
+    pressures: Sequence[float],
+    scene: str = "shell",
+    design: Sequence[str] = (NAME,),
+    volumes: Mapping[str, float] | None = None,
+) -> tuple[Result, float]:
     """A run, and its steps in a second of processor time, loading left in."""
     laminate = sbafab.build(*design)
     names = [chamber.name for chamber in laminate.chambers]
     told = dict(zip(names, pressures, strict=True))
     seconds = SECONDS[scene]
+    request = SimulationRequest(chambers=told, scene=scene, seconds=seconds, volumes=volumes or {})
     with tempfile.TemporaryDirectory() as place:
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-        done = simulate(laminate, Path(place), told, SofaJob(scene, seconds, **job))  # type: ignore[arg-type]
+        done = run(laminate, request, Path(place), ignore_progress)
         used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-    print(scene, list(pressures), done.last.tip, done.last.tilt, round(done.steps / used))
-    return done, done.steps / used
+    steps = seconds / STEP.get(scene, scene_files.DT)
+    print(scene, list(pressures), done.tip, done.tilt, round(steps / used))
+    return done, steps / used
 
 
-def told(done: SofaRun) -> str:
+def told(done: Result) -> str:
     return f"{done.last.tip[2]:.2f}, {done.last.tilt:.1f}"
 
 
@@ -121,7 +129,7 @@ def finer() -> Iterator[list[str]]:
     for sectors in (8, 12, 16):
         with _changed(lambda made, n=sectors: replace(made, sectors=n)):
             done, rate = ran([5.0] * 3)
-        nodes = len(shell.round_actuator(sbafab.build(NAME), None, sectors).mesh.rest)
+        nodes = len(shell.round_actuator(sbafab.build(NAME), sectors).mesh.rest)
         yield row(sectors, nodes, f"{done.last.tip[2]:.2f}", f"{rate:.0f}")
 
 
@@ -161,7 +169,7 @@ class _Stiff(CoarseActuator):
 
     @classmethod
     def of(cls, made: CoarseActuator, factor: float) -> CoarseActuator:
-        harder = cls(made.stack, made.pressures, made.sectors, made.start, made.is_fair)
+        harder = cls(made.stack, made.sectors, made.start, made.is_fair)
         object.__setattr__(harder, "factor", factor)
         return harder
 

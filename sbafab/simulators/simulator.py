@@ -18,16 +18,18 @@ from typing import Literal, NamedTuple, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.errors import DesignError, OutputError
+from sbafab.errors import DesignError, OutputError, VoidError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.process import Progress
-from sbafab.simulators.coarse.rounds import pocket_radii, why_not_round
+from sbafab.simulators.coarse import enclosed, pocket_radii, why_not_round
 
 Name = Literal["calculix", "sofa", "mujoco"]
 NAMES: tuple[Name, ...] = ("calculix", "sofa", "mujoco")
 LONGEST = 1e5
 """Longest simulated time, s."""
+DEFAULT_PRESSURE = 5.0
+"""kPa in a chamber, in SOFA and MuJoCo."""
 MOST_PRESSURE = 1000.0
 """kPa: nearly three times the burst pressure of the paper's actuators."""
 LARGEST_VACUUM = 101.325
@@ -254,7 +256,6 @@ def chamber_pressures(
     names: Sequence[str],
     request: SimulationRequest,
     default: float,
-    most: float = MOST_PRESSURE,
     least: float = 0.0,
 ) -> dict[str, float]:
     """Return the pressure in kPa of every chamber: named, ``request.pressure`` elsewhere.
@@ -272,10 +273,11 @@ def chamber_pressures(
     )
     pressures = {name: request.chambers.get(name, in_all) for name in names}
     for name, value in pressures.items():
-        if not (math.isfinite(value) and least <= value <= most):
+        if not (math.isfinite(value) and least <= value <= MOST_PRESSURE):
             hint = "; a vacuum is for calculix" if least == 0 > value else ""
             raise DesignError(
-                f"pressure of {name} = {value:g} kPa must be from {least:g} to {most:g} kPa{hint}"
+                f"pressure of {name} = {value:g} kPa must be from {least:g} to {MOST_PRESSURE:g} "
+                f"kPa{hint}"
             )
     if not any(pressures.values()):
         raise DesignError("pressure is 0 kPa in every chamber; give one of them more")
@@ -362,7 +364,7 @@ def _wrong(state: State, can_be: PhysicalLimits, passed: float) -> Iterator[str]
                 "each other"
             )
     air = sum(state.volumes.values())
-    if passed > MOST_OVERLAP * air:
+    if passed > MOST_OVERLAP * max(air, 0.0):
         yield f"films have passed through each other in {passed:.3g} ul, with {air:.3g} ul of air"
     if tip is None or can_be.highest is None:
         return
@@ -514,11 +516,163 @@ def _end(process: subprocess.Popen[bytes]) -> None:
             continue
 
 
-def tilt_of(points: Sequence[Vector]) -> float:
-    """Angle in degrees between the normal of a polygon of points and the axis."""
-    nx = ny = nz = 0.0
-    for (ax, ay, az), (bx, by, bz) in zip(points, [*points[1:], points[0]], strict=True):
-        nx += ay * bz - az * by
-        ny += az * bx - ax * bz
-        nz += ax * by - ay * bx
-    return math.degrees(math.atan2(math.hypot(nx, ny), nz))
+# A model whose nodes are recorded while it runs, and what they say.
+
+
+NODES_FILE = "nodes.state"
+PERIOD = 0.1
+"""Recording interval, s."""
+RAMP = 1.0
+"""Duration of the pressure ramp from 0, s."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedFilms:
+    """Nodes and films of a model of a laminate, from which its motion is read.
+
+    ``rest`` and ``start`` (n, 3) are the nodes in mm when flat and at the start; ``triangles``
+    (k, 3) all films, ``cavities`` closed surfaces by chamber, normals out of the air; both are
+    empty if films bear nothing. The mean of the ``middle`` nodes is the tip, the plane of the
+    ``tip`` nodes its tilt. ``pressures`` are kPa by chamber at the end, empty with volumes.
+    """
+
+    laminate: Laminate
+    rest: NDArray[np.float64]
+    start: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    cavities: Mapping[str, NDArray[np.int64]]
+    tip: NDArray[np.int64]
+    middle: NDArray[np.int64]
+    pressures: Mapping[str, float]
+
+    def state(self, time: float, nodes: NDArray[np.float64]) -> State:
+        """The state at a time in s, with the nodes (n, 3) in mm."""
+        on = min(1.0, time / RAMP)
+        pressures = {name: on * value for name, value in self.pressures.items()}
+        volumes = {name: enclosed(nodes, walls) for name, walls in self.cavities.items()}
+        if self.laminate.tube is not None:
+            return State(time, pressures, None, None, None, volumes)
+        x, y, z = (nodes[self.middle].mean(axis=0) - self.rest[self.middle].mean(axis=0)).tolist()
+        height = sum(layer.film.thickness for layer in self.laminate.tpe_layers) + z
+        return State(time, pressures, height, (x, y, z), tilt_of(nodes[self.tip]), volumes)
+
+    def figures(self, states: Sequence[State], nodes: NDArray[np.float64]) -> dict[str, float]:
+        """Figures of a run by name of ``FIGURES``, from its states and its last nodes."""
+        figures: dict[str, float] = {}
+        if self.laminate.tube is None:
+            figures["drift"] = drift(states)
+        else:
+            # Distance of the balloons' crowns from their tube's axis.
+            figures["diameter"] = float(2 * np.linalg.norm(nodes[self.tip, :2], axis=1).mean())
+        if len(self.triangles):
+            figures["overlap"] = overlap(nodes, self.rest, self.start, self.triangles)
+        return figures
+
+
+def read_nodes(path: Path) -> list[tuple[float, NDArray[np.float64]]]:
+    """Times in s and places (n, 3) in mm of recorded nodes, in the format of SOFA's WriteState.
+
+    They end before the first record that is truncated or not finite.
+    """
+    records: list[tuple[float, NDArray[np.float64]]] = []
+    lines = path.read_text("utf-8", "replace").splitlines(keepends=True) if path.is_file() else []
+    time = math.nan
+    for line in lines:
+        key, _, values = line.strip().partition("=")
+        try:
+            numbers = np.array(values.split(), dtype=float)
+        except ValueError:
+            break
+        if not np.isfinite(numbers).all() or not line.endswith("\n"):
+            break
+        if key == "T" and len(numbers) == 1:
+            time = float(numbers[0])
+        elif key == "X" and math.isfinite(time):
+            if len(numbers) < 9 or len(numbers) % 3:
+                break
+            records.append((time, numbers.reshape(-1, 3)))
+    return records
+
+
+class ModelRun(NamedTuple):
+    """A model to run for ``seconds`` of simulated time: its file and what is read from it.
+
+    ``command`` runs it in its folder and records its nodes in ``NODES_FILE`` every ``PERIOD``.
+    ``read_log`` returns the first trouble in the text of its log, if any, and the steps per s.
+    ``requested`` are the pressures or volumes of the chambers.
+    """
+
+    simulator: Name
+    model: Path
+    command: Sequence[str]
+    films: RecordedFilms
+    seconds: float
+    read_log: Callable[[str], tuple[str | None, float | None]]
+    requested: Collection[float]
+
+
+def run_model(run: ModelRun, minutes: float, progress: Progress) -> Result:
+    """Run a model for at most so many minutes, read its nodes and judge them.
+
+    Its log stays beside it. Raises VoidError if it ends by itself, is killed, logs an error or has
+    an impossible result; the message says how far the tip was known.
+    """
+    folder, name = run.model.parent, run.model.name
+    program = Path(run.command[0]).name if run.simulator == "sofa" else run.simulator
+    record, log = folder / NODES_FILE, folder / f"{program}.log"
+    record.unlink(missing_ok=True)
+    periods = round(run.seconds / PERIOD)
+
+    def look() -> None:
+        done = record.read_bytes().count(b"T=") if record.is_file() else 0
+        if done:
+            progress(program, min(done - 1, periods), periods)
+
+    ended = run_program(run.command, log, 60 * minutes, look)
+    trouble, rate = run.read_log(log.read_text(encoding="utf-8", errors="replace"))
+    records = read_nodes(record)
+    why = _why_void(program, ended, trouble, [time for time, _ in records], run.seconds)
+    is_cut_short = ended.stopped is not None and bool(records) and trouble is None
+    if why is not None and not is_cut_short:
+        known = f"the tip is known to {records[-1][0]:g} s" if records else "nothing is known of it"
+        raise VoidError(f"{name} did not run to its end: {why}; {known} (see {log})")
+    states = tuple(run.films.state(*each) for each in records)
+    figures = run.films.figures(states, records[-1][1])
+    wrong = impossible(
+        states[-1], limits(run.films.laminate, run.requested), figures.get("overlap", 0.0)
+    )
+    if wrong is not None:
+        raise VoidError(f"{name} ran to {states[-1].time:g} s, but its result cannot be: {wrong}")
+    record.unlink()
+    if ended.stopped is not None:
+        reached = f"{name} ran to {states[-1].time:g} of {run.seconds:g} s"
+        stopped = f"{reached}: {ended.stopped.words}; what it reached is kept"
+        return Result(run.simulator, states, figures, stopped)
+    progress(program, periods, periods)
+    return Result(run.simulator, states, figures | ({} if rate is None else {"rate": rate}))
+
+
+def _why_void(
+    program: str, ended: Ended, trouble: str | None, times: Sequence[float], seconds: float
+) -> str | None:
+    """Return the reason why a run did not come to its end, or None."""
+    code = ended.code
+    if ended.stopped is not None:
+        return ended.stopped.words
+    if code < 0:
+        return f"{program} was killed by signal {-code} ({signal.Signals(-code).name})"
+    if trouble is not None:
+        return f'its log says "{trouble[:200]}"'
+    if code > 0:
+        return f"{program} ended with exit code {code}"
+    if not times:
+        return f"it wrote no place of a node into {NODES_FILE}"
+    if times[-1] < seconds - 1.5 * PERIOD:
+        return f"its record ends before {seconds:g} s or is no finite number from there on"
+    return None
+
+
+def tilt_of(points: NDArray[np.float64]) -> float:
+    """Angle in degrees between the normal of a polygon of points (n, 3) and the axis."""
+    x, y, z = np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0).tolist()
+    return math.degrees(math.atan2(math.hypot(x, y), z))

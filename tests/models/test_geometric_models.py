@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 
 from sbafab.errors import DesignError
 from sbafab.models import lens, parabola, printed
-from sbafab.simulators.coarse.shell import Meridian
+from sbafab.simulators.coarse import Meridian
 
 
 @pytest.mark.parametrize("length", [2.5, 5.0, 0.7])

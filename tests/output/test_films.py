@@ -20,8 +20,7 @@ from sbafab.rules.deck import has_failed
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import Run, RunRequest, generate
 from sbafab.simulators.calculix.deck import deck_settings
-from sbafab.simulators.coarse.rounds import why_not_round
-from sbafab.simulators.coarse.shell import actuator
+from sbafab.simulators.coarse import CoarseActuator, round_stack, why_not_round
 from sbafab.simulators.mujoco.model import model_text
 from sbafab.simulators.sofa.scenes import why_no_scene
 
@@ -153,13 +152,14 @@ def test_calculix_takes_each_film_and_the_coarse_shell_one_that_is_known(
         build(design.with_(*(f"layup.{role}={name}" for role in ("base", "wall", "cap"))))
         for name in ("tpu50", "tpe", "pet")
     )
-    model = model_text(actuator(tpu))
+    coarse = {film: CoarseActuator(round_stack(film)) for film in (tpu, tpe)}
+    model = model_text(coarse[tpu], {"chamber1": 5.0})
     assert 'young="200000"' in model
     assert 'poisson="0.3"' in model
     # Two bonded films of 0.05 mm, and the mass of TPU at 1200 kg/m3 instead of TPE's.
     assert 'thickness="0.01"' in model
-    assert actuator(tpu).bending(1) == pytest.approx(20e3 * 0.05**3 / 12 / (1 - 0.09))
-    ratio = actuator(tpu).mass / actuator(tpe).mass
+    assert coarse[tpu].bending(1) == pytest.approx(20e3 * 0.05**3 / 12 / (1 - 0.09))
+    ratio = coarse[tpu].mass / coarse[tpe].mass
     assert ratio == pytest.approx(0.05 * 1200 / (0.038 * 1122))
     assert "add films.pet.modulus, in MPa" in (why_not_round(pet) or "")
     assert why_no_scene(tpu) is None

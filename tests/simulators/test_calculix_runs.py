@@ -26,11 +26,11 @@ from sbafab.simulators.calculix.run import (
     GROWTH,
     MEASURED_EQUATIONS,
     MEASURED_SECONDS,
-    History,
     deck_mesh,
     run_ccx,
     simulate,
 )
+from sbafab.simulators.simulator import Result
 from tests.site.formats import hold
 
 pytest.importorskip("netgen")
@@ -40,7 +40,7 @@ needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx is not i
 ORACLE = {0.95: 0.867, 6.0: 1.559}
 
 
-def inflated(folder: Path, settings: DeckSettings, h: float, minutes: float = 5) -> History:
+def inflated(folder: Path, settings: DeckSettings, h: float, minutes: float = 5) -> Result:
     """A quarter of the paper's balloon."""
     laminate = build(load_design("1dof-5mm", ("stack.balloons=1",)))
     mesh = MeshSettings(h=h, symmetry="quarter")

@@ -13,29 +13,29 @@ import trimesh
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.simulators.coarse.rounds import round_stack, why_not_round
-from sbafab.simulators.coarse.shell import (
+from sbafab.simulators.coarse import (
+    CoarseActuator,
     CoarseMesh,
     Meridian,
-    Triangle,
-    area,
+    Triangles,
+    areas,
     coarse_mesh,
     fullest,
     holding,
+    round_stack,
     standing,
+    why_not_round,
 )
 
 LOBED = "3dof-15mm"
 DESIGNS = [
     (LOBED,),
     ("1dof-5mm",),
-    ("1dof-10mm",),
-    *[(LOBED, f"chamber.count={count}", "stack.balloons=3") for count in (2, 4, 5, 6, 7, 8)],
+    *[(LOBED, f"chamber.count={count}", "stack.balloons=3") for count in (2, 4, 5, 8)],
     (LOBED, "stack.balloons=1"),
     (LOBED, "stack.balloons=4", "registration.method=ears"),
     (LOBED, "stack.balloons=3", "chamber.diameter=[6, 5, 4]"),
     (LOBED, "stack.balloons=3", "chamber.axis_radius=9"),
-    ("1dof-5mm", "stack.balloons=2", "films.tpe.thickness=0.05"),
 ]
 
 
@@ -44,69 +44,47 @@ def mesh_of(*design: str) -> CoarseMesh:
     return coarse_mesh(round_stack(sbafab.build(*design)))
 
 
-def edges(triangles: tuple[Triangle, ...]) -> Counter[tuple[int, int]]:
-    return Counter((t[i], t[i - 2]) for t in triangles for i in range(3))
+def edges(triangles: Triangles) -> Counter[tuple[int, int]]:
+    return Counter((t[i], t[i - 2]) for t in triangles.tolist() for i in range(3))
 
 
 def test_the_paper_s_actuator_has_the_size_that_was_run() -> None:
     mesh = mesh_of(LOBED)
-    assert len(mesh.rest) == len(mesh.position) == 2304
+    assert mesh.rest.shape == mesh.position.shape == (2304, 3)
     assert len(mesh.single) + len(mesh.double) == 4596
+    assert len(mesh.fixed) == 3 * 17
+    assert not mesh.position[mesh.fixed, 2].any()
+    assert not mesh.rest[:, 2].any()
+    axes = [chamber.centres[0] for chamber in sbafab.build(LOBED).chambers]
+    for ends in (mesh.tip, mesh.poles, mesh.roots):
+        assert mesh.rest[ends, :2] == pytest.approx(np.array(axes), abs=1e-6)
+    assert (mesh.position[mesh.tip, 2] == mesh.height).all()
 
 
 @pytest.mark.parametrize("design", DESIGNS, ids=" ".join)
-def test_groups_are_manifold_and_use_every_node(design: tuple[str, ...]) -> None:
-    mesh = mesh_of(*design)
-    for group in (mesh.lower, mesh.upper, mesh.web, mesh.necks):
-        directed = edges(group)
-        assert all(count == 1 for count in directed.values())
-    used = {node for triangle in mesh.single + mesh.double for node in triangle}
-    assert used == set(range(len(mesh.rest)))
-
-
-@pytest.mark.parametrize("design", DESIGNS, ids=" ".join)
-def test_triangles_are_no_slivers_flat_or_inflated(design: tuple[str, ...]) -> None:
-    mesh = mesh_of(*design)
+def test_groups_are_manifold_without_slivers_and_cavities_are_closed(
+    design: tuple[str, ...],
+) -> None:
+    mesh, laminate = mesh_of(*design), sbafab.build(*design)
+    triangles = np.concatenate([mesh.single, mesh.double])
+    for _, group, _ in mesh.groups:
+        assert set(edges(group).values()) == {1}
+    assert set(triangles.ravel().tolist()) == set(range(len(mesh.rest)))
     for points in (mesh.rest, mesh.position):
-        assert min(area(points, triangle) for triangle in mesh.single + mesh.double) > 0.05
-        for a, b, c in mesh.web + mesh.necks:
-            (ax, ay, _), (bx, by, _), (cx, cy, _) = points[a], points[b], points[c]
-            assert (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) > 0.05
-
-
-@pytest.mark.parametrize("design", DESIGNS, ids=" ".join)
-def test_cavities_are_closed_and_look_outward(design: tuple[str, ...]) -> None:
-    mesh = mesh_of(*design)
-    laminate = sbafab.build(*design)
-    assert [name for name, _ in mesh.cavities] == [c.name for c in laminate.chambers]
+        assert areas(points, triangles).min() > 0.05
+        a, b, c = points[mesh.double].transpose(1, 0, 2)
+        assert np.cross(b - a, c - a)[:, 2].min() > 0.05
+    tip = mesh.position[mesh.tip]
+    assert np.cross(tip[1] - tip[0], tip[2] - tip[1])[2] > 0.5
+    assert list(mesh.cavities) == [chamber.name for chamber in laminate.chambers]
     stack = round_stack(laminate)
-    meridians = [fullest(pocket, stack.neck) for pocket in stack.pockets]
-    for name, triangles in mesh.cavities:
-        directed = edges(triangles)
-        assert all(n == 1 and directed[end, start] == 1 for (start, end), n in directed.items())
-        surface = trimesh.Trimesh(mesh.position, triangles, process=False)
+    expected = sum(eight_sided(fullest(pocket, stack.neck), pocket) for pocket in stack.pockets)
+    for name, walls in mesh.cavities.items():
+        surface = trimesh.Trimesh(mesh.position, walls, process=False)
         assert surface.is_watertight
         assert surface.is_winding_consistent
         assert mesh.volume(name) == pytest.approx(surface.volume, rel=1e-9)
-        expected = sum(
-            eight_sided(meridian, pocket)
-            for meridian, pocket in zip(meridians, stack.pockets, strict=True)
-        )
         assert surface.volume == pytest.approx(expected, rel=0.02)
-
-
-@pytest.mark.parametrize("sectors", [12, 16, 24])
-def test_finer_rings_hold_nearly_what_round_ones_do(sectors: int) -> None:
-    stack = round_stack(sbafab.build(LOBED, "stack.balloons=2"))
-    mesh = coarse_mesh(stack, sectors=sectors)
-    for group in (mesh.lower, mesh.upper, mesh.web, mesh.necks):
-        assert all(count == 1 for count in edges(group).values())
-    eight = coarse_mesh(stack)
-    # Areas of polygons of so many corners, against that of eight.
-    ratio = sectors * math.sin(math.tau / sectors) / (8 * math.sin(math.tau / 8))
-    for name, triangles in mesh.cavities:
-        assert trimesh.Trimesh(mesh.position, triangles, process=False).is_watertight
-        assert mesh.volume(name) / eight.volume(name) == pytest.approx(ratio, rel=0.02)
 
 
 def eight_sided(meridian: Meridian, pocket: float) -> float:
@@ -120,25 +98,30 @@ def eight_sided(meridian: Meridian, pocket: float) -> float:
     )
 
 
-def test_ends_are_where_they_belong() -> None:
-    mesh = mesh_of(LOBED)
-    assert len(mesh.fixed) == 3 * 17
-    assert {mesh.position[node][2] for node in mesh.fixed} == {0.0}
-    axes = [chamber.centres[0] for chamber in sbafab.build(LOBED).chambers]
-    for node, (x, y) in zip(mesh.tip, axes, strict=True):
-        assert mesh.rest[node][:2] == pytest.approx((x, y), abs=1e-6)
-        assert mesh.position[node][2] == mesh.height
-        assert node in mesh.poles
-    assert [mesh.rest[node][:2] for node in mesh.roots] == [mesh.rest[n][:2] for n in mesh.poles]
-    assert all(z == 0 for _, _, z in mesh.rest)
+@pytest.mark.parametrize("sectors", [12, 16])
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_a_mirrored_mesh_is_the_same_and_begins_its_triangles_alike(
+    count: int, sectors: int
+) -> None:
+    """Corotational elements take their axes from a triangle's first edge: where mirrored triangles
+    begin with others, a chamber on the axis of x bends the actuator out of its plane.
+    """
+    design = (LOBED, f"chamber.count={count}", "stack.balloons=2")
+    mesh = coarse_mesh(round_stack(sbafab.build(*design)), sectors=sectors)
+    places = (mesh.position.round(4) + 0.0).tolist()
+    nodes = {(x, y, z): i for i, (x, y, z) in enumerate(places)}
+    mirror = [nodes[x, -y + 0.0, z] for x, y, z in places]
+    for _, group, _ in mesh.groups:
+        begun = {(frozenset((a, b)), c) for a, b, c in group.tolist()}
+        mirrored = {(frozenset((mirror[a], mirror[b])), mirror[c]) for a, b, c in group.tolist()}
+        assert begun == mirrored
 
 
-@pytest.mark.parametrize("design", [("1dof-5mm",), (LOBED, "chamber.count=2"), (LOBED,)])
-def test_the_tip_s_mean_is_on_the_axis_and_level(design: tuple[str, ...]) -> None:
-    mesh = mesh_of(*design)
-    points = np.array([mesh.position[node] for node in mesh.tip])
-    assert points.mean(axis=0)[:2] == pytest.approx([0, 0], abs=1e-6)
-    assert np.cross(points[1] - points[0], points[2] - points[1])[2] > 0.5
+def test_fair_rings_have_the_area_of_circles() -> None:
+    stack = round_stack(sbafab.build("1dof-5mm", "stack.balloons=1"))
+    for sectors in (8, 12):
+        mesh = CoarseActuator(stack, sectors, is_fair=True).mesh
+        assert areas(mesh.rest, mesh.lower).sum() == pytest.approx(math.pi * 2.5**2, rel=1e-6)
 
 
 def test_the_parabola_without_a_neck_is_the_paper_s() -> None:
@@ -147,6 +130,10 @@ def test_the_parabola_without_a_neck_is_the_paper_s() -> None:
     assert most.volume == pytest.approx(16.95, abs=0.005)
     assert most.height == pytest.approx(1.33, abs=0.005)
     assert most.edge == pytest.approx(2.01, abs=0.005)
+    assert fullest(2.5, 1.25).volume == pytest.approx(16.95, abs=0.005)
+    assert fullest(5.0, 1.25).volume == pytest.approx(8 * 16.95, abs=0.05)
+    assert 2 * standing(0.48)(2.5, 1.25).height == pytest.approx(0.48)
+    assert holding(1.25, 1.25, 1e9).volume < 19.04
 
 
 @pytest.mark.parametrize(("neck", "length", "slope"), [(1.25, 1.25, 1.65), (0.5, 3.0, 4.0)])
@@ -162,50 +149,20 @@ def test_the_meridian_keeps_its_length_and_volume(neck: float, length: float, sl
     assert meridian.point(0.4 * length) == pytest.approx((x[place], y[place]), abs=1e-3)
 
 
-def test_starts_hold_what_they_promise() -> None:
-    assert fullest(2.5, 1.25).volume == pytest.approx(16.95, abs=0.005)
-    assert fullest(5.0, 1.25).volume == pytest.approx(8 * 16.95, abs=0.05)
-    assert 2 * standing(0.48)(2.5, 1.25).height == pytest.approx(0.48)
-    assert holding(1.25, 1.25, 1e9).volume < 19.04
-
-
-def test_the_true_mass_is_that_of_the_films() -> None:
+def test_mass_and_stiffness_are_those_of_the_film() -> None:
     """Of one balloon: two films of the plate's area; chords lose a few per cent of it."""
-    design = ("1dof-5mm", "stack.balloons=1")
+    one = CoarseActuator(round_stack(sbafab.build("1dof-5mm", "stack.balloons=1")))
     plate = math.pi * 3.25**2 * 0.038 * 1122e-9
-    chords = 4 * math.sin(math.tau / 8) / math.pi
-    assert mesh_of(*design).mass(0.038, 1122) == pytest.approx(2 * plate * chords, rel=1e-6)
+    assert one.mass == pytest.approx(2 * plate * 4 * math.sin(math.tau / 8) / math.pi, rel=1e-6)
+    thick = CoarseActuator(round_stack(sbafab.build("1dof-5mm", "films.tpe.thickness=0.05")))
+    assert thick.membrane == pytest.approx(500)
+    assert thick.bending(1) == pytest.approx(10_000 * 0.05**3 / 12 / 0.96)
+    assert thick.bending(2) == pytest.approx(8 * thick.bending(1))
 
 
-def test_unsuited_designs_are_refused_with_the_reason(tmp_path: Path) -> None:
-    drawn = tmp_path / "square.svg"
-    drawn.write_text(
-        '<svg xmlns="http://www.w3.org/2000/svg" width="6mm" height="6mm" viewBox="-3 -3 6 6">'
-        '<path d="M -2.5 -2.5 L 2.5 -2.5 L 2.5 2.5 L -2.5 2.5 Z"/></svg>'
-    )
-    square = sbafab.build("1dof-5mm", "stack.balloons=2", f"chamber.outline={drawn}")
+def test_unsuited_designs_are_refused_with_the_reason(square: Path) -> None:
+    drawn = sbafab.build("1dof-5mm", "stack.balloons=2", f"chamber.outline={square}")
     with pytest.raises(DesignError, match=r"x 0\.000, y 0\.000 is drawn otherwise"):
-        round_stack(square)
+        round_stack(drawn)
     assert "lie on a sheet" in (why_not_round(sbafab.build("radial-15mm")) or "")
     assert why_not_round(sbafab.build("1dof-5mm")) is None
-
-
-@pytest.mark.parametrize("sectors", [8, 12, 16])
-@pytest.mark.parametrize("count", [2, 3, 4])
-def test_a_mirrored_mesh_is_the_same_and_begins_its_triangles_alike(
-    count: int, sectors: int
-) -> None:
-    """Corotational elements take their axes from a triangle's first edge: where mirrored triangles
-    begin with others, a chamber on the axis of x bends the actuator out of its plane.
-    """
-    design = (LOBED, f"chamber.count={count}", "stack.balloons=2")
-    mesh = coarse_mesh(round_stack(sbafab.build(*design)), sectors=sectors)
-    nodes = {
-        (round(x, 4), round(y, 4) + 0.0, round(z, 4)): i
-        for i, (x, y, z) in enumerate(mesh.position)
-    }
-    mirror = [nodes[round(x, 4), round(-y, 4) + 0.0, round(z, 4)] for x, y, z in mesh.position]
-    for group in (mesh.lower, mesh.upper, mesh.web, mesh.necks):
-        begun = {(frozenset((a, b)), c) for a, b, c in group}
-        mirrored = {(frozenset((mirror[a], mirror[b])), mirror[c]) for a, b, c in group}
-        assert begun == mirrored

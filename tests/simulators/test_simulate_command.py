@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import sys
 from hashlib import sha256
@@ -16,6 +15,8 @@ from filelock import FileLock
 from sbafab.cli import app
 from sbafab.errors import DesignError
 from sbafab.simulators.simulator import NAMES, SimulationRequest, chamber_pressures, simulator
+from tests.simulators.conftest import StandIn
+from tests.simulators.test_recorded_runs import SOFA
 from tests.site.formats import hold
 
 CHAMBERS = ("chamber1", "chamber2")
@@ -236,16 +237,9 @@ def test_a_run_leaves_what_it_found(tmp_path: Path) -> None:
     assert found["stopped"] is None
 
 
-def test_the_log_of_a_void_run_is_where_the_message_says(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A program in runSofa's place that writes no place of the tip."""
-    programs = tmp_path / "bin"
-    programs.mkdir()
-    program = programs / "runSofa"
-    program.write_text("#!/bin/sh\necho '[ERROR] what went wrong'\n")
-    program.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{programs}{os.pathsep}{os.environ['PATH']}")
+def test_the_log_of_a_void_run_is_where_the_message_says(tmp_path: Path, stand_in: StandIn) -> None:
+    """A program in runSofa's place that writes no place of a node."""
+    stand_in("runSofa", "print('[ERROR] what went wrong')")
     out = tmp_path / "out"
     given = ["simulate", "1dof-5mm", "--set", "stack.balloons=1", "--with", "sofa", "-o", str(out)]
     found = CliRunner().invoke(app, given)
@@ -256,33 +250,19 @@ def test_the_log_of_a_void_run_is_where_the_message_says(
     assert "[ERROR] what went wrong" in Path(named[1]).read_text(encoding="utf-8")
 
 
-RISEN = """#!/bin/sh
-cat > tip.state <<'END'
-T= 0
-  X= 1 0 1 0 1 1 -1 -1 1
-T= 0.1
-  X= 1 0 1 0 1 1 -1 -1 1
-END
-"""
-
-
 @pytest.fixture
-def risen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def risen(tmp_path: Path, stand_in: StandIn) -> list[str]:
     """A command that runs a program in runSofa's place, whose tip rises by 1 mm."""
-    program = tmp_path / "bin" / "runSofa"
-    program.parent.mkdir()
-    program.write_text(RISEN)
-    program.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{program.parent}{os.pathsep}{os.environ['PATH']}")
+    stand_in("runSofa", f"{SOFA}\nfor t in (0, 0.1): write(t, 1)\n")
     given = ["simulate", "1dof-5mm", "--set", "stack.balloons=1", "--with", "sofa"]
     return [*given, "--seconds", "0.1", "-o", str(tmp_path / "out")]
 
 
 def test_a_folder_that_another_run_holds_is_asked_for_before_the_run(
-    tmp_path: Path, risen: list[str]
+    tmp_path: Path, risen: list[str], stand_in: StandIn
 ) -> None:
     (tmp_path / "out").mkdir()
-    (tmp_path / "bin" / "runSofa").write_text("#!/bin/sh\ntouch ran\n")
+    stand_in("runSofa", "open('ran', 'w')")
     with FileLock(tmp_path / "out" / ".1dof-5mm.lock"):
         found = CliRunner().invoke(app, risen)
     assert found.exit_code == 2
@@ -304,5 +284,5 @@ def test_a_result_is_kept_where_its_folder_is_taken_meanwhile(
             assert "another run is writing" in found.stderr
             assert json.loads(found.stdout)["folder"] == str(out / name)
             kept = json.loads((out / name / "result.json").read_text())
-            assert kept["tip"] == [0, 0, 1]
+            assert kept["tip"] == pytest.approx([0, 0, 1])
             assert (out / name / "actuator.scn").is_file()

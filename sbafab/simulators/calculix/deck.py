@@ -13,16 +13,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.errors import DesignError
 from sbafab.laminate.films import PAPER_TPE, Film, density_of, in_order
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.meshing.formats.inp import write_inp
-from sbafab.simulators.simulator import (
-    LARGEST_VACUUM,
-    SimulationRequest,
-    chamber_pressures,
-)
+from sbafab.simulators.coarse import elastic_of
+from sbafab.simulators.simulator import LARGEST_VACUUM, SimulationRequest, chamber_pressures
 
 Procedure = Literal["dynamic", "static"]
 
@@ -103,13 +99,7 @@ def deck_settings(
 
 
 def _elastic(film: Film) -> Elastic:
-    """Return the film's elastic constants. Raises DesignError if its modulus is not known."""
-    if film.elastic is None:
-        raise DesignError(
-            f"CalculiX needs Young's modulus of {film.material}; add "
-            f"films.{film.material.lower()}.modulus, in MPa, and poisson, its ratio"
-        )
-    return Elastic(*film.elastic, 1e-12 * density_of(film, "CalculiX"))
+    return Elastic(*elastic_of(film, "CalculiX"), 1e-12 * density_of(film, "CalculiX"))
 
 
 # A start slightly off flat, which decides the direction of wrinkles.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -119,14 +119,6 @@ KEPT = (".inp", ".frd", ".sta", ".dat")
 DATED = re.compile(rb"(?m)^(    1U(?:DATE|TIME|HOST|USER|DIR)).*$")
 
 
-@dataclass(frozen=True)
-class History:
-    """The states from the unloaded one on, and one sentence if the run stopped early."""
-
-    states: tuple[LoadedState, ...]
-    stopped: str | None
-
-
 def deck_mesh(laminate: Laminate, settings: MeshSettings) -> Mesh:
     """The flat volume mesh for a deck. Raises DesignError, OutputError as meshing does."""
     stack = layup(laminate, settings)
@@ -140,7 +132,7 @@ def simulate(
     folder: Path,
     timeout: float,
     progress: Progress,
-) -> History:
+) -> Result:
     """Inflates a laminate in CalculiX; ``folder`` receives deck, results, table and pictures.
 
     ``timeout`` is in seconds. A run that diverges or takes too long keeps its results so far.
@@ -193,7 +185,8 @@ def simulate(
             f"beyond {_largest(states[-1]):.3g} kPa the result cannot be: {wrong[1]}; results up "
             "to there are kept"
         )
-    return History(tuple(states), stopped)
+    figures = {"stress": states[-1].stress, "work": states[-1].work}
+    return Result("calculix", tuple(states), figures, stopped)
 
 
 MEASURED_EQUATIONS, MEASURED_SECONDS, GROWTH = 147_513, 6.4, 1.5
@@ -323,10 +316,7 @@ def export(laminate: Laminate, request: SimulationRequest, folder: Path) -> None
 def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: Progress) -> Result:
     """Run the deck; the folder holds deck, results, table and pictures."""
     mesh, settings = _settings(laminate, request)
-    history = simulate(laminate, mesh, settings, folder, 60 * request.minutes, progress)
-    last = history.states[-1]
-    figures = {"stress": last.stress, "work": last.work}
-    return Result("calculix", history.states, figures, history.stopped)
+    return simulate(laminate, mesh, settings, folder, 60 * request.minutes, progress)
 
 
 def _settings(laminate: Laminate, request: SimulationRequest) -> tuple[MeshSettings, DeckSettings]:

@@ -1,1 +1,0 @@
-"""The coarse shell of a stack of round balloons, shared by several simulators."""
