@@ -1,42 +1,40 @@
-"""Checks of an output folder as it is on disk: file integrity, claims, rules, design."""
+"""``sbafab check FOLDER``: an output folder read, and made again from its design to be compared.
+
+Hashes and the manifest are compared, the layers are read and the rules run on what lies there, and
+every other file is compared with that of a folder made again from ``design.toml``; the places of
+parts on film sheets are those of ``nest.json``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
+from typing import Any
 
-from sbafab.actuators import build, load_design
-from sbafab.as_built.claims import (
-    claim,
-    design_problems,
-    file_problems,
-    height_problems,
-    lowered_problems,
-    order_problems,
-    property_problems,
-)
-from sbafab.as_built.cut_files import (
-    CutPart,
+from pydantic import BaseModel
+
+from sbafab.actuators import load_design
+from sbafab.as_built.as_cut import (
     LayerFile,
+    laminate_as_cut,
+    layer_departures,
     path_in_folder,
     read_layers,
     read_seams,
-    seam_departures,
-    stacked_layers,
 )
-from sbafab.as_built.expected import ExpectedLaminate, WrittenDesign, departure, expected_laminate
+from sbafab.as_built.differences import (
+    bodies,
+    file_difference,
+    has_lost_properties,
+    index_difference,
+    unreadable,
+)
+from sbafab.as_built.expected import ExpectedLaminate, expected_laminate
 from sbafab.as_built.kerf_removed import chords_for_arc
-from sbafab.as_built.measures import (
-    batch_problems,
-    fixture_problems,
-    interface_problems,
-    layer_problems,
-    pattern_problems,
-    place_problems,
-    size_problems,
-    with_plate_pins,
-)
 from sbafab.as_built.records import (
     CLAIMS,
     DESIGNED,
@@ -45,351 +43,175 @@ from sbafab.as_built.records import (
     findings_of,
     is_assembly,
     is_job,
-    read_assembly,
     read_claims,
     read_job,
 )
-from sbafab.as_built.sheets import DesignLot, SheetOrder, sheet_problems
-from sbafab.assemblies.build import Assembled, assemble
-from sbafab.assemblies.checks import lowered_checks, run_checks
-from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, load_assembly, part_entry
-from sbafab.design.identity import design_sha256
+from sbafab.assemblies.build import assemble
+from sbafab.assemblies.checks import run_checks
+from sbafab.assemblies.files import DESIGN_FILE, load_assembly
+from sbafab.cutting.lightburn import ENDING
+from sbafab.cutting.properties import FOLDER as LAYERS
+from sbafab.cutting.properties import CutSettings, curves_of
+from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
-from sbafab.errors import DesignError, OutputError
-from sbafab.laminate.folding import halves
+from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.models.formulas import sizes
-from sbafab.output.checked import Checked
-from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
-from sbafab.rules import film_limits, nets
-from sbafab.rules.deck import RULES, run_deck, run_rule
-from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, lowered
+from sbafab.laminate.netlist import read_netlist
+from sbafab.models.figures import Factors, PredictionRequest
+from sbafab.models.prediction import predict
+from sbafab.nesting.records import parts_of
+from sbafab.output.artefacts import (
+    ARTEFACTS,
+    PAGES,
+    TRAVELLER,
+    DesignFolder,
+    write_artefacts,
+    write_nested_sheets,
+    write_plates,
+)
+from sbafab.output.carry_over import MESH, PREDICTION, PRESS
+from sbafab.output.checked import (
+    EVERYTHING,
+    PICTURES,
+    Checked,
+    DesignPlan,
+    RunPart,
+    check,
+    cut_settings,
+    plan_design,
+    schedule_of,
+)
+from sbafab.output.folder import write_design, write_folder
+from sbafab.output.job import CheckedJob, find_nests, of_assembly, plan_job
+from sbafab.output.manifest import JobManifest, Manifest, as_json, file_hashes, file_names
+from sbafab.output.swap import is_among_cut_files
+from sbafab.process import ignore_progress
+from sbafab.rules.deck import RULES, run_rule
+from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.measures import Measures
+from sbafab.rules.nets import NAME as NETS
+from sbafab.rules.nets import NETLIST, netlist_findings
 from sbafab.rules.rule import Rule
+from sbafab.simulators.simulator import NAMES as SIMULATORS
+from sbafab.version import GENERATOR
 
-AS_DESIGNED = "all that lies here is what design.toml makes"
+INDEX = "manifest.json"
+AS_DESIGNED = "all files match design.toml"
+CUT_ENDINGS = (
+    *(".dxf", ".dwg", ".ai", ".cdr", ".eps", ".lbrn", ENDING),
+    *(".rd", ".plt", ".hpgl", ".gcode", ".nc", ".ngc", ".tap"),
+)
+"""Suffixes of CAD and laser files; pictures and pages are not cut by mistake."""
+DESIGN_ERRORS = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
+"""Errors of a doctored design."""
+BY_OTHER_COMMANDS = (*MESH, *PREDICTION, *SIMULATORS)
+"""Folders and files of other commands, which are not made again."""
+NOT_COMPARED = ("files", "mesh_statistics", "meshes")
+"""Keys of a manifest that hold hashes, or meshes of several commands."""
+UNMEASURED = (ArithmeticError, ValueError, LookupError, StopIteration)
+"""Errors that rules raise on shapes no design makes; programming errors are not included."""
+
+
+def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
+    """Return the findings on an output folder: files, manifest, the rules on the layers as cut, and
+    whether all files are what the design makes; with ``nets``, a file, also whether the layers join
+    what that netlist lists.
+
+    Of a job's folder, those of every design, and of the film sheets they share. Raises OutputError
+    for a folder without a sound manifest or without cut files, DesignError for a netlist that
+    cannot be read, or one of a job.
+    """
+    netlist = None if nets is None else read_netlist(nets)
+    if is_job(folder):
+        if nets is not None:
+            raise DesignError(
+                f"{folder} holds several designs, and a netlist is one design's; check the folder "
+                "of that one"
+            )
+        return _check_job(folder, read_job(folder))
+    claims = read_claims(folder)
+    try:
+        built = read_folder(folder)
+    except DesignError as error:
+        return _by_hashes(folder, claims, [str(error)])
+    findings = _findings(built, [*built.problems, *remade_problems(folder, built)])
+    if netlist is None or nets is None:
+        return findings
+    if built.laminate is None:
+        message = f"{nets.name} was not compared: not all layers could be read"
+        return (*findings, Finding(NETLIST, "fail", None, None, "", Place(), message))
+    return (*findings, *netlist_findings(built.laminate, built.design, netlist, nets.name))
+
+
+# The layers of a design's folder.
 
 
 @dataclass(frozen=True)
 class AsBuiltFolder:
-    """A folder read back; ``expected`` is the laminate of its design.
+    """The folder of a design read back.
 
-    ``laminate`` is None if the file of a layer could not be read, or the design has other layers.
+    ``checked`` is the design with the findings on it, ``expected`` its laminate and paths.
+    ``laminate`` has the layers as cut; None if one could not be read.
     """
 
     claims: Manifest
-    design: Design
+    checked: Checked
+    expected: ExpectedLaminate
+    settings: CutSettings
     files: tuple[LayerFile, ...]
     laminate: Laminate | None
     problems: tuple[Problem, ...]
-    expected: ExpectedLaminate
-    design_findings: tuple[Finding, ...] | None = None
-    """The findings of the design check of a run that has just written the folder."""
-    measured: tuple[Finding, ...] = ()
-    """The findings of the rules on the layers as cut."""
 
     @property
-    def is_expected(self) -> bool:
-        """True if every layer file cuts the design's layer; ``laminate`` is then the design's."""
-        laminate = self.laminate
-        has_same_seams = laminate is None or laminate.seams == self.expected.laminate.seams
-        return has_same_seams and all(
-            file.part is not None and file.part.is_expected for file in self.files
-        )
+    def design(self) -> Design:
+        return self.checked.design
 
 
-@dataclass(frozen=True)
-class FolderReadBack:
-    """An output folder read back and measured, without regenerating any of it.
+def read_folder(folder: Path) -> AsBuiltFolder:
+    """Read the layers of a design's folder, with the problems of its files.
 
-    ``findings`` are on files, claims, rules, and on the layers of each design of a job;
-    ``problems``: layers of a one-design folder that differ from its ``design.toml``.
-    ``designs`` is empty if a ``design.toml`` cannot be used.
-    """
-
-    findings: tuple[Finding, ...]
-    problems: tuple[Problem, ...]
-    designs: tuple[AsBuiltFolder, ...]
-    job: JobManifest | None = None
-
-    def against_design(self, problems: Sequence[Problem]) -> tuple[Finding, ...]:
-        """Return the findings, the last one with the ``problems`` against the design."""
-        return (*self.findings, *findings_of(DESIGNED, [*problems], AS_DESIGNED))
-
-
-def read_back(folder: Path, works: Mapping[str, WrittenDesign] | None = None) -> FolderReadBack:
-    """Read an output folder, of one design or several, from the disk.
-
-    ``works``: the designs of a run that has just written the folder, by name, with their expected
-    laminates and findings; layers cut exactly as expected are not measured again. Without
-    ``works``, both are made from each ``design.toml``. Raises OutputError for a folder without a
-    sound manifest or without cut files.
-    """
-    if is_job(folder):
-        return _read_job(folder, works)
-    work = next(iter(works.values())) if works is not None else None
-    try:
-        built = read_folder(folder, work=work)
-    except DesignError as error:
-        return _by_hashes(folder, read_claims(folder), [f"{error}"])
-    built = replace(built, measured=_run_deck(built))
-    return FolderReadBack(_findings(built), tuple(layer_departures(built)), (built,))
-
-
-def _by_hashes(
-    folder: Path, claims: Manifest | JobManifest, reasons: Sequence[str]
-) -> FolderReadBack:
-    """Compare the files of a folder, whose design cannot be used, with the manifest's hashes."""
-    problems = file_problems(folder, claims)
-    findings = findings_of(CLAIMS, problems, "every file has the hash that the manifest lists")
-    unusable = [
-        Problem(DESIGNED, f"{reason}; only the hashes of the files were compared")
-        for reason in reasons
-    ]
-    job = claims if isinstance(claims, JobManifest) else None
-    return FolderReadBack(tuple(findings), tuple(unusable), (), job)
-
-
-def _run_deck(built: AsBuiltFolder) -> tuple[Finding, ...]:
-    """Return the findings of the rules on the layers as cut."""
-    if built.laminate is None:
-        return rules_by_layer(built.files, built.claims, built.design)
-    if built.is_expected and built.design_findings is not None:
-        return built.design_findings
-    measures = Measures(built.laminate, built.design)
-    return tuple(finding for rule in RULES for finding in findings_as_built(rule, measures))
-
-
-def _findings(built: AsBuiltFolder) -> tuple[Finding, ...]:
-    problems = [*built.problems, *_unlisted_waivers(built.measured, built.claims)]
-    count = len(built.files)
-    return (
-        *findings_of(
-            INTEGRITY, problems, f"{count} cut files read back: closed contours in millimetres"
-        ),
-        *findings_of(CLAIMS, problems, "the manifest's claims hold for what lies on disk"),
-        *built.measured,
-    )
-
-
-def _read_job(folder: Path, works: Mapping[str, WrittenDesign] | None) -> FolderReadBack:
-    """Read the designs of a job, its sheets, and the places between the parts of an assembly.
-
-    ``works``: the designs of a run that has just written the folder.
-    """
-    job = read_job(folder)
-    findings: list[Finding] = []
-    lots: list[DesignLot] = []
-    problems: list[Problem] = []
-    lowered_limits: list[str] = []
-    folders: list[AsBuiltFolder] = []
-    unusable: list[str] = []
-    for entry in job.designs:
-        work = works.get(entry.name) if works is not None else None
-        try:
-            built = read_folder(path_in_folder(folder, entry.folder), of_job=True, work=work)
-        except DesignError as error:
-            unusable.append(f"{entry.name}: {error}")
-            continue
-        built = replace(built, measured=_run_deck(built))
-        folders.append(built)
-        lowered_limits += lowered(built.design)
-        design_findings = [*_findings(built)]
-        layers = layer_departures(built)
-        design_findings += findings_of(DESIGNED, layers, AS_DESIGNED) if layers else []
-        findings += [replace(f, message=f"{entry.name}: {f.message}") for f in design_findings]
-        lots.append(
-            DesignLot(
-                entry.name, entry.copies, _cut_parts(built.files), built.design.order.spare_parts
-            )
-        )
-        identity = (built.claims.name, built.claims.copies, built.claims.design_sha256)
-        if identity != (entry.name, entry.copies, entry.design_sha256):
-            message = f"{entry.folder}: name, copies or design_sha256 are not those of its manifest"
-            problems.append(claim(message))
-    if unusable:
-        return _by_hashes(folder, job, unusable)
-    first = folders[0]
-    problems += file_problems(folder, job)
-    order = SheetOrder(job, first.design, first.claims.kerf, lots)
-    problems += sheet_problems(folder, order)
-    if is_assembly(job):
-        lowered_limits += lowered_between(folder)
-        between, between_problems = assembly_findings(folder)
-        findings += between
-        problems += between_problems
-    problems += lowered_problems(job.lowered_limits, lowered_limits)
-    count = len(job.sheets)
-    all_findings = (
-        *findings,
-        *findings_of(INTEGRITY, problems, f"{count} sheets read back: closed contours, no overlap"),
-        *findings_of(CLAIMS, problems, "the sheets hold what the job's designs are made of"),
-    )
-    designed = tuple(problem for problem in problems if problem.rule == DESIGNED)
-    return FolderReadBack(all_findings, designed, tuple(folders), job)
-
-
-def read_folder(
-    folder: Path, of_job: bool = False, work: WrittenDesign | None = None
-) -> AsBuiltFolder:
-    """Read the laminate of a folder's cut files, with the problems of files and claims.
-
-    The folder of a design ``of_job`` does not hold film sheets: they are in the job's folder.
-    ``work``: the design of a run that has just written the folder. Raises OutputError like
-    ``read_back``, and DesignError if ``design.toml`` is missing or does not make a laminate.
+    Raises OutputError for a folder without a sound manifest or without cut files, and DesignError
+    if ``design.toml`` is missing or does not make a laminate.
     """
     claims = read_claims(folder)
     if all(layer.file is None for layer in claims.layers):
         raise OutputError(f"{folder} holds no cut files; write them with sbafab cut or generate")
-    design, digest = _design(folder)
-    expected = work.expected if work is not None else expected_laminate(design, claims.curves)
-    problems = design_problems(claims, design, digest)
-    problems += order_problems(claims, design)
-    problems += file_problems(folder, claims)
-    layers_expected = expected.layers(len(claims.layers))
-    files, file_errors = read_layers(folder, claims, _drawn_in_chords(design), layers_expected)
-    problems += file_errors
-    files = _as_laid(files, expected)
-    seams, file_errors = read_seams(folder, claims, design, expected)
-    problems += file_errors
-    layers = stacked_layers(files, design)
-    problems += height_problems(claims, layers, design)
-    problems += property_problems(files, claims, design)
-    problems += layer_problems(files, claims)
-    problems += pattern_problems(layers, claims)
-    if not of_job:
-        problems += _design_sheet_problems(folder, claims, design, files)
+    design = _design(folder)
+    try:
+        checked = check(design)
+        settings = cut_settings(design, checked.waived, curves_of(claims.curves))
+        expected = expected_laminate(checked.laminate, settings)
+    except DESIGN_ERRORS as error:
+        raise DesignError(f"design.toml makes no laminate: {error}") from None
+    problems = file_problems(folder, claims)
+    files, errors = read_layers(folder, expected, settings, _has_chords(design))
+    seams, seam_errors = read_seams(folder, expected.laminate.seams, settings)
+    problems += [*errors, *seam_errors, *layer_departures(files, expected)]
     laminate: Laminate | None = None
-    parts = [file.part for file in files if file.part is not None]
-    chord_error = max((part.chord_error for part in parts), default=0.0)
-    if len(parts) == len(files) == len(expected.laminate.layers):
+    if all(file.part is not None for file in files):
         try:
-            laminate = _laminate(files, design, expected.laminate)
-            if seams is not None:
-                laminate = replace(laminate, seams=seams)
-            problems += _laminate_problems(folder, laminate, claims, parts, design)
-            room = 2 * (TOLERANCE + chord_error)
-            problems += size_problems(claims, sizes(design, laminate), room)
-            laminate = with_plate_pins(folder, laminate, claims)
+            laminate = laminate_as_cut(files, expected.laminate)
+            laminate = laminate if seams == laminate.seams else replace(laminate, seams=seams)
         except UNMEASURED as error:
-            laminate = None
             message = f"the layers do not lie over each other as films of one stack ({error})"
             problems.append(Problem(INTEGRITY, message))
-    design_findings = work.findings if work is not None else None
     return AsBuiltFolder(
-        claims, design, tuple(files), laminate, tuple(problems), expected, design_findings
+        claims, checked, expected, settings, tuple(files), laminate, tuple(problems)
     )
 
 
-def _as_laid(files: Sequence[LayerFile], expected: ExpectedLaminate) -> list[LayerFile]:
-    """Return the files with each layer as assembled: turned over, or its half of a folded film.
-
-    The design's layers already have this position.
-    """
-    laminate = expected.laminate
-    if len(files) != len(laminate.layers):
-        return [*files]
-    roots = {fold.lower for fold in laminate.folds}
-    laid = []
-    for file in files:
-        part = file.part
-        if part is not None and not part.is_expected:
-            root = laminate.cut_with(laminate.layer(file.position))
-            region = part.region.mirrored() if laminate.layer(root).turned else part.region
-            if root in roots:
-                region = halves(root, laminate.folds, region)[file.position]
-            part = replace(part, region=region)
-        laid.append(replace(file, part=part))
-    return laid
-
-
-def _cut_parts(files: Sequence[LayerFile]) -> list[LayerFile]:
-    """Return each file once; layers of a folded film share one."""
-    return [*{file.claim.file or str(file.position): file for file in reversed(files)}.values()][
-        ::-1
-    ]
-
-
-def _laminate(files: Sequence[LayerFile], design: Design, designed: Laminate) -> Laminate:
-    """Return the laminate as cut, with bores, inlets and pins of the design."""
-    if all(file.part is not None and file.part.is_expected for file in files):
-        return designed
-    layers = zip(stacked_layers(files, design), designed.layers, strict=True)
-    cut = tuple(replace(layer, pieces=expected.pieces) for layer, expected in layers)
-    return replace(designed, layers=cut)
-
-
-def layer_departures(built: AsBuiltFolder) -> list[Problem]:
-    """Return the layers whose files differ from the design."""
-    problems = []
-    expected = built.expected.layers(len(built.files))
-    for file, layer in zip(built.files, expected, strict=True):
-        if file.part is None or file.part.is_expected or layer is None:
-            continue
-        difference = departure(file.part.path, layer.path)
-        if difference:
-            message = (
-                f"{file.label} is not what design.toml makes: {difference}; regenerate the folder"
-            )
-            problems.append(Problem(DESIGNED, message, (file.position,)))
-    if built.laminate is not None:
-        problems += seam_departures(built.laminate, built.expected)
-    if built.files and expected[0] is None:
-        count = len(built.expected.laminate.layers)
-        message = f"design.toml makes {count} layers, and the manifest lists {len(built.files)}"
-        problems.append(Problem(DESIGNED, message))
-    return problems
-
-
-def as_designed(built: AsBuiltFolder) -> Checked:
-    """Return the folder's design with its findings."""
-    in_chords = built.claims.curves is not None
-    laminate = build(built.design) if in_chords else built.expected.laminate
-    is_known = built.is_expected and not in_chords
-    findings = built.measured if is_known else run_deck(laminate, built.design)
-    return Checked(built.design, laminate, findings)
-
-
-def _design_sheet_problems(
-    folder: Path, claims: Manifest, design: Design, files: Sequence[LayerFile]
-) -> list[Problem]:
-    if not claims.sheets and is_job(folder.absolute().parent):
-        message = "the film sheets are those of the job, and were not looked at; check the folder "
-        return [Problem(CLAIMS, f"{message}above this one", verdict="warn")]
-    parts = _cut_parts(files)
-    lots = [DesignLot(claims.name, claims.copies, parts, design.order.spare_parts)]
-    return sheet_problems(folder, SheetOrder(claims, design, claims.kerf, lots))
-
-
-def _laminate_problems(
-    folder: Path,
-    laminate: Laminate,
-    claims: Manifest,
-    parts: Sequence[CutPart],
-    design: Design,
-) -> list[Problem]:
-    return [
-        *interface_problems(laminate, claims, parts),
-        *place_problems(laminate, claims),
-        *fixture_problems(folder, laminate, claims),
-        *batch_problems(laminate, claims, design),
-    ]
-
-
-def _design(folder: Path) -> tuple[Design, str]:
-    """Return the folder's design and its hash. Raises DesignError for one that cannot be used."""
+def _design(folder: Path) -> Design:
+    """Return the folder's design. Raises DesignError for one that cannot be used."""
     path = folder / "design.toml"
     if not path.exists():
         raise DesignError("design.toml is missing")
     try:
-        design = load_design(path)
-        return design, design_sha256(design)
+        return load_design(path)
     except (DesignError, OSError) as error:
         raise DesignError(f"design.toml cannot be used: {error or type(error).__name__}") from None
 
 
-def _drawn_in_chords(design: Design) -> bool:
+def _has_chords(design: Design) -> bool:
     """Return True if an outline of the user's has chords in place of arcs."""
     try:
         return any(chords_for_arc(outline) is not None for outline in design.outlines())
@@ -397,26 +219,36 @@ def _drawn_in_chords(design: Design) -> bool:
         return False
 
 
-def _unlisted_waivers(measured: Sequence[Finding], claims: Manifest) -> list[Problem]:
-    """Return the waived rules that fail as built and are not in the manifest."""
-    rules = dict.fromkeys(finding.rule for finding in measured if finding.by_user)
-    return [
-        claim(f"{rule} fails and is waived by design.toml, which the manifest does not say")
-        for rule in rules
-        if rule not in claims.waived
-    ]
+def _findings(built: AsBuiltFolder, problems: Sequence[Problem]) -> tuple[Finding, ...]:
+    """Return the findings on a design's folder, in the order of the report."""
+    count = len(built.files)
+    return (
+        *findings_of(
+            INTEGRITY, problems, f"{count} cut files read back: closed contours in millimetres"
+        ),
+        *findings_of(CLAIMS, problems, "hashes and manifest match the files and the design"),
+        *rules_as_cut(built),
+        *findings_of(DESIGNED, problems, AS_DESIGNED),
+    )
 
 
-# Rules as built: on a whole stack, or on the layers that could be read.
+def rules_as_cut(built: AsBuiltFolder) -> tuple[Finding, ...]:
+    """Return the findings of the rules on the layers as cut."""
+    if built.laminate is None:
+        lost = tuple(file.layer.index for file in built.files if file.part is None)
+        message = "not run: it needs every layer, and not all could be read"
+        return tuple(
+            Finding(rule.name, "warn", None, None, "", Place(None, lost), message)
+            for rule in RULES
+            if rule.name != NETS or built.design.has_nets
+        )
+    if built.laminate is built.expected.laminate and not built.settings.curves.in_chords:
+        return built.checked.findings
+    measures = Measures(built.laminate, built.design)
+    return tuple(finding for rule in RULES for finding in _findings_as_cut(rule, measures))
 
 
-BY_LAYER = (film_limits.NAME,)
-"""Rules that measure single layers."""
-UNMEASURED = (ArithmeticError, ValueError, LookupError, StopIteration)
-"""Errors that rules raise on shapes no design makes; programming errors are not included."""
-
-
-def findings_as_built(rule: Rule, measures: Measures) -> list[Finding]:
+def _findings_as_cut(rule: Rule, measures: Measures) -> list[Finding]:
     """Return the findings of a rule; a shape that the rule cannot measure fails it."""
     try:
         return run_rule(rule, measures)
@@ -425,88 +257,355 @@ def findings_as_built(rule: Rule, measures: Measures) -> list[Finding]:
         return [Finding(rule.name, "fail", None, None, "", Place(), message)]
 
 
-def rules_by_layer(
-    files: Sequence[LayerFile], claims: Manifest, design: Design
-) -> tuple[Finding, ...]:
-    """Return the findings of rules on single layers; every other rule fails as not run."""
-    layers = stacked_layers(files, design)
-    lost = tuple(file.position for file in files if file.part is None)
-    some = Laminate(
-        name=claims.name,
-        family=claims.family,
-        layers=layers,
-        chambers=(),
-        bores=(),
-        inlets=(),
-        pins=(),
-        lumen=None,
-        balloons=0,
-        registration=design.registration.method,
+# The folder of several designs, of a job or an assembly.
+
+
+def _check_job(folder: Path, job: JobManifest) -> tuple[Finding, ...]:
+    """Return the findings on the designs of a job, its sheets, and between an assembly's parts."""
+    built: list[AsBuiltFolder] = []
+    unusable: list[str] = []
+    for entry in job.designs:
+        try:
+            built.append(read_folder(path_in_folder(folder, entry.folder)))
+        except DesignError as error:
+            unusable.append(f"{entry.name}: {error}")
+    between: tuple[Finding, ...] = ()
+    whole = CheckedJob(job.schema_name, job.name, tuple(each.checked for each in built))
+    if is_assembly(job) and not unusable:
+        try:
+            assembled = assemble(load_assembly(folder / DESIGN_FILE))
+            between = run_checks(assembled)
+            whole = of_assembly(assembled, whole.designs)
+        except (DesignError, OSError) as error:
+            unusable.append(f"the parts were not put together, for {error or type(error).__name__}")
+    if unusable:
+        return _by_hashes(folder, job, unusable)
+    problems = [*file_problems(folder, job), *_remade_job_problems(folder, job, whole, built)]
+    findings = [
+        replace(finding, message=f"{each.design.name}: {finding.message}")
+        for each in built
+        for finding in _findings(each, each.problems)
+        if finding.rule != DESIGNED or finding.verdict == "fail"
+    ]
+    count = len(job.sheets)
+    return (
+        *findings,
+        *between,
+        *findings_of(INTEGRITY, problems, f"{count} sheets read back"),
+        *findings_of(CLAIMS, problems, "hashes and manifest match the files and the designs"),
+        *findings_of(DESIGNED, problems, AS_DESIGNED),
     )
-    why = "it needs every layer, and not all could be read" if lost else "there is no whole stack"
-    findings: list[Finding] = []
-    measures = Measures(some, design)
-    for rule in RULES:
-        if layers and rule.name in BY_LAYER:
-            findings += findings_as_built(rule, measures)
-        elif rule.name != nets.NAME or design.has_nets:
-            message = f"not run: {why}"
-            findings.append(Finding(rule.name, "warn", None, None, "", Place(None, lost), message))
-    return tuple(findings)
 
 
-# The assembly of a folder: its parts as design.toml joins them, and the manifest's claims.
+# Files against the hashes of the manifest.
 
 
-def assembly_findings(folder: Path) -> tuple[tuple[Finding, ...], list[Problem]]:
-    """Return the findings between parts of an assembly, and differences of its manifest.
+def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]:
+    """Return files that are missing, changed or not in the manifest.
 
-    Parts are taken as designed: their films are checked design by design.
+    An unlisted file that could be cut by mistake fails; any other is a warning. Raises OutputError
+    if the folder cannot be read.
     """
-    claims = read_assembly(folder)
     try:
-        assembled = assemble(load_assembly(folder / DESIGN_FILE))
-    except (DesignError, OSError) as error:
-        return (), [claim(f"the parts were not put together, for {error or type(error).__name__}")]
-    between = run_checks(assembled)
-    return between, [
-        *_assembly_problems(claims, assembled),
-        *_unlisted_assembly_waivers(claims, between),
-    ]
-
-
-def lowered_between(folder: Path) -> tuple[str, ...]:
-    """Return the lowered limits between parts of the assembly in a folder; () if unreadable."""
-    try:
-        return lowered_checks(load_assembly(folder / DESIGN_FILE).rules)
-    except (DesignError, OSError):
-        return ()
-
-
-def _assembly_problems(claims: AssemblyManifest, assembled: Assembled) -> list[Problem]:
+        hashes = file_hashes(folder)
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be read: {error.strerror or error}") from None
+    hashes.pop(INDEX, None)
+    layers = claims.layers if isinstance(claims, Manifest) else ()
+    layer_of = {layer.file: (number,) for number, layer in enumerate(layers, start=1)}
     problems = []
-    if claims.name != assembled.assembly.name:
-        problems.append(claim(f"design.toml names the assembly {assembled.assembly.name}"))
-    if claims.design_sha256 != assembly_sha256(assembled):
-        problems.append(claim("design_sha256 is not that of design.toml and its parts' designs"))
-    claimed = [(entry.name, entry.copies, entry.design_sha256) for entry in claims.designs]
-    designed = [
-        (part.design.name, part.design.order.quantity, design_sha256(part.design))
-        for part in assembled.designs
-    ]
-    if claimed != designed:
-        problems.append(claim("designs or their copies are not those that the parts ask for"))
-    if list(claims.parts) != [part_entry(placed) for placed in assembled.parts]:
-        problems.append(claim("parts or their places are not those of design.toml"))
+    for path, digest in claims.files.items():
+        message = ""
+        if path not in hashes:
+            message = f"{path} is in the manifest and not in the folder"
+        elif hashes[path] != digest:
+            message = (
+                f"{path} was changed: its sha256 is {hashes[path][:12]}..., the manifest's "
+                f"{digest[:12]}..."
+            )
+        if message:
+            problems.append(Problem(CLAIMS, message, layer_of.get(path, ())))
+    for path in (*hashes, *_links(folder)):
+        if path not in claims.files:
+            message = f"{path} lies in the folder and is not in the manifest; remove it"
+            verdict: Verdict = "fail" if _could_be_cut(path) else "warn"
+            problems.append(Problem(CLAIMS, message, verdict=verdict))
     return problems
 
 
-def _unlisted_assembly_waivers(
-    claims: AssemblyManifest, between: tuple[Finding, ...]
-) -> list[Problem]:
-    waived = dict.fromkeys(finding.rule for finding in between if finding.by_user)
+def _could_be_cut(path: str) -> bool:
+    """Return True if a file, by its folder or suffix, may be taken for a cut file.
+
+    Any file among the cut files may: laser programs also open pictures, pages and files without a
+    suffix.
+    """
+    return is_among_cut_files(PurePosixPath(path)) or path.lower().endswith(CUT_ENDINGS)
+
+
+def _links(folder: Path) -> list[str]:
+    """Return links to folders, and everything else without a hash of its contents."""
     return [
-        claim(f"{rule} fails and is waived by design.toml, which the manifest does not say")
-        for rule in waived
-        if rule not in claims.waived
+        path.relative_to(folder).as_posix()
+        for path in sorted(folder.rglob("*"))
+        if not path.is_file() and (path.is_symlink() or not path.is_dir())
     ]
+
+
+def _by_hashes(
+    folder: Path, claims: Manifest | JobManifest, reasons: Sequence[str]
+) -> tuple[Finding, ...]:
+    """Compare the files of a folder, whose design cannot be used, with the manifest's hashes."""
+    problems = file_problems(folder, claims)
+    unusable = [
+        Problem(DESIGNED, f"{reason}; only the hashes of the files were compared")
+        for reason in reasons
+    ]
+    passed = "every file has the hash that the manifest lists"
+    return (*findings_of(CLAIMS, problems, passed), *findings_of(DESIGNED, unusable, ""))
+
+
+# The folder made again, and compared.
+
+
+def remade_problems(folder: Path, built: AsBuiltFolder) -> list[Problem]:
+    """Return the files of a design, but a job's sheets, that differ from those made again."""
+    claims, of_job = built.claims, is_job(folder.absolute().parent)
+    if of_job and not claims.sheets:
+        message = "the film sheets are those of the job, and were not compared; check the folder "
+        sheets = [Problem(CLAIMS, f"{message}above this one", verdict="warn")]
+    else:
+        sheets = []
+    with _temporary_folder(folder) as (fresh, problems):
+        index = _remake(folder, fresh, built, of_job)
+        remade = {*file_names(fresh), *(layer["file"] for layer in index["layers"])}
+        # The pages of a job's design show the sheets of the job, and are compared there.
+        excluded = (*BY_OTHER_COMMANDS, *PAGES) if of_job else BY_OTHER_COMMANDS
+        problems.extend(_foreign_problems(claims, remade, excluded))
+        problems.extend(_compared(folder, fresh, claims.files, claims.generator))
+        if claims.generator == GENERATOR:
+            left_out = (*NOT_COMPARED, "sheets", "films") if of_job else NOT_COMPARED
+            problems.extend(_index_problems(folder, index, left_out))
+            problems.extend(_prediction_problems(folder, fresh, built))
+    return [*sheets, *problems, *_version_problems(claims.generator)]
+
+
+def _remade_job_problems(
+    folder: Path, job: JobManifest, whole: CheckedJob, built: Sequence[AsBuiltFolder]
+) -> list[Problem]:
+    """Return the files of a job and of its designs' folders that differ from those made again."""
+    curves = built[0].settings.curves
+    with _temporary_folder(folder) as (fresh, problems):
+        parts = PICTURES if is_assembly(job) and whole.failed else EVERYTHING
+        designs = [plan_design(each, parts, curves) for each in whole.designs]
+        plan = plan_job(whole, designs, folder, ignore_progress)
+        index = write_folder(plan, fresh, ignore_progress).index
+        problems.extend(_foreign_problems(job, file_names(fresh)))
+        problems.extend(_compared(folder, fresh, job.files, job.generator))
+        if job.generator == GENERATOR:
+            problems.extend(_index_problems(folder, index, ("files",)))
+    return [*problems, *_version_problems(job.generator)]
+
+
+@contextmanager
+def _temporary_folder(folder: Path) -> Iterator[tuple[Path, list[Problem]]]:
+    """Yield an empty folder and a list of problems; an error of the design is added to it."""
+    problems: list[Problem] = []
+    with TemporaryDirectory() as name:
+        try:
+            yield Path(name), problems
+        except DESIGN_ERRORS as error:
+            message = f"{folder.name} could not be made again to be compared: {error}"
+            problems.append(Problem(DESIGNED, message))
+
+
+def _remake(folder: Path, fresh: Path, built: AsBuiltFolder, of_job: bool) -> dict[str, Any]:
+    """Write the files of a run beside the layers to ``fresh``; return its manifest without hashes.
+
+    A design ``of_job`` has no film sheets and no pages in its own folder.
+    """
+    claims, checked, settings = built.claims, built.checked, built.settings
+    parts_of_run = _parts(claims.files)
+    # Pictures come with a run that makes everything: then there is a page as well.
+    if not of_job and (TRAVELLER in claims.files or {"press", "preview"} <= parts_of_run):
+        parts_of_run |= {"press", "preview"}
+    sheets: list[SheetFile] = []
+    if not of_job:
+        design, paths = checked.design, built.expected.paths
+        order = design.order
+        parts = parts_of(checked.laminate, paths, order.quantity, order.spare_parts)
+        nests = find_nests(parts, design, folder, ignore_progress)
+        sheets = write_nested_sheets(nests, design, fresh, settings, ignore_progress)
+    write_plates(checked, fresh, settings)
+    pressing = schedule_of(checked) if "press" in parts_of_run else None
+    plan = DesignPlan(checked, frozenset(parts_of_run), settings, pressing)
+    return write_design(DesignFolder(plan, sheets, fresh, ignore_progress, not of_job))
+
+
+def _parts(files: Collection[str]) -> set[RunPart]:
+    """Return the parts of a run that wrote these files."""
+    parts: set[RunPart] = {"cut"}
+    if any(path in files for path in PRESS):
+        parts.add("press")
+    if any(path.startswith("preview/") for path in files):
+        parts.add("preview")
+    if any(path.startswith(("mesh/solid.", "mesh/cavity_")) for path in files):
+        parts.add("mesh")
+    return parts
+
+
+def _foreign_problems(
+    claims: Manifest | JobManifest, remade: Collection[str], excluded: Collection[str] = ()
+) -> list[Problem]:
+    """Return the files that a manifest lists and its design does not make.
+
+    ``excluded``: folders and files of other commands, except files that could be cut.
+    """
+    return [
+        Problem(DESIGNED, f"{path} is listed and is no file of this design; regenerate the folder")
+        for path in claims.files
+        if path not in remade
+        and (_could_be_cut(path) or path.partition("/")[0] not in excluded)
+        and _is_compared(path, claims.generator)
+    ]
+
+
+def _compared(folder: Path, fresh: Path, listed: Collection[str], generator: str) -> list[Problem]:
+    """Return the files that differ from those made again; those in ``layers`` were read before."""
+    problems: list[Problem] = []
+    bare: list[str] = []
+    for path in sorted(path for path in fresh.rglob("*") if path.is_file()):
+        name = path.relative_to(fresh).as_posix()
+        is_layer = path.parent.name == LAYERS and path.suffix == ".dxf"
+        if name == INDEX or is_layer or not _is_compared(name, generator):
+            continue
+        rule, found = DESIGNED, folder / name
+        if name not in listed or not found.is_file():
+            difference = f"{name} is missing"
+        elif name.endswith(f"/{INDEX}"):
+            rule = CLAIMS
+            difference = index_difference(_read_index(found), _read_index(path), ("files",))
+            difference = f"{name}: {difference}" if difference else ""
+        elif unsound := unreadable(found):
+            rule, difference = INTEGRITY, f"{name}: {unsound}"
+        else:
+            difference = file_difference(found, path, name)
+            bare += [name] if has_lost_properties(found) else []
+        if difference:
+            problems.append(Problem(rule, f"{difference}; regenerate the folder"))
+    if bare:
+        message = (
+            f"{', '.join(bare)}: no custom properties; save as DXF R2004 or later to keep them"
+        )
+        problems.append(Problem(CLAIMS, message, verdict="warn"))
+    return problems
+
+
+def _is_compared(path: str, generator: str) -> bool:
+    """Return True for a file of this version, and for one of any version that is cut or pressed."""
+    return generator == GENERATOR or path.lower().endswith((*PRESS, *CUT_ENDINGS))
+
+
+def _version_problems(generator: str) -> list[Problem]:
+    if generator == GENERATOR:
+        return []
+    message = (
+        f"the folder was made by {generator}, and this is {GENERATOR}: only what is cut and "
+        "pressed was compared; regenerate the folder"
+    )
+    return [Problem(DESIGNED, message)]
+
+
+def _read_index(path: Path) -> dict[str, Any]:
+    index: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return index
+
+
+def _index_problems(
+    folder: Path, index: Mapping[str, Any], left_out: Collection[str]
+) -> list[Problem]:
+    """Return the first difference of the manifest from that of the folder made again."""
+    actual, expected = _read_index(folder / INDEX), json.loads(as_json(index))
+    difference = index_difference(actual, expected, left_out)
+    if not difference and "meshes" in left_out:
+        difference = _mesh_difference(folder, actual, expected)
+    return [Problem(CLAIMS, f"{INDEX}: {difference}; regenerate the folder")] if difference else []
+
+
+def _mesh_difference(folder: Path, actual: dict[str, Any], expected: dict[str, Any]) -> str:
+    """Return a difference of the listed surfaces; numbers of triangles may depend on libraries."""
+    meshes = [entry for entry in actual.get("meshes", []) if isinstance(entry, dict)]
+    listed = [entry for entry in meshes if entry.get("kind") in ("solid", "cavity")]
+    if len(listed) != len(expected["meshes"]):
+        return f"it lists {len(listed)} surfaces, not {len(expected['meshes'])}"
+    for mesh in expected["meshes"]:
+        listed_mesh: dict[str, Any] = next((m for m in listed if m.get("file") == mesh["file"]), {})
+        count = mesh["elements"]
+        if listed_mesh.get("elements") != count:
+            count = sum(len(body.surface.faces) for body in bodies(folder / mesh["file"]))
+        difference = index_difference(listed_mesh, {**mesh, "elements": count}, ())
+        if difference:
+            return f"{mesh['file']}: {difference}"
+    return ""
+
+
+class _PredictionRequest(BaseModel):
+    pressures_kpa: tuple[float, ...]
+    flow_ml_min: float
+    volumes_ul: tuple[float, ...]
+    press_factor: float
+    contact_factor: float
+    pocket_loss: float
+    modulus_mpa: float | None
+    modulus_ratio: float
+    water_delay: float
+    air_delay: float
+    loss_share: float
+    calibration: str
+    overrides: dict[str, float]
+
+
+class _PredictionFile(BaseModel):
+    """The request in ``predict.json``."""
+
+    asked: _PredictionRequest
+
+
+def _factors(request: _PredictionRequest) -> Factors:
+    """Return the factors of a prediction without calibration."""
+    return Factors(
+        request.press_factor,
+        request.contact_factor,
+        request.pocket_loss,
+        request.modulus_mpa,
+        request.modulus_ratio,
+        request.water_delay,
+        request.air_delay,
+        request.loss_share,
+    )
+
+
+def _prediction_problems(folder: Path, fresh: Path, built: AsBuiltFolder) -> list[Problem]:
+    """Return differences of the prediction from one for the same request."""
+    claims = built.claims
+    if "predict.json" not in claims.files:
+        return []
+    try:
+        request = _PredictionFile.model_validate_json((folder / "predict.json").read_bytes()).asked
+        asked = PredictionRequest(
+            request.pressures_kpa,
+            request.flow_ml_min,
+            request.volumes_ul,
+            None if request.calibration else _factors(request),
+            request.overrides,
+        )
+        written = fresh / "prediction"
+        written.mkdir()
+        prediction = predict(built.design, asked)
+        wanted: frozenset[RunPart] = frozenset(("predict",))
+        plan = DesignPlan(built.checked, wanted, built.settings, prediction=prediction)
+        rows = [row for row in ARTEFACTS if row.part == "predict"]
+        write_artefacts(DesignFolder(plan, (), written, ignore_progress), rows)
+    except (ValueError, OSError) as error:
+        message = f"predict.json does not say what was asked for ({error})"
+        return [Problem(DESIGNED, f"{message}; regenerate the folder")]
+    return _compared(folder, written, claims.files, claims.generator)

@@ -13,11 +13,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
-from sbafab.actuators import build
 from sbafab.as_built.kerf_removed import remove_kerf
 from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.kerf import compensated_paths
-from sbafab.cutting.properties import CutSettings, curves_of
+from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.verify import check_contours
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, GeometryError, OutputError
@@ -25,7 +24,6 @@ from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import Edge, edge_from_bulge
 from sbafab.geometry.region import Region, centroid
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.checked import cut_settings
 from sbafab.rules import registration_yield
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding
@@ -204,7 +202,7 @@ def as_cut(laminate: Laminate, paths: Mapping[str, Region], settings: CutSetting
         check_clear(path.contours)
         material = laminate.patterns[pattern][0].film.material
         part = remove_kerf(with_circles(path), settings.kerf_width(material) or 0.0)
-        cut.append(with_circles(part.region))
+        cut.append(with_circles(part))
     profiles = dict(zip(paths, in_agreement(cut), strict=True))
     return replace(
         laminate,
@@ -243,43 +241,21 @@ class ExpectedLaminate(NamedTuple):
     laminate: Laminate
     paths: Mapping[str, Region]
 
-    def layers(self, count: int) -> Sequence[Expected | None]:
-        """Return the expected ``count`` layers, bottom to top; all None if the count differs.
-
-        A surplus or missing layer may be anywhere, so that no layer has a certain place.
-        """
+    @property
+    def layers(self) -> list[Expected]:
+        """The expected layers, bottom to top."""
         layers = self.laminate.layers
-        if len(layers) != count:
-            return [None] * count
         return [Expected(layer.profile, self.paths[layer.pattern]) for layer in layers]
 
 
-class WrittenDesign(NamedTuple):
-    """The design that a run has just written: laminate, paths and findings."""
-
-    expected: ExpectedLaminate
-    findings: tuple[Finding, ...]
-
-
-def expected_laminate(design: Design, curves: str | None) -> ExpectedLaminate:
-    """Return the laminate of a design drawn with ``curves``; with chords, the one that these cut.
-
-    Raises DesignError if it cannot be built or cut.
+def expected_laminate(laminate: Laminate, settings: CutSettings) -> ExpectedLaminate:
+    """Return a laminate and its paths as drawn by the settings; with chords, the laminate that
+    these cut.
     """
-    try:
-        settings = drawn_settings(design, (), curves)
-        laminate = build(design)
-        paths = compensated_paths(laminate, settings)
-        if settings.curves.in_chords:
-            laminate = as_cut(laminate, paths, settings)
-        return ExpectedLaminate(laminate, paths)
-    except (DesignError, GeometryError, OutputError, ArithmeticError) as error:
-        raise DesignError(f"design.toml makes no laminate: {error}") from None
-
-
-def drawn_settings(design: Design, waived: tuple[str, ...], curves: str | None) -> CutSettings:
-    """Return the cut settings of a design for the manifest's claim on ``curves``."""
-    return cut_settings(design, waived, curves_of(curves))
+    paths = compensated_paths(laminate, settings)
+    if settings.curves.in_chords:
+        laminate = as_cut(laminate, paths, settings)
+    return ExpectedLaminate(laminate, paths)
 
 
 def departure(path: Region, expected: Region) -> str:

@@ -18,32 +18,18 @@ KINK = 0.05
 """Smallest turn of a corner, radians; arcs along one curve turn less where they join."""
 STEP = math.radians(5)
 """Largest turn of a chord round a corner."""
-MAX_HALF_TURN = math.radians(88)
-"""Half the turn of the sharpest corner in `_corner_room`."""
 CORNER_SHARE = 0.15
 """At a corner, the part's edge is shorter than this share of the path's."""
 
 
-class CutResult(NamedTuple):
-    """The part, and the largest area that rounded corners lose or gain, mm2."""
-
-    region: Region
-    corner_room: float
-
-
-def remove_kerf(path: Region, kerf: Kerf) -> CutResult:
+def remove_kerf(path: Region, kerf: Kerf) -> Region:
     """Return the part inside a path; raises OutputError, or is empty, if no such part exists."""
     a, b = (width / 2 for width in widths(kerf))
     if a == b:
-        region = shrink(path, a)
-        rounded = sum(
-            isinstance(e, Arc) and not e.ccw and abs(e.radius - a) < 5e-5 for e in region.edges
-        )
-        return CutResult(region, rounded * a * a)
+        return shrink(path, a)
     region = Region(tuple(_part_contour(contour, a, b) for contour in path.contours))
     check_clear(region.contours)
-    joints = [joint for contour in path.contours for joint in _joints(contour)]
-    return CutResult(region, sum(_corner_room(*joint, a, b) for joint in joints))
+    return region
 
 
 class _Vertex(NamedTuple):
@@ -106,15 +92,6 @@ def _joints(contour: Contour) -> Iterator[tuple[Edge, Edge]]:
 def _turn(before: Edge, after: Edge) -> float:
     (ux, uy), (vx, vy) = before.direction(after.start), after.direction(after.start)
     return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
-
-
-def _corner_room(before: Edge, after: Edge, a: float, b: float) -> float:
-    """Return the area between a corner to the right and its rounding, mm2."""
-    if _turn(before, after) > -KINK:
-        return 0.0
-    (ux, uy), (vx, vy) = before.direction(after.start), after.direction(after.start)
-    turn = math.atan2((ux * vy - uy * vx) * a * b, ux * vx * b * b + uy * vy * a * a)
-    return a * b * math.tan(min(abs(turn) / 2, MAX_HALF_TURN))
 
 
 def _vertices(before: Edge, after: Edge, a: float, b: float) -> Iterator[_Vertex]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -103,7 +104,7 @@ class Problem:
     verdict: Verdict = "fail"
 
 
-def findings_of(rule: str, problems: list[Problem], passed: str) -> list[Finding]:
+def findings_of(rule: str, problems: Sequence[Problem], passed: str) -> list[Finding]:
     """Return the findings of a rule: at most MAX_SHOWN problems in full, or one that passes."""
     rule_problems = [problem for problem in problems if problem.rule == rule]
     if not any(problem.verdict == "fail" for problem in rule_problems):

@@ -233,7 +233,7 @@ def _check_folder(request: CheckRequest) -> CheckOutcome:
     import logging
 
     # Reading a folder back takes as long to load as all that checks a design.
-    from sbafab.runs.check_folder import check_folder
+    from sbafab.as_built.check import check_folder
 
     if request.assignments or request.waivers or request.target is not None:
         raise DesignError(

@@ -12,6 +12,7 @@ import click
 
 from sbafab.cli.exit import print_error
 from sbafab.cli.progress import QUIET, is_requested, print_result
+from sbafab.rules.explained import AS_BUILT
 from sbafab.rules.finding import Finding, Verdict, counted, decisive
 
 if TYPE_CHECKING:
@@ -191,7 +192,8 @@ def print_lines(findings: Sequence[Finding], verbose: bool = False) -> None:
         line = Text(f"{finding.rule:{wide}}  ")
         line.append(f"{finding.verdict:7}", style=COLOURS[finding.verdict])
         measured = short_figure(finding.measured, _unit(finding))
-        if finding.verdict == "pass" and finding.measured is finding.limit is None:
+        is_empty = finding.measured is finding.limit is None
+        if finding.verdict == "pass" and is_empty and finding.rule not in AS_BUILT:
             measured = "not compared"
         line.append(f"  {measured:>13}  {limit_text(finding):>14}")
         line.rstrip()

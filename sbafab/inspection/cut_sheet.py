@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sbafab.as_built.cut_files import path_in_folder
+from sbafab.as_built.as_cut import path_in_folder
 from sbafab.as_built.records import is_job, read_claims, read_job
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.errors import DesignError, OutputError

@@ -69,8 +69,9 @@ class DesignFolder:
     """A design's folder while it is written from its plan.
 
     ``sheets`` are the film sheets of its parts, ``has_pages``: whether findings and a traveller
-    belong into it. Writers add the ``meshes`` they wrote, and to ``left_out`` the meshes and
-    the inputs of simulators that could not be, with the reason.
+    belong into it. Writers add the ``meshes`` they wrote, to ``verified`` the sha256 of each cut
+    file that was read back, and to ``left_out`` the meshes and the inputs of simulators that could
+    not be, with the reason.
     """
 
     plan: DesignPlan
@@ -79,6 +80,7 @@ class DesignFolder:
     progress: Progress
     has_pages: bool = True
     meshes: list[MeshFile] = field(default_factory=list)
+    verified: dict[str, str] = field(default_factory=dict)
     left_out: list[tuple[str, str]] = field(default_factory=list)
 
     @property
@@ -179,16 +181,14 @@ def write_text(path: Path, text: str) -> None:
 
 
 def _write_layers(folder: DesignFolder) -> None:
+    """Write the layer files, the paths of seams and the base plate."""
     # Without paths the layers' files are not written: they were read back, and are compared.
-    if folder.plan.paths:
-        write_cut_files(folder.plan, folder.path, folder.progress)
-
-
-def write_cut_files(plan: DesignPlan, folder: Path, progress: Progress) -> None:
-    """Write the layer files, the paths of seams and the base plate of a design."""
-    laminate = plan.checked.laminate
-    write_layer_files(laminate, plan.paths, folder, plan.settings, partial(progress, "cut files"))
-    write_plates(plan.checked, folder, plan.settings)
+    plan = folder.plan
+    if plan.paths:
+        laminate, progress = folder.laminate, partial(folder.progress, "cut files")
+        files = write_layer_files(laminate, plan.paths, folder.path, plan.settings, progress)
+        folder.verified |= {file.path: file.sha256 for file in files}
+        write_plates(plan.checked, folder.path, plan.settings)
 
 
 def write_plates(checked: Checked, folder: Path, settings: CutSettings) -> None:

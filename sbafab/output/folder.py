@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart
@@ -12,6 +13,7 @@ from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, assembly_toml,
 from sbafab.assemblies.records import Cup
 from sbafab.assemblies.shapes import colours, cup_mould, linear, placed_surface
 from sbafab.cutting.sheets import SheetFile
+from sbafab.errors import DefectError
 from sbafab.meshing.formats.surfaces import Node, write_scene, write_stl
 from sbafab.output.artefacts import (
     BENCH,
@@ -39,10 +41,12 @@ PICTURE = "preview/assembled.png"
 class WrittenFolder:
     """The ``index`` (manifest) of a written folder without its files' hashes.
 
-    ``left_out``: meshes and simulators' inputs that could not be, with the reason.
+    ``verified``: the sha256 of each cut file that was read back. ``left_out``: meshes and
+    simulators' inputs that could not be, with the reason.
     """
 
     index: dict[str, Any]
+    verified: Mapping[str, str]
     left_out: tuple[tuple[str, str], ...] = ()
 
 
@@ -56,9 +60,12 @@ def write_folder(plan: Plan, path: Path, progress: Progress) -> WrittenFolder:
         sheets = write_nested_sheets(plan.nests, design, path, plan.settings, progress)
     if job.schema == SCHEMA:
         folder = DesignFolder(first, sheets, path, progress)
-        return WrittenFolder(write_design(folder), tuple(folder.left_out))
+        index = write_design(folder)
+        verified = {**folder.verified, **{sheet.path: sheet.sha256 for sheet in sheets}}
+        return WrittenFolder(index, verified, tuple(folder.left_out))
     from_below = _from_below(sheets)
     left_out: list[tuple[str, str]] = []
+    verified = {sheet.path: sheet.sha256 for sheet in sheets}
     for each in plan.designs:
         subfolder = path / each.checked.design.name
         subfolder.mkdir()
@@ -66,12 +73,13 @@ def write_folder(plan: Plan, path: Path, progress: Progress) -> WrittenFolder:
         folder = DesignFolder(each, from_below, subfolder, progress, job.assembled is None)
         # The folder above has the sheets; a design's own is one without.
         close_folder(subfolder, {**write_design(folder), "sheets": []})
+        verified |= {f"{subfolder.name}/{name}": file for name, file in folder.verified.items()}
         left_out += [(f"{subfolder.name}/{name}", reason) for name, reason in folder.left_out]
     designs = [each.checked.design for each in plan.designs]
     index = job_manifest(job.schema, job.name, plan.settings, designs, sheets)
     if job.assembled is not None:
         index = _write_assembly(plan, job.assembled, sheets, index, path, progress)
-    return WrittenFolder(index, tuple(left_out))
+    return WrittenFolder(index, verified, tuple(left_out))
 
 
 def write_design(folder: DesignFolder) -> dict[str, Any]:
@@ -80,10 +88,21 @@ def write_design(folder: DesignFolder) -> dict[str, Any]:
     return manifest(folder.plan, folder.sheets, folder.meshes)
 
 
-def close_folder(folder: Path, index: dict[str, Any]) -> None:
-    """Write the manifest, with the hashes of all that lies in the folder."""
+def close_folder(
+    folder: Path, index: dict[str, Any], verified: Mapping[str, str] = MappingProxyType({})
+) -> None:
+    """Write the manifest, with the hashes of all files in the folder.
+
+    Raises DefectError if a ``verified`` file is not as it was when it was read back.
+    """
     index.pop("files", None)
     index["files"] = file_hashes(folder)
+    changed = [path for path, digest in verified.items() if index["files"].get(path) != digest]
+    if changed:
+        raise DefectError(
+            f"{changed[0]} was changed after it had been verified; this is a defect of sbafab and "
+            "nothing was written: please report this sentence with the design file"
+        )
     write_text(folder / "manifest.json", as_json(index))
 
 

@@ -16,7 +16,7 @@ from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import CutSettings
 from sbafab.design.records import Design
 from sbafab.design.sections import NAME_PATTERN
-from sbafab.errors import DesignError, GeometryError, OutputError
+from sbafab.errors import DefectError, DesignError, GeometryError, OutputError
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import PLACES, from_dict, nest
 from sbafab.nesting.records import Nest, NestPart
@@ -221,7 +221,21 @@ def find_nests(
         return ()
     progress("nesting", 0, 1)
     saved = _saved(parts, design, old_folder / PLACES)
-    return saved or nest(parts, stocks(design))
+    return saved or _nested(parts, design)
+
+
+def _nested(parts: Sequence[NestPart], design: Design) -> tuple[Nest, ...]:
+    """Return new places. Raises DefectError if they break spacing, border or counts."""
+    nests = nest(parts, stocks(design))
+    try:
+        for nested in nests:
+            check_nest(nested)
+    except OutputError as error:
+        raise DefectError(
+            f"{error} This is a defect of sbafab and nothing was written: please report this "
+            "sentence with the design file"
+        ) from error
+    return nests
 
 
 def _saved(parts: Sequence[NestPart], design: Design, path: Path) -> tuple[Nest, ...] | None:

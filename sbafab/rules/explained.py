@@ -73,7 +73,7 @@ AS_BUILT: Mapping[str, Explanation] = {
         "Generate again, or undo what another program changed in the file named.",
     ),
     "manifest-claims": Explanation(
-        "the manifest says what lies in the folder: hashes, areas, pieces, order, sheets",
+        "hashes and manifest match the files, and the manifest is what design.toml makes",
         "Programs and people go by it.",
         "Generate again; keep files of your own out of layers/ and sheets/.",
     ),

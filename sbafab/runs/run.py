@@ -9,19 +9,17 @@ from __future__ import annotations
 import shutil
 import tempfile
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sbafab.as_built.check import read_back
-from sbafab.as_built.expected import ExpectedLaminate, WrittenDesign, refuse_coarse
-from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY
+from sbafab.as_built.expected import refuse_coarse
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import TRUE_ARCS, Curves
 from sbafab.design.records import Design
-from sbafab.errors import DefectError, OccupiedError, OutputError
+from sbafab.errors import OccupiedError, OutputError
 from sbafab.laminate.burst import burst
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import Prediction
@@ -32,7 +30,6 @@ from sbafab.output.checked import (
     EVERYTHING,
     PICTURES,
     Checked,
-    DesignPlan,
     RunPart,
     check,
     plan_design,
@@ -57,9 +54,6 @@ from sbafab.simulators.simulator import (
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.layup import MeshSettings
     from sbafab.meshing.conforming.meshes import ConformingMeshes
-
-MOST_NAMED = 3
-"""Rules that the sentence on a folder which does not hold names."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +162,7 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     alone goes into a folder beside such a one (``Run.beside``). Of several designs nothing is
     written if one fails. With some of the ``parts`` only, the others stay if
     they are of the same design. Raises DesignError or OutputError, also where other parts are
-    another design's, and DefectError where the cut files read back are not what was checked; the
+    another design's, and DefectError where a cut file was changed after it had been read back; the
     old folder is then whole.
     """
     progress = progress or ignore_progress
@@ -191,9 +185,7 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
         written = write_folder(plan, folder, progress)
         if job.schema == SCHEMA and not job.failed:
             carry_over(target, folder, written.index)
-        close_folder(folder, written.index)
-        if plan.is_cut:
-            verify_written(plan, folder, progress)
+        close_folder(folder, written.index, written.verified)
     removed = removed_files(listed, written.index)
     return Run(job, target, written.index, plan, removed, beside=beside, left_out=written.left_out)
 
@@ -238,55 +230,6 @@ def _plan(
         meshes = conforming_meshes(design.checked.laminate, request.conforming.settings)
         design = replace(design, conforming=meshes, formats=request.conforming.formats)
     return replace(plan, designs=(design,))
-
-
-# A written folder read back, as ``sbafab check`` would, before it is swapped in.
-
-
-def verify_written(plan: Plan, folder: Path, progress: Progress) -> None:
-    """Raises DefectError where the files of a folder are not what its designs were checked to be.
-
-    The folder is then not swapped in, for either the files or the check of them are wrong, and no
-    user can tell which. Raises OutputError where the chords that were asked for are too coarse.
-    """
-    progress("reading back", 0, 1)
-    curves = plan.settings.curves
-    works = {each.checked.design.name: _work(each) for each in plan.designs}
-    read = read_back(folder, works)
-    findings = read.against_design(read.problems)
-    failed = [finding for finding in findings if finding.verdict == "fail"]
-    if not failed:
-        return
-    reasons = _first_failures(failed)
-    if curves.in_chords:
-        raise OutputError(
-            f"drawn with chords, the cut files do not hold: {reasons}; nothing was written: ask "
-            f"for a smaller --chord-error than {curves.chord_error:g}, or for arcs or bulges"
-        )
-    raise DefectError(
-        f"the design holds and its cut files do not: {reasons}; this is a defect of sbafab and "
-        "nothing was written: please report this sentence with the design file"
-    )
-
-
-def _work(plan: DesignPlan) -> WrittenDesign:
-    """Return what is expected of a design's files: its laminate, the beam's paths, the findings."""
-    return WrittenDesign(ExpectedLaminate(plan.checked.laminate, plan.paths), plan.checked.findings)
-
-
-def _first_failures(failed: Iterable[Finding]) -> str:
-    """Return the first finding of each rule; what is cut first, what is claimed of it last."""
-    first: dict[str, Finding] = {}
-    for finding in failed:
-        first.setdefault(finding.rule, finding)
-    order = {DESIGNED: 0, INTEGRITY: 1, CLAIMS: 3}
-    messages = [
-        f"{finding.rule}: {finding.message.rstrip('.')}"
-        for finding in sorted(first.values(), key=lambda finding: order.get(finding.rule, 2))
-    ]
-    rest = len(messages) - MOST_NAMED
-    more = "" if rest <= 0 else "; 1 more rule fails" if rest == 1 else f"; {rest} more rules fail"
-    return "; ".join(messages[:MOST_NAMED]) + more
 
 
 # A simulator run on a design, its results in the design's folder.

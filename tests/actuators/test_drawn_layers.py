@@ -13,6 +13,7 @@ import pytest
 import tomli_w
 
 from sbafab.actuators import FAMILIES, build, load_design
+from sbafab.as_built.check import check_folder
 from sbafab.design.files import template_text
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import validated
@@ -23,7 +24,6 @@ from sbafab.models.figures import PredictionRequest
 from sbafab.models.pouch import half_angle
 from sbafab.models.prediction import predict
 from sbafab.rules.deck import run_deck
-from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.designs import PAPER
 

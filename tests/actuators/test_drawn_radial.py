@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.as_built.check import check_folder
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import pin_holes
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.measures import Measures
-from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.designs import PAPER
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -10,8 +12,16 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
+from tests.faults.once import remembering
 
 FEW_BUILDS = "rules.yield_builds=100"
+
+
+@pytest.fixture(scope="session")
+def remember(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Callable[[], AbstractContextManager[None]]:
+    return remembering(tmp_path_factory.mktemp("anew"))
 
 
 @pytest.fixture(scope="session")

@@ -7,22 +7,20 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections import Counter
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import read_folder
+from sbafab.as_built.check import check_folder
 from sbafab.cli import main
 from sbafab.cutting.kerf import in_chords
 from sbafab.errors import OutputError
 from sbafab.geometry.offset import grow, shrink
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
-from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
@@ -40,8 +38,8 @@ def test_a_finding_names_the_faulty_layer(lobed: Doctor) -> None:
     lobed.redraw(9, lambda r: r.moved(0.15, 0.0))
     lobed.rehash()
     found = failed(lobed.folder)
-    assert "manifest-claims" in found
     assert "file-integrity" not in found
+    assert found["as-designed"].where.layers == (9,)
     finding = found["registration-nominal"]
     assert 9 in finding.where.layers
     assert finding.measured == pytest.approx(0.15, abs=1e-6)
@@ -124,11 +122,9 @@ def test_unsound_files_are_told_with_their_layer(
     broken = [f for f in found if f.rule == "file-integrity" and f.verdict == "fail"]
     assert [finding.where.layers for finding in broken] == [(3,)]
     assert "003_TPE_wall.dxf" in broken[0].message
-    # What needs the whole stack says that it did not run; what looks at single layers ran.
     told = {finding.rule: finding for finding in found}
     assert told["sealing"].verdict == "warn"
     assert "not run" in told["sealing"].message
-    assert told["film-limits"].verdict == "pass"
 
 
 def test_files_swapped_are_told(doctor: Doctor) -> None:
@@ -143,7 +139,7 @@ def test_files_swapped_are_told(doctor: Doctor) -> None:
 
 
 @pytest.mark.parametrize("times", [2, -1])
-def test_a_kerf_undone_wrongly_shows_in_areas_and_bores(times: int, tmp_path: Path) -> None:
+def test_a_kerf_undone_wrongly_breaks_rules(times: int, tmp_path: Path) -> None:
     design = load_design(
         "1dof-5mm", ["stack.balloons=2", "laser.kerf_tpe=0.2", "rules.yield_builds=100"]
     )
@@ -153,16 +149,8 @@ def test_a_kerf_undone_wrongly_shows_in_areas_and_bores(times: int, tmp_path: Pa
         doctor.redraw(layer, lambda r: grow(r, 0.1) if times == 2 else shrink(r, 0.2))
     doctor.rehash()
     found = failed(doctor.folder)
-    assert "area" in found["manifest-claims"].message
+    assert "as-designed" in found
     assert {"channel-clear", "mask-overhang"} & set(found)
-
-
-def rename_twin(manifest: dict[str, Any]) -> dict[str, Any]:
-    """The last layer of the first pattern that two share gets a pattern of its own; that layer."""
-    shared = Counter(layer["pattern"] for layer in manifest["layers"]).most_common(1)[0][0]
-    twin: dict[str, Any] = [one for one in manifest["layers"] if one["pattern"] == shared][-1]
-    twin["pattern"] = "P99"
-    return twin
 
 
 def swap_layers(manifest: dict[str, list[object]]) -> None:
@@ -170,56 +158,45 @@ def swap_layers(manifest: dict[str, list[object]]) -> None:
     layers[3], layers[5] = layers[5], layers[3]
 
 
+SHEET = {"width": 150.0, "border": 5.0, "density": 0.9, "picture": "a.svg", "number": 2}
 CLAIMS: list[tuple[str, Callable[..., object], str]] = [
-    ("order", swap_layers, "layer 4 of the manifest has index 6"),
-    ("thickness", lambda m: m["layers"][4].update(thickness=0.05), "layer 5 is 0.05 mm thick"),
-    ("role", lambda m: m["layers"][4].update(role="cap"), "layer 5 has the role cap"),
-    ("height", lambda m: m["layers"][4].update(z=0.5), "layer 5 lies at z 0.5"),
-    ("balloon", lambda m: m["layers"][4].update(balloon=3), "layer 5 is of balloon 3"),
-    ("area", lambda m: m["layers"][4].update(area=m["layers"][4]["area"] * 1.002), "has an area"),
-    ("pieces", lambda m: m["layers"][5].update(pieces=3), "falls into 1 pieces"),
-    ("bores", lambda m: m["layers"][0].update(bores=["chamber1"]), "open at the bores of none"),
-    ("pattern", lambda m: m["layers"][4].update(pattern="P01"), "PATTERN"),
-    ("twin pattern", rename_twin, "are equal, and of patterns"),
+    ("order", swap_layers, "layers.4.index is 6, not 4"),
+    ("height", lambda m: m["layers"][4].update(z=0.5), "layers.5.z is 0.5"),
+    ("area", lambda m: m["layers"][4].update(area=m["layers"][4]["area"] * 1.002), "5.area is"),
+    ("bores", lambda m: m["layers"][0].update(bores=["chamber1"]), "layers.1.bores has 1"),
+    ("path", lambda m: m["layers"][3].update(file="../outside.dxf"), "layers.4.file is"),
     ("hash", lambda m: m["files"].update({"press.json": "0" * 64}), "press.json"),
     ("file hash", lambda m: m["files"].update({m["layers"][2]["file"]: "0" * 64}), "was changed"),
-    (
-        "bond",
-        lambda m: m["interfaces"][0].update(bond_area=99.0),
-        "the bond at chamber interface 1",
+    ("bond", lambda m: m["interfaces"][0].update(bond_area=99.0), "interfaces.1.bond_area is 99.0"),
+    ("bore", lambda m: m["bores"][0].update(x=0.002), "bores.1.x is 0.002, not 0.0"),
+    ("lumen", lambda m: m.update(lumen=3.0), "lumen is 3.0, not null"),
+    ("design", lambda m: m.update(design_sha256="0" * 64), "design_sha256 is"),
+    ("kerf", lambda m: m["kerf"]["TPE"].update(state="compensated", width=0.1), "kerf.TPE.state"),
+    ("waived", lambda m: m.update(waived=["sealing"]), "waived has 1 entries, not 0"),
+    ("size", lambda m: m["sizes"].update(width=9.0), "sizes.width is 9.0"),
+    ("film", lambda m: m["films"][0].update(layers=3), "films.1.layers is 3"),
+    ("no sheets", lambda m: m.pop("sheets"), "sheets is missing"),
+    ("copies", lambda m: m.update(copies=3), "copies is 3, not 1"),
+    ("parts", lambda m: m["sheets"][0]["parts"][0].update(count=9), "sheets.1.parts.1.count is 9"),
+    *(
+        (key, lambda m, key=key: m["sheets"][0].update({key: SHEET[key]}), f"sheets.1.{key} is")
+        for key in SHEET
     ),
-    ("contact", lambda m: m["interfaces"][1].update(contact_area=9.0), "the contact at separator"),
-    ("kind", lambda m: m["interfaces"][1].update(kind="bond"), "tells otherwise"),
-    ("bore", lambda m: m["bores"][0].update(x=0.002), "the cut files have not"),
-    ("inlet", lambda m: m["inlets"][0].update(width=1.7), "the cut files have not"),
-    ("lumen", lambda m: m.update(lumen=3.0), "the lumen is 3.0"),
-    ("design", lambda m: m.update(design_sha256="0" * 64), "design_sha256"),
-    ("kerf", lambda m: m["kerf"]["TPE"].update(state="compensated", width=0.1), "the kerf of TPE"),
-    ("waived", lambda m: m.update(waived=["sealing"]), "sealing is waived in the manifest"),
-    ("size", lambda m: m["sizes"].update(width=9.0), "the width is 9 mm"),
-    ("film", lambda m: m["films"][0].update(layers=3), "films: 3 layers of TPE"),
 ]
 
 
 @pytest.mark.parametrize(("change", "said"), [c[1:] for c in CLAIMS], ids=[c[0] for c in CLAIMS])
-def test_wrong_claims_are_told(change: Callable[..., object], said: str, doctor: Doctor) -> None:
+def test_wrong_claims_are_told(
+    change: Callable[..., object],
+    said: str,
+    doctor: Doctor,
+    remember: Callable[[], AbstractContextManager[None]],
+) -> None:
     doctor.set_manifest(change)
-    told = [
-        problem.message
-        for problem in read_folder(doctor.folder).problems
-        if problem.rule == "manifest-claims" and problem.verdict == "fail"
-    ]
+    with remember():
+        found = check_folder(doctor.folder)
+    told = [f.message for f in found if f.rule == "manifest-claims" and f.verdict == "fail"]
     assert any(said in message for message in told), told
-
-
-def test_patterns_that_differ_by_less_than_files_can_tell_are_no_fault(doctor: Doctor) -> None:
-    """Such as by a tab of 1 um: equal on disk, and told apart by their areas in the manifest."""
-
-    def by_a_tab(manifest: dict[str, Any]) -> None:
-        rename_twin(manifest)["area"] += 1e-5
-
-    doctor.set_manifest(by_a_tab)
-    assert not [p for p in read_folder(doctor.folder).problems if "pattern" in p.message]
 
 
 def test_files_too_many_are_told_cut_files_as_faults(doctor: Doctor) -> None:
@@ -270,7 +247,7 @@ def test_limits_come_from_the_folders_design(doctor: Doctor) -> None:
     path.write_text(path.read_text().replace("bond_width = 0.75", "bond_width = 0.8"))
     found = failed(doctor.folder)
     assert found["bond-width"].limit == 0.8
-    assert "design_sha256" in found["manifest-claims"].message
+    assert "manifest-claims" in found
 
 
 @pytest.mark.parametrize(
@@ -317,13 +294,6 @@ def test_a_manifest_of_wrong_types_is_one_sentence(
     with pytest.raises(OutputError) as refused:
         check_folder(doctor.folder)
     assert "\n" not in str(refused.value)
-
-
-def test_a_path_out_of_the_folder_is_not_followed(doctor: Doctor) -> None:
-    outside = doctor.folder.parent / "outside.dxf"
-    shutil.copy(doctor.path(4), outside)
-    doctor.set_manifest(lambda m: m["layers"][3].update(file="../outside.dxf"))
-    assert "out of the folder" in failed(doctor.folder)["file-integrity"].message
 
 
 def test_the_command_prints_findings_and_writes_nothing(

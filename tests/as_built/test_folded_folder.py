@@ -9,7 +9,7 @@ import pytest
 import tomli_w
 
 from sbafab.api import check_folder, generate
-from sbafab.as_built.check import read_back
+from sbafab.as_built.check import read_folder, rules_as_cut
 from tests.laminate.test_folding import folded
 
 
@@ -36,12 +36,12 @@ def test_a_folded_folder_is_as_designed_and_a_moved_half_is_found(tmp_path: Path
     ]
     outline.set_points(points, format="xyseb")
     document.saveas(folder / "layers" / files[0])
-    built = read_back(folder).designs[0]
+    built = read_folder(folder)
     assert built.laminate is not None
     lower, _, upper = (layer.profile for layer in built.laminate.layers)
     assert lower.bounds[2] == pytest.approx(21, abs=1e-6)
     assert upper.bounds[2] == pytest.approx(20.7, abs=1e-6)
-    bond = next(finding for finding in built.measured if finding.rule == "bond-width")
+    bond = next(finding for finding in rules_as_cut(built) if finding.rule == "bond-width")
     assert bond.measured == pytest.approx(0.7, abs=1e-6)
     assert bond.verdict == "fail"
 
@@ -66,6 +66,6 @@ def test_a_turned_layer_is_cut_turned_over_and_read_back_as_it_lies(tmp_path: Pa
     ]
     outline.set_points(points, format="xyseb")
     document.saveas(cap)
-    built = read_back(folder).designs[0]
+    built = read_folder(folder)
     assert built.laminate is not None
     assert built.laminate.layers[2].profile.bounds[2] == pytest.approx(20.75, abs=1e-6)

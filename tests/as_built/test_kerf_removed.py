@@ -28,9 +28,8 @@ def missed(found: Region, meant: Region) -> float:
 def test_what_the_beam_leaves_is_the_part(meant: Region, pair: tuple[float, float]) -> None:
     part = remove_kerf(compensate(meant, pair), pair)
     # Edges apart by more than 2 nm would leave slivers.
-    assert missed(part.region, meant) == 0.0
-    assert len(part.region.edges) == len(meant.edges)
-    assert part.corner_room == 0.0
+    assert missed(part, meant) == 0.0
+    assert len(part.edges) == len(meant.edges)
 
 
 def test_every_pattern_of_an_actuator_comes_back() -> None:
@@ -38,8 +37,9 @@ def test_every_pattern_of_an_actuator_comes_back() -> None:
     for layers in laminate.patterns.values():
         meant = layers[0].profile
         part = remove_kerf(compensate(meant, (0.12, 0.1)), (0.12, 0.1))
-        assert missed(part.region, meant) <= part.corner_room
-        circles = sum(hole.circle is not None for hole in part.region.holes)
+        # Corners to the right are rounded by the beam.
+        assert missed(part, meant) < 0.06 * 0.05 * len(meant.edges)
+        circles = sum(hole.circle is not None for hole in part.holes)
         assert circles == sum(hole.circle is not None for hole in meant.holes)
 
 
@@ -47,8 +47,7 @@ def test_corners_of_windows_are_rounded_by_the_ellipse() -> None:
     meant = rectangle((-5.0, -5.0), (5.0, 5.0)) - rectangle((-2.0, -1.0), (2.0, 1.0))
     part = remove_kerf(compensate(meant, (0.3, 0.1)), (0.3, 0.1))
     left = 4 * 0.15 * 0.05 * (1 - math.pi / 4)
-    assert part.region.area - meant.area == pytest.approx(left, rel=0.02)
-    assert left < part.corner_room
+    assert part.area - meant.area == pytest.approx(left, rel=0.02)
 
 
 def test_a_path_with_a_sharp_corner_is_none() -> None:

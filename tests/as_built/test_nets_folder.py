@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 
 from sbafab.actuators import load_design
+from sbafab.as_built.check import check_folder
 from sbafab.cli import main
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, disc, strip
 from sbafab.laminate.netlist import compare, parchmint_nets, read_netlist
 from sbafab.rules.finding import Finding
 from sbafab.rules.nets import netlist_findings
-from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.actuators.test_drawn_nets import ROUTED
 from tests.as_built.doctoring import Doctor

@@ -19,12 +19,12 @@ from sbafab.laminate.laminate import Laminate
 from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Specimen
 
-RULE = "as-designed"
+RULE, CLAIMS = "as-designed", "manifest-claims"
 PROJECT = "sheets/TPE_1.lbrn2"
 SOLID, GLB, MODEL = "mesh/solid.stl", "mesh/solid.glb", "mesh/solid.3mf"
 
 
-def changed(name: str, file: str, change: Callable[[bytes], bytes]) -> Fault:
+def changed(name: str, file: str, change: Callable[[bytes], bytes], rule: str = RULE) -> Fault:
     """A file with other contents, and its hash put right."""
 
     def put(specimen: Specimen) -> None:
@@ -34,7 +34,7 @@ def changed(name: str, file: str, change: Callable[[bytes], bytes]) -> Fault:
         assert path.read_bytes() != data
         specimen.doctor.rehash()
 
-    return Fault(name, RULE, put, beside=True)
+    return Fault(name, rule, put, beside=True)
 
 
 def replaced(name: str, file: str, pattern: str, new: str) -> Fault:
@@ -48,7 +48,7 @@ def replaced(name: str, file: str, pattern: str, new: str) -> Fault:
     return changed(name, file, change)
 
 
-def told(name: str, file: str, change: Callable[[Any], object]) -> Fault:
+def told(name: str, file: str, change: Callable[[Any], object], rule: str = RULE) -> Fault:
     """A JSON file of which one value is another."""
 
     def edit(data: bytes) -> bytes:
@@ -56,7 +56,7 @@ def told(name: str, file: str, change: Callable[[Any], object]) -> Fault:
         change(document)
         return json.dumps(document).encode()
 
-    return changed(name, file, edit)
+    return changed(name, file, edit, rule)
 
 
 def lost(name: str, file: str) -> Fault:
@@ -199,13 +199,15 @@ KIND = Kind(
             "volume of the solid",
             "manifest.json",
             lambda d: d["meshes"][0].update(volume_mm3=1.0),
+            CLAIMS,
         ),
         told(
             "cutting time of a sheet",
             "manifest.json",
             lambda d: d["sheets"][0].update(estimated_minutes=0.01),
+            CLAIMS,
         ),
-        told("another kit", "manifest.json", lambda d: d["kit"].update(version="0")),
-        told("note", "manifest.json", lambda d: d.update(notes=["safe to cut"])),
+        told("another kit", "manifest.json", lambda d: d["kit"].update(version="0"), CLAIMS),
+        told("note", "manifest.json", lambda d: d.update(notes=["safe to cut"]), CLAIMS),
     ),
 )

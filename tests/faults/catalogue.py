@@ -11,6 +11,7 @@ from filelock import FileLock
 
 from sbafab.actuators import load_design
 from sbafab.as_built.check import read_folder
+from sbafab.as_built.records import DESIGNED
 from sbafab.design.identity import design_sha256
 from sbafab.errors import DesignError
 from sbafab.runs.run import RunRequest, generate
@@ -83,7 +84,7 @@ def caught_by(fault: Fault, template: str, goods: Goods, folder: Path) -> tuple[
         with unabridged():
             rules = failing(folder)
     else:
-        rules = failing(folder, layers=not fault.sheets, sheets=fault.sheets)
+        rules = failing(folder)
     shutil.rmtree(folder)
     return rules
 
@@ -92,6 +93,6 @@ def cell(fault: Fault, found: tuple[str, ...] | str) -> str:
     """What the table says of a fault in a template."""
     if isinstance(found, str):
         return f"n/a: {found}"
-    others = ", ".join(rule for rule in found if rule != fault.rule)
+    others = ", ".join(rule for rule in found if rule not in (fault.rule, DESIGNED))
     caught = "caught" if fault.rule in found else "MISSED"
     return f"{caught}; {others}" if others else caught

@@ -82,7 +82,7 @@ def tooling_hole(name: str, pick: Pick, by: float | None) -> Fault:
 
     def put(specimen: Specimen) -> None:
         specimen.redraw([pick(specimen.clean)], change)
-        specimen.agree()
+        specimen.doctor.rehash()
 
     return Fault(name, NOMINAL, put, settings=EARS)
 
@@ -97,7 +97,7 @@ def all_without_hole(name: str, *roles: Role) -> Fault:
     def put(specimen: Specimen) -> None:
         layers = [layer for layer in specimen.clean.layers if layer.role in roles]
         specimen.redraw(layers, change)
-        specimen.agree()
+        specimen.doctor.rehash()
 
     return Fault(name, "pin-holes", put, settings=EARS)
 

@@ -25,21 +25,20 @@ def seamed(name: str, rule: str, change: Callable[[Chain], Chain], beside: bool 
         path = specimen.doctor.folder / seam_path(specimen.clean.seams[0])
         (chain,), properties = read_seam(path)
         path.write_text(seam_text((change(chain),), properties), newline="\n")
-        specimen.agree()
+        specimen.doctor.rehash()
 
     return Fault(name, rule, put, beside=beside, templates=(TEMPLATE,))
 
 
 def narrowed(specimen: Specimen) -> None:
-    """A tool half as wide, in the seam's file and in the manifest."""
+    """A tool half as wide, in the seam's file."""
     seam = specimen.clean.seams[0]
     path = specimen.doctor.folder / seam_path(seam)
     (chain,), properties = read_seam(path)
     width = NARROW * seam.width
     text = seam_text((chain,), {**properties, "TOOL_WIDTH": f"{width:g}"})
     path.write_text(text, newline="\n")
-    specimen.doctor.set_manifest(lambda claims: claims["seams"][0].update(width=width))
-    specimen.agree()
+    specimen.doctor.rehash()
 
 
 NARROW = 0.3
@@ -66,7 +65,7 @@ def slit(specimen: Specimen) -> None:
         return region - strip(*fold.line, 0.2)
 
     specimen.redraw([specimen.clean.layer(fold.lower)], apart)
-    specimen.agree()
+    specimen.doctor.rehash()
 
 
 KIND = Kind(

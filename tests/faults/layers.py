@@ -43,7 +43,7 @@ def scaled_by(factor: float) -> Fault:
         specimen.redraw(specimen.clean.layers, lambda region, _: region.scaled(factor))
         specimen.doctor.rehash()
 
-    return Fault(f"every layer scaled by {factor:g}", "manifest-claims", put)
+    return Fault(f"every layer scaled by {factor:g}", "as-designed", put)
 
 
 def kerf(name: str, rule: str, times: int) -> Fault:
@@ -55,7 +55,7 @@ def kerf(name: str, rule: str, times: int) -> Fault:
         specimen.redraw(
             films, lambda region, _: grow(region, off) if off > 0 else shrink(region, -off)
         )
-        specimen.agree()
+        specimen.doctor.rehash()
 
     return Fault(name, rule, put, settings=(f"laser.kerf_tpe={KERF}",))
 

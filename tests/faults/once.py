@@ -11,10 +11,7 @@ from typing import Any
 from unittest.mock import patch
 
 from sbafab.as_built import check as as_built
-from sbafab.design.identity import design_sha256
-from sbafab.output.checked import Checked
-from sbafab.output.manifest import Manifest
-from sbafab.runs import check_folder as derived
+from sbafab.output import checked
 
 
 def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
@@ -22,44 +19,37 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
 
     That is what a design makes, what the rules find in it, and what it writes beside cut files.
     """
-    deck, write = as_built._run_deck, derived._regenerate
-    measured = _remembered(deck, _asked_of_deck)
-    expected = _remembered(
-        as_built.expected_laminate, lambda d, curves: f"{design_sha256(d)} {curves}"
+    remake = as_built._remake
+    check = _remembered(
+        as_built.check, lambda design: f"{design.model_dump_json()} {id(checked.run_deck)}"
     )
-    run_deck = _remembered(as_built.run_deck, lambda made, limits: made.name + repr(limits))
+    expected = _remembered(
+        as_built.expected_laminate, lambda made, settings: f"{made.name} {settings}"
+    )
     made: dict[str, Any] = {}
 
-    def write_once(
-        folder: Path, fresh: Path, claims: Manifest, checked: Checked, *made_of: object
-    ) -> Any:
+    def remake_once(folder: Path, fresh: Path, built: as_built.AsBuiltFolder, of_job: bool) -> Any:
         asked = [folder / name for name in ("design.toml", "sheets/nest.json")]
         files = [path.read_bytes() if path.exists() else b"" for path in asked]
-        said = repr((sorted(claims.files), claims.curves, checked.findings)).encode()
+        claims = built.claims
+        said = repr((sorted(claims.files), claims.curves, built.checked.findings)).encode()
         key = sha256(b"".join(files) + said).hexdigest()
         if key not in made:
             (root / key).mkdir(parents=True)
-            made[key] = write(folder, root / key, claims, checked, *made_of)
+            made[key] = remake(folder, root / key, built, of_job)
         shutil.copytree(root / key, fresh, dirs_exist_ok=True)
         return made[key]
 
     @contextmanager
     def context() -> Iterator[None]:
         with (
-            patch.object(as_built, "_run_deck", lambda b: (measured if b.is_expected else deck)(b)),
+            patch.object(as_built, "check", check),
             patch.object(as_built, "expected_laminate", expected),
-            patch.object(as_built, "run_deck", run_deck),
-            patch.object(derived, "_regenerate", write_once),
+            patch.object(as_built, "_remake", remake_once),
         ):
             yield
 
     return context
-
-
-def _asked_of_deck(built: as_built.AsBuiltFolder) -> str:
-    """Design, and the rules that are run: some checks leave out all or some."""
-    names = [rule.name for rule in as_built.RULES]
-    return built.design.model_dump_json() + repr((built.design_findings, names))
 
 
 def _remembered(work: Callable[..., Any], key: Callable[..., str]) -> Callable[..., Any]:

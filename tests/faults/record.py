@@ -19,10 +19,8 @@ WhyNot = Callable[[Laminate], str]
 class Fault:
     """A kind of fault. ``settings`` are those of the good folder that it is put into.
 
-    ``sheets``: it is one of the film sheets. These are looked at for such faults alone, for they
-    cut what the layers were and would tell every fault of a layer; the deck is then left out.
-    ``beside``: it is in a file beside the cut ones. All that a run writes is then in the folder,
-    and everything is looked at. It is put into its ``templates`` alone.
+    ``beside``: all that a run writes is in the folder, not the cut files alone. It is put into its
+    ``templates`` alone.
     """
 
     name: str
@@ -30,7 +28,6 @@ class Fault:
     put: Put
     why_not: WhyNot = lambda laminate: ""
     settings: tuple[str, ...] = ()
-    sheets: bool = False
     beside: bool = False
     templates: tuple[str, ...] = PAPER
 
@@ -45,14 +42,14 @@ class Kind:
 
 
 def redrawn(name: str, rule: str, pick: Pick, change: Change, *conditions: WhyNot) -> Fault:
-    """A fault in one layer's profile, with a manifest that agrees with it.
+    """A fault in one layer's profile, with its hash put right.
 
     It does not apply where a condition says so, or where the profile comes out as it was.
     """
 
     def put(specimen: Specimen) -> None:
         specimen.redraw([pick(specimen.clean)], change)
-        specimen.agree()
+        specimen.doctor.rehash()
 
     def why_not(laminate: Laminate) -> str:
         said = first_reason(laminate, conditions)

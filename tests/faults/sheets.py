@@ -21,7 +21,7 @@ from tests.faults.holes import EARS
 from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Specimen
 
-CLAIMS, INTEGRITY = "manifest-claims", "file-integrity"
+CLAIMS, INTEGRITY, DESIGNED = "manifest-claims", "file-integrity", "as-designed"
 KERF = 0.2
 PIN: Point = (139.0, 139.0)
 FREE: Point = (142.0, 142.0)
@@ -62,10 +62,9 @@ NO_SPARES = ("order.spares=0", "order.spare_share=0")
 def rearranged(
     name: str,
     change: Rearrange,
-    rule: str = CLAIMS,
     settings: tuple[str, ...] = (),
 ) -> Fault:
-    """Pieces of the first TPE sheet changed; areas, contours and lengths are told as they are."""
+    """Pieces of the first TPE sheet changed."""
 
     def put(specimen: Specimen) -> None:
         told, path = sheet_of(specimen)
@@ -74,26 +73,9 @@ def rearranged(
         path.write_text(
             drawn(found, cutting_order(region), (told["width"], told["length"])), newline="\n"
         )
-        specimen.doctor.set_manifest(lambda claims: retold(claims, told["file"], region))
         specimen.doctor.rehash()
 
-    return Fault(name, rule, put, settings=settings, sheets=True)
-
-
-def retold(claims: Claims, file: str, region: Region) -> None:
-    """The claims of a sheet, and of its film, made to agree with what it now holds."""
-    told = next(sheet for sheet in claims["sheets"] if sheet["file"] == file)
-    area = told["width"] * told["length"]
-    told.update(
-        contours=len(region.contours),
-        parts_area=region.area,
-        density=region.area / area,
-        cut_length=sum(contour.length for contour in region.contours),
-    )
-    own = [sheet for sheet in claims["sheets"] if sheet["material"] == told["material"]]
-    film = next(film for film in claims["films"] if film["material"] == told["material"])
-    parts = sum(sheet["parts_area"] for sheet in own)
-    film.update(waste=film["sheet_area"] - parts, density=parts / film["sheet_area"])
+    return Fault(name, DESIGNED, put, settings=settings)
 
 
 def edited(name: str, change: Callable[[Specimen], object], rule: str, *settings: str) -> Fault:
@@ -103,12 +85,12 @@ def edited(name: str, change: Callable[[Specimen], object], rule: str, *settings
         change(specimen)
         specimen.doctor.rehash()
 
-    return Fault(name, rule, put, settings=settings, sheets=True)
+    return Fault(name, rule, put, settings=settings)
 
 
 def told(name: str, change: Callable[[Claims], object]) -> Fault:
     """A claim about the sheets; every file as it was written."""
-    return Fault(name, CLAIMS, lambda s: s.doctor.set_manifest(change), sheets=True)
+    return Fault(name, CLAIMS, lambda s: s.doctor.set_manifest(change))
 
 
 def with_first(change: Callable[[Region], Region]) -> Rearrange:
@@ -235,8 +217,8 @@ def missing(specimen: Specimen) -> None:
 
 KIND = Kind(
     "Film sheets",
-    "The layers' files are as they were written; the sheet is the first of TPE, with its areas, "
-    "contours, lengths and hashes told as they are. The mirrored part is put in with "
+    "The layers' files are as they were written; the sheet is the first of TPE, with its hash put "
+    "right. The mirrored part is put in with "
     '`registration.method = "ears"`, of 4 balloons: other parts have a mirror line.',
     (
         rearranged("part missing on a sheet", lambda pieces: pieces[1:]),
@@ -260,22 +242,19 @@ KIND = Kind(
             with_first(lambda p: p.turned(90.0)),
             settings=("laser.kerf_tpe=[0.2, 0.1]",),
         ),
-        rearranged("part too near to its neighbour", too_near, INTEGRITY),
-        rearranged("part over the border", over_border, INTEGRITY),
+        rearranged("part too near to its neighbour", too_near),
+        rearranged("part over the border", over_border),
         rearranged(
-            "part on a pin",
-            onto_pin,
-            INTEGRITY,
-            (f"sheets.tpe.pins=[[{PIN[0]}, {PIN[1]}, 1.0]]",),
+            "part on a pin", onto_pin, settings=(f"sheets.tpe.pins=[[{PIN[0]}, {PIN[1]}, 1.0]]",)
         ),
-        edited("engraving through a part", engraved_through, INTEGRITY),
-        edited("parting cut through a sheet", parted, INTEGRITY),
-        edited("frame of another size", framed, INTEGRITY),
+        edited("engraving through a part", engraved_through, DESIGNED),
+        edited("parting cut through a sheet", parted, DESIGNED),
+        edited("frame of another size", framed, DESIGNED),
         edited("inch header of a sheet", in_inches, INTEGRITY),
         edited("holes cut after outlines", holes_last, INTEGRITY),
-        edited("sheet that tells another kerf", misnamed, CLAIMS),
-        edited("sheets of two films swapped", swapped, CLAIMS),
-        edited("sheet missing", missing, INTEGRITY),
+        edited("sheet that tells another kerf", misnamed, DESIGNED),
+        edited("sheets of two films swapped", swapped, DESIGNED),
+        edited("sheet missing", missing, DESIGNED),
         told("no sheets in the manifest", lambda m: m.update(sheets=[])),
         told("wrong copies", lambda m: m.update(copies=2)),
         told("wrong spacing of a sheet", lambda m: m["sheets"][0].update(spacing=0.5)),

@@ -1,4 +1,4 @@
-"""A written folder to put a fault into, with its claims made to agree with what is then cut."""
+"""A written folder to put a fault into."""
 
 from __future__ import annotations
 
@@ -8,28 +8,19 @@ from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 from unittest.mock import patch
 
+from sbafab.as_built import as_cut
 from sbafab.as_built import check as as_built
-from sbafab.as_built import cut_files
-from sbafab.as_built.check import read_folder
-from sbafab.as_built.cut_files import CutPart, read_part
+from sbafab.as_built.as_cut import CutPart, read_part
+from sbafab.as_built.check import check_folder
 from sbafab.as_built.expected import Expected
-from sbafab.as_built.sheets import sheet_problems
-from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.order import cutting_order
 from sbafab.geometry.region import Region
 from sbafab.laminate import laminate
 from sbafab.laminate.laminate import Laminate, Layer, Role, interface_regions
 from sbafab.output import checked
-from sbafab.output.checked import Checked, DesignPlan, cut_settings
-from sbafab.output.manifest import manifest
 from sbafab.rules import registration_worst_case, registration_yield
 from sbafab.rules.deck import RULES, run_deck
-from sbafab.runs import check_folder as whole
-from sbafab.runs.check_folder import check_folder, design_problems_of
 from tests.as_built.doctoring import Doctor
 
 Change = Callable[[Region, Laminate], Region]
@@ -47,43 +38,9 @@ class Specimen:
     clean: Laminate
 
     def redraw(self, layers: Sequence[Layer], change: Change) -> None:
-        """The layers' files with their profiles changed, their patterns named after the shape."""
-        names = {
-            (layer.film.material, layer.profile.key): layer.pattern for layer in self.clean.layers
-        }
+        """The layers' files with their profiles changed."""
         for layer in layers:
-            path = self.doctor.path(layer.index)
-            found = read_profile(path)
-            region = change(found.region, self.clean)
-            shape = layer.film.material, region.key
-            pattern = names.setdefault(shape, f"P{sha256(repr(shape).encode()).hexdigest()[:6]}")
-            text = dxf_text(cutting_order(region), {**found.properties, "PATTERN": pattern})
-            path.write_text(text, newline="\n")
-            self.doctor.set_manifest(_named(layer.index, pattern))
-
-    def agree(self) -> None:
-        """The manifest claims what lies on disk, so that only the geometry gives a fault away."""
-        built = read_folder(self.doctor.folder)
-        if built.laminate is not None:
-            checked = Checked(built.design, built.laminate, ())
-            planned = DesignPlan(checked, frozenset(), cut_settings(built.design, ()))
-            told = manifest(planned, (), ())
-            self.doctor.set_manifest(lambda claims: _retold(claims, told))
-        self.doctor.rehash()
-
-
-def _named(index: int, pattern: str) -> Callable[[dict[str, Any]], object]:
-    return lambda claims: claims["layers"][index - 1].update(pattern=pattern)
-
-
-def _retold(claims: dict[str, Any], told: dict[str, Any]) -> None:
-    for key in ("sizes", "interfaces", "bores", "inlets"):
-        claims[key] = told[key]
-    for own, found in zip(claims["films"], told["films"], strict=True):
-        own.update(found)
-    claims["registration"]["pins"] = told["registration"]["pins"]
-    for own, found in zip(claims["layers"], told["layers"], strict=True):
-        own.update({key: found[key] for key in ("area", "pieces", "bores", "balloon")})
+            self.doctor.redraw(layer.index, lambda region: change(region, self.clean))
 
 
 @contextmanager
@@ -91,19 +48,19 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
     """Files of equal bytes are parsed, and layers of equal shape laid on each other, once.
 
     ``parts`` remembers what was parsed. The rules of LEFT_OUT are not run, and none when a good
-    folder is written; film sheets are not looked at.
+    folder is written.
     """
 
     def known(
         path: Path,
-        chords_drawn: bool = False,
-        told: Mapping[str, str] | None = None,
+        has_chords: bool = False,
+        properties: Mapping[str, str] | None = None,
         expected: Expected | None = None,
     ) -> CutPart:
         shape = expected.profile.key if expected is not None else ""
         digest = sha256(path.read_bytes()).hexdigest() + shape
         if digest not in parts:
-            parts[digest] = read_part(path, chords_drawn, told, expected)
+            parts[digest] = read_part(path, has_chords, properties, expected)
         return parts[digest]
 
     def regions(below: Region, above: Region, masks: Sequence[Region]) -> tuple[Region, ...]:
@@ -111,11 +68,9 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
 
     rules = tuple(rule for rule in RULES if rule.name not in LEFT_OUT)
     with (
-        patch.object(cut_files, "read_part", known),
+        patch.object(as_cut, "read_part", known),
         patch.object(laminate, "interface_regions", regions),
         patch.object(as_built, "RULES", rules),
-        patch.object(as_built, "sheet_problems", lambda *_: []),
-        patch.object(whole, "design_problems_of", lambda *_: []),
         patch.object(checked, "run_deck", lambda *_: ()),
     ):
         yield
@@ -123,12 +78,8 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
 
 @contextmanager
 def unabridged() -> Iterator[None]:
-    """Every rule is run, and all that lies in a folder is held against its design."""
-    with (
-        patch.object(as_built, "RULES", RULES),
-        patch.object(whole, "design_problems_of", design_problems_of),
-        patch.object(checked, "run_deck", run_deck),
-    ):
+    """Every rule is run."""
+    with patch.object(as_built, "RULES", RULES), patch.object(checked, "run_deck", run_deck):
         yield
 
 
@@ -137,17 +88,9 @@ def _laid(below: Region, above: Region, *masks: Region) -> tuple[Region, ...]:
     return interface_regions(below, above, masks)
 
 
-def failing(folder: Path, layers: bool = True, sheets: bool = True) -> tuple[str, ...]:
-    """The rules that fail in a folder, in the order they are reported.
-
-    The deck is run with ``layers`` only, the film sheets are looked at with ``sheets`` only.
-    """
-    with (
-        patch.object(as_built, "sheet_problems", sheet_problems if sheets else lambda *_: []),
-        patch.object(as_built, "RULES", as_built.RULES if layers else ()),
-    ):
-        findings = check_folder(folder)
-    return tuple(dict.fromkeys(f.rule for f in findings if f.verdict == "fail"))
+def failing(folder: Path) -> tuple[str, ...]:
+    """The rules that fail in a folder, in the order they are reported."""
+    return tuple(dict.fromkeys(f.rule for f in check_folder(folder) if f.verdict == "fail"))
 
 
 def layer_of(role: Role, balloon: int | None = None) -> Pick:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.as_built.cut_files import CutPart
+from sbafab.as_built.as_cut import CutPart
 from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.errors import DesignError
 from sbafab.rules.deck import rule_names

@@ -9,8 +9,8 @@ import pytest
 from lxml import html as lxml_html
 
 from sbafab.actuators import load_design
+from sbafab.as_built.check import check_folder
 from sbafab.rules.deck import has_failed
-from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import Run, RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
@@ -112,7 +112,7 @@ def test_a_plate_without_a_hole_of_one_place_fails(doctor: Doctor) -> None:
         left = Region(tuple(c for c in found.region.contours if c is not holes[-1]))
         path.write_text(dxf_text(cutting_order(left), found.properties), newline="\n")
 
-    assert doctored(doctor, file, put) == {"manifest-claims", "as-designed"}
+    assert doctored(doctor, file, put) == {"as-designed"}
 
 
 def test_a_plate_with_other_notes_of_its_holes_fails(doctor: Doctor) -> None:

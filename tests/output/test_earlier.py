@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
+from sbafab.as_built.check import check_folder
 from sbafab.assemblies.files import load
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import Curves
@@ -15,7 +16,6 @@ from sbafab.errors import OutputError
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.output.checked import RunPart
 from sbafab.output.manifest import file_hashes
-from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import Conforming, RunRequest, generate
 from tests.quick import few
 

@@ -17,10 +17,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sbafab.actuators import load_design
+from sbafab.as_built.check import check_folder
 from sbafab.cli import main
 from sbafab.errors import DesignError
 from sbafab.output.checked import check
-from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.properties.designs import Draft, lobed, one_dof, radial, valid
 from tests.properties.faults import REFUSALS, RULES

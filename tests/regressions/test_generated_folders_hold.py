@@ -9,7 +9,7 @@ import ezdxf
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.runs.check_folder import check_folder
+from sbafab.as_built.check import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.quick import few
 

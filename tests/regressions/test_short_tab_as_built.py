@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sbafab.actuators import load_design
-from sbafab.runs.check_folder import check_folder
+from sbafab.as_built.check import check_folder
 from sbafab.runs.run import RunRequest, generate
 
 

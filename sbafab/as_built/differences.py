@@ -1,7 +1,6 @@
-"""An output folder read back, made again from its design and compared: texts, tables, meshes.
+"""Differences of two files: bytes first, then contents.
 
-The design is that of ``design.toml``; the places of parts on film sheets are those of
-``nest.json``.
+Another program or another version of a library may write the same contents in other bytes.
 """
 
 from __future__ import annotations
@@ -12,366 +11,23 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterator
 from io import BytesIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel
 
-from sbafab.as_built.check import FolderReadBack, as_designed, read_back
-from sbafab.as_built.claims import CUT_ENDINGS, could_be_cut
-from sbafab.as_built.cut_files import sound_digest
-from sbafab.as_built.expected import drawn_settings
-from sbafab.as_built.records import DESIGNED, Problem, is_assembly, is_job
-from sbafab.assemblies.build import assemble
-from sbafab.assemblies.files import DESIGN_FILE, load_assembly
+from sbafab.as_built.as_cut import check_sequence, sound_digest
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.machine_files import ENDINGS, rdworks_difference
-from sbafab.cutting.properties import FOLDER as LAYERS
-from sbafab.cutting.properties import curves_of
-from sbafab.cutting.sheets import SheetFile
 from sbafab.cutting.verify import TOLERANCE, check_contours
-from sbafab.errors import DesignError, GeometryError, OutputError
-from sbafab.geometry.region import Region
-from sbafab.laminate.netlist import read_netlist
+from sbafab.errors import OutputError
 from sbafab.meshing.surface import Surface, open_edges
-from sbafab.models.figures import Factors, PredictionRequest
-from sbafab.models.prediction import predict
-from sbafab.nesting.records import NestPart, parts_of
-from sbafab.output.artefacts import (
-    ARTEFACTS,
-    PAGES,
-    TRAVELLER,
-    DesignFolder,
-    write_artefacts,
-    write_nested_sheets,
-    write_plates,
-)
-from sbafab.output.carry_over import MESH, PREDICTION, PRESS
-from sbafab.output.checked import (
-    EVERYTHING,
-    PICTURES,
-    Checked,
-    DesignPlan,
-    RunPart,
-    plan_design,
-    schedule_of,
-)
-from sbafab.output.folder import write_design, write_folder
-from sbafab.output.job import CheckedJob, find_nests, of_assembly, plan_job
-from sbafab.output.manifest import JobManifest, Manifest, as_json, file_names
-from sbafab.process import ignore_progress
-from sbafab.rules.finding import Finding, Place
-from sbafab.rules.nets import NETLIST, netlist_findings
-from sbafab.simulators.simulator import NAMES as SIMULATORS
-from sbafab.version import GENERATOR
-
-INDEX = "manifest.json"
-DESIGN_ERRORS = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
-"""Errors of a doctored design."""
-BY_OTHER_COMMANDS = (*MESH, *PREDICTION, *SIMULATORS)
-"""Folders and files of other commands, which are not made again."""
-NOT_COMPARED = ("files", "mesh_statistics", "meshes")
-"""Keys of a manifest that hold hashes, or meshes of several commands."""
-
-
-def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
-    """Everything found in an output folder: file integrity, the manifest's claims, the deck, and
-    whether all that lies in it is what its design makes; with ``nets``, a file, also whether its
-    layers join what that netlist lists.
-
-    Of a job's folder, that of every design, and of the film sheets they share. Raises OutputError
-    with one sentence for a folder that holds no sound manifest or no cut files, DesignError for a
-    netlist that cannot be read, or one of a job.
-    """
-    netlist = None if nets is None else read_netlist(nets)
-    read = read_back(folder)
-    findings = read.against_design(design_problems_of(folder, read))
-    if netlist is None or nets is None:
-        return findings
-    if read.job is not None:
-        raise DesignError(
-            f"{folder} holds several designs, and a netlist is one design's; check the folder of "
-            "that one"
-        )
-    built = next(iter(read.designs), None)
-    if built is None or built.laminate is None:
-        message = f"{nets.name} was not compared: not all layers could be read"
-        return (*findings, Finding(NETLIST, "fail", None, None, "", Place(), message))
-    return (*findings, *netlist_findings(built.laminate, built.design, netlist, nets.name))
-
-
-def design_problems_of(folder: Path, read: FolderReadBack) -> list[Problem]:
-    """Layers, and all that lies beside them, that are not what the folder's designs make."""
-    if not read.designs:
-        return [*read.problems]
-    whole = [as_designed(built) for built in read.designs]
-    if read.job is not None:
-        return [*read.problems, *_job_problems(folder, read.job, whole, read.designs[0].claims)]
-    (built,) = read.designs
-    return [*read.problems, *_problems(folder, built.claims, whole[0], built.expected.paths)]
-
-
-def _problems(
-    folder: Path, claims: Manifest, checked: Checked, paths: Mapping[str, Region]
-) -> list[Problem]:
-    """Return the files of a design that differ from those made again; no sheets of a job's design.
-
-    ``paths`` holds the beam's path for every pattern of the laminate.
-    """
-    of_job = is_job(folder.absolute().parent)
-    with _temporary_folder(folder) as (fresh, problems):
-        order = checked.design.order
-        parts = parts_of(checked.laminate, paths, order.quantity, order.spare_parts)
-        index = _regenerate(folder, fresh, claims, checked, paths, None if of_job else parts)
-        regenerated = {*file_names(fresh), *(layer["file"] for layer in index["layers"])}
-        # The pages of a job's design show the sheets of the job, and are compared there.
-        excluded = (*BY_OTHER_COMMANDS, *PAGES) if of_job else BY_OTHER_COMMANDS
-        problems.extend(_foreign_problems(claims, regenerated, excluded))
-        problems.extend(_file_problems(folder, fresh, claims.files, claims.generator))
-        if claims.generator == GENERATOR:
-            problems.extend(_index_problems(folder, index, of_job))
-            problems.extend(_prediction_problems(folder, fresh, claims, checked))
-    return problems + _version_problems(claims.generator)
-
-
-def _job_problems(
-    folder: Path, job: JobManifest, checked: Sequence[Checked], claims: Manifest
-) -> list[Problem]:
-    """Return the files of a job and of its designs' folders that differ from those made again.
-
-    ``claims`` are those of one of the designs, which say how chords were drawn.
-    """
-    curves = curves_of(claims.curves)
-    with _temporary_folder(folder) as (fresh, problems):
-        whole = CheckedJob(job.schema_name, job.name, tuple(checked))
-        if is_assembly(job):
-            whole = of_assembly(assemble(load_assembly(folder / DESIGN_FILE)), checked)
-        parts = PICTURES if is_assembly(job) and whole.failed else EVERYTHING
-        designs = [plan_design(design, parts, curves) for design in checked]
-        write_folder(plan_job(whole, designs, folder, ignore_progress), fresh, ignore_progress)
-        problems.extend(_foreign_problems(job, file_names(fresh)))
-        problems.extend(_file_problems(folder, fresh, job.files, job.generator))
-    return problems + _version_problems(job.generator)
-
-
-def _foreign_problems(
-    claims: Manifest | JobManifest, regenerated: Collection[str], excluded: Collection[str] = ()
-) -> list[Problem]:
-    """Return the files that a manifest lists and its design does not make.
-
-    ``excluded``: folders and files of other commands, except files that could be cut.
-    """
-    return [
-        Problem(DESIGNED, f"{path} is listed and is no file of this design; regenerate the folder")
-        for path in claims.files
-        if path not in regenerated
-        and (could_be_cut(path) or path.partition("/")[0] not in excluded)
-        and _is_compared(path, claims.generator)
-    ]
-
-
-@contextmanager
-def _temporary_folder(folder: Path) -> Iterator[tuple[Path, list[Problem]]]:
-    """Yield an empty folder and a list of problems; an error of the design is added to it."""
-    problems: list[Problem] = []
-    with TemporaryDirectory() as name:
-        try:
-            yield Path(name), problems
-        except DESIGN_ERRORS as error:
-            message = f"{folder.name} could not be made again to be compared: {error}"
-            problems.append(Problem(DESIGNED, message))
-
-
-def _regenerate(
-    folder: Path,
-    fresh: Path,
-    claims: Manifest,
-    checked: Checked,
-    paths: Mapping[str, Region],
-    parts: Sequence[NestPart] | None,
-) -> dict[str, Any]:
-    """Write the files of a run beside the layers to ``fresh``; return its manifest without hashes.
-
-    ``parts`` are placed on film sheets; None for a design of a job.
-    """
-    design = checked.design
-    settings = drawn_settings(design, checked.waived, claims.curves)
-    parts_of_run = _parts(claims.files)
-    # Pictures come with a run that makes everything: then there is a page as well.
-    has_page = parts is not None and (
-        TRAVELLER in claims.files or {"press", "preview"} <= parts_of_run
-    )
-    parts_of_run |= {"press", "preview"} if has_page else set()
-    sheets: list[SheetFile] = []
-    if parts is not None:
-        nests = find_nests(parts, design, folder, ignore_progress)
-        sheets = write_nested_sheets(nests, design, fresh, settings, ignore_progress)
-    write_plates(checked, fresh, settings)
-    pressing = schedule_of(checked) if "press" in parts_of_run else None
-    plan = DesignPlan(checked, frozenset(parts_of_run), settings, pressing)
-    return write_design(DesignFolder(plan, sheets, fresh, ignore_progress, parts is not None))
-
-
-def _parts(files: Collection[str]) -> set[RunPart]:
-    """Return the parts of a run that wrote these files."""
-    parts: set[RunPart] = {"cut"}
-    if any(path in files for path in PRESS):
-        parts.add("press")
-    if any(path.startswith("preview/") for path in files):
-        parts.add("preview")
-    if any(path.startswith(("mesh/solid.", "mesh/cavity_")) for path in files):
-        parts.add("mesh")
-    return parts
-
-
-def _file_problems(
-    folder: Path, fresh: Path, listed: Collection[str], generator: str
-) -> list[Problem]:
-    """Return the files that differ from those made again."""
-    problems = []
-    for path in sorted(path for path in fresh.rglob("*") if path.is_file()):
-        name = path.relative_to(fresh).as_posix()
-        is_layer = path.parent.name == LAYERS and path.suffix == ".dxf"
-        if name == INDEX or is_layer or not _is_compared(name, generator):
-            continue
-        if name not in listed or not (folder / name).is_file():
-            difference = f"{name} is missing"
-        elif name.endswith(f"/{INDEX}"):
-            difference = index_difference(_read_index(folder / name), _read_index(path), ("files",))
-            difference = f"{name}: {difference}" if difference else ""
-        else:
-            difference = file_difference(folder / name, path, name)
-        if difference:
-            problems.append(Problem(DESIGNED, f"{difference}; regenerate the folder"))
-    return problems
-
-
-def _is_compared(path: str, generator: str) -> bool:
-    """Return True for a file of this version, and for one of any version that is cut or pressed."""
-    return generator == GENERATOR or path.lower().endswith((*PRESS, *CUT_ENDINGS))
-
-
-def _version_problems(generator: str) -> list[Problem]:
-    if generator == GENERATOR:
-        return []
-    message = (
-        f"the folder was made by {generator}, and this is {GENERATOR}: only what is cut and "
-        "pressed was compared; regenerate the folder"
-    )
-    return [Problem(DESIGNED, message)]
-
-
-def _read_index(path: Path) -> dict[str, Any]:
-    index: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return index
-
-
-def _index_problems(folder: Path, index: dict[str, Any], of_job: bool) -> list[Problem]:
-    """Return the differences of the manifest from the design's, without sheets of a job."""
-    left_out = (*NOT_COMPARED, "sheets", "films") if of_job else NOT_COMPARED
-    actual, expected = _read_index(folder / INDEX), json.loads(as_json(index))
-    difference = index_difference(actual, expected, left_out) or _mesh_difference(
-        folder, actual, expected
-    )
-    return (
-        [Problem(DESIGNED, f"manifest.json: {difference}; regenerate the folder")]
-        if difference
-        else []
-    )
-
-
-def _mesh_difference(folder: Path, actual: dict[str, Any], expected: dict[str, Any]) -> str:
-    """Return a difference of the listed surfaces; numbers of triangles may depend on libraries."""
-    meshes = [entry for entry in actual.get("meshes", []) if isinstance(entry, dict)]
-    listed = [entry for entry in meshes if entry.get("kind") in ("solid", "cavity")]
-    if len(listed) != len(expected["meshes"]):
-        return f"it lists {len(listed)} surfaces, not {len(expected['meshes'])}"
-    for mesh in expected["meshes"]:
-        listed_mesh: dict[str, Any] = next((m for m in listed if m.get("file") == mesh["file"]), {})
-        count = mesh["elements"]
-        if listed_mesh.get("elements") != count:
-            count = sum(len(body.surface.faces) for body in bodies(folder / mesh["file"]))
-        difference = index_difference(listed_mesh, {**mesh, "elements": count}, ())
-        if difference:
-            return f"{mesh['file']}: {difference}"
-    return ""
-
-
-class _PredictionRequest(BaseModel):
-    pressures_kpa: tuple[float, ...]
-    flow_ml_min: float
-    volumes_ul: tuple[float, ...]
-    press_factor: float
-    contact_factor: float
-    pocket_loss: float
-    modulus_mpa: float | None
-    modulus_ratio: float
-    water_delay: float
-    air_delay: float
-    loss_share: float
-    calibration: str
-    overrides: dict[str, float]
-
-
-class _PredictionFile(BaseModel):
-    """The request in ``predict.json``."""
-
-    asked: _PredictionRequest
-
-
-def _factors(request: _PredictionRequest) -> Factors:
-    """Return the factors of a prediction without calibration."""
-    return Factors(
-        request.press_factor,
-        request.contact_factor,
-        request.pocket_loss,
-        request.modulus_mpa,
-        request.modulus_ratio,
-        request.water_delay,
-        request.air_delay,
-        request.loss_share,
-    )
-
-
-def _prediction_problems(
-    folder: Path, fresh: Path, claims: Manifest, checked: Checked
-) -> list[Problem]:
-    """Return differences of the prediction from one for the same request."""
-    if "predict.json" not in claims.files:
-        return []
-    try:
-        request = _PredictionFile.model_validate_json((folder / "predict.json").read_bytes()).asked
-        wish = PredictionRequest(
-            request.pressures_kpa,
-            request.flow_ml_min,
-            request.volumes_ul,
-            None if request.calibration else _factors(request),
-            request.overrides,
-        )
-        written = fresh / "prediction"
-        written.mkdir()
-        settings = drawn_settings(checked.design, checked.waived, claims.curves)
-        prediction = predict(checked.design, wish)
-        plan = DesignPlan(checked, frozenset(("predict",)), settings, prediction=prediction)
-        rows = [row for row in ARTEFACTS if row.part == "predict"]
-        write_artefacts(DesignFolder(plan, (), written, ignore_progress), rows)
-    except (ValueError, OSError) as error:
-        message = f"predict.json does not say what was asked for ({error})"
-        return [Problem(DESIGNED, f"{message}; regenerate the folder")]
-    return _file_problems(folder, written, claims.files, claims.generator)
-
-
-# Comparison of two files: bytes first, then contents, since another program or another version of a
-# library may write the same contents in other bytes.
-
+from sbafab.output.swap import CUT_FOLDERS
 
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-6, 1e-6
 """Tolerances of numbers, since libraries round differently."""
@@ -404,6 +60,30 @@ def file_difference(actual: Path, expected: Path, name: str) -> str:
     except (OutputError, *UNREADABLE) as error:
         difference = f"it cannot be read ({error})"
     return f"{name} is not what design.toml makes: {difference}" if difference else ""
+
+
+def has_lost_properties(path: Path) -> bool:
+    """Return True for a sheet or plate without custom properties: other programs drop them."""
+    return _is_cut(path) and not read_profile(path).properties
+
+
+def unreadable(path: Path) -> str:
+    """Return why a layer, sheet or plate is not sound: its file, units, contours or cutting order;
+    "" if it is, and for other files.
+    """
+    if not _is_cut(path):
+        return ""
+    try:
+        sound_digest(path)
+        check_sequence(read_profile(path))
+    except (OutputError, *UNREADABLE) as error:
+        return str(error).removeprefix(f"{path.name}: ").rstrip(".")
+    return ""
+
+
+def _is_cut(path: Path) -> bool:
+    is_ours = path.suffix == ".dxf" and not path.name.endswith(ENDINGS["rdworks"])
+    return is_ours and path.parent.name in CUT_FOLDERS
 
 
 def index_difference(actual: Any, expected: Any, left_out: Collection[str]) -> str:
@@ -582,13 +262,12 @@ def _picture_difference(actual: bytes, expected: bytes) -> str:
 
 def _drawing_difference(actual: Path, expected: Path) -> str:
     """Return a difference of contours, strokes or properties of two drawings; "" if none."""
-    sound_digest(actual)
     drawing, expected_drawing = read_profile(actual), read_profile(expected)
     try:
         check_contours(drawing.region, expected_drawing.region, TOLERANCE)
     except OutputError as error:
         return str(error).rstrip(".")
-    # A version of DXF that knows no properties drops all of them, which is told once elsewhere.
+    # A version of DXF that knows no properties drops all of them: see ``has_lost_properties``.
     for name, value in expected_drawing.properties.items() if drawing.properties else ():
         if drawing.properties.get(name) != value:
             return f"custom property {name} is {drawing.properties.get(name)!r}, not {value!r}"
