@@ -14,7 +14,6 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.layer_files import write_layer_files
 from sbafab.cutting.properties import CutSettings
@@ -54,7 +53,7 @@ from sbafab.simulators.simulator import Name, SimulationRequest, simulator, unde
 from sbafab.version import GENERATOR
 
 if TYPE_CHECKING:
-    from sbafab.reports.traveller.job import Job, Work
+    from sbafab.reports.traveller.work import Work
 
 TRAVELLER = "traveller.html"
 BENCH = "bench.html"
@@ -109,12 +108,7 @@ class DesignFolder:
     @cached_property
     def work(self) -> Work:
         """What the pages for the bench are made from; only of a plan with a press schedule."""
-        # `check` and `cut` have no pages for the bench.
-        from sbafab.reports.traveller.job import Work
-
-        assert self.plan.pressing is not None
-        job = order_of(self.checked)
-        return Work(self.design, self.laminate, self.plan.pressing, self.sheets, job)
+        return work_of(self.plan, self.sheets)
 
     @cached_property
     def solid_png(self) -> bytes:
@@ -370,7 +364,7 @@ def _tray_pdf(folder: DesignFolder) -> bytes | None:
 
 def _tray_html(folder: DesignFolder) -> str | None:
     # Only a batch, or a design that asks for it, has a page for the phone.
-    from sbafab.reports.traveller.tray_page import tray_html
+    from sbafab.reports.traveller.batch import tray_html
 
     return tray_html(folder.work) if _has_tray(folder) else None
 
@@ -382,7 +376,7 @@ def _has_tray(folder: DesignFolder) -> bool:
 
 def _bill(folder: DesignFolder) -> str | None:
     # The pages for the bench take as long to load as all the rules.
-    from sbafab.reports.traveller.bill import bill_csv
+    from sbafab.reports.traveller.materials import bill_csv
 
     return bill_csv(folder.work)
 
@@ -391,8 +385,7 @@ def _traveller(folder: DesignFolder) -> str:
     # The pages for the bench take as long to load as all the rules.
     from sbafab.reports.traveller.page import traveller_html
 
-    work = folder.work
-    return traveller_html(replace(work, job=replace(work.job, solid_png=folder.solid_png)))
+    return traveller_html(replace(folder.work, solid_png=folder.solid_png))
 
 
 def _bench(folder: DesignFolder) -> str:
@@ -400,27 +393,17 @@ def _bench(folder: DesignFolder) -> str:
     from sbafab.reports.traveller.bench import bench_html
 
     work = folder.work
-    return bench_html(work.design.name, work.job.design_sha256, GENERATOR, [work])
+    return bench_html(work.design.name, work.sha256, [work])
 
 
-def order_of(checked: Checked, folder: str = "") -> Job:
-    """Return what a traveller says of the order of a design whose files lie in ``folder``."""
-    # `check` and `cut` have no traveller.
-    from sbafab.reports.traveller.job import Job
-    from sbafab.reports.underlay import NAME as UNDERLAY
-    from sbafab.reports.underlay import guides
+def work_of(plan: DesignPlan, sheets: Sequence[SheetFile], folder: str = "") -> Work:
+    """Return what the pages for the bench are made from; ``folder`` has the design's files."""
+    # `check` and `cut` have no pages for the bench.
+    from sbafab.reports.traveller.work import Work
 
-    design = checked.design
-    return Job(
-        design_sha256=design_sha256(design),
-        generator=GENERATOR,
-        waived=checked.waived,
-        lowered=checked.lowered,
-        findings=checked.findings,
-        fixture=f"{folder}{FIXTURE}" if checked.laminate.pins else None,
-        underlay=f"{folder}{UNDERLAY}" if guides(checked.laminate) else None,
-        kerf={str(name): kerf for name, kerf in design.kerf_widths.items()},
-    )
+    checked, pressing = plan.checked, plan.pressing
+    assert pressing is not None
+    return Work(checked.design, checked.laminate, pressing, sheets, checked.findings, folder)
 
 
 def findings_page(
@@ -436,7 +419,7 @@ def findings_page(
     ]
     if between:
         inspected.append(Inspected("Between the parts", between))
-    return findings_html(name, sha256, GENERATOR, inspected)
+    return findings_html(name, sha256, inspected)
 
 
 def _findings(folder: DesignFolder) -> str:

@@ -21,7 +21,7 @@ from sbafab.output.artefacts import (
     TRAVELLER,
     DesignFolder,
     findings_page,
-    order_of,
+    work_of,
     write_artefacts,
     write_nested_sheets,
     write_text,
@@ -31,7 +31,6 @@ from sbafab.output.job import CheckedJob, Plan
 from sbafab.output.manifest import AssemblyManifest, as_json, file_hashes, job_manifest, manifest
 from sbafab.output.swap import SCHEMA
 from sbafab.process import Progress
-from sbafab.version import GENERATOR
 
 SOLID = "mesh/assembled.glb"
 PICTURE = "preview/assembled.png"
@@ -215,36 +214,13 @@ def _bench_pages(
 ) -> tuple[str, str]:
     """Return the traveller and the page of the bench."""
     # Nor has it the pages of an assembly, whose modules take 0.1 s to load.
-    from sbafab.reports.traveller.assembly_page import (
-        AssemblyJob,
-        DesignWork,
-        assembly_html,
-        tools_of_assembly,
-    )
+    from sbafab.reports.traveller.assembly_page import AssemblyWork, assembly_html
     from sbafab.reports.traveller.bench import bench_html
-    from sbafab.reports.traveller.job import Work
 
-    works = []
-    for each in plan.designs:
-        design, laminate = each.checked.design, each.checked.laminate
-        assert each.pressing is not None
-        folder = f"{design.name}/"
-        work = Work(design, laminate, each.pressing, sheets, order_of(each.checked, folder))
-        works.append(DesignWork(work, folder))
+    works = [work_of(each, sheets, f"{each.checked.design.name}/") for each in plan.designs]
     sha256 = assembly_sha256(assembled)
-    traveller = assembly_html(
-        AssemblyJob(
-            assembled=assembled,
-            sha256=sha256,
-            generator=GENERATOR,
-            works=works,
-            sheets=sheets,
-            findings=plan.job.between or (),
-            waived=plan.job.waived,
-            lowered=plan.settings.lowered,
-            picture=picture,
-        )
+    between, lowered = plan.job.between or (), plan.settings.lowered
+    work = AssemblyWork(
+        assembled, sha256, works, sheets, between, plan.job.waived, lowered, picture
     )
-    designs = [each.work for each in works]
-    tools = tools_of_assembly(assembled)
-    return traveller, bench_html(assembled.assembly.name, sha256, GENERATOR, designs, tools)
+    return assembly_html(work), bench_html(assembled.assembly.name, sha256, works, assembled)

@@ -61,7 +61,7 @@ def test_from_the_first_record_to_the_report(
     )
 
     # The code on the traveller finds the record, and with the serial the one actuator.
-    scanned = record_text("1dof-5mm", new["design_sha256"], "sbafab 1.0.0")
+    scanned = record_text("1dof-5mm", new["design_sha256"])
     _, out, _ = run(["record", "--find", scanned, "--serial", "A2"], capsys)
     assert [line.split(",")[0] for line in out.splitlines()] == [
         "record 2",

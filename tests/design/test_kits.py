@@ -18,8 +18,8 @@ from sbafab.design.records import Design, design_toml, resolved
 from sbafab.design.sections import Acceptance, Laser, Press, Registration, Rules, Sheets
 from sbafab.errors import DesignError
 from sbafab.pressing.schedule import schedule
-from sbafab.reports.traveller.bill import waiting
-from sbafab.reports.traveller.job import Job, Work
+from sbafab.reports.traveller.times import times
+from sbafab.reports.traveller.work import Work
 
 SECTIONS = {
     "films": Films(),
@@ -139,8 +139,8 @@ def test_the_time_of_curing_is_that_of_the_kits_adhesive(lab: Path) -> None:
         design = load_design("1dof-5mm", changes)
         laminate = build(design)
         planned = schedule(laminate, design)
-        work = Work(design, laminate, planned, (), Job("0" * 64, "sbafab 1"))
-        assert waiting(work).cure == 60 * cure
+        work = Work(design, laminate, planned, ())
+        assert times(work).cure == 60 * cure
 
 
 def test_another_kit_takes_the_place_of_the_first_one(lab: Path) -> None:

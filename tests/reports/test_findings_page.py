@@ -18,7 +18,7 @@ def page(*given: str) -> Any:
     laminate, asked = build(design), design
     found = run_deck(laminate, asked)
     one = Inspected(design.name, found, laminate, asked)
-    return lxml_html.fromstring(findings_html(design.name, "0" * 64, "sbafab 1", [one]))
+    return lxml_html.fromstring(findings_html(design.name, "0" * 64, [one]))
 
 
 def table(tree: Any, kind: str) -> list[list[str]]:
@@ -52,7 +52,7 @@ def test_with_ears_no_hand_decides() -> None:
 def test_words_from_outside_stay_words() -> None:
     hostile = "<script>alert(1)</script>"
     found = Finding("bond-width", "warn", 1.0, None, "mm", Place(), hostile)
-    text = findings_html(hostile, "0" * 64, "sbafab 1", [Inspected(hostile, [found])])
+    text = findings_html(hostile, "0" * 64, [Inspected(hostile, [found])])
     assert text.count("alert(1)") == text.count("&gt;alert(1)")
 
 
@@ -61,6 +61,6 @@ def test_no_pin_is_offered_that_the_press_could_not_have_out() -> None:
     design = load_design("3dof-15mm", ("stack.balloons=2",))
     laminate, asked = build(design), design
     one = Inspected(design.name, run_deck(laminate, asked), laminate, asked)
-    text = findings_html(design.name, "0" * 64, "sbafab 1", [one])
+    text = findings_html(design.name, "0" * 64, [one])
     assert "Remedies" in text
     assert "lumen" not in text[text.index("Remedies") : text.index("Passes")]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 import shutil
 import subprocess
@@ -13,13 +12,13 @@ import pytest
 from lxml import html as lxml_html
 from PIL import Image
 
-from sbafab.actuators import build, load_design
+from sbafab.actuators import load_design
 from sbafab.assemblies.files import load_assembly
-from sbafab.pressing.schedule import schedule
-from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import record_text, traveller_html
 from sbafab.runs.run import RunRequest, generate
+from sbafab.version import GENERATOR
 from tests.quick import few
+from tests.reports.pages import work_of
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
@@ -31,7 +30,6 @@ FLAGS = (
     "--disable-background-networking",
     "--no-first-run",
 )
-SHA = hashlib.sha256(b"design").hexdigest()
 # Points, as the browser rounds them.
 PAPERS = {"A4": (595, 842), "letter": (612, 792)}
 
@@ -49,11 +47,7 @@ def chromium(folder: Path, page: Path, *flags: str) -> str:
 
 @pytest.fixture(scope="module")
 def html(sheet_files: Any) -> str:
-    design = load_design("3dof-15mm", ())
-    laminate = build(design)
-    plan = schedule(laminate, design)
-    job = Job(SHA, "sbafab 1.0.0", fixture="sheets/fixture.dxf")
-    return traveller_html(Work(design, laminate, plan, sheet_files(laminate), job))
+    return traveller_html(work_of("3dof-15mm", sheets=sheet_files))
 
 
 @pytest.mark.parametrize("paper", few(PAPERS, 1))
@@ -176,6 +170,7 @@ def test_a_phone_reads_its_code_off_the_screen(html: str, tmp_path: Path) -> Non
     assert light == 255
     zxing = pytest.importorskip("zxingcpp")
     [code] = zxing.read_barcodes(grey)
-    assert code.text == record_text("3dof-15mm", SHA, "sbafab 1.0.0")
-    find = f"sbafab record --find {SHA[:12]}"
-    assert code.text.splitlines() == ["3dof-15mm", f"sha256 {SHA}", "sbafab 1.0.0", find]
+    sha256 = work_of("3dof-15mm").sha256
+    assert code.text == record_text("3dof-15mm", sha256)
+    find = f"sbafab record --find {sha256[:12]}"
+    assert code.text.splitlines() == ["3dof-15mm", f"sha256 {sha256}", GENERATOR, find]

@@ -14,8 +14,8 @@ from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.cycles import Runs, design_runs
 from sbafab.pressing.schedule import schedule
-from sbafab.reports.traveller.job import Job, Work
-from sbafab.reports.traveller.tray_page import tray_html
+from sbafab.reports.traveller.batch import tray_html
+from sbafab.reports.traveller.work import Work
 from sbafab.reports.tray_plan import tray_pdf
 from tests.reports.test_underlay import BLACK, FILM, MASK, MM, SHA, paths
 
@@ -100,7 +100,7 @@ def test_the_page_for_the_phone_counts_patterns_by_cycle() -> None:
     design = load_design("1dof-5mm", ["order.copies=9", "stack.balloons=3"])
     laminate = build(design)
     plan = schedule(laminate, design, design_runs(design, laminate).cycles)
-    text = tray_html(Work(design, laminate, plan, (), Job(SHA, "sbafab")))
+    text = tray_html(Work(design, laminate, plan, ()))
     assert text is not None
     assert "<script" not in text
     assert "http" not in text.replace("w3.org", "")

@@ -9,9 +9,8 @@ from typing import NamedTuple
 from sbafab.design.records import Design
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.laminate.laminate import Laminate
-from sbafab.reports.html_templates import environment
 from sbafab.reports.nets_svg import nets_svg
-from sbafab.reports.traveller.job import HERE, frame
+from sbafab.reports.traveller.formatting import frame, render
 from sbafab.rules.finding import Finding
 from sbafab.rules.measures import Measures
 from sbafab.rules.nets import connectivity
@@ -71,7 +70,6 @@ def _hand_of(design: Design, share: float) -> Hand:
     return Hand(design.registration.hand_placement, design.registration.hand_turn, share)
 
 
-TEMPLATE = "findings.html.j2"
 YIELD = "registration-yield"
 
 
@@ -100,11 +98,10 @@ class _Chapter(NamedTuple):
     """A drawing of the nets with their faults; empty if the design declares none."""
 
 
-def findings_html(title: str, sha256: str, generator: str, inspected: Sequence[Inspected]) -> str:
+def findings_html(title: str, sha256: str, inspected: Sequence[Inspected]) -> str:
     """Return the whole page, with one chapter per design."""
     chapters = [_chapter(design) for design in inspected]
-    page = frame(title, sha256, generator)
-    return environment(HERE).get_template(TEMPLATE).render(**page, shapes="", chapters=chapters)
+    return render("findings.html.j2", **frame(title, sha256), shapes="", chapters=chapters)
 
 
 def _chapter(inspected: Inspected) -> _Chapter:

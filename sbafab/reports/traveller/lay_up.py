@@ -13,7 +13,6 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.reports.drawing import layer_numbers
-from sbafab.reports.traveller import units
 from sbafab.reports.traveller.shapes import Bed
 
 STATION = 0.25
@@ -48,6 +47,24 @@ class PiecePlace:
     low: float
 
 
+class Alignment(NamedTuple):
+    """The edge of a layer beside that of its neighbour in a step, or of the stack above it.
+
+    It lies ``outside`` the ``neighbour``, mm; None if each piece has its place in the table. It is
+    that of ``layer`` in a stack, 0 for a layer by itself, and may lie ``on`` the edge of a film of
+    the same stack too. Neighbours are named, and numbered by ``numbers``.
+    """
+
+    layer: int
+    is_several: bool
+    neighbour: str
+    is_above: bool
+    outside: float | None = None
+    all_round: bool = False
+    on: str = ""
+    numbers: tuple[int, int] = (0, 0)
+
+
 class Things:
     """The items that a step lays, lowest first: single layers, and each stack of earlier steps."""
 
@@ -61,50 +78,50 @@ class Things:
         """Return True if nothing lies under this layer in the step."""
         return self.things[0][0] == index
 
-    def line_up(self, index: int, numbered: bool = True) -> str:
-        """Return what the edge of a layer, or of the stack above it, is aligned with; empty for
-        none.
+    def alignment(self, index: int) -> Alignment | None:
+        """Return what the edge of a layer, or of the stack above it, is aligned with; None for
+        nothing.
 
         It is the edge below, or for the lowest layer the one above; a sheet's edges are too far
         off.
         """
         place = next(i for i, thing in enumerate(self.things) if thing[0] == index)
         if len(self.things) < 2:
-            return ""
-        side, beside = ("below", place - 1) if place else ("above", 1)
+            return None
+        beside = self.things[place - 1 if place else 1]
         layer = _widest(self.laminate, self.things[place], highest=False)
-        neighbour = _widest(self.laminate, self.things[beside], highest=place > 0)
-        each = "each" if len(layer.profile.pieces) > 1 else "its"
+        neighbour = _widest(self.laminate, beside, highest=place > 0)
+        own = layer.index if len(self.things[place]) > 1 else 0
+        edge = Alignment(own, len(layer.profile.pieces) > 1, film_name(neighbour), place == 0)
         edge_lip = lip(layer.profile, neighbour.profile)
         if edge_lip is None:
-            return f"{each} piece at its place in the table" if neighbour.role == "sheet" else ""
-        alone = len(self.things[place]) == 1
-        words = [f"{each} edge" + ("" if alone else f" (layer {layer.index})")]
-        upper = self._top_film(self.things[beside]) if place else neighbour
-        if upper is not neighbour and lip(layer.profile, upper.profile) == (0.0, True):
-            words.append(f"on that of {_neighbour_words(upper, side, numbered)},")
-        if abs(edge_lip.outside) < EQUAL:
-            words.append("on")
-        else:
-            way = "outside" if edge_lip.outside > 0 else "inside"
-            words.append(f"{units.millimetres(abs(edge_lip.outside))} {way}")
-        words.append(f"that of {_neighbour_words(neighbour, side, numbered)},")
-        words.append("all round" if edge_lip.all_round else "all round but for the tabs")
-        return " ".join(words)
-
-    def _top_film(self, thing: Sequence[int]) -> Layer:
-        films = [self.laminate.layer(i) for i in thing if not self.laminate.layer(i).is_mask]
-        return films[-1] if films else self.laminate.layer(thing[-1])
+            return edge if neighbour.role == "sheet" else None
+        films = [i for i in beside if not self.laminate.layer(i).is_mask] or beside
+        upper = self.laminate.layer(films[-1]) if place else neighbour
+        is_on = upper is not neighbour and lip(layer.profile, upper.profile) == (0.0, True)
+        return edge._replace(
+            outside=0.0 if abs(edge_lip.outside) < EQUAL else edge_lip.outside,
+            all_round=edge_lip.all_round,
+            on=film_name(upper) if is_on else "",
+            numbers=(neighbour.index, upper.index),
+        )
 
 
-def face_down(layer: Layer) -> str:
-    """Return the face of a layer that is laid down, ", tpu face down"; empty for a film with equal
-    faces, laid as it was cut.
+def face_down(layer: Layer, is_turned_over: bool = False) -> str:
+    """Return the face of a layer that is laid down, ", tpu face down", also on work that is turned
+    over; empty for a film with equal faces, laid as it was cut.
     """
     upper, lower = layer.faces
     if upper != lower:
-        return f", {lower} face down"
-    return ", upper face down" if layer.turned else ""
+        return f", {upper if is_turned_over else lower} face down"
+    return "" if layer.turned == is_turned_over else ", upper face down"
+
+
+def layer_words(layer: Layer) -> str:
+    """Return material, use, pattern and pieces of a layer, and how it is laid."""
+    pieces = len(layer.profile.pieces)
+    loose = f" in {pieces} pieces" if pieces > 1 else ""
+    return f"{film_name(layer)} {layer.pattern}{loose}{face_down(layer)}"
 
 
 def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
@@ -164,7 +181,7 @@ def pitch(piece_places: Sequence[PiecePlace]) -> float | None:
 def _piece_places(laminate: Laminate, sheet: Layer, thing: Sequence[int]) -> Iterator[PiecePlace]:
     layer = _widest(laminate, thing, highest=False)
     sheet_left, sheet_low = sheet.profile.bounds[:2]
-    single = f"layer {layer.index}, {_name(layer)}"
+    single = f"layer {layer.index}, {film_name(layer)}"
     words = single if len(thing) == 1 else f"stack of layers {layer_numbers(thing)}"
     centres = [centre for chamber in laminate.chambers for centre in chamber.centres]
     pieces = sorted(layer.profile.pieces, key=lambda piece: piece.bounds)
@@ -201,9 +218,6 @@ def _widest(laminate: Laminate, layers: Sequence[int], highest: bool) -> Layer:
     return laminate.layer(wide[-1] if highest else wide[0])
 
 
-def _neighbour_words(layer: Layer, side: str, numbered: bool) -> str:
-    return f"the {_name(layer)} {side}" + (f" (layer {layer.index})" if numbered else "")
-
-
-def _name(layer: Layer) -> str:
+def film_name(layer: Layer) -> str:
+    """Return the material and the use of a layer: "TPE wall"."""
     return f"{layer.film.material} {layer.role.replace('-', ' ')}"

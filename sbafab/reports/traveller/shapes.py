@@ -36,9 +36,11 @@ def definitions(regions: Iterable[tuple[str, Region]]) -> str:
     )
 
 
-def pattern_id(pattern: str) -> str:
-    """Return the id of a pattern's outline; "A P03" has a space, which ids must not have."""
-    return f"shape-{pattern.replace(' ', '-')}"
+def pattern_id(pattern: str, is_flat: bool = False) -> str:
+    """Return the id of a pattern's outline, or of the part cut folded out or turned over; "A P03"
+    has a space, which ids must not have.
+    """
+    return f"shape-{pattern.replace(' ', '-')}{'-flat' if is_flat else ''}"
 
 
 def pattern_regions(laminate: Laminate) -> Iterable[tuple[str, Region]]:
@@ -46,12 +48,7 @@ def pattern_regions(laminate: Laminate) -> Iterable[tuple[str, Region]]:
         yield pattern_id(pattern), layers[0].profile
         is_folded = any(fold.lower == layers[0].index for fold in laminate.folds)
         if is_folded or layers[0].turned:
-            yield pattern_id(flat_shape(pattern)), laminate.as_cut(layers[0])
-
-
-def flat_shape(pattern: str) -> str:
-    """Return the shape id of a part that is cut folded out or turned over."""
-    return f"{pattern}-flat"
+            yield pattern_id(pattern, is_flat=True), laminate.as_cut(layers[0])
 
 
 class Picture:
@@ -138,14 +135,14 @@ def label(at: Point, words: str, size: float = draw.SMALL) -> str:
     )
 
 
-def thumbnail(name: str, pattern: str, film: Film, bounds: Bounds) -> str:
-    """Return a small picture of a pattern."""
+def thumbnail(pattern: str, is_flat: bool, film: Film, bounds: Bounds) -> str:
+    """Return a small picture of a pattern, as it is cut."""
     low_x, low_y, high_x, high_y = bounds
     scale = min((THUMB[0] - 1) / (high_x - low_x), (THUMB[1] - 1) / (high_y - low_y))
-    picture = Picture(name, *THUMB, f"outline of pattern {pattern}")
+    picture = Picture(f"thumb-{pattern}", *THUMB, f"outline of pattern {pattern}")
     middle = (low_x + high_x) / 2, (low_y + high_y) / 2
     at = THUMB[0] / 2 - scale * middle[0], THUMB[1] / 2 + scale * middle[1]
-    picture.part(pattern_id(pattern), film, flat(scale, at), "fresh")
+    picture.part(pattern_id(pattern, is_flat), film, flat(scale, at), "fresh")
     return picture.svg()
 
 
@@ -153,8 +150,6 @@ def thumbnail(name: str, pattern: str, film: Film, bounds: Bounds) -> str:
 
 
 LONGEST_ROUND = 12
-STATION = 0.1
-"""Steps in depth at which a channel's walls are searched, mm."""
 INSIDE = 0.1
 """Distance inward of its mouth at which a tab is searched, mm."""
 
@@ -254,25 +249,3 @@ def inlets_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Inlet, ...]:
             for shape in shapes
         )
     )
-
-
-def straight_run(laminate: Laminate, inlet: Inlet) -> float:
-    """Return the straight run of an inlet's channel inward from its mouth at constant width, mm; 0
-    without a channel there.
-    """
-    (x, y), (u, v) = inlet.mouth, inlet.direction
-
-    def at(depth: float, left: float) -> Point:
-        return x - depth * u - left * v, y - depth * v + left * u
-
-    half, aside = inlet.width / 2 - STATION / 2, inlet.width / 2 + STATION / 2
-    gap = laminate.mouth_gap(inlet)
-    void = None if gap is None else gap.unbonded
-    depth = 0.0
-    while void is not None:
-        here = depth + STATION
-        inside = all(void.contains(at(here, left)) for left in (-half, half))
-        if not inside or any(void.contains(at(here, left)) for left in (-aside, aside)):
-            break
-        depth = here
-    return depth

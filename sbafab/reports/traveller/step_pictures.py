@@ -15,10 +15,10 @@ from sbafab.laminate.assembly import AssemblyStep, distinct_layers, stack_count
 from sbafab.laminate.laminate import Inlet, Laminate, Layer, Pin
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, UNDERLAY, BuildUpPart
 from sbafab.pressing.dowels import PinSetting, push_out
-from sbafab.pressing.schedule import Step, joined_words
+from sbafab.pressing.schedule import Step
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import layer_numbers
-from sbafab.reports.traveller import units
+from sbafab.reports.traveller.formatting import millimetres, stacks, temperature
 from sbafab.reports.traveller.shapes import (
     Bed,
     Picture,
@@ -388,7 +388,7 @@ def _levels(laminate: Laminate, bed: Bed) -> Iterator[Level]:
         shown = distinct_layers(laminate, bed.layers)[:4]
         words = f"layers {layer_numbers(bed.layers)}"
         many = stack_count(laminate, bed.layers)
-        yield Level(shown, words, f"the {units.stacks(many)} from step {bed.made_in}", True)
+        yield Level(shown, words, f"the {stacks(many)} from step {bed.made_in}", True)
         return
     for turn in rounds([laminate.layer(index) for index in bed.layers]):
         for place in turn.places:
@@ -549,20 +549,20 @@ def build_up_svg(step: Step, name: str) -> str:
         *_section_pins(step.pin_settings, face, bottom, by, low, high),
     )
     labels = [
-        (start + PLATEN / 2, f"upper platen, {units.temperature(step.temperature_c)}"),
+        (start + PLATEN / 2, f"upper platen, {temperature(step.temperature_c)}"),
         (
             top + pad / 2,
-            f"press pad {units.millimetres(thick[PAD].thickness_mm)}",
+            f"press pad {millimetres(thick[PAD].thickness_mm)}",
         ),
         (upper - release / 2, _release_words(step)),
         (
             upper + stack / 2,
-            f"laminate {units.millimetres(step.stack_mm)}, ~{step.film_kpa:.0f} kPa",
+            f"laminate {millimetres(step.stack_mm)}, ~{step.film_kpa:.0f} kPa",
         ),
         (bed - release / 2, "release film"),
         *_underlay_words(thick, (bed + face) / 2),
         (face + plate / 2, _plate_words(step, thick[BASE_PLATE].thickness_mm)),
-        (bottom + PLATEN / 2, f"lower platen, {units.temperature(step.temperature_c)}"),
+        (bottom + PLATEN / 2, f"lower platen, {temperature(step.temperature_c)}"),
     ]
     rows = draw.spread([y for y, _ in labels], GAP, SECTION_EDGE + 2.0, end)
     for (y, text), row in zip(labels, rows, strict=True):
@@ -592,16 +592,16 @@ def _underlay(top: float, bottom: float) -> list[str]:
 def _underlay_words(thick: Mapping[str, BuildUpPart], y: float) -> list[tuple[float, str]]:
     if UNDERLAY not in thick:
         return []
-    return [(y, f"underlay {units.millimetres(thick[UNDERLAY].thickness_mm)}, paper")]
+    return [(y, f"underlay {millimetres(thick[UNDERLAY].thickness_mm)}, paper")]
 
 
 def _release_words(step: Step) -> str:
     film = next(item for item in step.build_up if item.part == "release film")
-    return f"release film {units.millimetres(film.thickness_mm)}"
+    return f"release film {millimetres(film.thickness_mm)}"
 
 
 def _plate_words(step: Step, plate: float) -> str:
-    return f"base plate {units.millimetres(plate)}, {'pins in' if step.pin_settings else 'no pins'}"
+    return f"base plate {millimetres(plate)}, {'pins in' if step.pin_settings else 'no pins'}"
 
 
 def _pad(top: float, over: float, beside: float, low: float, high: float) -> str:
@@ -654,18 +654,7 @@ def _section_pins(
     return parts
 
 
-def pin_lines(step: Step) -> str:
-    """Return names, size, depth of hole and heights over plate and stack, equal pins together."""
-    return "; ".join(
-        f"{joined_words(names)}: ⌀{pin.diameter_mm:g} {draw.TIMES} {pin.length_mm:g} mm, "
-        f"{pin.seat_mm:.2f} mm in the plate, {pin.stands_mm - pin.tolerance_mm:.2f} to "
-        f"{pin.stands_mm + pin.tolerance_mm:.2f} mm over it, "
-        f"{pin.stands_mm - pin.tolerance_mm - step.top_mm:.2f} mm or more over the stack"
-        for names, pin in _equal_pins(step)
-    )
-
-
-def _equal_pins(step: Step) -> list[tuple[list[str], PinSetting]]:
+def equal_pins(step: Step) -> list[tuple[list[str], PinSetting]]:
     """Return the names of equal pins, and one pin of each kind."""
     groups: dict[PinSetting, list[str]] = {}
     for pin in sorted(step.pin_settings, key=lambda pin: (pin.diameter_mm, pin.length_mm)):

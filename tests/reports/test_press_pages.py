@@ -1,0 +1,306 @@
+"""The press steps and the plate, by the figures that their pages show."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+import shapely
+
+from sbafab.laminate.assembly import assembly, pins_when_added
+from sbafab.reports.drawing import text_width
+from sbafab.reports.traveller.acceptance import straight_run
+from sbafab.reports.traveller.bench import film_classes, pressure_range, punch
+from sbafab.reports.traveller.joints import FoldPage, SeamPage, joint_pages
+from sbafab.reports.traveller.shapes import beds
+from sbafab.reports.traveller.step_pictures import plan
+from sbafab.reports.traveller.steps import PressPage, step_pages
+from sbafab.reports.underlay import seams_pdf
+from tests.reports.pages import EARS, bench, built, page, words_of, work_of
+from tests.reports.welded import DOUBLE
+
+TPE, PTFE, BOND, OVERHANG = 0.038, 0.025, 0.75, 0.5
+
+
+def test_pins_are_drawn_filled_where_they_are_in() -> None:
+    work = work_of("3dof-15mm")
+    for step, article in zip(work.schedule.steps, page(work).findall(".//article"), strict=True):
+        drawn = article.findall(".//svg")[0]
+        fills = Counter(circle.get("fill") for circle in drawn.iter("circle"))
+        # One circle of each kind belongs to the key.
+        assert fills["#1a1a1a"] == len(step.pins) + 1
+        assert fills["#ffffff"] == len(work.laminate.pins) - len(step.pins) + 1
+
+
+def test_a_pin_counts_only_in_the_step_that_adds_the_layer() -> None:
+    def held(*design: str) -> dict[str, list[str]]:
+        laminate = built(*design)[1]
+        pins = pins_when_added(laminate)
+        return {
+            layers[0].pattern: [pin.name for pin in pins[layers[0].index]]
+            for layers in laminate.patterns.values()
+        }
+
+    # Base and cap have the lumen, and join in steps without pins.
+    tip = held("3dof-15mm")
+    assert (tip["P01"], tip["P07"], tip["P04"]) == ([], [], ["lumen"])
+    assert sorted(tip["P05"]) == ["chamber1", "chamber2", "chamber3", "lumen"]
+    eared = held("3dof-15mm", EARS)
+    assert eared["P01"] == eared["P07"] == ["film1", "film2"]
+
+
+@pytest.mark.parametrize("template", ["1dof-5mm", "3dof-15mm", "radial-15mm"])
+def test_what_the_force_means_is_said(template: str) -> None:
+    work = work_of(template)
+    rings = work.laminate.layers[-1].profile.polygons(1e-4)
+    top = sum(shapely.Polygon(outer, holes).area for outer, *holes in rings)
+    found = re.search(r"laminate alone: ([\d.]+) MPa on the (\d+) mm²", words_of(bench(work)))
+    assert found is not None
+    assert float(found[2]) == pytest.approx(top, abs=0.51)
+    assert float(found[1]) == pytest.approx(110e-3 * 152.4**2 / top, abs=0.051)
+
+
+def hole_rows(tree: Any) -> list[list[str]]:
+    [table] = [t for t in tree.iter("table") if t.get("class") == "holes"]
+    return [[words_of(cell) for cell in row] for row in table.findall(".//tbody/tr")]
+
+
+def test_pins_stand_over_the_stack_by_their_chamfer_at_least() -> None:
+    work = work_of("3dof-15mm")
+    depths = {row[1]: row[2] for row in hole_rows(bench(work))}
+    first, second, third, fourth = step_pages(work)
+    assert second.pins == fourth.pins == []
+    for step, stack in ((first, TPE + PTFE), (third, 27 * TPE + 28 * PTFE)):
+        pins = [pin for _, pin in step.pins]
+        # Chamfers of ISO 8734: 0.2 at a diameter of 1, 0.35 at 2.
+        assert [pin.diameter_mm for pin in pins] == [1, 2]
+        for pin, chamfer in zip(pins, (0.2, 0.35), strict=True):
+            assert depths[f"{pin.diameter_mm:g}"] == f"{pin.seat_mm:g} ± 0.05"
+            # A pin's length is good to 0.25, its hole's depth to 0.05.
+            assert pin.stands_mm == pytest.approx(pin.length_mm - pin.seat_mm)
+            assert pin.tolerance_mm == pytest.approx(0.3)
+            # The stack lies on a release film of 0.05 mm, which the pins are pricked through.
+            assert step.step.top_mm == pytest.approx(0.05 + stack)
+            assert pin.stands_mm - pin.tolerance_mm - step.step.top_mm >= chamfer
+
+
+def test_the_hole_table_has_every_pin_from_the_plates_corner() -> None:
+    work = work_of("3dof-15mm")
+    rows = hole_rows(bench(work))
+    assert [row[0] for row in rows] == [pin.name for pin in work.laminate.pins]
+    for row, pin in zip(rows, work.laminate.pins, strict=True):
+        assert (float(row[6]), float(row[7])) == pytest.approx(pin.centre, abs=6e-4)
+    # Both frames differ by one shift, and the plate's own lies in its front left corner.
+    shifts = {tuple(round(float(r[4 + i]) - float(r[6 + i]), 2) for i in (0, 1)) for r in rows}
+    assert len(shifts) == 1
+    assert all(60 < value < 95 for value in shifts.pop())
+
+
+def test_the_places_of_a_full_plate_are_said_as_a_grid() -> None:
+    work = work_of("1dof-5mm", "stack.balloons=2", "order.copies=60", "order.at_once=60")
+    words = words_of(bench(work))
+    found = re.search(
+        r"rows of (\d+): .* next ([\d.]+) mm to the right, .* next ([\d.]+) mm", words
+    )
+    assert found is not None
+    columns, right, back = int(found[1]), float(found[2]), float(found[3])
+    for n, place in enumerate(work.runs.places):
+        assert place == pytest.approx(((n % columns) * right, (n // columns) * back), abs=2e-2)
+    assert "place 2 by" not in words
+
+
+def test_a_punch_goes_through_the_push_out_hole() -> None:
+    """Of 0.6 diameters, to 0.1 mm."""
+    assert [punch(diameter) for diameter in (1.0, 2.0)] == [0.5, 1.1]
+
+
+def edges_by_eye(step: PressPage) -> dict[str, set[tuple[str, float | None, str, bool]]]:
+    """What the hand decides by pattern, and the edge along which."""
+    found: dict[str, set[tuple[str, float | None, str, bool]]] = {}
+    for bed in (one for one in step.beds if one.made_in is None):
+        for by_eye in (one for lay in step.lays(bed) for one in lay.by_eye):
+            edge = by_eye.edge
+            assert edge is not None
+            said = by_eye.hand, edge.outside, edge.neighbour, edge.all_round
+            found.setdefault(by_eye.pattern, set()).add(said)
+    return found
+
+
+def test_a_hand_lays_what_no_pin_holds_and_turns_what_one_holds() -> None:
+    """Separators turn about the lumen alone; walls have four pins, masks of pockets are discs."""
+    first, _, third, _ = step_pages(work_of("3dof-15mm"))
+    assert edges_by_eye(third) == {"P04": {("turn", OVERHANG, "TPE wall", True)}}
+    # Each strip of the mask in pieces turns about the pin of its own chamber.
+    assert edges_by_eye(first) == {"P02": {("turn", -BOND, "TPE wall", False)}}
+    # With ears all have two pins at least.
+    for step in step_pages(work_of("3dof-15mm", EARS)):
+        assert edges_by_eye(step) == {}
+    # One chamber has no lumen: its separators open wider than the only pin, whose lowest layer
+    # gives the angle that the wall is turned to.
+    first, _, third, _ = step_pages(work_of("1dof-5mm"))
+    assert set(edges_by_eye(first)) == {"P03"}
+    assert {edge[1:3] for edge in edges_by_eye(first)["P03"]} == {(BOND, "PTFE chamber mask")}
+    assert edges_by_eye(third)["P04"] == {("lay", OVERHANG, "TPE wall", True)}
+    # A separator reaches 0.5 mm out of the smaller wall, and so 0.3 out of one 0.4 wider.
+    sizes = ("chamber.diameter=[5.4, 3, 5.4, 5, 5]", "stack.balloons=5")
+    _, _, third, *_ = step_pages(work_of("1dof-5mm", *sizes))
+    assert {edge[1] for edge in edges_by_eye(third)["P10"]} == {0.3, 0.5}
+
+
+def test_without_pins_each_edge_is_laid_along_another() -> None:
+    _, second, _, fourth = step_pages(work_of("3dof-15mm"))
+    edge = second.edge(2)
+    assert edge is not None
+    assert (edge.layer, edge.outside, edge.neighbour, edge.numbers[0]) == (3, 0, "TPE base", 1)
+    stack, cap = fourth.edge(4), fourth.edge(59)
+    assert stack is not None
+    assert cap is not None
+    assert (stack.layer, stack.outside, stack.numbers[0]) == (4, OVERHANG, 3)
+    assert (cap.outside, cap.neighbour, cap.numbers) == (-OVERHANG, "PTFE separator mask", (56, 57))
+    assert cap.on == "TPE wall"
+    first, *_ = step_pages(work_of("radial-15mm"))
+    edge = first.edge(5)
+    assert edge is not None
+    assert (edge.is_several, edge.outside, edge.neighbour) == (True, BOND, "PTFE chamber mask")
+
+
+def test_every_piece_on_a_sheet_has_its_place() -> None:
+    *_, last = step_pages(work_of("radial-15mm"))
+    pitch = 15 * math.pi / 3
+    assert last.pitch == pytest.approx(pitch)
+    # 1 mm of sheet past the SBAs, which are 11.5 wide and 20 long.
+    for (out, piece), place in zip(
+        itertools.product((OVERHANG, 0.0), (1, 2, 3)), last.places, strict=True
+    ):
+        x = (piece - 0.5) * pitch
+        wanted = piece, x, 11.0, x - 5.75 - out, 1.0 - out
+        told = place.piece, place.x, place.y, place.left, place.low
+        assert told == pytest.approx(wanted, abs=1e-6)
+    for other in (("3dof-15mm",), ("radial-15mm", EARS)):
+        assert not any(step.places for step in step_pages(work_of(*other)))
+
+
+def test_the_underlay_is_laid_where_it_has_a_line() -> None:
+    printed = [step.printed for step in step_pages(work_of("1dof-5mm"))]
+    assert printed == [[], ["P01", "P03"], ["P04"], ["P01", "P03", "P04", "P07"]]
+    assert not any(step.printed for step in step_pages(work_of("1dof-5mm", EARS)))
+
+
+@pytest.mark.parametrize(
+    "design",
+    [
+        ("3dof-15mm", EARS),
+        ("1dof-5mm", EARS),
+        ("radial-15mm", EARS),
+        ("3dof-15mm", EARS, "chamber.count=4", "chamber.diameter=6.5", "lumen.diameter=3"),
+        ("3dof-15mm",),
+    ],
+)
+def test_names_in_the_top_view_are_apart(design: tuple[str, ...]) -> None:
+    _, laminate = built(*design)
+    parts = assembly(laminate)
+    known = {thing.name for thing in (*laminate.pins, *laminate.chambers)}
+    for part in parts:
+        drawn = plan(laminate, part, beds(parts, part), "plan")
+        found = re.findall(
+            r'<text x="([-\d.]+)" y="([-\d.]+)" font-size="([\d.]+)"[^>]*>(.*?)<', drawn
+        )
+        boxes = []
+        for x, y, size, words in found:
+            wide, low = text_width(words, float(size)), float(y) - 0.85 * float(size)
+            left = float(x) - wide / 2
+            if words in known:
+                boxes.append((words, shapely.box(left, low, left + wide, low + float(size))))
+        assert {pin.name for pin in part.pins} <= {words for words, _ in boxes}
+        for (a, one), (b, other) in itertools.combinations(boxes, 2):
+            shared = one.intersection(other).area
+            assert shared <= 0.1 * min(one.area, other.area), (part.number, a, b)
+
+
+def test_the_indicating_film_covers_what_the_films_get() -> None:
+    low, high = pressure_range([work_of("3dof-15mm")])
+    # The platen's 110 kPa to the 216 at the edge of the last step (docs, In the press).
+    assert (round(low), round(high)) == (110, 216)
+    classes = film_classes(low, high)
+    assert min(one.low for one in classes) <= low
+    assert max(one.high for one in classes) >= high
+    assert [one.product for one in classes] == ["4LW", "LLLW"]
+    assert [one.product for one in film_classes(110, 190)] == ["4LW"]
+
+
+def test_what_a_pound_on_the_gauge_is_on_the_platen() -> None:
+    """2.555 kN are 574 lbf on 6 x 6 in: a pound-force is 1 / 36 psi, 0.19 kPa."""
+    words = words_of(bench(work_of("1dof-5mm")))
+    assert "2555 N = 2.555 kN = 574 lbf; 1 lbf is 0.19 kPa" in words
+    assert pytest.approx(0.1915, abs=1e-4) == 6.894757 / 36
+    # Half a division within 5 % of 574 lbf.
+    assert "a division every 57 lbf" in words
+
+
+# Seams and folds of drawn layers.
+
+
+def test_a_fold_is_placed_on_the_loose_part() -> None:
+    """The line is at y = -12 and the mouth at y = 24 of the design."""
+    fold, *seams = joint_pages(work_of("folded"))
+    assert isinstance(fold, FoldPage)
+    assert fold.opened.lengths[0] == pytest.approx(36.0)
+    for number, (seam, name) in enumerate(zip(seams, ("left", "right"), strict=True), 1):
+        assert isinstance(seam, SeamPage)
+        assert seam.path == f"layers/seam_{number:03d}_{name}.dxf"
+    # From (-19, -13) on films with their lower left corner at (-20, -12).
+    assert isinstance(seams[0], SeamPage)
+    assert seams[0].start == pytest.approx((1.0, -1.0))
+
+
+def seam_pages(cap: str, tmp_path: Path) -> list[Any]:
+    file = tmp_path / f"double_{cap}.toml"
+    file.write_text(DOUBLE.replace("CAP", cap))
+    return joint_pages(work_of(str(file)))
+
+
+def test_a_film_under_a_joined_stack_is_laid_on_the_work_turned_over(tmp_path: Path) -> None:
+    """From above the tool would melt the cap, which lies over the seam of the other two films."""
+    upper, lower = seam_pages("pe", tmp_path)
+    assert (upper.step.from_below, lower.step.from_below) == (False, True)
+    assert lower.held == 3
+    assert [(layer.index, is_under) for layer, is_under in lower.lays] == [(1, False)]
+    # It begins at x = -2, 18 mm from the left edge at -20 and 24 mm from the right one at 22.
+    assert (upper.start[0], lower.start[0]) == pytest.approx((18.0, 24.0))
+    assert '<g transform="scale(1 -1)"' in upper.picture
+    assert '<g transform="scale(-1 -1)"' in lower.picture
+    # Under a film that stays solid it is laid as it lies.
+    _, solid = seam_pages("pet", tmp_path)
+    assert not solid.step.from_below
+    assert [(layer.index, is_under) for layer, is_under in solid.lays] == [(1, True)]
+
+
+def test_the_channel_of_a_drawn_tab_runs_straight_up_to_its_first_corner() -> None:
+    """Folded: from the mouth at 24 to 12, where the seams' corners begin to be round. Array: strips
+    from the pouch's rim at 9 + 4 mm to the mouth at 22 mm.
+    """
+    for template, run in (("folded", 12), ("array", 9)):
+        laminate = built(template)[1]
+        shortest = min(straight_run(laminate, inlet) for inlet in laminate.inlets)
+        assert math.floor(shortest) == run
+
+
+def test_paths_of_seams_are_printed_on_the_films_at_one_to_one() -> None:
+    work = work_of("folded")
+    data = seams_pdf(work.laminate, work.sha256)
+    assert data is not None
+    words = data.decode("latin-1")
+    assert words.count("/Type /Page ") == 1
+    # Millimetres, 72 / 25.4 points each, and the path as in the design, from its first corner.
+    assert "2.8346456693 0 0 2.8346456693 0 0 cm" in words
+    left = r"q 1 0 0 1 (\S+) (\S+) cm -19 -13 m -19 12 l -2\.2 12 l -2\.2 25 l S Q"
+    (x, y) = re.findall(left, words)[0]
+    # The fold is at y = -12: an edge of the film runs there, as far off as the path.
+    assert re.search(rf"\S+ {float(y) - 12:g} [ml]", words)
+    assert float(x) > 0
+    assert seams_pdf(built("pouch")[1], work.sha256) is None
