@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 from docs.scripts.rule_pictures import pair
-from sbafab.rules.explained import AS_BUILT, BETWEEN_PARTS, DECK, Explanation
+from sbafab.assemblies.checks import CHECKS
+from sbafab.rules.deck import AS_BUILT, EXPLAINED, rule_names
+from sbafab.rules.sentences import Explanation
 
 HEAD = """# Rules in pictures
 
@@ -21,14 +23,15 @@ def write(folder: Path) -> None:
     pictures = folder / "rules"
     pictures.mkdir()
     parts = [HEAD, "\n## On a design\n"]
-    for name, one in DECK.items():
+    for name in rule_names():
+        one = EXPLAINED[name]
         parts += [f"\n### {name}\n", _words(one)]
         drawn = pair(name)
         for which, text in (("right", drawn.right), ("wrong", drawn.wrong)):
             (pictures / f"{name}-{which}.svg").write_text(text, encoding="utf-8")
         parts += [_figure(name), f"> {_plain(drawn.said)}\n"]
     parts.append("\n## Between the parts of an assembly\n")
-    parts += [_short(BETWEEN_PARTS)]
+    parts += [_short(CHECKS)]
     parts.append("\n## On a folder\n\nThe rules above are run on what the files will cut, and:\n")
     parts += [_short(AS_BUILT)]
     (folder / "rules.md").write_text("\n".join(parts), encoding="utf-8")
@@ -49,10 +52,11 @@ def _figure(name: str) -> str:
     )
 
 
-def _short(explained: Mapping[str, Explanation]) -> str:
+def _short(names: Iterable[str]) -> str:
     rows = "\n".join(
         f"| `{name}` | {_plain(one.holds)} | {_plain(one.why)} | {_plain(one.mend)} |"
-        for name, one in explained.items()
+        for name in names
+        for one in [EXPLAINED[name]]
     )
     return f"| check | holds when | because | if it fails |\n|---|---|---|---|\n{rows}\n"
 

@@ -282,7 +282,7 @@ def _check_job(folder: Path, job: JobManifest) -> tuple[Finding, ...]:
         return _by_hashes(folder, job, unusable)
     problems = [*file_problems(folder, job), *_remade_job_problems(folder, job, whole, built)]
     findings = [
-        replace(finding, message=f"{each.design.name}: {finding.message}")
+        replace(finding, design=each.design.name)
         for each in built
         for finding in _findings(each, each.problems)
         if finding.rule != DESIGNED or finding.verdict == "fail"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -20,21 +20,27 @@ from sbafab.meshing.surface import Surface, Vector
 from sbafab.models.formulas import LOBES, deflated_diameter, folded_diameter
 from sbafab.models.formulas import sizes as sizes_of
 from sbafab.models.intervals import factors_of
-from sbafab.rules.finding import Finding, Place
+from sbafab.rules.finding import Finding, Place, Verdict, judged, marked
 from sbafab.rules.limits import holds, weakened
+from sbafab.rules.sentences import Clause, say
 
-WHOLE = Place()
 
-
-def _finding(
-    rule: str,
-    passed: bool,
-    limit: float | None,
+def _judged(
+    rule: CheckName,
+    verdict: Verdict | bool,
+    limit: float,
     measured: float | None,
-    message: str,
+    sentence: str,
+    parts: Iterable[PlacedPart],
     unit: str = "mm",
+    /,
+    **facts: Any,
 ) -> Finding:
-    return Finding(rule, "pass" if passed else "fail", limit, measured, unit, WHOLE, message)
+    """Return a finding about parts, of which its sentence names the first and its host."""
+    names = tuple(part.name for part in parts)
+    facts = {**dict(zip(("part", "host"), names, strict=False)), **facts}
+    finding = judged(rule, verdict, limit, measured, unit, Place(), sentence, **facts)
+    return replace(finding, parts=names)
 
 
 def joints(assembled: Assembled) -> Iterator[tuple[PlacedPart, PlacedPart]]:
@@ -53,32 +59,17 @@ def tube_match(assembled: Assembled) -> Iterator[Finding]:
             continue
         if placed.radius is None:
             continue
-        outer = host.part.outer_diameter
+        outer, both = host.part.outer_diameter, (placed, host)
         wrap = placed.made.design.form.wrap
         if wrap is not None:
-            design_diameter = wrap.tube_diameter
-            off = abs(design_diameter - outer)
+            off = abs(wrap.tube_diameter - outer)
+            facts = {"tube": wrap.tube_diameter, "outer": outer}
             good = holds(tolerance, off)
-            message = (
-                f"{placed.name}, made for a tube of {design_diameter:g}, goes round {host.name} "
-                f"of {outer:g}"
-            )
-            if not good:
-                message += (
-                    f"; set tube.outer_diameter = {outer:g} in its design, or change the tube"
-                )
-            yield _finding("tube-match", good, tolerance, off, message)
+            yield _judged("tube-match", good, tolerance, off, "made-for", both, **facts)
             continue
         walls = placed.made.laminate.layers[0].profile.turned(placed.turn)
         width, room = walls.bounds[2] - walls.bounds[0], math.pi * outer
-        yield _finding(
-            "tube-match",
-            holds(room, width),
-            room,
-            width,
-            f"{placed.name} takes {width:.2f} of the {room:.2f} round {host.name}, tabs included"
-            + ("" if holds(room, width) else "; take a thicker tube or a smaller actuator"),
-        )
+        yield _judged("tube-match", holds(room, width), room, width, "round", both)
 
 
 def inlet_match(assembled: Assembled) -> Iterator[Finding]:
@@ -89,17 +80,10 @@ def inlet_match(assembled: Assembled) -> Iterator[Finding]:
         if not isinstance(host, PlacedSba):
             continue
         inlet = inlet_of(placed.name, placed.part, host)
-        limit = 2 * inlet.width / math.pi
-        outer = placed.part.outer_diameter
-        yield _finding(
-            "inlet-match",
-            holds(limit, outer),
-            limit,
-            outer,
-            f"{placed.name} has an outer diameter of {outer:g}, and the inlet of {inlet.chamber} "
-            f"in {host.name}, {inlet.width:g} wide, opens to {limit:.3f}"
-            + ("" if holds(limit, outer) else "; set inlet.tube_outer_diameter in its design"),
-        )
+        limit, outer = 2 * inlet.width / math.pi, placed.part.outer_diameter
+        facts = {"chamber": inlet.chamber, "width": inlet.width}
+        good, both = holds(limit, outer), (placed, host)
+        yield _judged("inlet-match", good, limit, outer, "opens", both, **facts)
 
 
 def line_clearance(assembled: Assembled) -> Iterator[Finding]:
@@ -111,17 +95,10 @@ def line_clearance(assembled: Assembled) -> Iterator[Finding]:
         lumen = _opening(host)
         if lumen is None:
             continue
-        clearance = lumen - placed.part.outer_diameter
-        good = holds(clearance, limit)
-        yield _finding(
-            "line-clearance",
-            good,
-            limit,
-            clearance,
-            f"{placed.name} of {placed.part.outer_diameter:g} in the lumen of {host.name}, "
-            f"{lumen:g}, leaves {clearance:.3f} in diameter"
-            + ("" if good else f"; take a line of at most {lumen - limit:g} or a wider lumen"),
-        )
+        outer, both = placed.part.outer_diameter, (placed, host)
+        facts = {"outer": outer, "lumen": lumen, "most": lumen - limit}
+        good, clearance = holds(lumen - outer, limit), lumen - outer
+        yield _judged("line-clearance", good, limit, clearance, "leaves", both, **facts)
 
 
 def _opening(placed: PlacedPart) -> float | None:
@@ -146,11 +123,8 @@ def seat(assembled: Assembled) -> Iterator[Finding]:
         elif placed.part.at != "inlet":
             lower, under = _lower_face(placed), _face_of(host, placed.part.at)
             share = (lower & under).area / min(lower.area, under.area)
-            good = holds(share, limit)
-            message = f"{share:.0%} of the smaller face of {placed.name} on {host.name} is glued"
-            if not good:
-                message += "; move it with offset, or use a larger part: an opening lies under it"
-            yield _finding("seat", good, limit, share, message, "")
+            both = placed, host
+            yield _judged("seat", holds(share, limit), limit, share, "glued", both, "")
 
 
 def _through(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
@@ -158,14 +132,9 @@ def _through(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
     start, end = placed.part.along, placed.part.along + placed.height
     inside = max(0.0, min(end, host.height) - max(start, 0.0))
     share = inside / min(placed.height, host.height)
-    good = holds(share, limit)
-    message = f"{inside:.3f} of {placed.name} lie in the lumen of {host.name}"
-    if not good:
-        message += (
-            f", which reaches from 0 to {host.height:.3f}; along = {start:g} puts the line from "
-            f"{start:g} to {end:g}"
-        )
-    return _finding("seat", good, limit, share, message, "")
+    facts = {"length": inside, "height": host.height, "start": start, "end": end}
+    both = placed, host
+    return _judged("seat", holds(share, limit), limit, share, "inside", both, "", **facts)
 
 
 def _around(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
@@ -175,25 +144,17 @@ def _around(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
     along, length = placed.part.along, host.height
     low, high = max(y0, -along), min(y1, length - along)
     share = (lower & rectangle((x0, low), (x1, high))).area / lower.area if low < high else 0.0
+    verdict: Verdict = "warn"
     if not holds(share, limit):
-        message = (
-            f"{share:.0%} of {placed.name} lies on {host.name}, which is {length:g} long; "
-            f"along = {along:g} puts it from {along + y0:.2f} to {along + y1:.2f}"
-        )
-        return _finding("seat", False, limit, share, message, "")
-    if placed.radius is None:
-        remedy = f"build the joint of {placed.name} up with adhesive"
-        message = f"{remedy}: it is stiff and touches the round {host.name} in a line only"
-        return Finding("seat", "warn", limit, 0.0, "", WHOLE, message, remedy=remedy)
-    message = f"{share:.0%} of {placed.name} lies on {host.name}"
-    if holds(share, 1.0):
-        return _finding("seat", True, limit, share, message, "")
-    remedy = f"move {placed.name} along {host.name}, or glue well what lies on it"
-    message = (
-        f"{remedy}: {message}, the rest hangs past its end; along = {along:g} puts it from "
-        f"{along + y0:.2f} to {along + y1:.2f} of {length:g}"
-    )
-    return Finding("seat", "warn", limit, share, "", WHOLE, message, remedy=remedy)
+        verdict, sentence = "fail", "off-tube"
+    elif placed.radius is None:
+        sentence, share = "stiff", 0.0
+    elif holds(share, 1.0):
+        verdict, sentence = "pass", "lies"
+    else:
+        sentence = "overhangs"
+    facts = {"along": along, "start": along + y0, "end": along + y1, "length": length}
+    return _judged("seat", verdict, limit, share, sentence, (placed, host), "", **facts)
 
 
 def _lower_face(placed: PlacedPart) -> Region:
@@ -325,19 +286,20 @@ def supply_tubes(assembled: Assembled) -> Iterator[Finding]:
         if not supply:
             continue
         crossing = [run for run in supply if run.over]
-        if not crossing:
-            message = f"the supply tubes of {placed.name} run past all balloons"
-            yield _finding("supply-tubes", True, 0, 0, message, "tubes")
-            continue
-        names = ", ".join(dict.fromkeys(name for run in crossing for name in run.over))
-        message = (
-            f"{len(crossing)} of {len(supply)} supply tubes of {placed.name} would lie on balloons "
-            f"of {names} and be squeezed against the lumen; {_remedy(placed, assembled, supply)}"
+        over = list(dict.fromkeys(name for run in crossing for name in run.over))
+        facts: dict[str, Any] = {"crossing_count": len(crossing), "count": len(supply)}
+        facts["over"] = ", ".join(over)
+        if crossing:
+            facts["mending"] = _remedy(placed, assembled, supply)
+        sentence, parts = (
+            "crossing" if crossing else "past",
+            [placed, *map(assembled.__getitem__, over)],
         )
-        yield Finding("supply-tubes", "fail", 0, len(crossing), "tubes", WHOLE, message)
+        count = len(crossing)
+        yield _judged("supply-tubes", not count, 0, count, sentence, parts, "tubes", **facts)
 
 
-def _remedy(placed: PlacedPart, assembled: Assembled, supply: Sequence[SupplyRun]) -> str:
+def _remedy(placed: PlacedPart, assembled: Assembled, supply: Sequence[SupplyRun]) -> Clause:
     """Return the remedy: the turn, in whole degrees, with every tube farthest from balloons."""
     tube = assembled.on(placed)
     assert tube is not None
@@ -353,8 +315,8 @@ def _remedy(placed: PlacedPart, assembled: Assembled, supply: Sequence[SupplyRun
 
     best = max(range(360), key=lambda turn: (round(room(turn), 6), -turn))
     if room(best) <= 0:
-        return "lead them through the tube, or use narrower chambers"
-    return f"turn = {(placed.turn + best) % 360:g} leads them between"
+        return say("supply-tubes.through")
+    return say("supply-tubes.turn", turn=(placed.turn + best) % 360)
 
 
 # Ways of the whole: through an aperture, into a lumen, against its wall.
@@ -363,7 +325,7 @@ def _remedy(placed: PlacedPart, assembled: Assembled, supply: Sequence[SupplyRun
 class _Passage(NamedTuple):
     """The diameter that a part needs, mm, with films as bought and at its folded height."""
 
-    name: str
+    part: PlacedPart
     nominal: float
     pressed: float
     how: str
@@ -380,42 +342,32 @@ def aperture(assembled: Assembled) -> Iterator[Finding]:
         return
     needs = [_passage(placed) for placed in assembled.parts]
     worst = max(needs, key=lambda need: (need.pressed > hole, need.nominal))
-    message = f"{worst.name} {worst.how} needs {worst.nominal:.2f} of the aperture's {hole:g}"
-    if holds(hole, worst.nominal):
-        yield _finding("aperture", True, hole, worst.nominal, message)
-    elif holds(hole, worst.pressed):
-        remedy = "try it in the aperture first"
-        message = (
-            f"{remedy}: {message} with films as bought, or {worst.pressed:.2f} at its folded height"
-        )
-        yield Finding("aperture", "warn", hole, worst.nominal, "mm", WHOLE, message, remedy=remedy)
-    else:
-        message += "; use fewer balloons, smaller chambers or a smaller part"
-        yield _finding("aperture", False, hole, worst.pressed, message)
+    facts = {"pressed_mm": worst.pressed, "how": say(f"aperture.{worst.how}")}
+    verdict: Verdict = "pass" if holds(hole, worst.nominal) else "warn"
+    size, sentence = worst.nominal, "needs" if verdict == "pass" else "pressed"
+    if not holds(hole, min(worst.nominal, worst.pressed)):
+        verdict, sentence, size = "fail", "needs", worst.pressed
+    part, nominal = (worst.part,), worst.nominal
+    yield _judged("aperture", verdict, hole, size, sentence, part, nominal=nominal, **facts)
 
 
 def _passage(placed: PlacedPart) -> _Passage:
-    part = placed.part
     if not isinstance(placed, PlacedSba):
-        size = _girth(placed)
-        soft = isinstance(part, Cup)
-        return _Passage(
-            placed.name, size, 0.0 if soft else size, "squeezed" if soft else "as it is"
+        size, is_soft = _girth(placed), isinstance(placed.part, Cup)
+        return (
+            _Passage(placed, size, 0.0, "squeezed")
+            if is_soft
+            else _Passage(placed, size, size, "as-it-is")
         )
     design, laminate = placed.made.design, placed.made.laminate
-    form = design.form
-    if form.wrap is not None:
-        size = deflated_diameter(form.wrap, laminate.thickness)
-        return _Passage(placed.name, size, size, "deflated")
+    if design.form.wrap is not None:
+        size = deflated_diameter(design.form.wrap, laminate.thickness)
+        return _Passage(placed, size, size, "deflated")
     lobe = _lobe_width(placed)
-    if lobe is not None:
-        return _Passage(
-            placed.name,
-            folded_diameter(lobe, laminate.thickness),
-            folded_diameter(lobe, factors_of(design).folded(laminate).height),
-            "folded",
-        )
-    return _Passage(placed.name, _flat_diameter(placed), 0.0, "unfolded")
+    if lobe is None:
+        return _Passage(placed, _flat_diameter(placed), 0.0, "unfolded")
+    folded = folded_diameter(lobe, factors_of(design).folded(laminate).height)
+    return _Passage(placed, folded_diameter(lobe, laminate.thickness), folded, "folded")
 
 
 def _lobe_width(placed: PlacedSba) -> float | None:
@@ -449,26 +401,22 @@ def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
     lumen = assembled.assembly.deploy.lumen_diameter
     if lumen is None:
         return
-    sizes = [(_deflated(placed, assembled), placed, "") for placed in assembled.parts]
+    sizes = [(_deflated(placed, assembled), placed, False) for placed in assembled.parts]
     sizes += [
-        (folded, placed, "tabs folded back with their tubes")
+        (folded, placed, True)
         for placed in assembled.parts
         if (folded := folded_diameter_with_tubes(placed, assembled)) is not None
     ]
-    widest, part, how = max(sizes, key=lambda entry: (round(entry[0], 6), entry[1].radius is None))
-    good = widest < lumen
-    message = (
-        f"deflated, with films as bought, {part.name} is the widest part, {widest:.2f} in a lumen "
-        f"of {lumen:g}"
+    widest, part, is_folded = max(
+        sizes, key=lambda entry: (round(entry[0], 6), entry[1].radius is None)
     )
-    if how:
-        message += f", {how}"
-        if part.radius is None and reach(part) > lumen:
-            message += f" (unfolded they reach {reach(part):.2f}: tie them before it goes in)"
-    if not good:
-        message += "; make it narrower or its laminate thinner"
-        message += ", or take thinner supply tubes" if how else ""
-    yield _finding("lumen-pass", good, lumen, widest, message)
+    tabs, thinner = "no-tabs", "no-tabs"
+    if is_folded:
+        is_untied = part.radius is None and reach(part) > lumen
+        tabs, thinner = "tabs-tied" if is_untied else "tabs-folded", "thinner-tubes"
+    facts: dict[str, Any] = {"thinner": say(f"lumen-pass.{thinner}")}
+    facts["tabs"] = say(f"lumen-pass.{tabs}", unfolded=reach(part) if is_folded else 0.0)
+    yield _judged("lumen-pass", widest < lumen, lumen, widest, "widest", (part,), **facts)
 
 
 def _deflated(placed: PlacedPart, assembled: Assembled) -> float:
@@ -494,19 +442,11 @@ def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
         and (reached := sizes_of(placed.made.design, placed.made.laminate).get("reached_diameter"))
     ]
     if not sizes:
-        message = (
-            f"no part expands against a lumen of {lumen:g}; add a radial design, or leave out "
-            "deploy.lumen_diameter"
-        )
-        yield _finding("lumen-brace", False, lumen, None, message)
+        yield _judged("lumen-brace", False, lumen, None, "none", ())
         return
     widest, name = max(sizes)
-    good = holds(widest, lumen)
-    message = f"inflated, {name} reaches {widest:.2f} free (lens of two arcs), and the lumen is "
-    message += f"{lumen:g}"
-    if not good:
-        message += "; use wider or longer chambers, more balloons or a thicker tube"
-    yield _finding("lumen-brace", good, lumen, widest, message)
+    part, good = (assembled[name],), holds(widest, lumen)
+    yield _judged("lumen-brace", good, lumen, widest, "reaches", part)
 
 
 # Collisions of solids in place, deflated, their pockets filled.
@@ -538,23 +478,11 @@ def collision(assembled: Assembled) -> Iterator[Finding]:
             worst = max(worst, volume)
             if volume > TOUCH:
                 has_collision = True
-                yield _hit(a, b, volume, _box_of(shared))
+                x, y, z = _box_of(shared).tolist()
+                facts = {"x": x, "y": y, "z": z}
+                yield _judged("collision", False, TOUCH, volume, "share", (a, b), "mm3", **facts)
     if not has_collision:
-        message = "no two parts run into each other, deflated, at nominal film thickness"
-        yield _finding("collision", True, TOUCH, worst, message, "mm3")
-
-
-def _hit(a: PlacedPart, b: PlacedPart, volume: float, at: NDArray[np.float64]) -> Finding:
-    x, y, z = at
-    return _finding(
-        "collision",
-        False,
-        TOUCH,
-        volume,
-        f"{a.name} and {b.name} share {volume:.2f} mm3 round x {x:.1f}, y {y:.1f}, "
-        f"z {z:.1f}; move one of them (along, angle, offset, turn) or make it smaller",
-        "mm3",
-    )
+        yield _judged("collision", True, TOUCH, worst, "clear", (), "mm3")
 
 
 def _lies_on(a: PlacedPart, b: PlacedPart) -> bool:
@@ -614,11 +542,9 @@ def run_checks(assembled: Assembled) -> tuple[Finding, ...]:
     """Return the findings of all checks, in their order, with failures that the assembly waives."""
     rules = assembled.assembly.rules
     return tuple(
-        _waived(finding) if name in rules.waive and finding.verdict == "fail" else finding
+        marked(finding, lowered_checks(rules, name), "the assembly" if name in rules.waive else "")
         for name, check in CHECKS.items()
-        for finding in (
-            _against(lowered_checks(rules, name), result) for result in check(assembled)
-        )
+        for finding in check(assembled)
     )
 
 
@@ -635,14 +561,3 @@ def lowered_checks(rules: AssemblyRules, name: str | None = None) -> tuple[str, 
         for check, key, is_weaker in keys
         if is_weaker and name in (None, check)
     )
-
-
-def _against(weak: tuple[str, ...], finding: Finding) -> Finding:
-    if not weak:
-        return finding
-    return replace(finding, message=f"{finding.message}; limits lowered: {', '.join(weak)}")
-
-
-def _waived(finding: Finding) -> Finding:
-    message = f"waived by the assembly: {finding.message}"
-    return replace(finding, verdict="waived", by_user=True, message=message)

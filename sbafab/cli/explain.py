@@ -13,7 +13,7 @@ from click.shell_completion import CompletionItem
 from sbafab.cli.options import completions, json_option
 from sbafab.cli.printing import print_facts, print_json
 from sbafab.output.schema_ids import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
-from sbafab.rules.explained import EXPLAINED
+from sbafab.rules.deck import EXPLAINED
 
 MEASURED = "a text with its unit"
 NAMED = "NAME"

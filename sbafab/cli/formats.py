@@ -39,7 +39,7 @@ from sbafab.reproduction.comparison import ComparisonDocument
 from sbafab.reproduction.page import ReproductionDocument
 from sbafab.results.records import HistoryEntry, LabRow, Record
 from sbafab.results.report import ReportDocument
-from sbafab.rules.rule import Explanation
+from sbafab.rules.sentences import Explanation
 from sbafab.search.compare import CompareDocument
 from sbafab.search.quantities import QuantityName
 from sbafab.search.target_yield import YieldEntry

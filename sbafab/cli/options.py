@@ -96,7 +96,7 @@ designs_or_folders = designs
 def rules(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete the names of rules and checks."""
     # Options need no rule; a shell asks for their names.
-    from sbafab.rules.explained import EXPLAINED
+    from sbafab.rules.deck import EXPLAINED
 
     return completions(typed, ((name, rule.holds) for name, rule in EXPLAINED.items()))
 

@@ -12,7 +12,7 @@ import click
 
 from sbafab.cli.exit import print_error
 from sbafab.cli.progress import QUIET, is_requested, print_result
-from sbafab.rules.explained import AS_BUILT
+from sbafab.rules.deck import AS_BUILT
 from sbafab.rules.finding import Finding, Verdict, counted, decisive
 
 if TYPE_CHECKING:

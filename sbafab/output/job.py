@@ -57,11 +57,7 @@ class CheckedJob:
         if len(self.designs) == 1 and self.between is None:
             return self.designs[0].findings
         named = (
-            replace(
-                finding,
-                message=f"{checked.design.name}: {finding.message}",
-                design=checked.design.name,
-            )
+            replace(finding, design=checked.design.name)
             for checked in self.designs
             for finding in checked.findings
         )

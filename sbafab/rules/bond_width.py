@@ -2,69 +2,38 @@
 
 from __future__ import annotations
 
-from sbafab.design.records import Design
-from sbafab.geometry.width import Width
-from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import at, holds
-from sbafab.rules.measures import DistinctInterface, Measures, distinct_interfaces, interface_name
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.finding import Finding, Place, judged
+from sbafab.rules.limits import holds
+from sbafab.rules.measures import Measures, distinct_interfaces, place_in
+from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import explained
 
 NAME = "bond-width"
 
 
 def check(measures: Measures) -> list[Finding]:
-    """The least width of any bond, measured between facing edges."""
-    laminate, design = measures.laminate, measures.design
-    worst: tuple[float, Width | None, DistinctInterface] | None = None
-    for distinct in distinct_interfaces(laminate):
-        bond = distinct.interface.bond
-        width = measures.bond(distinct.interface)
-        if width is None and not bond.is_empty:
-            continue
-        value = width.value if width else 0.0
-        if worst is None or value < worst[0] - 1e-9:
-            worst = value, width, distinct
-    if worst is None:
-        return [_finding(None, design, Place(), "the laminate has no bond to measure")]
-    value, width, distinct = worst
+    """Return the least width of any bond, measured between facing edges."""
+    limit = measures.design.rules.bond_width
+    widths = [
+        (width.value if width else 0.0, width, distinct)
+        for distinct in distinct_interfaces(measures.laminate)
+        for width in [measures.bond(distinct.interface)]
+        if width is not None or distinct.interface.bond.is_empty
+    ]
+    if not widths:
+        return [judged(NAME, False, limit, None, "mm", Place(), "none")]
+    value, width, distinct = min(widths, key=lambda entry: round(entry[0], 9))
     interface = distinct.interface
-    x, y = width.middle if width else (None, None)
-    place = Place(interface.index, interface.layer_indices, x, y)
-    return [_finding(value, design, place, _message(value, width, distinct, design))]
-
-
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "every bond is at least 0.75 mm wide between facing edges",
-        "A narrower ring peels or leaks under pressure; the paper found 0.75 mm to hold (Sec. 2).",
-        "Make bond.width larger, or a seam wider, move what lies near the edge away from it, or "
-        "round the outline.",
-        ("rules.bond_width", "bond.width"),
-    ),
-)
-
-
-def _finding(value: float | None, design: Design, place: Place, message: str) -> Finding:
-    good = value is not None and holds(value, design.rules.bond_width)
-    return Finding(
-        NAME, "pass" if good else "fail", design.rules.bond_width, value, "mm", place, message
-    )
-
-
-def _message(value: float, width: Width | None, distinct: DistinctInterface, design: Design) -> str:
-    where = interface_name(distinct.interface) + distinct.suffix
+    is_seamed = bool(interface.seams) and not interface.pressed
     if width is None:
-        if distinct.interface.seams and not distinct.interface.pressed:
-            return f"nothing bonds at {where}: its seams lie beside the films; move their paths"
-        return f"nothing bonds at {where}: the mask covers all of it; make the mask smaller"
-    narrowest = f"the narrowest bond is {value:.3f} mm, at {where}, {at(width.middle)}"
-    if holds(value, design.rules.bond_width):
-        return narrowest
-    remedy = "raise bond.width, or move the edges on either side apart there"
-    if not value:
-        remedy = "round the sharp corner there"
-    elif distinct.interface.seams and not distinct.interface.pressed:
-        remedy = "make the seam there wider, or move its path inward from the film's edge"
-    return f"{narrowest}; it needs {design.rules.bond_width:g}: {remedy}"
+        sentence = "seams-beside" if is_seamed else "covered"
+    elif not value:
+        sentence = "sharp"
+    else:
+        sentence = "thin-seam" if is_seamed else "narrowest"
+    place = place_in(interface, width and width.middle)
+    good = holds(value, limit)
+    return [judged(NAME, good, limit, value, "mm", place, sentence, where=distinct.name)]
+
+
+RULE = Rule(NAME, check, explained(NAME))

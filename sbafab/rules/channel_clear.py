@@ -12,10 +12,11 @@ from typing import NamedTuple
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Edge, Point, distance_to
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
-from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import at, holds
+from sbafab.rules.finding import Finding, Place, judged
+from sbafab.rules.limits import holds
 from sbafab.rules.measures import Measures
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import Clause, explained, layer_name, say
 
 # Channels: chamber bores and the lumen, and the layers each runs through; pins that stand in none.
 
@@ -26,7 +27,7 @@ class Channel(NamedTuple):
     ``has_axis``: all openings lie about one axis, as a pin or a tube stands in it.
     """
 
-    name: str
+    name: Clause
     centre: Point
     diameter: float
     layers: tuple[Layer, ...]
@@ -53,11 +54,12 @@ def channels(laminate: Laminate) -> list[Channel]:
             films = (layer for layer in within if not layer.is_mask)
             within = [film for film in films if not film.profile.contains(bore.centre)]
         if within:
-            name, bored = f"bore of {bore.chamber}", _distinct(within)
+            name = say("channel-clear.bore", chamber=bore.chamber)
+            bored = _distinct(within)
             passages.append(Channel(name, bore.centre, bore.diameter, bored, not laminate.nets))
     if laminate.lumen is not None:
         layers = _distinct(laminate.layers)
-        passages.append(Channel("lumen", (0.0, 0.0), laminate.lumen, layers))
+        passages.append(Channel(say("channel-clear.lumen"), (0.0, 0.0), laminate.lumen, layers))
     return passages
 
 
@@ -99,33 +101,16 @@ def check(measures: Measures) -> list[Finding]:
     laminate = measures.laminate
     clearances = [_clear(channel) for channel in channels(laminate)]
     if not clearances:
-        message = "no balloon is joined to another, so there is no channel to keep clear"
-        if laminate.nets:
-            message = "no balloon has a bore; what drawn holes join is judged by nets"
-        return [Finding(NAME, "pass", None, None, "mm", Place(), message)]
-    worst = min(clearances, key=lambda clear: clear.diameter - clear.channel.diameter)
-    stated = worst.channel.diameter
-    good = holds(worst.diameter, stated)
-    message = f"the {worst.channel.name} passes {worst.diameter:.3f} mm, {at(worst.at)}"
-    if not good:
-        message += (
-            f", and should pass {stated:g}; layer {worst.layer.index} ({worst.layer.name}) stands "
-            "in the way: open or align its hole"
-        )
-    place = Place(None, (worst.layer.index,), *worst.at)
-    return [Finding(NAME, "pass" if good else "fail", stated, worst.diameter, "mm", place, message)]
+        sentence = "no-bore" if laminate.nets else "none"
+        return [judged(NAME, True, None, None, "mm", Place(), sentence)]
+    channel, diameter, p, layer = min(clearances, key=lambda row: row.diameter - row[0].diameter)
+    place, limit = Place(None, (layer.index,), *p), channel.diameter
+    facts = {"channel": channel.name, "layer": layer_name(layer)}
+    good = holds(diameter, limit)
+    return [judged(NAME, good, limit, diameter, "mm", place, "passes", **facts)]
 
 
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "all openings along a bore, and along the lumen, together pass its diameter",
-        "One layer off its axis narrows the channel to what all openings have in common.",
-        "Draw the openings about one axis, or ask for less: bore.diameter, lumen.diameter.",
-        ("bore.diameter", "lumen.diameter"),
-    ),
-)
+RULE = Rule(NAME, check, explained(NAME))
 
 
 def _clear(channel: Channel) -> _Clear:

@@ -7,8 +7,7 @@ without it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
 from typing import get_args
 
 from sbafab import plugins
@@ -18,10 +17,11 @@ from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.plugins import Plugins
 from sbafab.process import Progress
-from sbafab.rules.finding import Finding
+from sbafab.rules.finding import Finding, marked
 from sbafab.rules.limits import lowered
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import WORDS, Explanation, catalogue, explained
 
 OWN = {name: f"sbafab.rules.{name.replace('-', '_')}:RULE" for name in get_args(RuleName)}
 
@@ -55,11 +55,8 @@ def run_deck(
 
 def run_rule(rule: Rule, measures: Measures) -> list[Finding]:
     """Return the findings of a rule; failures the user waived and lowered limits are marked."""
-    weak = lowered(measures.design, rule.name)
-    findings = [_against(weak, finding) for finding in rule.check(measures)]
-    if rule.name not in measures.design.rules.waive:
-        return findings
-    return [_waived(finding) if finding.verdict == "fail" else finding for finding in findings]
+    weak, waived = lowered(measures.design, rule.name), rule.name in measures.design.rules.waive
+    return [marked(found, weak, "the design" if waived else "") for found in rule.check(measures)]
 
 
 def has_failed(findings: Iterable[Finding]) -> bool:
@@ -71,13 +68,10 @@ def rule_names() -> tuple[str, ...]:
     return tuple(rule.name for rule in RULES)
 
 
-def _against(weak: Sequence[str], finding: Finding) -> Finding:
-    """Return the finding with the limits that the design lowers; a rule's own waivers omit them."""
-    if not weak or finding.verdict == "waived":
-        return finding
-    return replace(finding, message=f"{finding.message}; limits lowered: {', '.join(weak)}")
+AS_BUILT = ("file-integrity", "manifest-claims", "as-designed")
+"""The checks on a folder, beside the rules on what it will cut."""
 
-
-def _waived(finding: Finding) -> Finding:
-    message = f"waived by the design: {finding.message}"
-    return replace(finding, verdict="waived", by_user=True, message=message)
+EXPLAINED: Mapping[str, Explanation] = {rule.name: rule.explanation for rule in RULES} | {
+    name: explained(name) for name in catalogue() if name not in (WORDS, *get_args(RuleName))
+}
+"""Explanations of all rules and checks by name, for ``sbafab explain`` and the reference pages."""

@@ -11,19 +11,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from sbafab.design.records import Design
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import LOOSE, Interface, Laminate, Pin
+from sbafab.laminate.laminate import LOOSE, Interface, Laminate
 from sbafab.rules.boundary import Facing, beside, edges_along, outward_reach, without_slivers
-from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, at, holds
+from sbafab.rules.finding import Finding, Place, judged
+from sbafab.rules.limits import TOLERANCE, holds
 from sbafab.rules.margins import pin_at
 from sbafab.rules.measures import Measures, distinct_interfaces
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import explained, layer_name
 
 NAME = "facing-films"
 
@@ -36,37 +36,31 @@ class _Weld(NamedTuple):
     number: int
 
 
-class _Overhang(NamedTuple):
-    value: float
-    at: Point
-    gap: Interface
-
-
 def check(measures: Measures) -> list[Finding]:
     """Return the largest unintended weld; without any, the least overhang of masks there."""
-    laminate, design = measures.laminate, measures.design
+    laminate, limit = measures.laminate, measures.design.rules.mask_overhang
     pairs = _distinct(measures.facing)
     welds = [*_past_films(pairs), *_at_rims(laminate)]
     if welds:
         return [_welded(welds, laminate)]
-    message = "films of two balloons meet where they are meant to bond, and nowhere else"
-    clear = Finding(NAME, "pass", 0.0, 0.0, "mm2", Place(), message)
-    overhangs = [o for pair, _ in pairs for o in _overhangs(pair.gap, laminate.pins, measures)]
-    return [clear, _least(overhangs, design)] if overhangs else [clear]
+    overhangs = [
+        (reach.value, edge.nearest(reach.at), pair.gap)
+        for pair, _ in pairs
+        for edge, reach in measures.reaches(pair.gap)
+        if not pin_at(edge, laminate.pins)
+    ]
+    findings = [judged(NAME, True, 0.0, 0.0, "mm2", Place(), "apart")]
+    if overhangs:
+        value, p, gap = min(overhangs, key=lambda overhang: round(overhang[0], 9))
+        below, above = gap.below.index, gap.above.index
+        place = Place(gap.index, (below, *sorted(mask.index for mask in gap.masks), above), *p)
+        facts = {"below": below, "above": above}
+        good = holds(value, limit)
+        findings.append(judged(NAME, good, limit, value, "mm", place, "overhang", **facts))
+    return findings
 
 
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "films of two balloons meet where they are meant to bond, and nowhere else",
-        "The press welds any two films with neither film nor mask between them, neighbours or not, "
-        "in a step that holds both, if their faces bond in it.",
-        "Make balloons more alike, tabs shorter, or masks larger where the message says.",
-        ("rules.mask_overhang", "mask.overhang", "chamber.diameter"),
-    ),
-    at_most=True,
-)
+RULE = Rule(NAME, check, explained(NAME), at_most=True)
 
 
 def _distinct(pairs: Iterable[Facing]) -> list[tuple[Facing, int]]:
@@ -126,45 +120,17 @@ def _is_ear(piece: Region, laminate: Laminate) -> bool:
     return False
 
 
-def _overhangs(gap: Interface, pins: tuple[Pin, ...], measures: Measures) -> Iterator[_Overhang]:
-    """Reach of the masks past the edges of either film in the area of facing."""
-    for edge, reach in measures.reaches(gap):
-        if not pin_at(edge, pins):
-            yield _Overhang(reach.value, edge.nearest(reach.at), gap)
-
-
 def _welded(welds: Sequence[_Weld], laminate: Laminate) -> Finding:
     worst = max(welds, key=lambda weld: round(weld.region.area, 9))
-    gap, area, p = worst.gap, worst.region.area, _inside(worst.region)
-    message = (
-        f"layers {gap.below.index} ({gap.below.name}) and {gap.above.index} ({gap.above.name}) "
-        f"face each other over {area:.3f} mm2 with neither film nor mask between, {at(p)}, and "
-        f"weld there; let the mask below layer {gap.above.index} reach over that place"
-    )
+    gap, area = worst.gap, worst.region.area
     masks = laminate.interfaces[gap.index - 1].masks
-    more = sum(weld.number for weld in welds) - 1
-    if more:
-        message += f" (and {more} more such place{'s' if more > 1 else ''})"
     layers = (gap.below.index, *(mask.index for mask in masks), gap.above.index)
-    place = Place(gap.index, layers, *p)
-    return Finding(NAME, "fail", 0.0, area, "mm2", place, message)
-
-
-def _least(overhangs: Sequence[_Overhang], design: Design) -> Finding:
-    worst = min(overhangs, key=lambda overhang: round(overhang.value, 9))
-    gap, limit = worst.gap, design.rules.mask_overhang
-    good = holds(worst.value, limit)
-    message = (
-        f"layers {gap.below.index} and {gap.above.index} face each other past films that end "
-        f"between them; the masks there reach {worst.value:.3f} mm past their edges, {at(worst.at)}"
+    place = Place(gap.index, layers, *_inside(worst.region))
+    facts: dict[str, Any] = {"lower": layer_name(gap.below), "upper": layer_name(gap.above)}
+    facts |= {"above": gap.above.index, "more": sum(weld.number for weld in welds) - 1}
+    return judged(
+        NAME, False, 0.0, area, "mm2", place, "welds" if facts["more"] else "weld", **facts
     )
-    if not good:
-        message += (
-            f"; it needs {limit:g}: let the mask below layer {gap.above.index} reach further there"
-        )
-    layers = (gap.below.index, *sorted(mask.index for mask in gap.masks), gap.above.index)
-    place = Place(gap.index, layers, *worst.at)
-    return Finding(NAME, "pass" if good else "fail", limit, worst.value, "mm", place, message)
 
 
 def _inside(region: Region) -> Point:

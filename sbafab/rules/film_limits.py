@@ -12,10 +12,11 @@ from sbafab.geometry.offset import beam_path, widths
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import TAPER, Width, least_gap, least_width, place_of
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import at, holds
+from sbafab.rules.finding import Finding, Place, judged
+from sbafab.rules.limits import holds
 from sbafab.rules.measures import Measures
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import explained, layer_name, say
 
 NAME = "film-limits"
 
@@ -41,31 +42,15 @@ def check(measures: Measures) -> list[Finding]:
         return [lost]
     finest = _finest(laminate)
     if finest is None:
-        message = "no layer has a web, slot or gap"
-        return [Finding(NAME, "pass", limit, None, "mm", Place(), message)]
+        return [judged(NAME, True, limit, None, "mm", Place(), "none")]
     layer, kind, width = finest
-    good = holds(width.value, limit)
-    message = (
-        f"the finest feature is a {kind} of {width.value:.3f} mm in layer {layer.index} "
-        f"({layer.name}), {at(width.middle)}"
-    )
-    if not good:
-        remedy = "widen it" if width.value else "end it blunt and as wide as that"
-        message += f"; the laser needs {limit:g}: {remedy} or leave it out"
-    place = Place(None, (layer.index,), *width.middle)
-    return [Finding(NAME, "pass" if good else "fail", limit, width.value, "mm", place, message)]
+    sentence = "finest" if width.value else "pointed"
+    facts = {"kind": kind, "layer": layer_name(layer)}
+    place, good = Place(None, (layer.index,), *width.middle), holds(width.value, limit)
+    return [judged(NAME, good, limit, width.value, "mm", place, sentence, **facts)]
 
 
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "nothing is finer than the laser cuts, before and after kerf",
-        "A slot or web below the beam's own width burns away or stays uncut.",
-        "Make the feature at the place named wider, or measure the kerf.",
-        ("laser.least_feature", "laser.kerf_tpe", "laser.kerf_ptfe"),
-    ),
-)
+RULE = Rule(NAME, check, explained(NAME))
 
 
 def _finest(laminate: Laminate) -> _Feature | None:
@@ -97,7 +82,7 @@ def _lost_to_kerf(laminate: Laminate, design: Design) -> Finding | None:
         kerf = design.kerf_widths.get(layer.film.material) or 0.0
         if max(widths(kerf)) == 0:
             continue
-        place, fault = Place(None, (layer.index,)), "loses or joins a hole or piece"
+        place, fault = Place(None, (layer.index,)), say("film-limits.unnamed")
         try:
             lost = beam_path(laminate.as_cut(layer), kerf).lost
             if lost is None:
@@ -105,13 +90,10 @@ def _lost_to_kerf(laminate: Laminate, design: Design) -> Finding | None:
             spot = place_of(laminate.as_cut(layer), lost, kerf)
             place = Place(None, (layer.index,), *spot)
             kind = "hole" if lost.contour.is_hole else "outline"
-            fault = f"has a {kind} that {lost.fate} at {at(spot)}"
+            fault = say("film-limits.contour", kind=kind, fate=lost.fate)
         except GeometryError:
             pass
-        width = " x ".join(f"{w:g}" for w in dict.fromkeys(widths(kerf)))
-        message = (
-            f"layer {layer.index} ({layer.name}) {fault} when its cut path is moved by half the "
-            f"kerf of {width} mm; widen what is narrower than the kerf"
-        )
-        return Finding(NAME, "fail", max(widths(kerf)), None, "mm", place, message)
+        limit, width = max(widths(kerf)), " x ".join(f"{w:g}" for w in dict.fromkeys(widths(kerf)))
+        facts = {"layer": layer_name(layer), "fault": fault, "kerf": width}
+        return judged(NAME, False, limit, None, "mm", place, "lost", **facts)
     return None

@@ -1,13 +1,14 @@
-"""Findings of rules and checks as data: verdict, value, limit, place and message."""
+"""Findings of rules and checks as data: verdict, value, limit, place, and what they say."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from sbafab.notebook import data_frame, table_html
+from sbafab.rules.sentences import FAIL, REMEDY, Clause, is_said, say, tell
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -27,11 +28,13 @@ class Place:
 
 @dataclass(frozen=True)
 class Finding:
-    """A verdict with the measured worst value, its limit, unit and place.
+    """A verdict with the measured worst value, its limit, unit and place, and what it ``says``.
 
-    ``by_user`` distinguishes a failure that the design waives by name from a waiver that the rule
-    grants (a flush mask at a pinned bore). ``remedy`` is the action that a warning asks for; the
-    message begins with it. ``interval`` is the 95 % interval of a counted share.
+    ``says`` is a sentence of the catalogue with its facts, or the text of a rule of another
+    package. ``waived_by`` the design, or the assembly, if that waives a failure by name; a rule
+    grants a waiver itself too (a flush mask at a pinned bore). ``lowered`` lists the limits that
+    the design lowers. ``interval`` is the 95 % interval of a counted share; ``parts`` are the parts
+    of an assembly that it is about; ``design`` is the design's name if there are several.
     """
 
     rule: str
@@ -40,17 +43,84 @@ class Finding:
     measured: float | None
     unit: str
     where: Place
-    message: str
-    by_user: bool = False
-    remedy: str = ""
+    says: Clause | str
+    waived_by: str = ""
+    lowered: tuple[str, ...] = ()
     interval: tuple[float, float] | None = None
+    parts: tuple[str, ...] = ()
     design: str = ""
-    """The design's name if there are several designs; the message begins with it."""
 
     def __post_init__(self) -> None:
         # Limits are in um: what arithmetic leaves below 1 nm says nothing.
         if isinstance(self.measured, float):
             object.__setattr__(self, "measured", round(self.measured, 6))
+
+    @property
+    def id(self) -> str:
+        """The rule, and which of its sentences it says: "bond-width.narrowest"."""
+        return self.rule if isinstance(self.says, str) else self.says.id
+
+    @property
+    def by_user(self) -> bool:
+        """True for a failure that the design or the assembly waives by name."""
+        return bool(self.waived_by)
+
+    @property
+    def remedy(self) -> str:
+        """The action that a warning asks for; the message begins with it."""
+        if isinstance(self.says, str) or self.verdict != "warn":
+            return ""
+        remedy = self.says._replace(id=self.says.id + REMEDY)
+        return tell(remedy, self._facts) if is_said(remedy.id) else ""
+
+    @property
+    def message(self) -> str:
+        """The finding in one sentence."""
+        said = self.says if isinstance(self.says, str) else tell(self.says, self._facts)
+        text = ": ".join(filter(None, (self.remedy, said)))
+        if self.lowered:
+            text += f"; limits lowered: {', '.join(self.lowered)}"
+        waived = f"waived by {self.waived_by}" if self.waived_by else ""
+        return ": ".join(filter(None, (self.design, waived, text)))
+
+    @property
+    def _facts(self) -> dict[str, Any]:
+        place = self.where.x, self.where.y
+        return {"measured": self.measured, "limit": self.limit, "at": place}
+
+
+def judged(
+    rule: str,
+    verdict: Verdict | bool,
+    limit: float | None,
+    measured: float | None,
+    unit: str,
+    where: Place,
+    sentence: str,
+    /,
+    **facts: Any,
+) -> Finding:
+    """Return a finding that says a sentence of its rule, or that one's "-fail" if it fails."""
+    if isinstance(verdict, bool):
+        verdict = "pass" if verdict else "fail"
+    name = f"{rule}.{sentence}"
+    if verdict == "fail" and is_said(name + FAIL):
+        name += FAIL
+    return Finding(
+        rule, verdict, limit, measured, unit, where, say(name, **{"measured": measured, **facts})
+    )
+
+
+def marked(finding: Finding, lowered: tuple[str, ...], waived_by: str) -> Finding:
+    """Return a finding with the lowered limits it was held against, waived by a user if it failed.
+
+    What a rule waives itself states no lowered limits.
+    """
+    if lowered and finding.verdict != "waived":
+        finding = replace(finding, lowered=lowered)
+    if waived_by and finding.verdict == "fail":
+        finding = replace(finding, verdict="waived", waived_by=waived_by)
+    return finding
 
 
 def decisive(findings: Iterable[Finding]) -> dict[str, Finding]:

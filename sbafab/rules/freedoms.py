@@ -23,9 +23,6 @@ from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import LOOSE, Laminate
 from sbafab.rules.limits import error_on_pins
 
-EARS = 'set registration.method = "ears" (drawn layers: draw ears, list their pins)'
-"""Remedy if a hand places a body that pins could hold."""
-
 
 class Part(NamedTuple):
     """A piece of a layer: the layer's index and the piece's place in ``profile.pieces``."""

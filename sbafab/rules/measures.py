@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 from sbafab.design.records import Design
 from sbafab.geometry.cache import cached
-from sbafab.geometry.edges import Edge
+from sbafab.geometry.edges import Edge, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_width
 from sbafab.laminate.assembly import assembly
 from sbafab.laminate.folding import lies_on
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.boundary import Facing, Reach, edges_along, facing_films, outward_reach
+from sbafab.rules.finding import Place
 from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
 from sbafab.rules.margins import (
     SHARP,
@@ -26,6 +27,7 @@ from sbafab.rules.margins import (
     narrow_places,
 )
 from sbafab.rules.seam_overlaps import SeamEnds, seam_ends
+from sbafab.rules.sentences import Clause, say
 
 
 class Measures:
@@ -139,9 +141,12 @@ class DistinctInterface(NamedTuple):
     number: int
 
     @property
-    def suffix(self) -> str:
-        """Suffix of a message that holds for more than one interface: " (and 2 like it)"."""
-        return f" (and {self.number - 1} like it)" if self.number > 1 else ""
+    def name(self) -> Clause:
+        """The interface as sentences name it, with the number of others like it."""
+        named = interface_name(self.interface)
+        if self.number == 1:
+            return named
+        return say("words.interface-like", interface=named, like=self.number - 1)
 
 
 def distinct_interfaces(laminate: Laminate) -> tuple[DistinctInterface, ...]:
@@ -152,7 +157,19 @@ def distinct_interfaces(laminate: Laminate) -> tuple[DistinctInterface, ...]:
     return tuple(DistinctInterface(group[0], len(group)) for group in groups.values())
 
 
-def interface_name(interface: Interface) -> str:
-    """Return an interface as messages name it, with its layers."""
-    kind = f"{interface.kind} interface"
-    return f"{kind} {interface.index} (layers {interface.below.index} and {interface.above.index})"
+def interface_name(interface: Interface) -> Clause:
+    """Return an interface as sentences name it, with its layers."""
+    below, above = interface.below.index, interface.above.index
+    kind, index = interface.kind, interface.index
+    return say("words.interface", kind=kind, index=index, below=below, above=above)
+
+
+def place_in(interface: Interface, p: Point | None = None) -> Place:
+    """Return a place in an interface, mm."""
+    return Place(interface.index, interface.layer_indices, *(p or (None, None)))
+
+
+def middle(region: Region) -> Point:
+    """Return the middle of the box round a region."""
+    low_x, low_y, high_x, high_y = region.bounds
+    return (low_x + high_x) / 2, (low_y + high_y) / 2

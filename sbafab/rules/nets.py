@@ -23,11 +23,11 @@ from sbafab.laminate.joints import Net
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.laminate.netlist import Netlist, compare
 from sbafab.rules.boundary import without_slivers
-from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import at
-from sbafab.rules.measures import Measures
+from sbafab.rules.finding import Finding, Place, Verdict, judged
+from sbafab.rules.measures import Measures, middle, place_in
 from sbafab.rules.opening_pressure import hardest_place
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import Clause, explained, say, tell
 from sbafab.rules.void_axes import (
     AxisNode,
     Terminal,
@@ -68,7 +68,16 @@ class NetFault:
     interface: int | None
     layers: tuple[int, ...]
     at: Point
-    message: str
+    says: Clause
+
+    @property
+    def message(self) -> str:
+        """The difference in one sentence."""
+        return tell(self.says, {"at": self.at, "interface": self.interface})
+
+    @property
+    def where(self) -> Place:
+        return Place(self.interface, self.layers, *self.at)
 
 
 @dataclass(frozen=True)
@@ -106,41 +115,24 @@ def check(measures: Measures) -> list[Finding]:
     laminate, design = measures.laminate, measures.design
     if not laminate.nets:
         return []
-    found = connectivity(laminate, design)
-    findings = [_failed(fault, fault.message) for fault in found.faults]
+    read = connectivity(laminate, design)
+    findings = [
+        Finding(NAME, "fail", 0.0, 1.0, "faults", fault.where, _in_place(fault))
+        for fault in read.faults
+    ]
     if not findings:
         nets = declared(laminate)
-        count = sum(len(net.ports) for net in nets)
-        message = (
-            f"{_counted(len(nets), 'net')} of {_counted(count, 'port')} joined as declared, and to "
-            "nothing else"
-        )
-        findings.append(Finding(NAME, "pass", 0.0, 0.0, "faults", Place(), message))
-    return [*findings, *_openings(found.narrow, laminate, design)]
+        ports = sum(len(net.ports) for net in nets)
+        facts = {"nets": len(nets), "ports": ports}
+        findings.append(judged(NAME, True, 0.0, 0.0, "faults", Place(), "joined", **facts))
+    return [*findings, *_openings(read.narrow, laminate, design)]
 
 
-def _failed(fault: NetFault, message: str) -> Finding:
-    place = Place(fault.interface, fault.layers, *fault.at)
-    return Finding(NAME, "fail", 0.0, 1.0, "faults", place, message)
+def _in_place(fault: NetFault) -> Clause:
+    return fault.says.also(interface=fault.interface)
 
 
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "the voids join the ports of each net, and nothing else; no branch ends blind, and every "
-        "channel opens under pressure",
-        "An open net never fills, two that are joined fill together, and a blind branch keeps air.",
-        "Look at the place named: a mask that is cut or bridged, or a hole that is missing or one "
-        "too many.",
-        ("nets", "ports", "rules.opening_pressure_kpa", "rules.dead_end"),
-    ),
-    at_most=True,
-)
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"
+RULE = Rule(NAME, check, explained(NAME), at_most=True)
 
 
 def declared(laminate: Laminate) -> tuple[Net, ...]:
@@ -193,28 +185,28 @@ def netlist_findings(
         Net(name, tuple(member for member in members if member in names))
         for name, members in netlist.nets.items()
     )
-    found = connectivity(replace(laminate, ports=ports, nets=nets), design)
-    comparison = compare(found.groups, netlist.nets)
-    findings = [
-        Finding(NETLIST, "fail", 0.0, 1.0, "differences", Place(), _missing(name, file, names))
-        for name in comparison.missing
+    read = connectivity(replace(laminate, ports=ports, nets=nets), design)
+    comparison = compare(read.groups, netlist.nets)
+    said = [_missing(name, names) for name in comparison.missing]
+    said += [
+        (fault.where, say("netlist.fault", fault=_in_place(fault)))
+        for fault in read.faults
+        if fault.kind in ("open", "short", "leak")
     ]
-    for fault in found.faults:
-        if fault.kind in ("open", "short", "leak"):
-            place = Place(fault.interface, fault.layers, *fault.at)
-            message = f"{file}: {fault.message}"
-            findings.append(Finding(NETLIST, "fail", 0.0, 1.0, "differences", place, message))
-    if not findings:
-        count = _counted(len(comparison.matched), "net")
-        message = f"{file}: {count} joined as listed, and to nothing else"
-        findings.append(Finding(NETLIST, "pass", 0.0, 0.0, "differences", Place(), message))
-    return findings
+    verdict: Verdict = "fail" if said else "pass"
+    count = float(bool(said))
+    said = said or [(Place(), say("netlist.joined", nets=len(comparison.matched)))]
+    return [
+        Finding(NETLIST, verdict, 0.0, count, "differences", where, says.also(file=file))
+        for where, says in said
+    ]
 
 
-def _missing(name: str, file: str, names: Iterable[str]) -> str:
+def _missing(name: str, names: Iterable[str]) -> tuple[Place, Clause]:
     near = get_close_matches(name, sorted(names), 1)
-    hint = f"did you mean {near[0]}?" if near else "give its layers and its place, or correct it"
-    return f"{file} names {name}, which is no port or chamber of the design; {hint}"
+    if near:
+        return Place(), say("netlist.near", member=name, near_name=near[0])
+    return Place(), say("netlist.unknown", member=name)
 
 
 class _Terminal(NamedTuple):
@@ -224,7 +216,7 @@ class _Terminal(NamedTuple):
     """
 
     member: str
-    label: str
+    label: Clause | str
     cavities: tuple[int, ...]
     at: Point
     width: float
@@ -275,15 +267,16 @@ class _Reading:
             if inlet.chamber == member:
                 mouths = graph.joins.get(mouth_of(number), {})
                 beside = tuple(sorted({self.cavity_of[void] for void in mouths}))
-                label = f"the inlet of {member}"
+                label = say("nets.inlet", member=member)
                 rows.append(_Terminal(member, label, beside, inlet.mouth, inlet.width, False, ()))
         gaps = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
         for chamber in laminate.chambers:
             balloons = [n for n in range(1, len(gaps) + 1) if chamber.is_in(n)]
             for balloon in balloons if chamber.name == member else ():
                 layers = (gaps[balloon - 1].below.index, gaps[balloon - 1].above.index)
-                label = f"the pocket of {member}"
-                label += f" in balloon {balloon}" if len(balloons) > 1 else ""
+                label = say("nets.pocket", member=member)
+                if len(balloons) > 1:
+                    label = say("nets.pocket-in", member=member, balloon=balloon)
                 rows += [
                     _Terminal(member, label, self._holding(p, layers), p, 0.0, True, layers)
                     for p in chamber.centres
@@ -357,12 +350,9 @@ class _Reading:
                     dict.fromkeys(counts), key=lambda p: -1 if p is None else counts.count(p)
                 )
             for row in (row for row, part in home.items() if part is None):
-                message = (
-                    f"net {net.name} is open: {row.label} lies in no void ({at(row.at)}); open the "
-                    "mask or the film there, or move the port"
-                )
+                says = say("nets.open-void", net=net.name, member=row.label)
                 gap = self._between(row.layers)
-                yield NetFault("open", (net.name,), gap, row.layers, row.at, message)
+                yield NetFault("open", (net.name,), gap, row.layers, row.at, says)
             for part in dict.fromkeys(p for p in home.values() if p not in (None, main)):
                 yield self._open(net.name, home, part or 0, main or 0)
 
@@ -370,45 +360,48 @@ class _Reading:
         self, name: str, home: Mapping[_Terminal, int | None], part: int, main: int
     ) -> NetFault:
         cut = self._gap_between(part, main)
-        apart, rest = _labels(home, part), _labels(home, main)
         gap = self.interface(cut.interface)
-        reason = (
-            f"layer {gap.above.index} has no hole there"
-            if cut.is_through_film
-            else f"{cut.length:.3f} mm of bond lie between"
+        says = say(
+            "nets.open-hole" if cut.is_through_film else "nets.open-bond",
+            net=name,
+            one=_labels(home, part),
+            rest=_labels(home, main),
+            above=gap.above.index,
+            length=cut.length,
         )
-        message = (
-            f"net {name} is open: {apart} is not joined to {rest}; they come nearest at interface "
-            f"{cut.interface} ({at(cut.at)}), where {reason}: join them"
-        )
-        return NetFault("open", (name,), cut.interface, gap.layer_indices, cut.at, message)
+        return self._fault("open", (name,), gap, cut.at, says)
+
+    def _fault(
+        self, kind: FaultKind, nets: tuple[str, ...], gap: Interface, p: Point, says: Clause
+    ) -> NetFault:
+        return NetFault(kind, nets, gap.index, gap.layer_indices, p, says)
 
     def shorts(self) -> Iterable[NetFault]:
         """Yield the parts that several nets share, a fault for each further net."""
         for part, names in self.owners.items():
             for name in names[1:]:
-                shared = self._shared_mouth(part, names[0], name)
-                number, p, why = shared or self._bridge(part, names[0], name)
+                both, says = (names[0], name), say("nets.short", net=names[0], other=name)
+                shared = self._shared_mouth(part, *both)
+                if shared is None:
+                    number, p = self._bridge(part, *both)
+                else:
+                    number, p, chamber = shared
+                    says = say("nets.short-mouth", net=names[0], other=name, chamber=chamber)
                 gap = self.interface(self.cavities[number].interface)
-                message = (
-                    f"nets {names[0]} and {name} are joined at interface {gap.index} ({at(p)})"
-                )
-                message += why
-                yield NetFault("short", (names[0], name), gap.index, gap.layer_indices, p, message)
+                yield self._fault("short", both, gap, p, says)
 
     def leaks(self) -> Iterable[NetFault]:
         """Yield the places where a net reaches the outside."""
         for void, p in self.graph.joins.get(OUTSIDE, {}).items():
             names = self.owners.get(self.part_of[void], ())
-            if not names:
-                continue
-            interface = None if void.kind == "opening" else void.level
-            layers = (void.level,) if interface is None else self.interface(interface).layer_indices
-            where = f"layer {void.level}" if interface is None else f"interface {interface}"
-            message = f"net {names[0]} reaches the outside at {where} ({at(p)})"
-            wide = past_mouth(self.laminate, void.level, p) if void.kind == "pocket" else None
-            message += f": {wide}" if wide else "; close the opening, or make it a port"
-            yield NetFault("leak", names, interface, layers, p, message)
+            if names and void.kind == "opening":
+                says = say("nets.leak-layer", net=names[0], layer=void.level)
+                yield NetFault("leak", names, None, (void.level,), p, says)
+            elif names:
+                wide = past_mouth(self.laminate, void.level, p) if void.kind == "pocket" else None
+                sentence = "nets.leak-past-mouth" if wide else "nets.leak"
+                says = say(sentence, net=names[0], wide=wide)
+                yield self._fault("leak", names, self.interface(void.level), p, says)
 
     def dead_ends(self, ratio: float) -> Iterable[NetFault]:
         """Yield the blind ends in the cavities of the nets."""
@@ -422,22 +415,13 @@ class _Reading:
                 if any(terminal.is_port for terminal in terminals):
                     continue
                 start = terminals[0].at if terminals else None
-                p = _middle(cavity.region) if start is None else self._far_from(number, start)
-                what = "a hole that leads nowhere" if cavity.is_open_film else "a void with no port"
-            else:
-                for end in blind_ends(self.axis(number), terminals, ratio):
-                    message = (
-                        f"net {names[0]} has a dead end at interface {gap.index} ({at(end.at)}): "
-                        f"{end.depth:.2f} mm long, {end.width:.2f} mm wide and without a port; "
-                        "remove that part of the mask, or put a port there"
-                    )
-                    yield NetFault("dead-end", names, gap.index, gap.layer_indices, end.at, message)
+                p = middle(cavity.region) if start is None else self._far_from(number, start)
+                blind = "nets.blind-hole" if cavity.is_open_film else "nets.blind-void"
+                yield self._fault("dead-end", names, gap, p, say(blind, net=names[0]))
                 continue
-            message = (
-                f"net {names[0]} has a dead end at interface {gap.index} ({at(p)}): {what}; remove "
-                "it, or put a port there"
-            )
-            yield NetFault("dead-end", names, gap.index, gap.layer_indices, p, message)
+            for end in blind_ends(self.axis(number), terminals, ratio):
+                says = say("nets.dead-end", net=names[0], depth=end.depth, width=end.width)
+                yield self._fault("dead-end", names, gap, end.at, says)
 
     def strays(self) -> Iterable[NetFault]:
         """Yield closed voids outside all nets, and chamber interfaces' voids that open outside."""
@@ -452,12 +436,8 @@ class _Reading:
             if part in is_open and not (gap.kind == "chamber" and gap.pressed):
                 continue
             seen.add(part)
-            p = _middle(cavity.region)
-            message = (
-                f"a void of no net lies at interface {gap.index} ({at(p)}); remove that part of "
-                "the mask, or put a port of a net there"
-            )
-            yield NetFault("stray", (), gap.index, gap.layer_indices, p, message)
+            p = middle(cavity.region)
+            yield self._fault("stray", (), gap, p, say("nets.stray"))
 
     # Widths.
 
@@ -530,11 +510,11 @@ class _Reading:
                     cuts += _overlaps(here, there)
         if not cuts:
             cavity = self.cavities[self._of_part(part)[0]]
-            return _Cut(0.0, 0.0, cavity.interface, _middle(cavity.region), True)
+            return _Cut(0.0, 0.0, cavity.interface, middle(cavity.region), True)
         return min(cuts, key=lambda cut: (cut.cost, cut.interface))
 
     def _shared_mouth(self, part: int, first: str, second: str) -> tuple[int, Point, str] | None:
-        """The cavity of the second net and the place in it where a mouth alone joins two nets."""
+        """The cavity and place of the second net, and the chamber, whose mouth alone joins both."""
         walled = _parts(self.graph, ("outside", "mouth"))
         firsts, seconds = (
             {
@@ -550,14 +530,10 @@ class _Reading:
             own = [void for void in voids if walled[void] in seconds]
             if own and len(own) < len(voids):
                 chamber = self.laminate.inlets[mouth.level].chamber
-                why = (
-                    f": both open into the mouth of {chamber}; lead one of them elsewhere, or "
-                    "state a narrower mouth"
-                )
-                return self.cavity_of[own[0]], voids[own[0]], why
+                return self.cavity_of[own[0]], voids[own[0]], chamber
         return None
 
-    def _bridge(self, part: int, first: str, second: str) -> tuple[int, Point, str]:
+    def _bridge(self, part: int, first: str, second: str) -> tuple[int, Point]:
         """The cavity and the place in it where two nets of one part are joined.
 
         The ways between the ports of each net are its own; the bridge is the middle of the shortest
@@ -582,8 +558,7 @@ class _Reading:
         shared = [node for node in trees[0] if node in trees[1]]
         way = shared or shortest_way(axes, links, trees[0], trees[1])
         place, sample = way[len(way) // 2]
-        why = "; bond the films between them, or close the hole"
-        return numbers[place], axes[place].centre(sample), why
+        return numbers[place], axes[place].centre(sample)
 
     def _links(
         self, numbers: Sequence[int], axes: Sequence[VoidAxis]
@@ -639,7 +614,7 @@ def _overlaps(a: Cavity, b: Cavity) -> list[_Cut]:
     for piece in without_slivers(a.region & b.region).pieces:
         left = [len(without_slivers(cavity.region - piece).pieces) for cavity in (a, b)]
         cost = 2 * _across(piece) if min(left) > 1 else 0.0
-        cuts.append(_Cut(cost, 0.0, lower, _middle(piece), True))
+        cuts.append(_Cut(cost, 0.0, lower, middle(piece), True))
     return cuts
 
 
@@ -660,17 +635,16 @@ def _across(opening: Region) -> float:
     return min(high_x - low_x, high_y - low_y)
 
 
-def _middle(region: Region) -> Point:
-    low_x, low_y, high_x, high_y = region.bounds
-    return (low_x + high_x) / 2, (low_y + high_y) / 2
-
-
-def _labels(home: Mapping[_Terminal, int | None], part: int) -> str:
+def _labels(home: Mapping[_Terminal, int | None], part: int) -> list[Clause | str]:
     """The members of a net in a part; inlet or pocket where the other of the two lies elsewhere."""
     here = [row for row, number in home.items() if number == part]
     away = {row.member for row, number in home.items() if number != part}
-    labels = (row.label if row.member in away else row.member for row in here)
-    return " and ".join(dict.fromkeys(labels))
+    labels = {
+        str(name): name
+        for row in here
+        for name in [row.label if row.member in away else row.member]
+    }
+    return [*labels.values()]
 
 
 def _openings(
@@ -682,30 +656,21 @@ def _openings(
     if known:
         pressure, worst = max(known, key=lambda row: row[0])
         interface = laminate.interfaces[worst.interface - 1]
-        place = Place(worst.interface, interface.layer_indices, *worst.width.middle)
-        is_good = pressure <= limit * (1 + 1e-9)
-        left = f"is {worst.left:.3f} mm" if worst.left > 0 else "closes"
-        message = (
-            f"the channel of net {worst.net} that is hardest to open is drawn "
-            f"{worst.width.value:.3f} mm wide, at interface {worst.interface} "
-            f"({at(worst.width.middle)}), and {left} at worst "
-            f"({VoidEdges.of(interface, design).words()})"
-        )
-        if worst.left > 0:
-            message += f"; it opens by a film's thickness at {pressure:.3g} kPa (clamped plate)"
-        if not is_good:
-            message += (
-                f"; the limit is {limit:g} kPa: widen it there, or raise rules.opening_pressure_kpa"
-            )
+        facts = {
+            "net": worst.net,
+            "drawn": worst.width.value,
+            "interface": worst.interface,
+            "left": worst.left,
+            "pressure": pressure,
+            "edges": VoidEdges.of(interface, design).causes(),
+        }
+        good, place = pressure <= limit * (1 + 1e-9), place_in(interface, worst.width.middle)
         measured = pressure if math.isfinite(pressure) else None
-        verdict: Literal["pass", "fail"] = "pass" if is_good else "fail"
-        yield Finding(NAME, verdict, limit, measured, "kPa", place, message)
+        sentence = "opens" if worst.left > 0 else "closes"
+        yield judged(NAME, good, limit, measured, "kPa", place, sentence, **facts)
     if len(known) < len(narrow):
         unknown = next(place for place in narrow if place.pressure is None)
-        message = (
-            "State modulus and poisson of the films: without them it is not known what opens the "
-            f"channel of {unknown.width.value:.3f} mm, {unknown.left:.3f} at worst, at interface "
-            f"{unknown.interface}"
-        )
+        facts = {"drawn": unknown.width.value, "left": unknown.left}
         where = Place(unknown.interface, (), *unknown.width.middle)
-        yield Finding(NAME, "warn", limit, None, "kPa", where, message, remedy=message)
+        facts["interface"] = unknown.interface
+        yield judged(NAME, "warn", limit, None, "kPa", where, "unknown", **facts)

@@ -2,50 +2,27 @@
 
 from __future__ import annotations
 
-from sbafab.rules.finding import Finding, Place
-from sbafab.rules.measures import Measures
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.finding import Finding, Place, judged
+from sbafab.rules.measures import Measures, middle
+from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import explained, layer_name
 
 NAME = "piece-count"
 
 
 def check(measures: Measures) -> list[Finding]:
-    """The largest departure of any layer's number of pieces from the one it should have."""
+    """Return the largest departure of a layer's number of pieces from the one it should have."""
     laminate = measures.laminate
     counts = {name: len(layers[0].profile.pieces) for name, layers in laminate.patterns.items()}
     worst = max(laminate.layers, key=lambda layer: abs(counts[layer.pattern] - layer.pieces))
-    count = counts[worst.pattern]
-    off = abs(count - worst.pieces)
-    if off == 0:
-        message = "every layer falls into the pieces its role asks for"
-        return [Finding(NAME, "pass", 0.0, 0.0, "pieces", Place(), message)]
-    x = y = None
-    if count:
-        smallest = min(worst.profile.pieces, key=lambda piece: piece.area)
-        low_x, low_y, high_x, high_y = smallest.bounds
-        x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
-    pieces = "1 piece" if count == 1 else f"{count} pieces"
-    remedy = (
-        "remove the stray one or join it to the rest"
-        if count > worst.pieces
-        else "separate what has grown together or restore what is lost"
-    )
-    message = (
-        f"layer {worst.index} ({worst.name}) falls into {pieces} and should fall into "
-        f"{worst.pieces}; {remedy}"
-    )
-    place = Place(None, (worst.index,), x, y)
-    return [Finding(NAME, "fail", 0.0, float(off), "pieces", place, message)]
+    count, wanted = counts[worst.pattern], worst.pieces
+    if count == wanted:
+        return [judged(NAME, True, 0.0, 0.0, "pieces", Place(), "whole")]
+    smallest = min(worst.profile.pieces, key=lambda piece: piece.area, default=None)
+    place = Place(None, (worst.index,), *(middle(smallest) if smallest else ()))
+    sentence, off = "more" if count > wanted else "fewer", float(abs(count - wanted))
+    facts = {"layer": layer_name(worst), "count": count, "wanted": wanted}
+    return [judged(NAME, False, 0.0, off, "pieces", place, sentence, **facts)]
 
 
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "every layer falls into the pieces that its role says",
-        "A film in two pieces is no film; a mask in one piece too many shifts in the press.",
-        "Make the chamber larger or the bond narrower, so that the layer hangs together.",
-        ("chamber.diameter", "bond.width"),
-    ),
-    at_most=True,
-)
+RULE = Rule(NAME, check, explained(NAME), at_most=True)

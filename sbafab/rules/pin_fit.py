@@ -15,10 +15,11 @@ from sbafab.design.records import Design
 from sbafab.laminate.assembly import assembly, distinct_layers
 from sbafab.laminate.base_plate import pin_deviations
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
-from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, at, error_on_pins
+from sbafab.rules.finding import Finding, Place, judged
+from sbafab.rules.limits import TOLERANCE, error_on_pins
 from sbafab.rules.measures import Measures
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import explained, layer_name, say
 
 NAME = "pin-fit"
 
@@ -50,50 +51,30 @@ def check(measures: Measures) -> list[Finding]:
     limit = design.registration.pin_stretch
     fits = list(_fits(laminate, design))
     if not fits:
-        message = "no pin holds a layer"
-        return [Finding(NAME, "pass", limit, None, "", Place(), message)]
+        return [judged(NAME, True, limit, None, "", Place(), "no-pin")]
     worst = max(fits, key=lambda fit: round(fit.stretch, 9))
     # What a hole may miss its drawing by counts for it.
     good = worst.stretch <= limit + 2 * TOLERANCE / max(worst.least, TOLERANCE)
-    pin = worst.pin
-    message = (
-        f"{_stretch_text(worst)}; {100 * limit:.4g}% at most is allowed: the "
-        f"{worst.drawn:.3f} mm hole of layer {worst.layer.index} ({worst.layer.name}) may come out "
-        f"{max(worst.least, 0.0):.3f} mm wide, and the pin {pin.name} at {at(pin.centre)} up to "
-        f"{worst.most:.3f} mm; {_threaded(laminate, pin)} films are threaded on this pin"
-    )
-    if design.kerf_widths.get(worst.layer.film.material) is None:
-        message += "; its kerf is not measured, so holes come out wider by it and hold less"
-    if not good:
-        message += (
-            "; take a thinner pin or a wider hole (bore.pin_diameter, bore.diameter, "
-            "registration.pin_diameter)"
-        )
-    value = None if math.isinf(worst.stretch) else worst.stretch
-    place = Place(None, (worst.layer.index,), *pin.centre)
-    return [Finding(NAME, "pass" if good else "fail", limit, value, "", place, message)]
+    is_closed, pin, layer = math.isinf(worst.stretch), worst.pin, worst.layer
+    stretch = "closed" if is_closed else "stretches" if worst.stretch > 0 else "to-spare"
+    is_known = design.kerf_widths.get(layer.film.material) is not None
+    facts = {
+        "stretch": say(f"pin-fit.{stretch}", spare=worst.least - worst.most),
+        "percent": 100 * limit,
+        "drawn": worst.drawn,
+        "layer": layer_name(layer),
+        "least": max(worst.least, 0.0),
+        "pin": pin.name,
+        "most": worst.most,
+        "threaded": _threaded(laminate, pin),
+        "kerf": say("pin-fit.kerf-known" if is_known else "pin-fit.kerf-unknown"),
+    }
+    value = None if is_closed else worst.stretch
+    place = Place(None, (layer.index,), *pin.centre)
+    return [judged(NAME, good, limit, value, "", place, "fit", **facts)]
 
 
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "every film goes on its pins with hole and pin at their worst: 30 % stretch at most",
-        "Holes come out narrower than drawn; a film stretched further over its pin tears.",
-        "Use a thinner pin, a wider bore, or registration.pin_clearance.",
-        ("registration.pin_stretch", "bore.clearance", "bore.pin_diameter"),
-    ),
-    at_most=True,
-)
-
-
-def _stretch_text(fit: _Fit) -> str:
-    """Text for the stretch of a fit."""
-    if math.isinf(fit.stretch):
-        return "no hole may be left to go over a pin"
-    if fit.stretch > 0:
-        return f"at worst a film must stretch by {fit.stretch:.1%} over its pin"
-    return f"no film must stretch over its pin ({fit.least - fit.most:.3f} mm to spare at worst)"
+RULE = Rule(NAME, check, explained(NAME), at_most=True)
 
 
 def _fits(laminate: Laminate, design: Design) -> Iterator[_Fit]:

@@ -6,16 +6,17 @@ and is warned; one that states it fails.
 
 from __future__ import annotations
 
-from sbafab.laminate.burst import NOT_BURST, Burst, burst
-from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.limits import at
-from sbafab.rules.measures import Measures, interface_name
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.laminate.burst import NOT_BURST, burst
+from sbafab.rules.finding import Finding, Place, Verdict, judged
+from sbafab.rules.measures import Measures, interface_name, place_in
+from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import explained
 
 NAME = "pressure-rating"
 UNSTATED = 100.0
 """kPa that a design is held against which states no working pressure."""
-KEY = "acceptance.working_pressure_kpa"
+ROUNDING = 1e-9
+"""Share of a limit that rounding may take."""
 
 
 def check(measures: Measures) -> list[Finding]:
@@ -24,54 +25,22 @@ def check(measures: Measures) -> list[Finding]:
     stated, factor = acceptance.working_pressure_kpa, acceptance.safety_factor
     working = UNSTATED if stated is None else stated
     if working <= 0:
-        return [_passed("it works under a vacuum, by which no film bursts")]
+        return [judged(NAME, True, None, None, "kPa", Place(), "vacuum")]
     estimate = burst(measures.laminate)
-    if estimate is None and stated is None:
-        return [_passed(f"not compared: {NOT_BURST}, and state {KEY}")]
     if estimate is None:
-        remedy = "burst one actuator, and divide its pressure by the safety factor"
-        message = f"{remedy}: {NOT_BURST}; whether {working:g} kPa is safe is not known"
-        return [Finding(NAME, "warn", None, None, "kPa", Place(), message, remedy=remedy)]
-    return [_compared(estimate, working, factor, stated is not None)]
-
-
-def _passed(message: str) -> Finding:
-    return Finding(NAME, "pass", None, None, "kPa", Place(), message)
-
-
-def _compared(estimate: Burst, working: float, factor: float, is_stated: bool) -> Finding:
+        verdict: Verdict = "pass" if stated is None else "warn"
+        sentence = "not-compared" if stated is None else "unknown"
+        facts = {"unburst": NOT_BURST, "working": working}
+        return [judged(NAME, verdict, None, None, "kPa", Place(), sentence, **facts)]
     limit, interface = factor * working, estimate.interface
-    where = f"the widest pocket, of {interface_name(interface)} at {at(estimate.centre)},"
-    bursts = f"{where} is estimated to burst at {estimate.kpa:.3g} kPa"
-    is_good = estimate.kpa >= limit * (1 - ROUNDING)
-    safe = f"{estimate.kpa / factor:.3g} kPa"
-    place = Place(interface.index, interface.layer_indices, *estimate.centre)
-    remedy = ""
-    if is_good:
-        message = f"{bursts}: with a safety factor of {factor:g} it may work at {safe}"
-    elif is_stated:
-        message = (
-            f"{bursts}, less than {factor:g} times {working:g} kPa; lower {KEY} to {safe} or less, "
-            "or take narrower pockets or thicker film"
-        )
+    facts = {"working": working, "factor": factor, "safe_kpa": estimate.kpa / factor}
+    facts["where"] = interface_name(interface)
+    if estimate.kpa >= limit * (1 - ROUNDING):
+        verdict, sentence = "pass", "safe"
     else:
-        remedy = f"state {KEY}, at most {safe}"
-        message = f"{remedy}: {bursts}, less than {factor:g} times {working:g} kPa, the default"
-    verdict: Verdict = "pass" if is_good else "fail" if is_stated else "warn"
-    return Finding(NAME, verdict, limit, estimate.kpa, "kPa", place, message, remedy=remedy)
+        verdict, sentence = ("warn", "unstated") if stated is None else ("fail", "unsafe")
+    place = place_in(interface, estimate.centre)
+    return [judged(NAME, verdict, limit, estimate.kpa, "kPa", place, sentence, **facts)]
 
 
-ROUNDING = 1e-9
-"""Share of a limit that rounding may take."""
-
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "the estimated burst pressure is at least the working pressure times the safety factor; a "
-        "film without a burst test is not compared, and warned of if a working pressure is stated",
-        "A film under too much pressure bursts, or its bonds peel, at first use or after many.",
-        "Work at less pressure, take smaller pockets or a thicker film.",
-        (KEY, "acceptance.safety_factor", "chamber.diameter", "films.tpe.thickness"),
-    ),
-)
+RULE = Rule(NAME, check, explained(NAME))

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.rules.channel_clear import ON_ONE_PIN, Channel, channels, tooling_pins
-from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, at
+from sbafab.rules.finding import Finding, Place, judged
+from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.measures import Measures, distinct_interfaces
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import explained, layer_name
 
 NAME = "registration-nominal"
 
@@ -23,38 +24,25 @@ class _Departure(NamedTuple):
     value: float
     at: Point
     layers: tuple[int, ...]
-    fault: str
+    sentence: str
+    facts: dict[str, Any]
 
 
 def check(measures: Measures) -> list[Finding]:
-    """The largest departure of a hole from its axis or pin, or of an outline from its twin."""
-    laminate = measures.laminate
-    limit = TOLERANCE
+    """Return the largest departure of a hole from its axis or pin, or of an outline."""
+    laminate, limit = measures.laminate, TOLERANCE
     departures = [*_off_axis(laminate), *_off_pins(laminate), *_off_outline(laminate)]
     if not departures:
-        message = "no two layers have to lie over each other"
-        return [Finding(NAME, "pass", limit, None, "mm", Place(), message)]
+        return [judged(NAME, True, limit, None, "mm", Place(), "none")]
     worst = max(departures, key=lambda departure: departure.value)
+    place, sentence, facts = Place(None, worst.layers, *worst.at), worst.sentence, worst.facts
     good = worst.value <= limit + 1e-9
-    message = f"{worst.fault} by {worst.value:.4f} mm, {at(worst.at)}"
     if good:
-        message = f"bores are coaxial and outlines congruent to {max(worst.value, 1e-6):.6f} mm"
-    else:
-        message += f"; {limit:g} is allowed: draw both from the same edge"
-    place = Place(None, worst.layers, *worst.at)
-    return [Finding(NAME, "pass" if good else "fail", limit, worst.value, "mm", place, message)]
+        sentence, facts = "aligned", {"off": max(worst.value, 1e-6)}
+    return [judged(NAME, good, limit, worst.value, "mm", place, sentence, **facts)]
 
 
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "bores are coaxial and the two outlines of a balloon congruent, to 1 um",
-        "What is drawn off its place is off before any hand has touched it.",
-        "Draw both from the same edge.",
-    ),
-    at_most=True,
-)
+RULE = Rule(NAME, check, explained(NAME), at_most=True)
 
 
 def _off_axis(laminate: Laminate) -> Iterator[_Departure]:
@@ -62,13 +50,9 @@ def _off_axis(laminate: Laminate) -> Iterator[_Departure]:
         for layer in channel.layers if channel.has_axis else ():
             centre = _opening_centre(layer, channel)
             if centre is not None:
-                yield _Departure(
-                    math.dist(centre, channel.centre),
-                    centre,
-                    (layer.index,),
-                    f"the hole in layer {layer.index} ({layer.name}) misses the axis of the "
-                    f"{channel.name}",
-                )
+                facts = {"layer": layer_name(layer), "channel": channel.name}
+                off = math.dist(centre, channel.centre)
+                yield _Departure(off, centre, (layer.index,), "off-axis", facts)
 
 
 def _opening_centre(layer: Layer, channel: Channel) -> Point | None:
@@ -90,12 +74,9 @@ def _off_pins(laminate: Laminate) -> Iterator[_Departure]:
             holed = sum(off[layer.pattern] < pin.diameter for layer in siblings)
             if 2 * holed > len(siblings):
                 for layer in siblings:
-                    yield _Departure(
-                        off[layer.pattern],
-                        pin.centre,
-                        (layer.index,),
-                        f"layer {layer.index} ({layer.name}) misses the pin {pin.name}",
-                    )
+                    facts = {"layer": layer_name(layer), "pin": pin.name}
+                    value = off[layer.pattern]
+                    yield _Departure(value, pin.centre, (layer.index,), "off-pin", facts)
 
 
 def _off_pin(layer: Layer, pin: Pin) -> float:
@@ -113,13 +94,8 @@ def _off_outline(laminate: Laminate) -> Iterator[_Departure]:
             Region(layer.profile.outers) for layer in (interface.below, interface.above)
         )
         value, p = max(_farthest(below, above), _farthest(above, below), key=lambda entry: entry[0])
-        yield _Departure(
-            value,
-            p,
-            (interface.below.index, interface.above.index),
-            f"the outlines of layers {interface.below.index} and {interface.above.index}, one "
-            "balloon, depart from each other",
-        )
+        pair = interface.below.index, interface.above.index
+        yield _Departure(value, p, pair, "off-outline", {"below": pair[0], "above": pair[1]})
 
 
 @cached

@@ -15,9 +15,9 @@ from sbafab.design.records import Design
 from sbafab.geometry.on_demand import np
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.laminate.laminate import Interface, Laminate
-from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.freedoms import EARS, Freedom
-from sbafab.rules.limits import at, holds, least_passing
+from sbafab.rules.finding import Finding, Place, Verdict, judged
+from sbafab.rules.freedoms import Freedom
+from sbafab.rules.limits import holds, least_passing
 from sbafab.rules.margins import (
     InterfaceMargins,
     Margin,
@@ -26,21 +26,13 @@ from sbafab.rules.margins import (
     bonding_seams,
     pushes,
 )
-from sbafab.rules.measures import DistinctInterface, Measures, interface_name
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.measures import DistinctInterface, Measures, interface_name, place_in
+from sbafab.rules.rule import Rule
 from sbafab.rules.seam_overlaps import EdgeBond
+from sbafab.rules.sentences import Clause, explained, say
 
 NAME = "registration-worst-case"
 
-WHAT: dict[MarginKind, str] = {"bond": "bond", "overhang": "overhang of a mask past a film edge"}
-REMEDY: dict[MarginKind, str] = {
-    "bond": "make bond.width larger, or draw the bond wider",
-    "overhang": "make mask.overhang larger, or draw the mask so",
-}
-STEADIER = (
-    "make the seam wider, or run it farther past the edge or the other seam, or state a smaller "
-    "registration.seam_error that the tool keeps"
-)
 SAME = 1e-8
 """mm: of values that differ by less, the first is the worst if they are equal when rounded."""
 
@@ -129,22 +121,7 @@ def check(measures: Measures) -> list[Finding]:
     return [bond, overhang]
 
 
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "with every error at its worst 0.5 mm of a bond and 0.25 mm of an overhang are left",
-        "Cutting and pins must leave that (else it fails); what a hand may take only warns.",
-        f"Lay up with care, {EARS}, make bond and overhang larger, or run seams farther past each "
-        "other and past edges.",
-        (
-            "rules.worst_bond_width",
-            "rules.worst_mask_overhang",
-            "registration.hand_placement",
-            "registration.seam_error",
-        ),
-    ),
-)
+RULE = Rule(NAME, check, explained(NAME))
 
 
 def _finding(
@@ -152,7 +129,7 @@ def _finding(
 ) -> Finding:
     places = [place for place in remaining if place.quantity == quantity]
     if not places:
-        return Finding(NAME, "pass", limit, None, "mm", Place(), f"no {WHAT[quantity]} to measure")
+        return judged(NAME, True, limit, None, "mm", Place(), f"no-{quantity}")
     worst = min(places, key=lambda place: round(place.worst, 9))
     least_pinned = min(places, key=lambda place: round(place.pinned, 9))
     verdict: Verdict = "pass"
@@ -160,81 +137,74 @@ def _finding(
         verdict = "fail"
     elif not holds(worst.worst, limit):
         verdict = "warn"
-    interface = worst.interfaces[0]
     margin = worst.margin
     dearest = costs(pushes(margin, worst.group.first, measures.moves))
-    message = _message(worst, margin, dearest, measures.design)
-    remedy = ""
-    if verdict == "fail":
-        by_seams = any(freedom.seam for freedom, _ in dearest)
-        message += (
-            f"; even without what is laid by hand {_mm(least_pinned.pinned)} is left at "
-            f"{interface_name(least_pinned.interfaces[0])}, and it needs {limit:g}: "
-            f"{STEADIER if by_seams else REMEDY[quantity]}"
-        )
-    elif verdict == "warn":
-        short = sum(len(place.interfaces) for place in places if not holds(place.worst, limit))
-        remedy = _remedy(quantity, dearest, measures.laminate)
-        message = (
-            f"{remedy}: {message}; that is short of {limit:g} at {short} "
-            f"interface{'s' if short > 1 else ''}, {_why(least_pinned.pinned)}"
-        )
+    by_seams = any(freedom.seam for freedom, _ in dearest)
+    pinned, first = least_pinned.pinned, least_pinned.interfaces[0]
+    facts = {
+        "rest": _mm(worst.worst),
+        "nominal": margin.nominal,
+        "what": _what(margin, worst.group.first),
+        "where": worst.distinct.name,
+        "cause": _cause(dearest, margin, measures.design),
+        "firm": _mm(pinned),
+        "firm_where": interface_name(first),
+        "count": sum(len(place.interfaces) for place in places if not holds(place.worst, limit)),
+        "why": say(f"{NAME}.{'drawn-short' if math.isinf(pinned) else 'firm-leaves'}"),
+        "mending": say(f"{NAME}.{'steadier' if by_seams else f'wider-{quantity}'}"),
+        "plate": say(f"{NAME}.no-plate"),
+    }
+    if verdict == "warn":
+        facts["advice"] = _advice(quantity, dearest, measures.laminate)
     if quantity == "bond":
-        message += _plate(verdict == "fail", measures.laminate, measures.design)
-    place = Place(interface.index, interface.layer_indices, *margin.middle)
-    value = max(0.0, worst.worst)
-    return Finding(NAME, verdict, limit, value, "mm", place, message, remedy=remedy)
+        facts["plate"] = _plate(verdict == "fail", measures.laminate, measures.design)
+    sentence = {"pass": "kept", "warn": "short", "fail": "fails"}[verdict]
+    place, value = place_in(worst.interfaces[0], margin.middle), max(0.0, worst.worst)
+    return judged(NAME, verdict, limit, value, "mm", place, sentence, **facts)
 
 
-def _plate(failed: bool, laminate: Laminate, design: Design) -> str:
+def _plate(failed: bool, laminate: Laminate, design: Design) -> Clause:
     """Return the command for a plate that a workshop can make, if several pins hold layers."""
+    sentence = "no-plate"
     if design.plate_machine is None or len(laminate.pins) < 2:
-        return ""
+        sentence = "no-plate"
+    elif design.plate_machine == "cnc-mill":
+        sentence = "how-much" if failed else "no-plate"
+    else:
+        sentence = "jig-borer" if design.plate_machine == "jig-borer" else "mill"
     command = f"`{for_a_cnc_mill('DESIGN')}`"
-    if design.plate_machine == "cnc-mill":
-        return f" ({command} finds by how much)" if failed else ""
-    exact = ""
-    if design.plate_machine == "jig-borer":
-        exact = f"its pins are to stand within {design.pin_error:g} mm, which takes a jig borer: "
-    return f"; {exact}for a plate from a CNC mill, {command}"
+    return say(f"{NAME}.{sentence}", command=command, pin_error=design.pin_error)
 
 
-def _message(worst: Remaining, margin: Margin, dearest: Sequence[Push], design: Design) -> str:
-    """The value, its place and the largest contribution there."""
-    where = f"{interface_name(worst.interfaces[0])}{worst.distinct.suffix}"
-    text = (
-        f"at worst {_mm(worst.worst)} is left of the {margin.nominal:.3f} mm "
-        f"{_what(margin, worst.group.first)} at {where}, {at(margin.middle)}"
-    )
-    if not dearest and margin.is_overlap:
-        return f"{text}; nothing can move"
-    if not dearest:
-        cutting = design.registration.cutting_error
-        return f"{text}; cutting takes {2 * cutting:.3f} mm and nothing can move"
-    freedom, cost = dearest[0]
-    return f"{text}; largest contribution: {_source(freedom)}, {cost:.3f} mm"
+def _cause(dearest: Sequence[Push], margin: Margin, design: Design) -> Clause:
+    """Return the largest contribution to a loss."""
+    if dearest:
+        freedom, cost = dearest[0]
+        return say(f"{NAME}.largest", source=_source(freedom), cost=cost)
+    if margin.is_overlap:
+        return say(f"{NAME}.still")
+    return say(f"{NAME}.cutting", cutting_mm=2 * design.registration.cutting_error)
 
 
-def _what(margin: Margin, interface: Interface) -> str:
+def _what(margin: Margin, interface: Interface) -> Clause:
     if not margin.is_overlap:
-        return WHAT[margin.quantity]
+        return say(f"{NAME}.{margin.quantity}")
     seams = bonding_seams(interface)
     of, on = (seams[owner.seat - 2 - len(interface.masks)].name for owner in margin.owners)
-    return f"overlap of seams {of} and {on}"
+    return say(f"{NAME}.overlap", of=of, on=on)
 
 
 def _at_edge(bond: EdgeBond, design: Design) -> Finding:
     """The finding of a seam that may end too near to the edge of a film, or short of it."""
     interface, seam, limit = bond.interface, bond.seam, design.rules.worst_bond_width
-    error = design.registration.error_of_seam(seam.tool)
-    left = f"bonds only {_mm(bond.width)}" if bond.width > 0 else "ends short"
-    message = (
-        f"with its end {error:g} mm off its path, seam {seam.name} "
-        f"{left} of the film's edge at {interface_name(interface)}, {at(bond.at)}, where it parts "
-        f"two voids; it needs {limit:g}: {STEADIER}"
-    )
-    place = Place(interface.index, interface.layer_indices, *bond.at)
-    return Finding(NAME, "fail", limit, bond.width, "mm", place, message)
+    facts = {
+        "error": design.registration.error_of_seam(seam.tool),
+        "seam_name": seam.name,
+        "held": say(f"{NAME}.{'bonds-only' if bond.width > 0 else 'ends-short'}"),
+        "where": interface_name(interface),
+    }
+    place = place_in(interface, bond.at)
+    return judged(NAME, False, limit, bond.width, "mm", place, "edge", **facts)
 
 
 def costs(acting: Iterable[Push]) -> list[Push]:
@@ -247,46 +217,32 @@ def costs(acting: Iterable[Push]) -> list[Push]:
     return sorted(total.values(), key=lambda push: -round(push.cost, 9))
 
 
-def _moved(freedom: Freedom) -> str:
-    """Text for the layers of a freedom."""
-    is_single = freedom.lowest == freedom.highest
-    return (
-        f"layer {freedom.lowest}" if is_single else f"layers {freedom.lowest} to {freedom.highest}"
-    )
+def _moved(freedom: Freedom) -> Clause:
+    """Return the layers of a freedom."""
+    sentence = "layer" if freedom.lowest == freedom.highest else "layers"
+    return say(f"{NAME}.{sentence}", lowest=freedom.lowest, highest=freedom.highest)
 
 
-def _source(freedom: Freedom) -> str:
-    """Text for a displacement: its cause, its layers and its press step."""
-    layers = _moved(freedom)
+def _source(freedom: Freedom) -> Clause:
+    """Return a displacement: its cause, its layers and its press step."""
     if freedom.seam:
-        return f"place of seam {freedom.seam}"
-    cause = {0: "hand placement", 1: "turn about the only pin"}.get(
-        freedom.pins, "play on the pins"
-    )
-    return f"{cause} of {layers} in step {freedom.step}"
+        return say(f"{NAME}.seam", seam_name=freedom.seam)
+    cause = {0: "hand", 1: "turn"}.get(freedom.pins, "play")
+    return say(f"{NAME}.{cause}", moved=_moved(freedom), step=freedom.step)
 
 
-def _why(pinned: float) -> str:
-    if math.isinf(pinned):
-        return "and short as drawn"
-    return f"though pins and cutting alone leave {_mm(pinned)}"
-
-
-def _remedy(quantity: MarginKind, dearest: Iterable[Push], laminate: Laminate) -> str:
-    """Remedy for the hand's errors."""
+def _advice(quantity: MarginKind, dearest: Iterable[Push], laminate: Laminate) -> Clause:
+    """Return the remedy for the hand's errors."""
+    wider = say(f"{NAME}.wider-{quantity}")
     loose = next((freedom for freedom, _ in dearest if freedom.pins < 2 and not freedom.seam), None)
     if loose is None:
-        return REMEDY[quantity]
-    where = f"{_moved(loose)} in step {loose.step}"
+        return wider
     on_its_own = loose.lowest == loose.highest
     masks_pocket = on_its_own and laminate.layer(loose.lowest).role == "chamber-mask"
-    if laminate.registration == "channel-pin" and not masks_pocket:
-        return f"align {where} with care, or {EARS}"
-    return (
-        f"align {where} with care (registration.hand_placement, registration.hand_turn), or "
-        f"{REMEDY[quantity]}"
-    )
+    is_pinned = laminate.registration == "channel-pin" and not masks_pocket
+    sentence = "align-or-ears" if is_pinned else "align"
+    return say(f"{NAME}.{sentence}", moved=_moved(loose), step=loose.step, mending=wider)
 
 
-def _mm(value: float) -> str:
-    return f"{value:.3f} mm" if value > 0 else "nothing"
+def _mm(value: float) -> Clause:
+    return say("words.mm", value=value) if value > 0 else say("words.nothing")

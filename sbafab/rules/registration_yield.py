@@ -9,20 +9,21 @@ Each error has a row of random numbers a batch (a shift has two).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.design.records import Design
 from sbafab.design.sections import Registration
 from sbafab.geometry.on_demand import np
 from sbafab.laminate.laminate import Interface, Laminate
-from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.freedoms import EARS, Freedom, Freedoms
+from sbafab.rules.finding import Finding, Place, Verdict, judged
+from sbafab.rules.freedoms import Freedom, Freedoms
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.margins import QUANTITIES, LinearForms, MarginKind, Owner, seated
 from sbafab.rules.measures import Measures
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import Clause, explained, say
 
 if TYPE_CHECKING:
     from sbafab.geometry.edge_table import Floats, Indices
@@ -237,83 +238,47 @@ def check(measures: Measures) -> list[Finding]:
     return [finding_of(simulate(laminate, design, SEED, measures), laminate, design)]
 
 
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "enough random builds keep what registration-worst-case asks",
-        "The worst of all errors at once is rare; this counts how rare. The hand is calibrated on "
-        "the paper's success of nine in ten, not measured.",
-        "Run sbafab check DESIGN --target-yield 0.95: it advises bond and overhang; generate with "
-        "the same option changes the design as little as the share needs.",
-        ("rules.target_yield", "registration.hand_placement", "registration.hand_turn"),
-    ),
-)
+RULE = Rule(NAME, check, explained(NAME))
 
 
 def finding_of(outcome: Yield, laminate: Laminate, design: Design) -> Finding:
     """Return the finding of a yield."""
-    low, high = outcome.whole.interval
-    target = design.rules.target_yield
+    share, hand, target = outcome.whole, design.registration, design.rules.target_yield
+    low, high = share.interval
     verdict: Verdict = "pass"
+    sentence = "free"
     if target is not None:
-        verdict = "pass" if low >= target else "fail"
+        verdict, sentence = "pass" if low >= target else "fail", "target"
     elif high < PAPER_SUCCESS:
+        sentence = "low-ears" if laminate.registration == "channel-pin" else "low"
         verdict = "warn"
-    message = (
-        f"{outcome.whole.value:.2%} of {outcome.whole.builds} random builds keep every limit "
-        f"(95 % interval {low:.2%} to {high:.2%}){_by_interface(outcome)}; errors are assumed "
-        f"spread evenly, up to {_by_hand(design.registration)}"
-    )
-    if target is None:
-        message += "; no least share is asked for (rules.target_yield)"
-    else:
-        message += f"; the lower end of the interval must be {100 * target:.10g}% at least"
-    if verdict == "fail":
-        message += ": `sbafab check --target-yield` advises"
-    remedy = _remedy(laminate) if verdict == "warn" else ""
-    if remedy:
-        message = f"{remedy}: {message}"
-    worst = min(outcome.interfaces, key=lambda index: outcome.interfaces[index].good, default=None)
-    place = Place()
-    if worst is not None and outcome.interfaces[worst].good < outcome.whole.builds:
-        place = Place(worst, laminate.interfaces[worst - 1].layer_indices)
-    share = outcome.whole
-    return Finding(
-        NAME,
-        verdict,
-        target,
-        share.value,
-        "",
-        place,
-        message,
-        remedy=remedy,
-        interval=share.interval,
-    )
-
-
-def _remedy(laminate: Laminate) -> str:
-    """Remedy for a low yield."""
-    wider = "ask `sbafab check --target-yield 0.95` how much wider bonds and overhangs should be"
-    if laminate.registration == "channel-pin":
-        return f"{wider}, or {EARS}"
-    return wider
-
-
-def _by_hand(errors: Registration) -> str:
-    """Text for the design's assumed placement errors."""
-    return (
-        f"{errors.hand_placement:g} mm and {errors.hand_turn:g} degree where a hand places"
-        f"{_calibrated(errors)}"
-    )
-
-
-def _calibrated(errors: Registration) -> str:
-    """Source of the hand's figures, if they are the usual ones."""
     usual = Registration.model_construct()
-    if (errors.hand_placement, errors.hand_turn) != (usual.hand_placement, usual.hand_turn):
-        return ""
-    return f" (calibrated on the paper's success rate of {PAPER_SUCCESS:.0%}, not measured)"
+    is_usual = (hand.hand_placement, hand.hand_turn) == (usual.hand_placement, usual.hand_turn)
+    losing = {i: each for i, each in outcome.interfaces.items() if each.good < each.builds}
+    order = sorted(losing, key=lambda i: (losing[i].good, i))
+    facts = {
+        "builds": share.builds,
+        "low": low,
+        "high": high,
+        "losing": _losing(losing, order),
+        "placement": hand.hand_placement,
+        "turn": hand.hand_turn,
+        "source": say(f"{NAME}.{'calibrated' if is_usual else 'stated'}", paper=PAPER_SUCCESS),
+        "percent": 100 * (target or 0.0),
+    }
+    place = Place(order[0], laminate.interfaces[order[0] - 1].layer_indices) if order else Place()
+    finding = judged(NAME, verdict, target, share.value, "", place, sentence, **facts)
+    return replace(finding, interval=share.interval)
+
+
+def _losing(shares: Mapping[int, Share], order: Sequence[int]) -> Clause:
+    """Return the interfaces that are not always good, with the least shares."""
+    if not order:
+        return say(f"{NAME}.no-losing")
+    first = ", ".join(f"{i} {shares[i].value:.2%}" for i in order[:3])
+    others = len(order) - 3
+    sentence = "losing-others" if others > 0 else "losing"
+    return say(f"{NAME}.{sentence}", first=first, others=others)
 
 
 def simulate(
@@ -441,14 +406,3 @@ def _renamed(
         else CutContour(layers[error.layer], error.contour)
         for error in errors
     ]
-
-
-def _by_interface(outcome: Yield) -> str:
-    """Runs of interfaces that are not always good, with the least share of each run."""
-    losing = {i: share for i, share in outcome.interfaces.items() if share.good < share.builds}
-    if not losing:
-        return ""
-    order = sorted(losing, key=lambda i: (losing[i].good, i))
-    parts = [f"{i} {losing[i].value:.2%}" for i in order[:3]]
-    rest = f", {len(order) - 3} others above" if len(order) > 3 else ""
-    return f"; by interface: {', '.join(parts)}{rest}"

@@ -5,21 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
+from sbafab.rules.sentences import Explanation
+
 if TYPE_CHECKING:
     from sbafab.rules.finding import Finding
     from sbafab.rules.measures import Measures
 
-
-class Explanation(NamedTuple):
-    """The condition that ``holds`` if a rule passes, ``why`` it matters, how to ``mend`` it.
-
-    ``keys`` of a design file set the limit or the measured value.
-    """
-
-    holds: str
-    why: str
-    mend: str
-    keys: tuple[str, ...] = ()
+__all__ = ["Explanation", "Rule"]
 
 
 class Rule(NamedTuple):

@@ -6,18 +6,18 @@ searched from each inlet.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, strip
 from sbafab.geometry.width import Width
 from sbafab.laminate.laminate import Chamber, Interface, Laminate
-from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import at
-from sbafab.rules.measures import Measures, distinct_interfaces
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.finding import Finding, Place, judged
+from sbafab.rules.measures import Measures, distinct_interfaces, middle, place_in
+from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import Clause, explained, layer_name, say
 from sbafab.rules.void_edges import VoidEdges
 from sbafab.rules.voids import (
     OUTSIDE,
@@ -35,68 +35,44 @@ CUT = 1e-4
 
 
 class _Offence(NamedTuple):
-    """A fault of one void."""
+    """A fault of one void: its sentence, its place, and its facts."""
 
-    message: str
+    sentence: str
     interface: int | None
     at: Point | None
+    facts: Mapping[str, Any]
+
+    @property
+    def says(self) -> Clause:
+        return say(f"{NAME}.{self.sentence}", interface=self.interface, at=self.at, **self.facts)
 
 
 def check(measures: Measures) -> list[Finding]:
-    """The number of pockets that leak, reach another, are cut off or missing, and loose films."""
-    laminate = measures.laminate
-    if laminate.nets:
-        return _judged_by_nets(laminate)
-    graph = void_graph(laminate)
-    owners = _owners(laminate, graph)
-    offences = [
-        *_missing_pockets(laminate, graph, owners),
-        *_wrong_reaches(laminate, graph, owners),
-        *_loose_films(laminate),
-    ]
-    offences = offences or list(_closing(laminate, graph, owners, measures.design))
+    """Return the number of pockets that leak, reach another, are cut off or missing, and of loose
+    films. If nets are declared, the rule nets judges how voids join.
+    """
+    laminate, offences, owners = measures.laminate, _loose_films(measures.laminate), {}
+    if not laminate.nets:
+        graph = void_graph(laminate)
+        owners = _owners(laminate, graph)
+        offences = [
+            *_missing_pockets(laminate, graph, owners),
+            *_wrong_reaches(laminate, graph, owners),
+            *offences,
+        ]
+        offences = offences or list(_closing(laminate, graph, owners, measures.design))
     if not offences:
-        pockets = "1 pocket" if len(owners) == 1 else f"{len(owners)} pockets"
-        message = f"{pockets} sealed, each reached from the inlet of its own chamber alone"
-        return [Finding(NAME, "pass", 0.0, 0.0, "voids", Place(), message)]
-    return [_failed(offences, laminate)]
+        sentence = "by-nets" if laminate.nets else "sealed"
+        return [judged(NAME, True, 0.0, 0.0, "voids", Place(), sentence, count=len(owners))]
+    first, count = offences[0], len(offences)
+    gap = None if first.interface is None else laminate.interfaces[first.interface - 1]
+    place, says = place_in(gap, first.at) if gap else Place(), first.says
+    if count > 1:
+        says = say("sealing.more", first=says, more=count - 1)
+    return [Finding(NAME, "fail", 0.0, float(count), "voids", place, says)]
 
 
-def _judged_by_nets(laminate: Laminate) -> list[Finding]:
-    """If nets are declared, the rule nets judges how voids join; loose films stay a fault."""
-    offences = _loose_films(laminate)
-    if offences:
-        return [_failed(offences, laminate)]
-    message = "no film is loose; what the voids join is judged by nets"
-    return [Finding(NAME, "pass", 0.0, 0.0, "voids", Place(), message)]
-
-
-def _failed(offences: Sequence[_Offence], laminate: Laminate) -> Finding:
-    first = offences[0]
-    layers: tuple[int, ...] = ()
-    if first.interface is not None:
-        layers = laminate.interfaces[first.interface - 1].layer_indices
-    x, y = first.at or (None, None)
-    message = first.message
-    if len(offences) > 1:
-        message += f" (and {len(offences) - 1} more)"
-    place = Place(first.interface, layers, x, y)
-    return Finding(NAME, "fail", 0.0, float(len(offences)), "voids", place, message)
-
-
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "every pocket is reached from its own chamber's inlet and from nowhere else",
-        "A pocket that opens elsewhere leaks; one that is cut off never inflates. Channels between "
-        "seams must stay open when these lie off their paths by registration.seam_error.",
-        "Look at the place named: an opening too near another, a mask that crosses a bond, or a "
-        "seam with a gap.",
-        ("bore.diameter", "lumen.diameter", "inlet.width", "registration.seam_error"),
-    ),
-    at_most=True,
-)
+RULE = Rule(NAME, check, explained(NAME), at_most=True)
 
 
 def _owners(laminate: Laminate, graph: VoidGraph) -> dict[Void, frozenset[str]]:
@@ -167,22 +143,15 @@ def _missing_pockets(
             if not chamber.is_in(balloon):
                 continue
             pieces = pockets.get((interface.index, chamber.name), [])
-            for centre in chamber.centres:
-                if not any(_holds(piece, centre) for piece in pieces):
-                    remedy = "add its disc to the mask there"
-                    if _is_seamed(interface):
-                        remedy = "move the path of the seam off it, so that it goes round it"
-                    message = (
-                        f"{chamber.name} has no pocket at chamber interface {interface.index} "
-                        f"({at(centre)}); {remedy}"
-                    )
-                    offences.append(_Offence(message, interface.index, centre))
+            sentence = _seamed("no-pocket", interface)
+            offences += [
+                _Offence(sentence, interface.index, centre, {"chamber": chamber.name})
+                for centre in chamber.centres
+                if not any(_holds(piece, centre) for piece in pieces)
+            ]
     if len(levels) != laminate.balloons:
-        message = (
-            f"the laminate has {len(levels)} chamber interfaces for {laminate.balloons} balloons; "
-            "each balloon needs one chamber mask between two films"
-        )
-        offences.append(_Offence(message, None, None))
+        facts = {"levels": len(levels), "balloons": laminate.balloons}
+        offences.append(_Offence("levels", None, None, facts))
     return offences
 
 
@@ -220,19 +189,15 @@ def _foreign(
     inlet: str,
     names: frozenset[str],
     graph: VoidGraph,
-    came: dict[Void, Void | None],
+    came: Mapping[Void, Void | None],
 ) -> _Offence:
-    whose = " and ".join(sorted(names)) or "no chamber"
     before = came[void]
     assert before is not None
     p = graph.joins[before][void]
     if before.kind == "mouth" and len(graph.joins[before]) == 1:
-        p = _somewhere(graph.pieces[void])
-    message = (
-        f"the inlet of {inlet} feeds a pocket of {whose} at chamber interface {void.level} "
-        f"({at(p)}); separate them by a bond there"
-    )
-    return _Offence(message, void.level, p)
+        p = middle(graph.pieces[void])
+    facts = {"inlet": inlet, "whose": sorted(names) or "no chamber"}
+    return _Offence("foreign", void.level, p, facts)
 
 
 def _closing(
@@ -251,13 +216,8 @@ def _closing(
         for place, left in edges.narrow_places(region) if edges.seams else ():
             if left.value > 0 or not _parts(region, place, held):
                 continue
-            message = (
-                f"{' and '.join(names)} may be parted at chamber interface {void.level} "
-                f"({at(place.middle)}): seams leave {place.value:.3f} mm there, and nothing at "
-                f"worst ({edges.words()}); lay them farther apart, or state a smaller "
-                "registration.seam_error that the tool keeps"
-            )
-            yield _Offence(message, void.level, place.middle)
+            facts = {"whose": [*names], "drawn": place.value, "edges": edges.causes()}
+            yield _Offence("closing", void.level, place.middle, facts)
             break
 
 
@@ -285,15 +245,8 @@ def _loose_films(laminate: Laminate) -> list[_Offence]:
         for piece in pieces:
             bond = gap.bond if len(pieces) == 1 else gap.bond & piece
             if bond.is_empty:
-                p = _somewhere(piece)
-                remedy = f"open the mask at interface {gap.index} there"
-                if _is_seamed(gap):
-                    remedy = "move the path of a seam onto it"
-                message = (
-                    f"the film of layer {gap.above.index} ({gap.above.name}) at {at(p)} is bonded "
-                    f"to nothing below it; {remedy}"
-                )
-                offences.append(_Offence(message, gap.index, p))
+                facts = {"layer": layer_name(gap.above)}
+                offences.append(_Offence(_seamed("loose", gap), gap.index, middle(piece), facts))
     return offences
 
 
@@ -311,46 +264,28 @@ def _leak(
     p = graph.joins[last][foreign]
     pocket = next(void for void in reversed(path[:step]) if void.kind == "pocket")
     interface = last.level if last.kind == "gap" else pocket.level
-    where = f"layer {last.level}" if last.kind == "opening" else f"interface {interface}"
     if foreign.kind == "separator":
-        outlet = f"into the slit between two balloons at interface {foreign.level}"
+        outlet = say("sealing.into-slit", slit=foreign.level)
+    elif last.kind == "opening":
+        outlet = say("sealing.outside-at-layer", layer=last.level)
     else:
-        outlet = f"to the outside at {where}"
-    remedy = "close the opening or bond round it"
-    if last.kind != "opening" and _is_seamed(laminate.interfaces[interface - 1]):
-        remedy = "close the path of the seam there, make it wider, or move it onto both films"
-    message = (
-        f"{chamber.name} leaks {outlet} ({at(p)}), from its pocket at chamber interface "
-        f"{pocket.level}; {remedy}"
-    )
-    wide = past_mouth(laminate, interface, p) if last.kind == "pocket" else None
+        outlet = say("sealing.outside-at-interface")
+    facts = {"chamber": chamber.name, "outlet": outlet, "pocket": pocket.level}
+    sentence, wide = "leak", past_mouth(laminate, interface, p) if last.kind == "pocket" else None
     if wide is not None:
-        message = f"{chamber.name} leaks {outlet} ({at(p)}): {wide}"
-    return pocket, _Offence(message, interface, p)
+        sentence, facts["wide"] = "leak-past-mouth", wide
+    elif last.kind != "opening":
+        sentence = _seamed("leak", laminate.interfaces[interface - 1])
+    return pocket, _Offence(sentence, interface, p, facts)
 
 
 def _cut_off(void: Void, names: frozenset[str], laminate: Laminate, graph: VoidGraph) -> _Offence:
-    p = _somewhere(graph.pieces[void])
-    where = f"at chamber interface {void.level} ({at(p)})"
-    if names:
-        whose = f"the pocket of {' and '.join(sorted(names))}"
-        remedy = "open a bore or a strip to it"
-        if _is_seamed(laminate.interfaces[void.level - 1]):
-            remedy = "open the path of the seam toward the mouth"
-        message = f"{whose} {where} is reached from no inlet; {remedy}"
-    else:
-        remedy = "remove that part of the mask"
-        if _is_seamed(laminate.interfaces[void.level - 1]):
-            remedy = "make the seam there wider, or move its path, so that it bonds there"
-        message = f"a pocket of no chamber lies {where}; {remedy}"
-    return _Offence(message, void.level, p)
+    interface = laminate.interfaces[void.level - 1]
+    sentence = _seamed("cut-off" if names else "stray", interface)
+    facts = {"whose": sorted(names)}
+    return _Offence(sentence, void.level, middle(graph.pieces[void]), facts)
 
 
-def _is_seamed(interface: Interface) -> bool:
-    """Return True if seams alone bond, so that masks do not decide which areas are open."""
-    return bool(interface.seams) and not interface.pressed
-
-
-def _somewhere(piece: Region) -> Point:
-    low_x, low_y, high_x, high_y = piece.bounds
-    return (low_x + high_x) / 2, (low_y + high_y) / 2
+def _seamed(sentence: str, interface: Interface) -> str:
+    """Return the sentence for an interface that seams alone bond."""
+    return f"{sentence}-seamed" if interface.seams and not interface.pressed else sentence

@@ -14,32 +14,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sbafab.design.records import Design
-from sbafab.geometry.edges import Edge, Line, Point
+from sbafab.geometry.edges import Line, Point
 from sbafab.geometry.nearby import EdgeIndex, boxes_meet
 from sbafab.geometry.region import Region, strip
 from sbafab.geometry.width import Width
 from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer
-from sbafab.rules.boundary import Reach, outward_reach
-from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.limits import TOLERANCE, at, holds
-from sbafab.rules.measures import Measures, distinct_interfaces
-from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.boundary import outward_reach
+from sbafab.rules.finding import Finding, Place, Verdict, judged
+from sbafab.rules.limits import TOLERANCE, holds
+from sbafab.rules.measures import Measures, distinct_interfaces, place_in
+from sbafab.rules.rule import Rule
+from sbafab.rules.sentences import explained, say
 from sbafab.rules.void_edges import VoidEdges
 from sbafab.rules.voids import PAST_MOUTH, mouth_openings
 
 NAME = "tube-fit"
-BOND = "the bond beside the strip"
-MOUTH = "the mouth"
 UNLIKE = 2 * PAST_MOUTH
 """mm by which a strip may be wider or narrower than its inlet states."""
 
 
 class _Fit(NamedTuple):
-    """One measure of an inlet: the feature, its value at worst and its least value, mm.
+    """One measure of an inlet: mouth, strip or bond, its value at worst and its least value, mm.
 
     ``drawn`` is the width as drawn; ``firm`` the width left at worst with seams on their paths.
     """
@@ -47,86 +46,68 @@ class _Fit(NamedTuple):
     inlet: Inlet
     interface: Interface | None
     feature: str
-    value: float
     limit: float
     at: Point
-    remedy: str
+    value: float = 0.0
     drawn: float = 0.0
     firm: float = 0.0
 
+    @property
+    def spare(self) -> float:
+        return self.value - self.limit
+
 
 def check(measures: Measures) -> list[Finding]:
-    """The strip's width at the mouth and along its run, and its bonds; tubes on holes of films."""
+    """Return the least width of strips and of their bonds, and tubes on holes of films."""
     laminate, design = measures.laminate, measures.design
     fits = [fit for inlet in laminate.inlets for fit in _fits(inlet, laminate, design)]
-    on_holes = [
-        fit
-        for port in laminate.ports
-        if port.kind == "hole"
-        for fit in _on_hole(port, laminate, design)
-    ]
-    if on_holes and not fits:
-        return [_of_holes(on_holes)]
-    if not fits:
-        message = "the laminate has no inlet, so no tube can be fitted; give every chamber one"
-        return [Finding(NAME, "fail", None, None, "mm", Place(), message)]
+    on_holes = [fit for port in laminate.tube_holes for fit in _on_hole(port, laminate, design)]
+    findings: list[Finding] = []
+    if fits:
+        findings.append(_of_inlets(fits, design))
+        findings += _unlike(fits) if findings[0].verdict == "pass" else ()
+    if on_holes:
+        findings.append(_of_holes(on_holes))
+    return findings or [judged(NAME, False, None, None, "mm", Place(), "no-inlet")]
+
+
+RULE = Rule(NAME, check, explained(NAME))
+
+
+def _of_inlets(fits: Sequence[_Fit], design: Design) -> Finding:
     short = [fit for fit in fits if not holds(fit.value, fit.limit)]
-    worst = min(short or [fit for fit in fits if fit.feature != BOND], key=_margin)
-    good = not short
-    if worst.feature == BOND:
-        message = (
-            f"{worst.feature} of {worst.inlet.chamber} is {worst.value:.3f} mm wide, "
-            f"{at(worst.at)}; to hold the tube it needs {worst.limit:.3f}"
-        )
-    else:
-        message = (
-            f"{worst.feature} of {worst.inlet.chamber} is drawn {worst.drawn:.3f} mm wide, "
-            f"{at(worst.at)}, and {_made(worst.interface)} {worst.value:.3f} at worst "
-            f"({_edges(worst.interface, design).words()}); a tube of "
-            f"{worst.inlet.tube_diameter:g} beside its strip needs {worst.limit:.3f}"
-        )
+    worst = min(short or [fit for fit in fits if fit.feature != "bond"], key=lambda fit: fit.spare)
     # What only the seams' places take from a strip leaves it open, if narrow for its tube.
     by_seams = worst.value > 0 and all(holds(fit.firm, fit.limit) for fit in short)
-    verdict: Verdict = "pass" if good else "warn" if by_seams else "fail"
-    if verdict == "fail":
-        message += f": {worst.remedy}"
-    elif verdict == "warn":
-        message = f"{worst.remedy}: {message}"
-    place = Place(None, (), *worst.at)
-    if worst.interface is not None:
-        place = Place(worst.interface.index, worst.interface.layer_indices, *worst.at)
-    remedy = worst.remedy if verdict == "warn" else ""
-    finding = Finding(NAME, verdict, worst.limit, worst.value, "mm", place, message, remedy=remedy)
-    holes = [_of_holes(on_holes)] if on_holes else []
-    return [finding, *(_unlike(fits) if good else ()), *holes]
+    verdict: Verdict = "pass" if not short else "warn" if by_seams else "fail"
+    gap, edges = worst.interface, _edges(worst.interface, design)
+    sentence = "seams" if edges.seams else "width"
+    if worst.feature == "bond":
+        sentence = "bond"
+    elif gap is None:
+        sentence = worst.feature
+    is_cut = gap is None or gap.pressed
+    facts = {
+        "feature": say("tube-fit.strip" if worst.feature == "strip" else "tube-fit.mouth"),
+        "chamber": worst.inlet.chamber,
+        "drawn": worst.drawn,
+        "how": say("tube-fit.cut" if is_cut else "tube-fit.welded"),
+        "edges": edges.causes(),
+        "tube": worst.inlet.tube_diameter,
+        # Rounded up to the micrometre.
+        "needed": math.ceil(round((worst.limit + worst.drawn - worst.value) * 1000, 6)) / 1000,
+    }
+    place = Place(None, (), *worst.at) if gap is None else place_in(gap, worst.at)
+    return judged(NAME, verdict, worst.limit, worst.value, "mm", place, sentence, **facts)
 
 
 def _unlike(fits: Sequence[_Fit]) -> Iterator[Finding]:
     """Yield a warning for each mouth that is drawn with another width than its inlet states."""
     for fit in fits:
-        stated = fit.inlet.width
-        if fit.feature != MOUTH or fit.interface is None or abs(fit.drawn - stated) <= UNLIKE:
-            continue
-        remedy = f"write {fit.drawn:.3f} as the width of {fit.inlet.chamber}, or draw it so"
-        message = (
-            f"{remedy}: the strip of {fit.inlet.chamber} is stated {stated:.3f} mm wide and drawn "
-            f"{fit.drawn:.3f}, {at(fit.at)}"
-        )
-        place = Place(fit.interface.index, fit.interface.layer_indices, *fit.at)
-        yield Finding(NAME, "warn", stated, fit.drawn, "mm", place, message, remedy=remedy)
-
-
-RULE = Rule(
-    NAME,
-    check,
-    Explanation(
-        "the inlet strip, cut at its narrowest, opens to the tube and its own film",
-        "A flat channel opens to half the perimeter of what goes in; less, and the tube tears it.",
-        "Leave inlet.width out, so that it follows the tube, draw strips of drawn layers wider, or "
-        "use a thinner tube.",
-        ("inlet.width", "inlet.tube_outer_diameter", "laser.unknown_kerf"),
-    ),
-)
+        stated, gap = fit.inlet.width, fit.interface
+        if fit.feature == "mouth" and gap is not None and abs(fit.drawn - stated) > UNLIKE:
+            place, chamber = place_in(gap, fit.at), fit.inlet.chamber
+            yield judged(NAME, "warn", stated, fit.drawn, "mm", place, "unlike", chamber=chamber)
 
 
 # Ports that are holes of an outer film.
@@ -139,18 +120,15 @@ class _HoleFit(NamedTuple):
     port: Port
     value: float
     limit: float
-    words: str
-    remedy: str
+    sentence: str
+    facts: dict[str, Any]
 
 
 def _of_holes(fits: Sequence[_HoleFit]) -> Finding:
-    """The finding of the worst tube on a hole."""
-    worst = min(fits, key=lambda fit: fit.value - fit.limit)
-    good = holds(worst.value, worst.limit)
-    message = worst.words if good else f"{worst.words}: {worst.remedy}"
-    place = Place(None, (worst.layer.index,), *worst.port.at)
-    verdict: Verdict = "pass" if good else "fail"
-    return Finding(NAME, verdict, worst.limit, worst.value, "mm", place, message)
+    """Return the finding of the worst tube on a hole."""
+    layer, port, value, limit, sentence, facts = min(fits, key=lambda fit: fit.value - fit.limit)
+    place, good = Place(None, (layer.index,), *port.at), holds(value, limit)
+    return judged(NAME, good, limit, value, "mm", place, sentence, port=port.name, **facts)
 
 
 def _on_hole(port: Port, laminate: Laminate, design: Design) -> Iterator[_HoleFit]:
@@ -160,108 +138,77 @@ def _on_hole(port: Port, laminate: Laminate, design: Design) -> Iterator[_HoleFi
     """
     ends = {layer.index: layer for layer in (laminate.tpe_layers[0], laminate.tpe_layers[-1])}
     beside = [ends[index] for index in (port.below, port.above) if index in ends]
-    here = f"the hole of {port.name}, {at(port.at)},"
-    for layer in beside:
-        hole = next((hole for hole in layer.profile.holes if hole.winding(port.at)), None)
-        if hole is not None:
-            break
-    else:
-        words = f"{here} is in no outer film, so no tube can be glued there"
-        yield _HoleFit(beside[0], port, 0.0, design.rules.bond_width, words, "draw it in the film")
+    holes = [(layer, h) for layer in beside for h in layer.profile.holes if h.winding(port.at)]
+    if not holes:
+        yield _HoleFit(beside[0], port, 0.0, design.rules.bond_width, "no-hole", {})
         return
-    reach = max(_farthest(edge, port.at) for edge in hole.edges)
+    layer, hole = holes[0]
+    # An arc counts as its whole circle.
+    reach = max(
+        max(math.dist(edge.start, port.at), math.dist(edge.end, port.at))
+        if isinstance(edge, Line)
+        else math.dist(edge.centre, port.at) + edge.radius
+        for edge in hole.edges
+    )
     if port.tube_diameter is not None:
         is_known = design.kerf_widths.get(layer.film.material) is not None
         kerf = 0.0 if is_known else design.laser.unknown_kerf
         cut = 2 * (reach + design.registration.cutting_error) + kerf
-        words = (
-            f"{here} is drawn {2 * reach:.3f} mm wide and cut {cut:.3f} at worst; a tube of "
-            f"{port.tube_diameter:g} is glued on it"
-        )
-        remedy = "make the hole smaller, or take a wider tube (inlet.tube_outer_diameter)"
-        yield _HoleFit(layer, port, port.tube_diameter, cut, words, remedy)
+        drawn = {"drawn": 2 * reach}
+        yield _HoleFit(layer, port, port.tube_diameter, cut, "covered", drawn)
     others = Region(tuple(other for other in layer.profile.contours if other is not hole))
     film = others.distance_to_edge(port.at) - reach
-    words = (
-        f"{here} has {film:.3f} mm of film round it; to glue its tube on it needs "
-        f"{design.rules.bond_width:g}"
-    )
-    yield _HoleFit(
-        layer, port, film, design.rules.bond_width, words, "move what is cut beside it away"
-    )
-
-
-def _farthest(edge: Edge, p: Point) -> float:
-    """The greatest distance of an edge from a point, mm; an arc counts as its whole circle."""
-    if isinstance(edge, Line):
-        return max(math.dist(edge.start, p), math.dist(edge.end, p))
-    return math.dist(edge.centre, p) + edge.radius
+    yield _HoleFit(layer, port, film, design.rules.bond_width, "film", {})
 
 
 # Inlets between two films.
 
 
 def _fits(inlet: Inlet, laminate: Laminate, design: Design) -> list[_Fit]:
-    for distinct in distinct_interfaces(laminate):
-        interface = distinct.interface
-        if interface.kind != "chamber":
-            continue
-        needed = _needed(inlet, interface)
-        openings = mouth_openings(inlet, interface)
+    gaps = [distinct.interface for distinct in distinct_interfaces(laminate)]
+    gaps = [gap for gap in gaps if gap.kind == "chamber"]
+    for gap in gaps:
+        openings = mouth_openings(inlet, gap)
         if openings:
             # A tube goes into one opening; bond between two of them holds it out of both.
             low, high = max(openings, key=lambda ends: ends[1] - ends[0])
             (x, y), (dx, dy) = inlet.mouth, inlet.direction
             ends = [(x + dy * offset, y - dx * offset) for offset in (low, high)]
-            opening = _Fit(inlet, interface, MOUTH, 0.0, needed, inlet.mouth, "")
-            run = _along_run(inlet, interface, needed, design)
-            return [_at_worst(opening, ends[0], ends[1], design), *run]
-    message = "open a mask strip to the tab's end"
-    gaps = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
-    if gaps and not any(interface.pressed for interface in gaps):
-        message = "open the path of the seam at the tab's end, as wide as that"
+            mouth = _at_worst(inlet, gap, "mouth", inlet.mouth, ends, design)
+            return [mouth, *_along_run(inlet, gap, design)]
+    is_seamed = gaps and not any(gap.pressed for gap in gaps)
     needed = math.pi * inlet.tube_diameter / 2
-    return [_Fit(inlet, None, MOUTH, 0.0, needed, inlet.mouth, message)]
+    return [_Fit(inlet, None, "closed-seamed" if is_seamed else "closed", needed, inlet.mouth)]
 
 
-def _along_run(inlet: Inlet, interface: Interface, needed: float, design: Design) -> list[_Fit]:
+def _along_run(inlet: Inlet, interface: Interface, design: Design) -> Iterator[_Fit]:
+    """Yield the narrowest place of the strip, and of the bond beside it."""
     if inlet.length < TOLERANCE:
-        return []
-    x, y = inlet.mouth
-    dx, dy = inlet.direction
+        return
+    (x, y), (dx, dy) = inlet.mouth, inlet.direction
     inner = (x - dx * inlet.length, y - dy * inlet.length)
     beside = strip(inner, inlet.mouth, 2 * inlet.width)
     near = [piece for piece in interface.unbonded.pieces if boxes_meet(piece.bounds, beside.bounds)]
     if not interface.pressed:
         # Films continue beside a seam; their other side does not belong to the strip.
         near = [piece for piece in near if piece.contains((x - dx * TOLERANCE, y - dy * TOLERANCE))]
-    every = Region(tuple(contour for piece in near for contour in piece.contours))
-    run = every & beside
-    sides = [edge for edge in run.edges if _is_side(edge, inlet)]
-    widths = [
-        outward_reach(edge.reversed(), EdgeIndex([e for e in run.edges if e is not edge]))
-        for edge in sides
-    ]
+    run = Region(tuple(contour for piece in near for contour in piece.contours)) & beside
+    ends = TOLERANCE, inlet.length - TOLERANCE
+    sides = [edge for edge in run.edges if ends[0] < inlet.depth(edge.at(0.5)) < ends[1]]
     rims = interface.contact.index if interface.pressed else EdgeIndex(())
-    bonds = [outward_reach(edge, rims) for edge in sides]
-    fits = []
-    wide = _least(sides, widths)
-    if wide is not None:
-        edge, reach = wide
-        strip_fit = _Fit(inlet, interface, "the strip", 0.0, needed, reach.at, "")
-        fits.append(_at_worst(strip_fit, edge.nearest(reach.at), reach.at, design))
-    bonded = _least(sides, bonds)
-    if bonded is not None:
-        value, place = bonded[1]
-        remedy = "make the tab wider, by bond.width or in the shape of a drawn layer"
+    widths, bonds = [], []
+    for edge in sides:
+        others = EdgeIndex([other for other in run.edges if other is not edge])
+        across, outward = outward_reach(edge.reversed(), others), outward_reach(edge, rims)
+        widths += [(across.value, across.at, edge.nearest(across.at))] if across else []
+        bonds += [outward] if outward else []
+    if widths:
+        _, p, q = min(widths, key=lambda width: width[0])
+        yield _at_worst(inlet, interface, "strip", p, (q, p), design)
+    if bonds:
+        value, p = min(bonds, key=lambda bond: bond.value)
         limit = design.rules.bond_width
-        fits.append(_Fit(inlet, interface, BOND, value, limit, place, remedy, value, value))
-    return fits
-
-
-def _least(edges: Sequence[Edge], reaches: Sequence[Reach | None]) -> tuple[Edge, Reach] | None:
-    both = ((edge, reach) for edge, reach in zip(edges, reaches, strict=True) if reach is not None)
-    return min(both, key=lambda pair: pair[1].value, default=None)
+        yield _Fit(inlet, interface, "bond", limit, p, value, value, value)
 
 
 def _edges(interface: Interface | None, design: Design) -> VoidEdges:
@@ -270,34 +217,17 @@ def _edges(interface: Interface | None, design: Design) -> VoidEdges:
     return VoidEdges.of(interface, design)
 
 
-def _at_worst(fit: _Fit, p: Point, q: Point, design: Design) -> _Fit:
-    """Return the fit of a strip between two points of its edges, with the width left at worst."""
-    drawn = Width(math.dist(p, q), p, q)
-    edges = _edges(fit.interface, design)
-    value = edges.left(drawn).value
-    least = math.ceil(round((fit.limit + drawn.value - value) * 1000, 6)) / 1000
-    remedy = f"make it {least:.3f} mm wide, by inlet.width or in the shape of a drawn layer"
-    if edges.seams:
-        remedy = f"lay the seams beside the inlet of {fit.inlet.chamber} {least:.3f} mm apart"
-    firm = edges.with_seams_in_place.left(drawn).value
-    return fit._replace(value=value, remedy=remedy, drawn=drawn.value, firm=firm)
-
-
-def _needed(inlet: Inlet, interface: Interface) -> float:
-    """Width that opens to the tube with the strip beside it."""
-    strip = max((mask.film.thickness for mask in interface.masks), default=0.0)
-    return math.pi / 2 * (inlet.tube_diameter + strip)
-
-
-def _made(interface: Interface | None) -> str:
-    return "cut" if interface is None or interface.pressed else "welded"
-
-
-def _margin(fit: _Fit) -> float:
-    return fit.value - fit.limit
-
-
-def _is_side(edge: Edge, inlet: Inlet) -> bool:
-    """Return True if an edge of the run is one of the strip's sides, not an end of the run."""
-    depth = inlet.depth(edge.at(0.5))
-    return TOLERANCE < depth < inlet.length - TOLERANCE
+def _at_worst(
+    inlet: Inlet,
+    interface: Interface,
+    feature: str,
+    p: Point,
+    ends: Sequence[Point],
+    design: Design,
+) -> _Fit:
+    """Return the width between two points of a strip's edges that is left at worst."""
+    drawn, edges = Width(math.dist(*ends), *ends), VoidEdges.of(interface, design)
+    thickness = max((mask.film.thickness for mask in interface.masks), default=0.0)
+    needed = math.pi / 2 * (inlet.tube_diameter + thickness)
+    value, firm = edges.left(drawn).value, edges.with_seams_in_place.left(drawn).value
+    return _Fit(inlet, interface, feature, needed, p, value, drawn.value, firm)

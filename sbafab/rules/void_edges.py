@@ -17,6 +17,7 @@ from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_width
 from sbafab.laminate.laminate import Interface
 from sbafab.rules.margins import bonding_seams
+from sbafab.rules.sentences import Clause, say
 
 NEAR: Final = 1e-5
 """mm within which a place begins at an edge."""
@@ -109,10 +110,10 @@ class VoidEdges:
             place = Width(float(places.value[number]), (x, y), (u, v))
             yield place, self.left(place)
 
-    def words(self) -> str:
-        """Text for the causes of the loss."""
+    def causes(self) -> Clause:
+        """Return the causes of the loss, as sentences name them."""
         if self.seams:
             errors = " or ".join(f"{error:g}" for error in sorted({e for _, e in self.seams}))
-            return f"seams up to {errors} off their paths"
-        edges = f"{self.cutting:g} on each edge"
-        return f"{edges}, kerf up to {self.kerf:g}" if self.kerf else edges
+            return say("words.seams-off", errors=errors)
+        sentence = "words.edges-and-kerf" if self.kerf else "words.cut-edges"
+        return say(sentence, cutting=self.cutting, kerf=self.kerf)

@@ -21,6 +21,7 @@ from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer
 from sbafab.rules.boundary import beside, edges_along
 from sbafab.rules.limits import TOLERANCE
+from sbafab.rules.sentences import Clause, say
 
 INSET: Final = 1e-5
 """mm from an edge at which a point surely lies on one side of it."""
@@ -299,17 +300,18 @@ def mouth_openings(inlet: Inlet, interface: Interface) -> list[tuple[float, floa
     return openings
 
 
-def past_mouth(laminate: Laminate, level: int, p: Point) -> str | None:
-    """Return text on how a mouth's opening reaches past it at a place; None without a mouth."""
+def past_mouth(laminate: Laminate, level: int, p: Point) -> Clause | None:
+    """Return how a mouth's opening reaches past it at a place; None without a mouth."""
     interface = laminate.interfaces[level - 1]
     for inlet in laminate.inlets if interface.kind == "chamber" else ():
         for low, high in mouth_openings(inlet, interface):
             if abs(inlet.depth(p)) <= PAST_MOUTH and low <= inlet.offset(p) <= high:
-                return (
-                    f"the opening there is {high - low:.3f} mm wide and reaches "
-                    f"{max(high, -low) - inlet.width / 2:.3f} mm past the end of the mouth of "
-                    f"{inlet.chamber}, which is {inlet.width:.3f} mm wide; make the opening "
-                    "narrower, or state its width and its middle"
+                return say(
+                    "words.past-mouth",
+                    opening=high - low,
+                    past=max(high, -low) - inlet.width / 2,
+                    mouth=inlet.chamber,
+                    mouth_width=inlet.width,
                 )
     return None
 

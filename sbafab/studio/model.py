@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from sbafab import api
@@ -139,18 +139,26 @@ def nets_model(laminate: Laminate, nets: NetMap, has: Collection[str]) -> dict[s
             {"name": port.name, "layers": [port.below, port.above], "at": list(port.at)}
             for port in laminate.ports
         ],
-        "faults": [asdict(fault) for fault in nets.faults],
+        "faults": [
+            {
+                "kind": fault.kind,
+                "nets": list(fault.nets),
+                "interface": fault.interface,
+                "layers": list(fault.layers),
+                "at": list(fault.at),
+                "message": fault.message,
+            }
+            for fault in nets.faults
+        ],
         "shapes": shapes.new,
     }
 
 
 def finding_model(finding: Finding) -> dict[str, Any]:
-    """A finding as in ``checks.json``; for a part's design, its message omits the design's name."""
-    model = {**FindingEntry.of(finding), "by_user": finding.by_user}
-    if finding.design:
-        message = finding.message.removeprefix(f"{finding.design}: ")
-        model |= {"design": finding.design, "message": message}
-    return model
+    """A finding as in ``checks.json``, its design, whose name the message omits, and its parts."""
+    entry = FindingEntry.of(replace(finding, design=""))
+    design = {"design": finding.design} if finding.design else {}
+    return {**entry, **design, "by_user": finding.by_user, "parts": list(finding.parts)}
 
 
 # Assemblies: the surface of each part once, and its place.

@@ -26,7 +26,9 @@ from sbafab.rules.finding import Finding, Place
 from tests.reports.pages import APPROVED, EARS, TPU, lines_of, work_of
 from tests.reports.welded import DOUBLE
 
-WAIVED = Finding("bond-width", "waived", 0.75, 0.5, "mm", Place(), "too narrow", by_user=True)
+WAIVED = Finding(
+    "bond-width", "waived", 0.75, 0.5, "mm", Place(), "too narrow", waived_by="the design"
+)
 WARNS = Finding("film-limits", "warn", 1.0, 2.0, "mm", Place(), "too near the limit")
 BATCH = ("order.copies=9", "order.at_once=4", "order.batch=24", "order.made_for=Ward 7")
 DESIGNS: dict[str, tuple[str, ...]] = {

@@ -102,7 +102,9 @@ def test_the_middle_is_told_in_rounds(balloons: int, turns: int) -> None:
 
 def test_words_from_outside_stay_words(sheet_files: Any) -> None:
     hostile = '"><script>alert(1)</script>&amp;{{ 7*7 }}</style>'
-    finding = Finding("bond-width", "waived", 1.0, 1.0, "mm", Place(), hostile, by_user=True)
+    finding = Finding(
+        "bond-width", "waived", 1.0, 1.0, "mm", Place(), hostile, waived_by="the design"
+    )
     order = (f"order.made_for={json.dumps(hostile)}", f"order.note={json.dumps(hostile)}")
     work = work_of("1dof-5mm", *order, sheets=sheet_files, findings=[finding])
     named = replace(work.laminate, name=hostile)

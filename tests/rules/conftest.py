@@ -1,10 +1,11 @@
-"""Good laminates from the templates, and a way to spoil one layer of them."""
+"""Good laminates from the templates, ways to spoil them, and findings held against each other."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import pytest
 
@@ -14,7 +15,7 @@ from sbafab.laminate.laminate import Laminate
 
 Build = Callable[..., Laminate]
 Spoil = Callable[..., Laminate]
-
+Change = Region | Callable[[Region], Region]
 
 ROUND_NUMBERS = (
     "bore.diameter=1",
@@ -30,10 +31,11 @@ def built(template: str, *assignments: str) -> Laminate:
     return build(load_design(template, [*ROUND_NUMBERS, *assignments]))
 
 
-def spoiled(laminate: Laminate, index: int, profile: Region, pieces: int | None = None) -> Laminate:
+def spoiled(laminate: Laminate, index: int, change: Change, pieces: int | None = None) -> Laminate:
     """The laminate with another profile in one layer, and another number of pieces asked for."""
     layers = list(laminate.layers)
     layer = laminate.layer(index)
+    profile = change if isinstance(change, Region) else change(layer.profile)
     layers[index - 1] = replace(
         layer,
         profile=profile,
@@ -41,6 +43,14 @@ def spoiled(laminate: Laminate, index: int, profile: Region, pieces: int | None 
         pieces=layer.pieces if pieces is None else pieces,
     )
     return replace(laminate, layers=tuple(layers))
+
+
+def made(design: tuple[str, ...], changes: Mapping[int, Change], **fields: Any) -> Laminate:
+    """The laminate of a design with changed layers, and with other fields."""
+    laminate = built(*design)
+    for index, change in changes.items():
+        laminate = spoiled(laminate, index, change)
+    return replace(laminate, **fields)
 
 
 @pytest.fixture(scope="session")

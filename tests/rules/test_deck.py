@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple, get_args
 
 import pytest
@@ -13,7 +14,9 @@ from sbafab.design.sections import RuleName
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, disc, rectangle, strip
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules.deck import has_failed, rule_names, run_deck
+from sbafab.rules import bond_width, film_limits, mask_overhang, measures, pin_holes
+from sbafab.rules.deck import rule_names, run_deck
+from sbafab.rules.measures import Measures
 from tests.designs import PAPER, errors
 from tests.quick import few
 from tests.rules.conftest import built
@@ -256,8 +259,6 @@ def test_a_pin_too_thick_for_its_holes_fails_pin_fit_alone(good: Callable[..., L
     assert failing(thick, cut) == {"pin-fit"}
     (found,) = (f for f in run_deck(thick, cut) if f.rule == "pin-fit")
     assert found.measured == pytest.approx(1.198 / 0.8 - 1)
-    most = "a film must stretch by 49.7% over its pin; 30% at most is allowed"
-    assert most in found.message
     assert found.where.layers == (2,)
 
 
@@ -295,18 +296,6 @@ def test_variants_pass(design: tuple[str, ...], good: Callable[..., Laminate]) -
     assert failing(good(*design)) == set()
 
 
-def test_a_waived_failure_stops_nothing_and_says_so(
-    good: Callable[..., Laminate], spoil: Callable[..., Laminate]
-) -> None:
-    narrow = spoil(good(*ONE), 4, disc(AXIS, 3.75) - disc(AXIS, 1.2))
-    findings = run_deck(narrow, EXACT.with_(rules={"waive": ["bond-width"]}))
-    assert not has_failed(findings)
-    waived = next(finding for finding in findings if finding.rule == "bond-width")
-    assert waived.verdict == "waived"
-    assert waived.message.startswith("waived by the design: ")
-    assert has_failed(run_deck(narrow, EXACT.with_(rules={"waive": ["sealing"]})))
-
-
 def test_findings_come_in_the_decks_order(good: Callable[..., Laminate]) -> None:
     found = list(dict.fromkeys(finding.rule for finding in run_deck(good(*LOBED), FEW)))
     assert found == [name for name in rule_names() if name not in SILENT]
@@ -314,3 +303,81 @@ def test_findings_come_in_the_decks_order(good: Callable[..., Laminate]) -> None
 
 def test_every_rule_of_the_deck_can_be_waived_by_name() -> None:
     assert set(get_args(RuleName)) == set(rule_names())
+
+
+def test_ears_that_vanished_from_all_films(good: Callable[..., Laminate]) -> None:
+    """The plate is drilled for them; where no hole tells an ear, its bond past the mask counts."""
+    laminate = good("1dof-5mm", "stack.balloons=3", EARS)
+    tools = [pin for pin in laminate.pins if pin.name.startswith("film")]
+
+    def earless(profile: Region) -> Region:
+        for pin in tools:
+            profile = profile | disc(pin.centre, 0.8)
+        return profile
+
+    layers = tuple(
+        layer
+        if layer.is_mask
+        else replace(layer, profile=earless(layer.profile), pattern=f"{layer.pattern}x")
+        for layer in laminate.layers
+    )
+    laminate = replace(laminate, layers=layers)
+    assert failing(laminate, EXACT) == {"pin-holes", "facing-films"}
+    (found,) = pin_holes.check(Measures(laminate, EXACT))
+    assert found.id == "pin-holes.loose"
+    # Three patterns of film (tabbed base, tabbed wall, wall, cap) hang on nothing, two pins idle.
+    assert found.measured >= 5
+
+
+@pytest.mark.parametrize("turn", [10.0, 25.0, 40.0])
+def test_a_strip_that_leaves_aslant_is_no_narrow_bond(
+    turn: float, good: Callable[..., Laminate], spoil: Callable[..., Laminate]
+) -> None:
+    # A square pocket turned under the strip: their edges meet at 90 degrees less ``turn``.
+    pocket = rectangle((-1.7, -1.7), (1.7, 1.7)).turned(turn)
+    mask = (pocket | strip(AXIS, (8.75, 0.0), 1.6)) - disc(AXIS, 0.5)
+    (found,) = bond_width.check(Measures(spoil(good(*ONE), 2, mask), PAPER))
+    assert (found.verdict, found.measured) == ("pass", pytest.approx(0.75, abs=1e-9))
+
+
+@pytest.mark.parametrize(("rule", "module"), [(bond_width, measures), (film_limits, film_limits)])
+def test_equal_profiles_are_measured_once(
+    rule: object, module: object, good: Callable[..., Laminate], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measured: list[Region] = []
+    original = module.least_width
+
+    def counting(region: Region, *more: float) -> object:
+        measured.append(region)
+        return original(region, *more)
+
+    monkeypatch.setattr(module, "least_width", counting)
+    counts = []
+    for balloons in (4, 40):
+        measured.clear()
+        rule.check(Measures(good("1dof-5mm", f"stack.balloons={balloons}"), PAPER))
+        counts.append(len(measured))
+    assert counts[0] == counts[1] > 0
+
+
+def test_what_is_measured_once_is_measured_of_that_laminate(good: Callable[..., Laminate]) -> None:
+    one = Measures(good("1dof-5mm", "stack.balloons=2"), PAPER)
+    more = Measures(good("1dof-5mm", "stack.balloons=4"), PAPER)
+    assert len(one.moves) < len(more.moves)
+    assert one.moves is one.moves
+    wide = PAPER.with_("registration.hand_placement=0.4")
+    assert Measures(one.laminate, wide).moves != one.moves
+
+
+def test_flush_masks_at_pins_are_waived_by_name(good: Callable[..., Laminate]) -> None:
+    laminate = good("3dof-15mm")
+    main, *waived = mask_overhang.check(Measures(laminate, PAPER))
+    assert main.verdict == "pass"
+    assert main.measured == pytest.approx(0.5, abs=1e-9)
+    # Each bore is in all 15 pockets; the lumen bounds the film in the 14 separator interfaces.
+    counts = [15 if pin.diameter == 1.0 else 14 for pin in laminate.pins]
+    assert sorted(counts) == [14, 15, 15, 15]
+    for finding, pin, count in zip(waived, laminate.pins, counts, strict=True):
+        assert finding.verdict == "waived"
+        assert finding.measured == pytest.approx(0.0, abs=1e-9)
+        assert dict(finding.says.facts).items() >= {"pin": pin.name, "count": count}.items()

@@ -41,7 +41,7 @@ def test_a_rules_worst_finding_is_the_one_that_counts() -> None:
     better = Finding("bond-width", "pass", 0.75, 0.8, "mm", Place(), "")
     worse = replace(better, measured=0.76)
     flush = replace(better, verdict="waived", measured=0.0)
-    asked = replace(better, verdict="waived", measured=0.7, by_user=True)
+    asked = replace(better, verdict="waived", measured=0.7, waived_by="the design")
     assert margins([better, worse, flush])["bond-width"].margin == pytest.approx(0.01)
     assert margins([better, asked, worse])["bond-width"].margin == pytest.approx(-0.05)
     assert margins([flush]) == {}

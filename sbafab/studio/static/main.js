@@ -182,8 +182,8 @@ function goto(finding, section) {
 }
 
 // Of an assembly the parts that a finding is about are picked out.
-function gotoParts({ design, message }) {
-  const named = (part) => (design ? part.design?.name === design : new RegExp(`(^|[^\\w-])${part.name}([^\\w-]|$)`).test(message));
+function gotoParts({ design, parts }) {
+  const named = (part) => (design ? part.design?.name === design : parts.includes(part.name));
   phonePanel("views");
   if (!["parts", "plan"].includes(upper.shown)) show("parts");
   studio.pickParts((studio.parts ?? []).filter(named).map(({ name }) => name));

@@ -1,0 +1,109 @@
+"""The catalogue of all that rules and checks say, by id, in ``sentences.toml``, and how it is told.
+
+A finding holds the id of its sentence and the facts that fill it; nothing but a reader reads it.
+"""
+
+from __future__ import annotations
+
+import string
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from typing import Any, NamedTuple
+
+from sbafab.laminate.laminate import Layer
+from sbafab.rules.limits import at
+
+WORDS = "words"
+"""Table of the words that several rules use."""
+FAIL, REMEDY = "-fail", "-remedy"
+"""Endings of the sentences for a failure, and for what a warning asks to do."""
+
+
+class Explanation(NamedTuple):
+    """The condition that ``holds`` if a rule passes, ``why`` it matters, how to ``mend`` it.
+
+    ``keys`` of a design file set the limit or the measured value.
+    """
+
+    holds: str
+    why: str
+    mend: str
+    keys: tuple[str, ...] = ()
+
+
+class Clause(NamedTuple):
+    """A sentence or a part of one: its id, "rule.sentence", and the facts that fill it, by name.
+
+    A fact is a number, a text, a point (x, y), another clause, or several texts or clauses.
+    """
+
+    id: str
+    facts: tuple[tuple[str, Any], ...] = ()
+
+    def __str__(self) -> str:
+        return tell(self, {})
+
+    def also(self, **facts: Any) -> Clause:
+        """Return the clause with further facts, or other ones by the same names."""
+        return say(self.id, **{**dict(self.facts), **facts})
+
+
+@cache
+def catalogue() -> Mapping[str, Any]:
+    """Return the tables of all rules and checks, by name, in their order."""
+    file = resources.files("sbafab.rules") / "sentences.toml"
+    return tomllib.loads(file.read_text(encoding="utf-8"))
+
+
+def explained(name: str) -> Explanation:
+    """Return the explanation of a rule or check."""
+    table = catalogue()[name]
+    return Explanation(table["holds"], table["why"], table["mend"], tuple(table["keys"]))
+
+
+def is_said(sentence: str) -> bool:
+    """Return True if the catalogue has a sentence."""
+    rule, name = sentence.split(".")
+    return name in catalogue()[rule]["says"]
+
+
+def say(sentence: str, **facts: Any) -> Clause:
+    """Return a clause; lists become tuples, so that it can be hashed."""
+    rows = ((name, tuple(fact) if isinstance(fact, list) else fact) for name, fact in facts.items())
+    return Clause(sentence, tuple(rows))
+
+
+def layer_name(layer: Layer) -> Clause:
+    return say("words.layer", index=layer.index, name=layer.name)
+
+
+def tell(clause: Clause, outer: Mapping[str, Any]) -> str:
+    """Return the text of a clause; facts that it lacks are those of the sentence it stands in."""
+    rule, name = clause.id.split(".")
+    text: str = catalogue()[rule]["says"][name]
+    return _Teller(rule).vformat(text, (), {**outer, **dict(clause.facts)}) if "{" in text else text
+
+
+class _Teller(string.Formatter):
+    """Fills a sentence of a rule with facts, with other sentences of the rule, and with words."""
+
+    def __init__(self, rule: str) -> None:
+        self.rule = rule
+
+    def get_value(self, key: int | str, args: Any, kwargs: Mapping[str, Any]) -> Any:
+        if key in kwargs:
+            fact = kwargs[str(key)]
+        else:
+            own = f"{self.rule}.{key}"
+            fact = Clause(own if is_said(own) else f"{WORDS}.{key}")
+        return tell(fact, kwargs) if isinstance(fact, Clause) else fact
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        if isinstance(value, tuple):
+            is_text = value and isinstance(value[0], str | Clause)
+            return " and ".join(map(str, value)) if is_text else at(value)
+        if isinstance(value, int) and format_spec[:2].isalpha():
+            return f"{value} {format_spec}{'' if value == 1 else 's'}"
+        return str(super().format_field(value, format_spec))
