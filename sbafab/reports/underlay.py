@@ -1,10 +1,10 @@
-"""underlay.pdf: pages to print at 1:1 and to lay up on, below the release film; seams.pdf: the
-paths of seams on their films.
+"""Pages to print at 1:1: underlay.pdf to lay up on, below the release film; seams.pdf: the paths
+of seams on their films.
 
-It shows the edges of every layer without pins at its place in the stack, seen from above, with the
-actuator's axis at the cross. If a cycle of many laminates does not fit one page, it is spread over
-several, with whole laminates on each: their dotted frames are cut out and laid edge to edge. Ours;
-its effect on placement by hand was not measured.
+The underlay shows the edges of every layer without pins at its place in the stack, seen from above,
+with the actuator's axis at the cross. If a cycle of many laminates does not fit one page, it is
+spread over several, with whole laminates on each: their dotted frames are cut out and laid edge to
+edge. Ours; its effect on placement by hand was not measured.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from sbafab.cutting.fixture import whole_plate
 from sbafab.cutting.seam_files import shift_words
@@ -24,23 +25,193 @@ from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.pressing.schedule import joined_words, layers_in_words
 from sbafab.reports.traveller.shapes import Bed, beds
 
-NAME = "underlay.pdf"
+# PDF 1.4 without compression, dates or embedded fonts: the same pages give the same bytes with
+# every version of every library. Arcs become Bezier curves, within 5e-6 of their radius.
+
+
+POINTS = 72 / 25.4
+"""PDF points per mm."""
+MOST_SWEEP = math.pi / 4
+ENCODING = "cp1252"
+"""Encoding of the fonts that every reader has; other characters become "?"."""
+Rgb = tuple[float, float, float]
+Dashes = tuple[float, ...]
+BLACK: Rgb = (0.0, 0.0, 0.0)
+FILM: Rgb = (0.05, 0.25, 0.55)
+MASK: Rgb = (0.85, 0.4, 0.0)
+GREY: Rgb = (0.55, 0.55, 0.55)
+DASHED: Dashes = (1.0, 0.6)
+THIN = 0.1
+
+
+class PdfPage:
+    """A page in mm, its lower left corner at (0, 0); later elements cover earlier ones.
+
+    The content of the page ``under``, which several pages may share, lies below.
+    """
+
+    def __init__(self, width: float, height: float, under: PdfPage | None = None) -> None:
+        self.width, self.height, self.under = width, height, under
+        self._drawn = [f"q {POINTS:.10f} 0 0 {POINTS:.10f} 0 0 cm 1 J 1 j"]
+
+    def stroke(self, colour: Rgb, width: float = THIN, dashes: Dashes = ()) -> None:
+        """Set colour, width and dashes (mm) of the following lines."""
+        shades, on = (" ".join(map(coord, values)) for values in (colour, dashes))
+        self._drawn.append(f"{shades} RG {coord(width)} w [{on}] 0 d")
+
+    def contours(self, contours: Iterable[Contour], by: Point = (0.0, 0.0)) -> None:
+        """Closed lines of straight edges and arcs, shifted by an offset in mm."""
+        self._paths([contour.edges for contour in contours], by, "h S")
+
+    def chains(self, chains: Iterable[Sequence[Edge]], by: Point = (0.0, 0.0)) -> None:
+        """Open lines of straight edges and arcs, shifted by an offset in mm."""
+        self._paths(chains, by, "S")
+
+    def _paths(self, chains: Iterable[Sequence[Edge]], by: Point, end: str) -> None:
+        paths = [
+            " ".join([f"{_at(edges[0].start)} m", *map(_curve, edges), end]) for edges in chains
+        ]
+        self._drawn.append(f"q 1 0 0 1 {_at(by)} cm {' '.join(paths)} Q")
+
+    def lines(self, *ends: tuple[Point, Point]) -> None:
+        self._drawn += [f"{_at(start)} m {_at(end)} l S" for start, end in ends]
+
+    def text(self, at: Point, words: str, size: float, bold: bool = False) -> None:
+        """Words that begin at a point, ``size`` mm."""
+        font = "F2" if bold else "F1"
+        self._drawn.append(f"BT /{font} {coord(size)} Tf {_at(at)} Td {_string(words)} Tj ET")
+
+    @property
+    def contents(self) -> list[str]:
+        """The content streams, lowest first."""
+        return [*(self.under.contents if self.under else ()), "\n".join([*self._drawn, "Q"])]
+
+
+def pdf(pages: Sequence[PdfPage], title: str) -> bytes:
+    """The whole file, set to print at actual size."""
+    font = "<< /Type /Font /Subtype /Type1 /BaseFont /%s /Encoding /WinAnsiEncoding >>"
+    streams = list(dict.fromkeys(content for page in pages for content in page.contents))
+    numbers = {content: 5 + len(pages) + n for n, content in enumerate(streams)}
+    kids = " ".join(f"{5 + n} 0 R" for n in range(len(pages)))
+    objects = [
+        "<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
+        f"<< /Type /Pages /Kids [{kids}] /Count {len(pages)} >>",
+        font % "Helvetica",
+        font % "Helvetica-Bold",
+    ]
+    for page in pages:
+        box = f"[0 0 {page.width * POINTS:.4f} {page.height * POINTS:.4f}]"
+        contents = " ".join(f"{numbers[content]} 0 R" for content in page.contents)
+        objects.append(
+            f"<< /Type /Page /Parent 2 0 R /MediaBox {box} /Contents [{contents}] /Resources "
+            "<< /Font << /F1 3 0 R /F2 4 0 R >> >> >>"
+        )
+    objects += [f"<< /Length {len(s)} >>\nstream\n{s}\nendstream" for s in streams]
+    return _file([*objects, f"<< /Title {_string(title)} >>"])
+
+
+def _file(objects: Iterable[str]) -> bytes:
+    """Numbered objects with the table of their offsets; the last one is the file's title."""
+    data = bytearray(b"%PDF-1.4\n%\xe2\xe3\xcf\xd3\n")
+    places = ["0000000000 65535 f \n"]
+    for index, body in enumerate(objects, 1):
+        places.append(f"{len(data):010d} 00000 n \n")
+        data += f"{index} 0 obj\n{body}\nendobj\n".encode(ENCODING, "replace")
+    start, count = len(data), len(places)
+    data += f"xref\n0 {count}\n{''.join(places)}trailer\n".encode()
+    data += f"<< /Size {count} /Root 1 0 R /Info {count - 1} 0 R >>\n".encode()
+    data += f"startxref\n{start}\n%%EOF\n".encode()
+    return bytes(data)
+
+
+def _string(words: str) -> str:
+    for mark in "\\()":
+        words = words.replace(mark, f"\\{mark}")
+    return f"({words})"
+
+
+def _at(p: Point) -> str:
+    return f"{coord(p[0])} {coord(p[1])}"
+
+
+def _curve(edge: Edge) -> str:
+    if not isinstance(edge, Arc):
+        return f"{_at(edge.end)} l"
+    parts = max(1, math.ceil(abs(edge.sweep) / MOST_SWEEP - 1e-9))
+    step = edge.sweep / parts
+    # Handles of this length put the curve's middle on the arc.
+    handle = 4 / 3 * math.tan(step / 4) * edge.radius
+    curves = []
+    for part in range(parts):
+        first, last = (edge.start_angle + step * n for n in (part, part + 1))
+        (x0, y0), (x1, y1) = (_round(edge, angle) for angle in (first, last))
+        leave = x0 - handle * math.sin(first), y0 + handle * math.cos(first)
+        arrive = x1 + handle * math.sin(last), y1 - handle * math.cos(last)
+        curves.append(f"{_at(leave)} {_at(arrive)} {_at((x1, y1))} c")
+    return " ".join(curves)
+
+
+def _round(edge: Arc, angle: float) -> Point:
+    (x, y), r = edge.centre, edge.radius
+    return x + r * math.cos(angle), y + r * math.sin(angle)
+
+
+# What all pages have: a title, how to use the print, and bars that check its size.
+
+
 PAPER = (210.0, 279.4)
 """mm: as wide as A4 and as long as Letter, so that either prints it whole at 100 %."""
-PLATEN = (152.4, 152.4)
-"""mm: the paper's heated area."""
 BAR = 100.0
 """Length of the bars that check the size of a print, mm."""
 CLOSE = 0.3
 """Tolerance of a bar, mm: at 15 mm from the middle the print is then 0.05 mm off."""
 SIDE, HEAD = 25.0, 52.0
-"""Margins of the page: left and right, and above, mm."""
+"""Margins of a page to work on: left and right, and above, mm."""
+LEFT = 14.0
+SMALL, WORDS, TITLE, ROW = 2.2, 3.0, 5.0, 4.5
+
+
+def head(page: PdfPage, at: Point, title: str, lines: Sequence[str], size: float = TITLE) -> None:
+    page.text(at, title, size, bold=True)
+    _lines(page, (at[0], at[1] - 1 - ROW), lines)
+
+
+def _lines(page: PdfPage, at: Point, lines: Iterable[str]) -> None:
+    for number, line in enumerate(lines):
+        page.text((at[0], at[1] - ROW * number), line, WORDS)
+
+
+def bars(page: PdfPage, across: Point, up: Point) -> None:
+    """A bar along each direction of the page, from a point."""
+    page.stroke(BLACK)
+    (x0, y), (x, y0) = across, up
+    page.lines(((x0, y), (x0 + BAR, y)), ((x, y0), (x, y0 + BAR)))
+    for end in (0.0, BAR):
+        page.lines(((x0 + end, y - 2), (x0 + end, y + 2)), ((x - 2, y0 + end), (x + 2, y0 + end)))
+
+
+def _work_head(page: PdfPage, title: str, use: Sequence[str]) -> None:
+    """Title, use and bars of a page to work on."""
+    head(page, (LEFT, page.height - 16), title, use)
+    across, up = ((page.width - BAR) / 2, page.height - HEAD + 8), (LEFT, page.height - HEAD - BAR)
+    bars(page, across, up)
+    page.text((across[0] + BAR / 2 - 8, across[1] + 1.5), f"{BAR:g} mm", WORDS)
+    page.text((up[0] - 4, up[1] - 6), f"{BAR:g} mm", WORDS)
+
+
+def look(page: PdfPage, is_mask: bool, width: float = THIN) -> None:
+    """Set the look of a film's edges, or of a mask's."""
+    page.stroke(MASK if is_mask else FILM, width, DASHED if is_mask else ())
+
+
+# The underlay.
+
+
+NAME = "underlay.pdf"
+PLATEN = (152.4, 152.4)
+"""mm: the paper's heated area."""
 BEYOND = 8.0
 """Length of the cross beyond the outermost line, mm."""
-FILM: Rgb = (0.05, 0.25, 0.55)
-MASK: Rgb = (0.85, 0.4, 0.0)
-GREY: Rgb = (0.55, 0.55, 0.55)
-THIN, SMALL, WORDS, TITLE, ROW = 0.1, 2.2, 3.0, 5.0, 4.5
 USE = (
     "Print at 100 % (“actual size”, not “fit to page”) on plain paper. Measure both bars:",
     f"if either is not {BAR:g} mm, {CLOSE:g} more or less, do not use this print.",
@@ -52,8 +223,6 @@ NOTES = (
     "A fresh print for every hot cycle: paper dries and shrinks. Toner softens in the press and",
     "may mark the release film or stick to it: print with ink if you can. Not tried by us.",
 )
-
-
 TRIM = (
     "Cut along the dotted frames and lay pages edge to edge on the plate: crosses go on across the "
     "cut."
@@ -105,20 +274,27 @@ def underlay_pdf(
     as large as the ``platen`` (mm), as a line to cut along.
     """
     outlines = guides(laminate)
-    if not outlines:
-        return None
     spread = leaves(laminate, places, platen)
     plate = whole_plate(laminate, platen, places).outers[0]
     pages = []
     for number, leaf in enumerate(spread, 1):
         page = PdfPage(*leaf.size)
         _draw(page, laminate, outlines, places, leaf, plate)
-        _bars(page)
         which = f", page {number} of {len(spread)}" if len(spread) > 1 else ""
-        _words(page, f"{laminate.name}: alignment underlay{which}, seen from above, 1:1")
-        _notes(page, outlines, design_sha256, leaf)
+        title = f"{laminate.name}: alignment underlay{which}, seen from above, 1:1"
+        _work_head(page, title, USE)
+        y = _foot(outlines) - 8
+        for guide in outlines:
+            look(page, guide.is_mask)
+            page.lines(((LEFT, y + 1), (LEFT + 10, y + 1)))
+            page.text((LEFT + 13, y), guide.words, WORDS)
+            y -= ROW
+        notes = NOTES if leaf.is_plate else (TRIM, *NOTES)
+        _lines(page, (LEFT, y), notes)
+        y -= ROW * (len(notes) - 1)
+        page.text((page.width - 46, y), f"design {design_sha256[:12]}", WORDS)
         pages.append(page)
-    return pdf(pages, f"{laminate.name}: alignment underlay")
+    return pdf(pages, f"{laminate.name}: alignment underlay") if pages else None
 
 
 def leaves(
@@ -132,59 +308,61 @@ def leaves(
     outlines = guides(laminate)
     if not outlines:
         return ()
-    box = _bounds(outlines)
-    xs, ys = (sorted({place[axis] for place in places}) for axis in (0, 1))
-    margins = 2 * SIDE, HEAD + _foot(outlines)
-    room = [PAPER[axis] - margins[axis] - 2 * BEYOND for axis in (0, 1)]
-    columns = _runs(xs, box[2] - box[0], room[0])
-    rows = _runs(ys, box[3] - box[1], room[1])
+    box = box_round([guide.region.bounds for guide in outlines])
     plate = whole_plate(laminate, platen, places).bounds
+    margins = 2 * SIDE, HEAD + _foot(outlines)
+    columns, rows = (
+        _tiles({place[axis] for place in places}, box, plate, PAPER[axis] - margins[axis], axis)
+        for axis in (0, 1)
+    )
     has_room = all(plate[axis + 2] - plate[axis] <= PAPER[axis] - margins[axis] for axis in (0, 1))
+    is_plate = len(rows) * len(columns) == 1 and has_room
     spread = []
     for row in rows:
         for column in columns:
-            numbers = tuple(n for n, (x, y) in enumerate(places, 1) if x in column and y in row)
-            if not numbers:
-                continue
-            wide = max(column) - min(column) + box[2] - box[0] + 2 * BEYOND
-            high = max(row) - min(row) + box[3] - box[1] + 2 * BEYOND
-            size = max(PAPER[0], wide + margins[0]), max(PAPER[1], high + margins[1])
-            if len(rows) * len(columns) == 1 and has_room:
-                spread.append(Leaf(size, numbers, plate, is_plate=True))
-            else:
-                spans = _between(xs, column, box, plate, 0), _between(ys, row, box, plate, 1)
-                (x0, x1), (y0, y1) = spans
-                spread.append(Leaf(size, numbers, (x0, y0, x1, y1)))
+            numbers = tuple(
+                n for n, (x, y) in enumerate(places, 1) if x in column.steps and y in row.steps
+            )
+            size = max(PAPER[0], column.length + margins[0]), max(PAPER[1], row.length + margins[1])
+            trim = plate if is_plate else (column.low, row.low, column.high, row.high)
+            if numbers:
+                spread.append(Leaf(size, numbers, trim, is_plate))
     return tuple(spread)
 
 
-def _runs(steps: Sequence[float], size: float, room: float) -> list[list[float]]:
-    """Rows or columns per page, as even as possible, at least one on each."""
-    pitch = steps[1] - steps[0] if len(steps) > 1 else 0.0
-    most = max(1, int((room - size) / pitch + 1 + 1e-9)) if pitch else 1
-    pages = -(-len(steps) // most)
-    each = -(-len(steps) // pages)
-    return [list(steps[first : first + each]) for first in range(0, len(steps), each)]
+class _Tile(NamedTuple):
+    """Columns or rows on one page, the length that they take, and the ends of the paper, mm."""
+
+    steps: Sequence[float]
+    length: float
+    low: float
+    high: float
 
 
-def _between(
-    steps: Sequence[float], here: Sequence[float], box: Bounds, plate: Bounds, axis: int
-) -> tuple[float, float]:
-    """From midway to the previous page to midway to the next; at an end up to the cross, or the
-    plate.
+def _tiles(
+    steps: Iterable[float], box: Bounds, plate: Bounds, room: float, axis: int
+) -> list[_Tile]:
+    """Rows or columns per page, as even as possible, at least one on each.
+
+    Paper ends midway to the next page; at an end beyond the cross, where the plate has room.
     """
+    every = sorted(steps)
     low, high = box[axis], box[axis + 2]
-    pitch = steps[1] - steps[0] if len(steps) > 1 else 0.0
+    pitch = every[1] - every[0] if len(every) > 1 else 0.0
+    spare = room - 2 * BEYOND - (high - low)
+    most = max(1, int(spare / pitch + 1 + 1e-9)) if pitch else 1
+    pages = -(-len(every) // most)
+    each = -(-len(every) // pages)
     half = (pitch - (high - low)) / 2
-    ends = min(here) + low, max(here) + high
-    first = ends[0] - (half if min(here) > steps[0] else _beyond(ends[0] - plate[axis]))
-    last = ends[1] + (half if max(here) < steps[-1] else _beyond(plate[axis + 2] - ends[1]))
-    return first, last
-
-
-def _beyond(free: float) -> float:
-    """Return the margin of paper beyond the drawing, where that much of the plate is free."""
-    return min(BEYOND, max(free, 0.0))
+    tiles = []
+    for first in range(0, len(every), each):
+        here = every[first : first + each]
+        start, end = here[0] + low, here[-1] + high
+        before = half if first else min(BEYOND, max(start - plate[axis], 0.0))
+        is_last = here[-1] == every[-1]
+        after = min(BEYOND, max(plate[axis + 2] - end, 0.0)) if is_last else half
+        tiles.append(_Tile(here, end - start + 2 * BEYOND, start - before, end + after))
+    return tiles
 
 
 def _foot(outlines: Sequence[Guide]) -> float:
@@ -195,13 +373,13 @@ def _foot(outlines: Sequence[Guide]) -> float:
 def _draw(
     page: PdfPage,
     laminate: Laminate,
-    outlines: tuple[Guide, ...],
+    outlines: Sequence[Guide],
     places: Sequence[Point],
     leaf: Leaf,
     plate: Contour,
 ) -> None:
     """The laminates of a page, numbered if there are several, with its trim frame in the middle."""
-    box = _bounds(outlines)
+    box = box_round([guide.region.bounds for guide in outlines])
     foot = _foot(outlines)
     x0, low, right, top = leaf.trim
     x = page.width / 2 - (x0 + right) / 2
@@ -212,27 +390,29 @@ def _draw(
         _laminate(page, laminate, outlines, at)
         if len(places) > 1:
             page.text((at[0] + box[0], at[1] + box[1] - 2.3), f"{number}", SMALL)
-    page.stroke(BLACK, THIN, (0.2, 0.8))
+    page.stroke(BLACK, dashes=(0.2, 0.8))
     if leaf.is_plate:
-        (frame,) = _moved(Region((plate,)), (x, y))
-        page.contour(frame)
+        page.contours([plate], (x, y))
         return
     ring = [(x0, low), (right, low), (right, top), (x0, top), (x0, low)]
-    for start, end in zip(ring, ring[1:], strict=False):
-        page.line((start[0] + x, start[1] + y), (end[0] + x, end[1] + y))
+    corners = [(u + x, v + y) for u, v in ring]
+    page.lines(*zip(corners, corners[1:], strict=False))
 
 
-def _laminate(page: PdfPage, laminate: Laminate, outlines: tuple[Guide, ...], shift: Point) -> None:
-    """The cross, the pins and the lines of one laminate."""
-    _cross(page, _bounds(outlines), shift)
+def _laminate(page: PdfPage, laminate: Laminate, outlines: Sequence[Guide], at: Point) -> None:
+    """The cross through the axis, the pins and the lines of one laminate."""
+    low_x, low_y, high_x, high_y = box_round([guide.region.bounds for guide in outlines])
+    x, y = at
+    page.stroke(GREY)
+    page.lines(
+        ((low_x - BEYOND + x, y), (high_x + BEYOND + x, y)),
+        ((x, low_y - BEYOND + y), (x, high_y + BEYOND + y)),
+    )
     for pin in laminate.pins:
-        page.stroke(GREY, THIN)
-        for contour in disc(pin.centre, pin.diameter / 2).moved(*shift).contours:
-            page.contour(contour)
+        page.contours(disc(pin.centre, pin.diameter / 2).contours, at)
     for guide in outlines:
-        _stroke(page, guide)
-        for contour in _moved(guide.region, shift):
-            page.contour(contour)
+        look(page, guide.is_mask)
+        page.contours(guide.region.contours, at)
 
 
 def guides(laminate: Laminate) -> tuple[Guide, ...]:
@@ -270,71 +450,6 @@ def _loose(laminate: Laminate, step: AssemblyStep, bed: Bed) -> Iterator[Layer]:
         yield max(layers, key=lambda layer: sum(contour.area for contour in layer.profile.outers))
 
 
-def _bounds(outlines: tuple[Guide, ...]) -> Bounds:
-    boxes = [guide.region.bounds for guide in outlines]
-    lows, highs = [box[:2] for box in boxes], [box[2:] for box in boxes]
-    return (
-        min(x for x, _ in lows),
-        min(y for _, y in lows),
-        max(x for x, _ in highs),
-        max(y for _, y in highs),
-    )
-
-
-def _moved(region: Region, shift: Point) -> tuple[Contour, ...]:
-    return tuple(region.moved(*shift).contours)
-
-
-def _stroke(page: PdfPage, guide: Guide) -> None:
-    page.stroke(MASK if guide.is_mask else FILM, THIN, (1.0, 0.6) if guide.is_mask else ())
-
-
-def _cross(page: PdfPage, bounds: Bounds, shift: Point) -> None:
-    """Lines through the axis, extending past the page's content."""
-    low_x, low_y, high_x, high_y = bounds
-    x, y = shift
-    page.stroke(GREY, THIN)
-    page.line((low_x - BEYOND + x, y), (high_x + BEYOND + x, y))
-    page.line((x, low_y - BEYOND + y), (x, high_y + BEYOND + y))
-
-
-def _bars(page: PdfPage) -> None:
-    """One bar along each direction of the page."""
-    page.stroke(BLACK, THIN)
-    y, x = page.height - HEAD + 8, 14.0
-    x0, low = (page.width - BAR) / 2, page.height - HEAD - BAR
-    page.line((x0, y), (x0 + BAR, y))
-    page.line((x, low), (x, low + BAR))
-    for end in (0.0, BAR):
-        page.line((x0 + end, y - 2), (x0 + end, y + 2))
-        page.line((x - 2, low + end), (x + 2, low + end))
-    page.text((x0 + BAR / 2 - 8, y + 1.5), f"{BAR:g} mm", WORDS)
-    page.text((x - 4, low - 6), f"{BAR:g} mm", WORDS)
-
-
-def _words(page: PdfPage, title: str) -> None:
-    """Title and use, above the drawing."""
-    top = page.height - 16
-    page.text((14, top), title, TITLE, bold=True)
-    for number, line in enumerate(USE, 1):
-        page.text((14, top - 1 - ROW * number), line, WORDS)
-
-
-def _notes(page: PdfPage, outlines: tuple[Guide, ...], sha256: str, leaf: Leaf) -> None:
-    """Write the meaning of the lines below the drawing."""
-    y = _foot(outlines) - 8
-    for guide in outlines:
-        _stroke(page, guide)
-        page.line((14, y + 1), (24, y + 1))
-        page.text((27, y), guide.words, WORDS)
-        y -= ROW
-    join = () if leaf.is_plate else (TRIM,)
-    for line in (*join, *NOTES):
-        page.text((14, y), line, WORDS)
-        y -= ROW
-    page.text((page.width - 46, y + ROW), f"design {sha256[:12]}", WORDS)
-
-
 # Paths of seams on their films.
 
 
@@ -359,9 +474,8 @@ def seams_pdf(
     for step in laying(laminate):
         if step.joining is not None and step.joining.seam is not None:
             steps.setdefault(step.layers, []).append((step.number, step.joining.seam))
-    offsets = offsets or {}
     pages = [
-        _seam_page(laminate, layers, seams, design_sha256, offsets)
+        _seam_page(laminate, layers, seams, design_sha256, offsets or {})
         for layers, seams in steps.items()
     ]
     return pdf(pages, f"{laminate.name}: paths of seams") if pages else None
@@ -374,190 +488,36 @@ def _seam_page(
     sha256: str,
     offsets: Mapping[str, Point],
 ) -> PdfPage:
-    shifted = [tool for tool in dict.fromkeys(seam.tool for _, seam in seams) if tool in offsets]
     films = union([laminate.layer(index).profile for index in layers])
-    low_x, low_y, high_x, high_y = box_round(
-        [films.bounds, *(seam.region.bounds for _, seam in seams)]
-    )
-    foot = 24 + ROW * (len(seams) + len(shifted) + 2)
+    box = box_round([films.bounds, *(seam.region.bounds for _, seam in seams)])
+    tools = [tool for tool in dict.fromkeys(seam.tool for _, seam in seams) if tool in offsets]
+    words = [
+        *(
+            f"step {step}: seam {seam.name}, {seam.tool}, {seam.width:g} mm wide, layers "
+            f"{seam.below} and {seam.above}; begins at its circle"
+            for step, seam in seams
+        ),
+        *(f"As made: the {shift_words(tool, offsets[tool])}." for tool in tools),
+        f"Blue: edges of {layers_in_words(layers)}. Black: the middle of the tool. Dashed: its "
+        "width.",
+    ]
+    foot = 24 + ROW * (len(words) + 1)
+    low_x, low_y, high_x, high_y = box
     width = max(PAPER[0], high_x - low_x + 2 * SIDE)
     height = max(PAPER[1], high_y - low_y + HEAD + foot)
     page = PdfPage(width, height)
-    x = (width - low_x - high_x) / 2
-    y = foot + (height - HEAD - foot - low_y - high_y) / 2
-    page.stroke(FILM, THIN)
-    for contour in films.moved(x, y).contours:
-        page.contour(contour)
+    at = (width - low_x - high_x) / 2, foot + (height - HEAD - foot - low_y - high_y) / 2
+    look(page, is_mask=False)
+    page.contours(films.contours, at)
     for step, seam in seams:
-        page.stroke(MASK, THIN, (1.0, 0.6))
-        for contour in seam.region.moved(x, y).contours:
-            page.contour(contour)
-        page.stroke(BLACK, THIN)
-        for chain in seam.path:
-            page.chain(chain, (x, y))
+        look(page, is_mask=True)
+        page.contours(seam.region.contours, at)
+        page.stroke(BLACK)
+        page.chains(seam.path, at)
         start = seam.path[0][0].start
-        dot = start[0] + x, start[1] + y
-        for contour in disc(dot, START).contours:
-            page.contour(contour)
-        page.text((dot[0] + 1.5, dot[1] + 1.0), f"{step}", SMALL)
-    _bars(page)
-    top = page.height - 16
-    page.text((14, top), f"{laminate.name}: paths of seams, from above, 1:1", TITLE, bold=True)
-    for number, line in enumerate(SEAM_USE, 1):
-        page.text((14, top - 1 - ROW * number), line, WORDS)
-    y = foot - 8
-    for step, seam in seams:
-        words = f"step {step}: seam {seam.name}, {seam.tool}, {seam.width:g} mm wide, layers "
-        page.text((14, y), f"{words}{seam.below} and {seam.above}; begins at its circle", WORDS)
-        y -= ROW
-    for tool in shifted:
-        page.text((14, y), f"As made: the {shift_words(tool, offsets[tool])}.", WORDS)
-        y -= ROW
-    lines = f"Blue: edges of {layers_in_words(layers)}. Black: the middle of the tool. Dashed: its"
-    page.text((14, y), f"{lines} width.", WORDS)
-    page.text((page.width - 46, y - ROW), f"design {sha256[:12]}", WORDS)
+        page.contours(disc(start, START).contours, at)
+        page.text((start[0] + at[0] + 1.5, start[1] + at[1] + 1.0), f"{step}", SMALL)
+    _work_head(page, f"{laminate.name}: paths of seams, from above, 1:1", SEAM_USE)
+    _lines(page, (LEFT, foot - 8), words)
+    page.text((width - 46, foot - 8 - ROW * len(words)), f"design {sha256[:12]}", WORDS)
     return page
-
-
-# Pages of lines, curves and words as PDF, in millimetres and to scale.
-#
-# PDF 1.4 without compression, dates or embedded fonts: the same pages give the same bytes with
-# every version of every library. Arcs become Bezier curves, within 5e-6 of their radius.
-
-
-POINTS = 72 / 25.4
-"""PDF points per mm."""
-MOST_SWEEP = math.pi / 4
-ENCODING = "cp1252"
-"""Encoding of the fonts that every reader has."""
-Rgb = tuple[float, float, float]
-BLACK: Rgb = (0.0, 0.0, 0.0)
-
-
-class PdfPage:
-    """A page, its lower left corner at (0, 0); later elements cover earlier ones.
-
-    The content of the page ``under``, which several pages may share, lies below.
-    """
-
-    def __init__(self, width: float, height: float, under: PdfPage | None = None) -> None:
-        self.width, self.height, self.under = width, height, under
-        self._drawn: list[str] = [f"{POINTS:.10f} 0 0 {POINTS:.10f} 0 0 cm 1 J 1 j"]
-
-    def stroke(self, colour: Rgb, width: float, dashes: Iterable[float] = ()) -> None:
-        """Set colour, width and dashes (mm) of the following lines."""
-        shades = " ".join(map(coord, colour))
-        on = " ".join(map(coord, dashes))
-        self._drawn.append(f"{shades} RG {coord(width)} w [{on}] 0 d")
-
-    def contour(self, contour: Contour) -> None:
-        """A closed line of straight edges and arcs."""
-        path = [f"{_at(contour.edges[0].start)} m", *map(_drawn, contour.edges), "h S"]
-        self._drawn.append(" ".join(path))
-
-    def chain(self, edges: Sequence[Edge], by: Point) -> None:
-        """An open line of straight edges and arcs, shifted by an offset in mm."""
-        x, y = coord(by[0]), coord(by[1])
-        path = [f"{_at(edges[0].start)} m", *map(_drawn, edges), "S"]
-        self._drawn.append(f"q 1 0 0 1 {x} {y} cm {' '.join(path)} Q")
-
-    def line(self, start: Point, end: Point) -> None:
-        self._drawn.append(f"{_at(start)} m {_at(end)} l S")
-
-    def text(self, at: Point, words: str, size: float, bold: bool = False) -> None:
-        """Words that begin at a point, ``size`` mm; characters outside Windows-1252 become "?"."""
-        font = "F2" if bold else "F1"
-        self._drawn.append(f"BT /{font} {coord(size)} Tf {_at(at)} Td {_string(words)} Tj ET")
-
-    def objects(self, number: int, under: int | None = None) -> tuple[bytes, bytes]:
-        """The page and its content as PDF objects; ``number`` is the content's, ``under`` the
-        underlay's.
-        """
-        box = f"[0 0 {self.width * POINTS:.4f} {self.height * POINTS:.4f}]"
-        contents = f"{number} 0 R" if under is None else f"[{under} 0 R {number} 0 R]"
-        return (
-            f"<< /Type /Page /Parent 2 0 R /MediaBox {box} /Contents {contents} /Resources "
-            "<< /Font << /F1 3 0 R /F2 4 0 R >> >> >>".encode(),
-            _stream(self._drawn),
-        )
-
-    def beneath(self) -> bytes:
-        """The page's content, as an object that leaves the scale of the page unchanged."""
-        return _stream(["q", *self._drawn, "Q"])
-
-
-def pdf(pages: Sequence[PdfPage], title: str) -> bytes:
-    """The whole file, set to print at actual size."""
-    font = "<< /Type /Font /Subtype /Type1 /BaseFont /%s /Encoding /WinAnsiEncoding >>"
-    unders = list(dict.fromkeys(page.under for page in pages if page.under is not None))
-    numbers = {under: 5 + 2 * len(pages) + n for n, under in enumerate(unders)}
-    drawn = [
-        page.objects(6 + 2 * place, None if page.under is None else numbers[page.under])
-        for place, page in enumerate(pages)
-    ]
-    kids = " ".join(f"{5 + 2 * place} 0 R" for place in range(len(pages)))
-    return _file(
-        [
-            b"<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
-            f"<< /Type /Pages /Kids [{kids}] /Count {len(pages)} >>".encode(),
-            (font % "Helvetica").encode(),
-            (font % "Helvetica-Bold").encode(),
-            *(part for pair in drawn for part in pair),
-            *(under.beneath() for under in unders),
-            f"<< /Title {_string(title)} >>".encode(ENCODING, "replace"),
-        ]
-    )
-
-
-def _stream(drawn: Sequence[str]) -> bytes:
-    content = "\n".join(drawn).encode(ENCODING, "replace")
-    return b"<< /Length %d >>\nstream\n%s\nendstream" % (len(content), content)
-
-
-def _file(objects: Iterable[bytes]) -> bytes:
-    """Numbered objects with the table of their offsets; the last one is the file's title."""
-    data = bytearray(b"%PDF-1.4\n%\xe2\xe3\xcf\xd3\n")
-    places = []
-    for index, body in enumerate(objects, 1):
-        places.append(len(data))
-        data += b"%d 0 obj\n%s\nendobj\n" % (index, body)
-    start, count = len(data), len(places) + 1
-    data += b"xref\n0 %d\n0000000000 65535 f \n" % count
-    data += b"".join(b"%010d 00000 n \n" % place for place in places)
-    data += b"trailer\n<< /Size %d /Root 1 0 R /Info %d 0 R >>\n" % (count, count - 1)
-    data += b"startxref\n%d\n%%%%EOF\n" % start
-    return bytes(data)
-
-
-def _string(words: str) -> str:
-    for mark in "\\()":
-        words = words.replace(mark, f"\\{mark}")
-    return f"({words})"
-
-
-def _at(p: Point) -> str:
-    return f"{coord(p[0])} {coord(p[1])}"
-
-
-def _drawn(edge: Edge) -> str:
-    if not isinstance(edge, Arc):
-        return f"{_at(edge.end)} l"
-    parts = max(1, math.ceil(abs(edge.sweep) / MOST_SWEEP - 1e-9))
-    step = edge.sweep / parts
-    # Handles of this length put the curve's middle on the arc.
-    handle = 4 / 3 * math.tan(step / 4) * edge.radius
-    curves = []
-    for part in range(parts):
-        first, last = (edge.start_angle + step * n for n in (part, part + 1))
-        (x0, y0), (x1, y1) = (_round(edge, angle) for angle in (first, last))
-        leave = x0 - handle * math.sin(first), y0 + handle * math.cos(first)
-        arrive = x1 + handle * math.sin(last), y1 - handle * math.cos(last)
-        curves.append(f"{_at(leave)} {_at(arrive)} {_at((x1, y1))} c")
-    return " ".join(curves)
-
-
-def _round(edge: Arc, angle: float) -> Point:
-    return (
-        edge.centre[0] + edge.radius * math.cos(angle),
-        edge.centre[1] + edge.radius * math.sin(angle),
-    )

@@ -300,7 +300,7 @@ def test_paths_of_seams_are_printed_on_the_films_at_one_to_one() -> None:
     assert "2.8346456693 0 0 2.8346456693 0 0 cm" in words
     left = r"q 1 0 0 1 (\S+) (\S+) cm -19 -13 m -19 12 l -2\.2 12 l -2\.2 25 l S Q"
     (x, y) = re.findall(left, words)[0]
-    # The fold is at y = -12: an edge of the film runs there, as far off as the path.
-    assert re.search(rf"\S+ {float(y) - 12:g} [ml]", words)
+    # The fold is at y = -12: an edge of the film runs there, shifted as far as the path.
+    assert re.search(rf"q 1 0 0 1 {x} {y} cm [^Q]*\S+ -12 [ml]", words)
     assert float(x) > 0
     assert seams_pdf(built("pouch")[1], work.sha256) is None

@@ -1,9 +1,11 @@
-"""underlay.pdf read back by PDFium: the sizes of page and bars, and every line in its place."""
+"""underlay.pdf, seams.pdf and tray.pdf read back by PDFium: true sizes, every line in its place."""
 
 from __future__ import annotations
 
 import ctypes
 import math
+import re
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,18 +14,22 @@ import pypdfium2.raw as pdfium
 import pytest
 import shapely
 import shapely.affinity
+from lxml import html as lxml_html
 
 from sbafab.actuators import build, load_design
 from sbafab.cutting.fixture import plate_corner
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.cycles import runs_of
+from sbafab.pressing.cycles import Runs, design_runs, runs_of
 from sbafab.pressing.schedule import schedule
+from sbafab.reports.traveller.batch import tray_html
+from sbafab.reports.traveller.work import Work
+from sbafab.reports.tray_plan import tray_pdf
 from sbafab.reports.underlay import guides, leaves, underlay_pdf
-from tests.quick import few
 
 SHA = "0123456789abcdef" * 4
 MM = 25.4 / 72
 FILM, MASK, BLACK, GREY = (13, 64, 140), (217, 102, 0), (0, 0, 0), (140, 140, 140)
+PLATE = 152.4
 Points = list[tuple[float, float]]
 
 
@@ -77,21 +83,42 @@ def _bezier(p: Points, t: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("template", ["3dof-15mm", "1dof-5mm", "radial-15mm"])
-def test_the_print_is_at_actual_size(template: str) -> None:
+def test_the_print_is_at_actual_size_and_its_trim_line_is_the_edge_of_the_plate(
+    template: str,
+) -> None:
+    """Cut out and laid flush with the plate, its lines lie where the plate's holes want them."""
     laminate, document = printed(template)
     assert len(document) == 1
-    width, height = document[0].get_size()
+    width, height = (side * MM for side in document[0].get_size())
     # As wide as A4, as long as Letter: both print it whole.
-    assert (width * MM, height * MM) == pytest.approx((210.0, 279.4), abs=0.01)
-    # What a printer's window asks is answered in the file: no scaling.
+    assert (width, height) == pytest.approx((210.0, 279.4), abs=0.01)
+    # The file answers a printer's window: no scaling.
     assert b"/PrintScaling /None" in (underlay_pdf(laminate, SHA) or b"")
-    lengths = [math.dist(path[0], path[-1]) for path in paths(document, BLACK)]
+    black = list(paths(document, BLACK))
+    lengths = [math.dist(path[0], path[-1]) for path in black]
     assert sorted(lengths)[-2:] == pytest.approx([100.0, 100.0], abs=1e-3)
+    # A square of 6 inches, less 5 mm at the corner of largest x and y.
+    [edge] = [
+        shapely.Polygon(path)
+        for path in black
+        if len(path) >= 5 and shapely.Polygon(path).area > 1e4
+    ]
+    assert edge.area == pytest.approx(PLATE**2 - 5 * 5 / 2, abs=0.1)
+    left, low, right, top = edge.bounds
+    assert (right - left, top - low) == pytest.approx((PLATE, PLATE), abs=2e-3)
+    assert not edge.contains(shapely.Point(right - 1, top - 1))
+    # The actuator's axis, where the cross is, lies from the edge as the plate's datum does.
+    x0, y0 = plate_corner(laminate, (PLATE, PLATE))
+    lines = [path for path in paths(document, GREY) if len(path) == 2]
+    [upright] = [path for path in lines if abs(path[0][0] - path[1][0]) < 1e-3]
+    [level] = [path for path in lines if abs(path[0][1] - path[1][1]) < 1e-3]
+    assert (upright[0][0] - left, level[0][1] - low) == pytest.approx((-x0, -y0), abs=2e-3)
+    assert 18 < left < right < width - 18
+    assert 40 < low < top < height - 50
 
 
-@pytest.mark.parametrize("template", few(["3dof-15mm", "1dof-5mm", "radial-15mm"], 1))
-def test_every_line_is_the_edge_of_what_is_laid_there(template: str) -> None:
-    laminate, document = printed(template)
+def test_every_line_is_the_edge_of_what_is_laid_there() -> None:
+    laminate, document = printed("3dof-15mm")
     drawn = [line for colour in (FILM, MASK) for line in paths(document, colour) if len(line) > 2]
     laid = [laminate.patterns[guide.patterns[0]][0].profile for guide in guides(laminate)]
     rings = [piece[0] for profile in laid for piece in profile.polygons(1e-5)]
@@ -160,32 +187,6 @@ def test_a_cycle_larger_than_the_paper_is_tiled_edge_to_edge() -> None:
     assert whole.area == pytest.approx(whole.envelope.area)
 
 
-@pytest.mark.parametrize("template", ["3dof-15mm", "1dof-5mm", "radial-15mm"])
-def test_its_trim_line_is_the_edge_of_the_plate(template: str) -> None:
-    """Cut out and laid flush with the plate, its lines lie where the plate's holes want them."""
-    laminate, document = printed(template)
-    # A square of 6 inches, less 5 mm at the corner of largest x and y.
-    [frame] = [
-        path
-        for path in paths(document, BLACK)
-        if len(path) >= 5 and shapely.Polygon(path).area > 1e4
-    ]
-    edge = shapely.Polygon(frame)
-    assert edge.area == pytest.approx(152.4**2 - 5 * 5 / 2, abs=0.1)
-    left, low, right, top = edge.bounds
-    assert (right - left, top - low) == pytest.approx((152.4, 152.4), abs=2e-3)
-    assert not edge.contains(shapely.Point(right - 1, top - 1))
-    # The actuator's axis, where the cross is, lies from the edge as the plate's datum does.
-    x0, y0 = plate_corner(laminate, (152.4, 152.4))
-    lines = [path for path in paths(document, GREY) if len(path) == 2]
-    [upright] = [path for path in lines if abs(path[0][0] - path[1][0]) < 1e-3]
-    [level] = [path for path in lines if abs(path[0][1] - path[1][1]) < 1e-3]
-    assert (upright[0][0] - left, level[0][1] - low) == pytest.approx((-x0, -y0), abs=2e-3)
-    width, height = (side * MM for side in document[0].get_size())
-    assert 18 < left < right < width - 18
-    assert 40 < low < top < height - 50
-
-
 def test_paper_that_is_no_plate_ends_on_the_plate() -> None:
     laminate = build(load_design("1dof-5mm"))
     [leaf] = leaves(laminate, ((0.0, 0.0),), (400.0, 400.0))
@@ -197,7 +198,7 @@ def test_paper_that_is_no_plate_ends_on_the_plate() -> None:
 
 
 @pytest.mark.parametrize("method", ["channel-pin", "ears"])
-@pytest.mark.parametrize("template", ["3dof-15mm", "1dof-5mm", "1dof-10mm", "radial-15mm"])
+@pytest.mark.parametrize("template", ["3dof-15mm", "1dof-5mm", "radial-15mm"])
 def test_it_lies_in_every_step_that_counts_its_thickness(template: str, method: str) -> None:
     design = load_design(template, [f'registration.method="{method}"'])
     laminate = build(design)
@@ -210,37 +211,114 @@ def test_it_lies_in_every_step_that_counts_its_thickness(template: str, method: 
     assert counted == with_lines
 
 
-def test_it_shows_what_a_hand_lays() -> None:
+def test_it_shows_what_a_hand_lays_in_films_by_their_names() -> None:
     # Base and cap; a 1-DoF separator, whose hole is wider than the pin, in step 3 as well.
-    one = {guide.patterns[0]: guide.steps for guide in guides(printed("1dof-5mm")[0])}
+    one = {guide.patterns[0]: guide.steps for guide in guides(build(load_design("1dof-5mm")))}
     assert one == {"P01": (2, 4), "P04": (3, 4), "P07": (4,)}
-    three = {guide.patterns[0]: guide.steps for guide in guides(printed("3dof-15mm")[0])}
+    three = {guide.patterns[0]: guide.steps for guide in guides(build(load_design("3dof-15mm")))}
     assert three == {"P01": (2, 4), "P04": (4,), "P07": (4,)}
-
-
-def test_with_ears_there_is_nothing_to_lay_by() -> None:
-    eared = build(load_design("1dof-5mm", ('registration.method="ears"',)))
-    assert underlay_pdf(eared, SHA) is None
-
-
-def test_words_stand_as_they_were_given() -> None:
-    _, document = printed("1dof-5mm", "name=a.b_c-d")
+    assert underlay_pdf(build(load_design("1dof-5mm", ["registration.method=ears"])), SHA) is None
+    film = "temperature_limit=250" + ', kind="mask", product="PTFE", thickness=0.05, density=2200'
+    _, document = printed(
+        "1dof-5mm", "name=a.b_c-d", f"films.ptfe50={{{film}}}", "layup.separator_mask=ptfe50"
+    )
     words = document[0].get_textpage().get_text_range()
-    assert "a.b_c-d: alignment underlay" in words
-    assert "“actual size”" in words
-    assert "(TPE): outer edge" in words
+    for expected in ("a.b_c-d: alignment underlay", "“actual size”", "(TPE): outer edge"):
+        assert expected in words
+    assert "(PTFE50, dashed): outer edge" in words
 
 
-def test_films_other_than_the_papers_go_by_their_names() -> None:
-    tpu = (
-        'films.tpu50={kind="structural", product="TPU", thickness=0.05, density=1200, '
-        "melting_point=115}"
-    )
-    mask = (
-        'films.ptfe50={kind="mask", product="PTFE", thickness=0.05, density=2200, '
-        "temperature_limit=250}"
-    )
-    layup = ("layup.cap=tpu50", "layup.separator_mask=ptfe50")
-    found = guides(build(load_design("1dof-5mm", (tpu, mask, *layup))))
-    assert [guide.films for guide in found] == [("TPE",), ("PTFE50",), ("TPU50",)]
-    assert "(PTFE50, dashed): outer edge" in found[1].words
+def planned(template: str, *changes: str) -> tuple[Laminate, Runs, pypdfium2.PdfDocument]:
+    design = load_design(template, changes)
+    laminate = build(design)
+    runs = design_runs(design, laminate)
+    data = tray_pdf(laminate, runs, SHA, design.order.batch)
+    assert data is not None
+    return laminate, runs, pypdfium2.PdfDocument(data)
+
+
+def words(document: pypdfium2.PdfDocument, page: int) -> str:
+    return document[page].get_textpage().get_text_range()
+
+
+@pytest.mark.parametrize(
+    ("template", "changes", "pages"),
+    [
+        ("3dof-15mm", ("order.copies=20", "stack.balloons=5"), 1),
+        ("1dof-10mm", ("order.copies=3", "registration.method=ears"), 1),
+        ("radial-15mm", ("order.copies=2",), None),
+        ("3dof-15mm", ("stack.balloons=30", "order.copies=2"), 2),
+    ],
+)
+def test_every_part_of_a_laminate_has_its_place_at_full_size(
+    template: str, changes: tuple[str, ...], pages: int | None
+) -> None:
+    laminate, runs, document = planned(template, *changes)
+    each, rest = divmod(len(document), runs.together)
+    assert not rest
+    assert each == (pages or each)
+    labels = []
+    areas: Counter[tuple[bool, float]] = Counter()
+    for page in range(each):
+        width, height = document[page].get_size()
+        labels += re.findall(r"(\d+) (P\d+)", words(document, page))
+        hulls = []
+        for colour in (FILM, MASK):
+            for line in paths(document, colour, page):
+                shape = shapely.Polygon(line)
+                assert shapely.box(0, 0, width * MM, height * MM).contains(shape)
+                areas[colour == MASK, round(shape.area, 1)] += 1
+                hulls.append(shape)
+        # Holes lie in their parts; nothing else lies on anything.
+        tree = shapely.STRtree(hulls)
+        for one, other in tree.query(hulls, predicate="intersects").T:
+            if one != other:
+                a, b = hulls[one], hulls[other]
+                assert a.contains(b) or b.contains(a)
+        across, down = sorted(
+            (line for line in paths(document, BLACK, page) if shapely.LineString(line).length > 50),
+            key=lambda line: abs(line[0][1] - line[-1][1]),
+        )
+        for bar in (across, down):
+            assert shapely.LineString(bar).length == pytest.approx(100, abs=0.01)
+    if template == "3dof-15mm":
+        # The paper's order: the bottom balloon, its base below it, the middle, the cap.
+        order = [2, 3, 1, *range(4, len(laminate.layers) + 1)]
+        assert [int(number) for number, _ in labels] == order
+    assert {int(n): p for n, p in labels} == {
+        layer.index: layer.pattern for layer in laminate.layers
+    }
+    assert len(labels) == len(laminate.layers)
+    # Curves are followed in chords, which lie within a hundredth of the area.
+    expected = sum(abs(c.area) for layer in laminate.layers for c in layer.profile.contours)
+    assert sum(a * n for (_, a), n in areas.items()) == pytest.approx(expected, rel=0.01)
+    assert sum(areas.values()) == sum(len(x.profile.contours) for x in laminate.layers)
+
+
+def test_each_place_of_a_cycle_has_its_pages_with_its_serials() -> None:
+    _, runs, document = planned("1dof-5mm", "order.copies=20", "order.batch=24")
+    assert runs.cycles == (7, 7, 6)
+    for page in range(len(document)):
+        place = page + 1
+        names = [f"24-{c}-{place:02d}" for c in ("ABC" if place < 7 else "AB")]
+        assert f"place {place} ({', '.join(names)})" in words(document, page)
+
+
+def test_the_page_for_the_phone_counts_patterns_by_cycle() -> None:
+    design = load_design("1dof-5mm", ["order.copies=9", "stack.balloons=3"])
+    laminate = build(design)
+    plan = schedule(laminate, design, design_runs(design, laminate).cycles)
+    text = tray_html(Work(design, laminate, plan, ()))
+    assert text is not None
+    assert "<script" not in text
+    assert "http" not in text.replace("w3.org", "")
+    page = lxml_html.fromstring(text)
+    cards = {card.findtext(".//h2"): card for card in page.xpath("//li")}
+    patterns = Counter(layer.pattern for layer in laminate.layers)
+    assert set(cards) == set(patterns)
+    for name, card in cards.items():
+        assert card.xpath(".//svg//use/@href") == [f"#shape-{name}"]
+        # Nine copies in cycles of five and four.
+        counts = [int(b.text) for b in card.xpath(".//label/b")]
+        assert counts == [5 * patterns[name], 4 * patterns[name]]
+        assert card.xpath(".//span[@class='each']")[0].text.startswith(f"{patterns[name]} each")
