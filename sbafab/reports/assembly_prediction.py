@@ -4,246 +4,40 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
+from sbafab.assemblies.build import Assembled, PartDesign, PlacedPart, PlacedSba
+from sbafab.assemblies.shapes import placed_surface
 from sbafab.design.records import Discs, Slots
+from sbafab.meshing.surface import Surface
 from sbafab.models.balloons import balloons_of
 from sbafab.models.elastic import free_rise
-from sbafab.models.formulas import is_near_burst, is_the_papers_3dof, refuse_beyond_burst
+from sbafab.models.formulas import is_near_burst, is_the_papers_3dof, refuse_beyond_burst, sizes
 from sbafab.models.intervals import factors_of
 from sbafab.models.lens import fullest, rate
 from sbafab.models.paper import counterpart
-from sbafab.models.quantity import ANYWHERE, Conditions, FigureKey, ModelId, Quantity
+from sbafab.models.quantity import ANYWHERE, Conditions, ModelId, Quantity
 from sbafab.models.stack import Stack, stack
-from sbafab.reports.inflated import (
-    TOUCHING,
-    as_it_is,
-    box_gap,
-    carried,
-    lifted,
-    shared_volume,
-    solids,
-)
+from sbafab.reports.inflated import COARSE, inflated
 
 if TYPE_CHECKING:
+    import manifold3d
     from numpy.typing import NDArray
 
     from sbafab.models.stack import Pose
-    from sbafab.reports.inflated import Solids
 
-# Contacts and clearances of an arm bent by some of its chambers.
-#
-# Each chamber alone and each pair of neighbours are pressurised, the others empty, while every
-# other actuator is inflated; parts on the arm move with its tip.
-
-
-FARTHEST = 10.0
-"""Clearances are computed up to this distance, mm."""
-SLIGHTEST = 0.1
-"""Lowest pressure at which an arm is checked, kPa."""
-HALVINGS = 5
-FOOT = 3
-"""Levels from below that may rest on the part under the arm."""
-
-
-class Clearance(NamedTuple):
-    """Clearance in mm between a bent arm, with the parts on it, and another part."""
-
-    other: str
-    chambers: str
-    gap: float
-
-
-@dataclass(frozen=True)
-class BentTouch:
-    """An arm that shares ``volume`` mm3 with another part when its ``chambers`` are pressed.
-
-    Contact begins at about ``from_kpa``, at a bend of ``bend`` degrees; ``measured`` is the paper's
-    bend if the model is off by more than a quarter of it.
-    """
-
-    part: str
-    other: str
-    chambers: str
-    volume: float
-    from_kpa: float
-    bend: float
-    measured: str = ""
-
-
-class _Around(NamedTuple):
-    """An arm and its surroundings: ``carried`` are solids on its top, when it is flat."""
-
-    placed: PlacedSba
-    arm_stack: Stack
-    lift: NDArray[np.float64]
-    carried: Solids
-    surrounding: dict[str, Solids]
-
-
-def bent_arms(
-    assembled: Assembled,
-    placed: PlacedSba,
-    stacks: Mapping[str, Stack],
-    rises: Mapping[str, NDArray[np.float64]],
-    pressure: float,
-    pause: Callable[[], None] = lambda: None,
-) -> Iterator[Clearance | BentTouch]:
-    """Yield for each other part the least clearance, or each bend at which the arm meets it.
-
-    ``rises`` is how far each actuator lifts the parts on it. No clearance is given for the part
-    under the arm and for parts farther away than ``FARTHEST``.
-    """
-    arm_stack = stacks[placed.name]
-    if arm_stack.chambers < 2:
-        return
-    around = _around(assembled, placed, stacks, rises, pressure)
-    nearest: dict[str, Clearance] = {}
-    met = set()
-    for pressed in _ways(arm_stack.chambers):
-        pause()
-        names = " and ".join(placed.made.laminate.chambers[i].name for i in pressed)
-        arm = _moved(around, _bent(arm_stack, pressed, pressure))
-        for part, theirs in around.surrounding.items():
-            volume = shared_volume(arm.beyond(part, placed), theirs)
-            if volume > TOUCHING:
-                met.add(part)
-                first = _first(around, part, pressed, pressure)
-                start, beside = (
-                    first.pressures[pressed[0]],
-                    arm_stack.counterparts.get("bend", ""),
-                )
-                yield BentTouch(placed.name, part, names, volume, start, first.bend, beside)
-                continue
-            if part == placed.part.on:
-                continue
-            gap = _gap(arm.beyond(part, placed), theirs)
-            if gap < min(FARTHEST, nearest[part].gap if part in nearest else FARTHEST):
-                nearest[part] = Clearance(part, names, gap)
-    yield from (clearance for part, clearance in nearest.items() if part not in met)
-
-
-def _ways(chambers: int) -> list[tuple[int, ...]]:
-    """Return the sets of pressurised chambers: each alone, and each two side by side."""
-    alone: list[tuple[int, ...]] = [(i,) for i in range(chambers)]
-    return alone + [(i, (i + 1) % chambers) for i in range(chambers) if chambers > 2]
-
-
-def _bent(arm_stack: Stack, pressed: Sequence[int], pressure: float) -> Pose:
-    return arm_stack.pose(
-        tuple(pressure if i in pressed else 0.0 for i in range(arm_stack.chambers))
-    )
-
-
-def _around(
-    assembled: Assembled,
-    placed: PlacedSba,
-    stacks: Mapping[str, Stack],
-    rises: Mapping[str, NDArray[np.float64]],
-    pressure: float,
-) -> _Around:
-    moving = carried(assembled, placed.name)
-    lift = lifted(assembled, placed, rises)
-    on_top: Solids = []
-    surrounding = {}
-    for part in assembled.parts:
-        if part.name == placed.name or part.part.kind == "line":
-            continue
-        raised = lifted(assembled, part, rises)
-        if part.name in moving:
-            raised = raised - rises[placed.name]
-        if isinstance(part, PlacedSba) and part.name in stacks:
-            part_stack = stacks[part.name]
-            part_solids = solids(
-                part, part_stack, part_stack.pose((pressure,) * part_stack.chambers), raised
-            )
-        else:
-            part_solids = as_it_is(part, raised)
-        if part.name in moving:
-            on_top += part_solids
-        else:
-            surrounding[part.name] = part_solids
-    return _Around(placed, stacks[placed.name], lift, on_top, surrounding)
-
-
-class _Arm(NamedTuple):
-    """A bent arm's solids and the parts on it; ``foot`` holds the solids of its lowest levels."""
-
-    foot: Solids
-    rest: Solids
-
-    def beyond(self, part: str, placed: PlacedPart) -> Solids:
-        """Return the solids that may meet another part; the foot may rest on the part under the
-        arm.
-        """
-        return self.rest if part == placed.part.on else self.foot + self.rest
-
-
-def _moved(around: _Around, pose: Pose) -> _Arm:
-    """The bent arm and the parts on it."""
-    places = around.placed.upright(pose.frames[0]) + around.lift
-    levels = (places[1:] + places[:-1]) / 2
-    arm = _Arm([], [])
-    for solid in solids(around.placed, around.arm_stack, pose, around.lift):
-        middle = np.array(solid.bounding_box()).reshape(2, 3).mean(0)
-        level = int(np.linalg.norm(levels - middle, axis=1).argmin())
-        (arm.foot if level < FOOT else arm.rest).append(solid)
-    if not around.carried:
-        return arm
-    # From the flat arm's top to the bent one's, in the arm's own frame, then in the assembly's.
-    tip = np.eye(4)
-    tip[:3, :3] = pose.frames[1][-1]
-    tip[:3, 3] = pose.tip - tip[:3, :3] @ np.array([0.0, 0.0, around.arm_stack.flat_height])
-    frame = _frame(around.placed)
-    frame[:3, 3] += around.lift
-    rows = np.ascontiguousarray((frame @ tip @ np.linalg.inv(frame))[:3])
-    return arm._replace(rest=arm.rest + [solid.transform(rows) for solid in around.carried])
-
-
-def _frame(placed: PlacedPart) -> NDArray[np.float64]:
-    """Matrix (4, 4) of a part's own frame in the assembly's."""
-    corners = placed.upright(np.concatenate([np.zeros((1, 3)), np.eye(3)]))
-    frame = np.eye(4)
-    frame[:3, 3] = corners[0]
-    frame[:3, :3] = (corners[1:] - corners[0]).T
-    return frame
-
-
-def _gap(arm: Solids, theirs: Solids) -> float:
-    """Distance in mm between the nearest two, at most ``FARTHEST``."""
-    least = FARTHEST
-    pairs = ((box_gap(a, b), a, b) for a in arm for b in theirs)
-    for boxes, a, b in sorted(pairs, key=lambda pair: pair[0]):
-        if boxes >= least:
-            break
-        least = min(least, float(a.min_gap(b, least)))
-    return least
-
-
-def _first(around: _Around, part: str, pressed: Sequence[int], pressure: float) -> Pose:
-    """Return approximately the first pose in contact with another part, up to a pressure."""
-    low, high = min(SLIGHTEST, pressure / 2), pressure
-    pose = _bent(around.arm_stack, pressed, high)
-    for _ in range(HALVINGS):
-        middle = math.sqrt(low * high)
-        tried = _bent(around.arm_stack, pressed, middle)
-        arm = _moved(around, tried).beyond(part, around.placed)
-        if shared_volume(arm, around.surrounding[part]) > TOUCHING:
-            high, pose = middle, tried
-        else:
-            low = middle
-    return pose
-
+    Array = NDArray[np.float64]
+    Solids = list[manifold3d.Manifold]
 
 GRAVITY = 9.80665
 MARBLE_G = 1.2
 """Mass of the marble that the paper's brace lifts, g (Sec. 5)."""
-STACK_WORDS = ModelId.ELASTIC_STACK.words
+STACK = ModelId.ELASTIC_STACK.words
 LENS = f"{ModelId.LENS.words}, virtual work p dV/dh"
 STATIC = "statics"
 IN_THE_LUMEN = (
@@ -251,8 +45,6 @@ IN_THE_LUMEN = (
     "push of each stack on the wall",
     "friction",
 )
-SEVERAL = 3
-"""Number of chambers of a bending arm."""
 PAPERS = ("aperture", "brace", "standing")
 """The assemblies built in the paper; only their figures have measured values beside them."""
 
@@ -281,6 +73,23 @@ class Touch:
     part: str
     other: str
     volume: float
+
+
+@dataclass(frozen=True)
+class BentTouch:
+    """An arm that shares ``volume`` mm3 with another part when its ``chambers`` are pressed.
+
+    Contact begins at about ``from_kpa``, at a bend of ``bend`` degrees; ``measured`` is the paper's
+    bend if the model is off by more than a quarter of it.
+    """
+
+    part: str
+    other: str
+    chambers: str
+    volume: float
+    from_kpa: float
+    bend: float
+    measured: str = ""
 
 
 @dataclass(frozen=True)
@@ -319,6 +128,110 @@ class AssemblyPrediction:
         return sentences
 
 
+def predict_assembly(
+    assembled: Assembled,
+    pressure_kpa: float = 10.0,
+    load_g: float = MARBLE_G,
+    pause: Callable[[], None] = lambda: None,
+) -> AssemblyPrediction:
+    """Predict the parts at one pressure, with a mass at the tips; the paper's marble has 1.2 g.
+
+    ``pause`` is called between parts of the work, which takes seconds; an exception from it stops
+    the work. Raises DesignError for pressures beyond the models or a part's estimated burst.
+    """
+    actuators = [placed for placed in assembled.parts if isinstance(placed, PlacedSba)]
+    for placed in actuators:
+        refuse_beyond_burst(placed.made.laminate, pressure_kpa)
+    figures: list[AssemblyFigure] = []
+    touches: list[Touch] = []
+    bent: list[BentTouch] = []
+    left_out: list[str] = []
+    scene = _Scene(assembled, pressure_kpa)
+    for placed in actuators:
+        pause()
+        pockets = placed.made.design.form.pockets
+        if isinstance(pockets, Slots):
+            hold = grip(assembled, placed)
+            assert hold is not None
+            figures += _grip_figures(hold, placed.made.design.form.stacks, pressure_kpa, load_g)
+            if hold.push is None:
+                left_out.append(f"{placed.name}, {', '.join(IN_THE_LUMEN)}: {hold.why_none}")
+        elif isinstance(pockets, Discs):
+            figures += _arm_figures(placed, scene.stacks[placed.name], pressure_kpa, load_g)
+            touches += scene.touches(placed)
+            pause()
+            for outcome in scene.bends(placed, pause):
+                if isinstance(outcome, BentTouch):
+                    bent.append(outcome)
+                else:
+                    figures.append(outcome)
+        else:
+            left_out.append(f"{placed.name}: no model knows the form of a drawn pocket outline")
+    if assembled.assembly.name not in PAPERS:
+        figures = [replace(figure, paper="") for figure in figures]
+    return AssemblyPrediction(
+        assembled.assembly.name,
+        pressure_kpa,
+        load_g,
+        tuple(figures),
+        tuple(touches),
+        tuple(left_out),
+        tuple(bent),
+        tuple(p.name for p in actuators if is_near_burst(p.made.laminate, pressure_kpa)),
+    )
+
+
+def _arm_figures(
+    placed: PlacedSba, arm: Stack, pressure: float, load_g: float
+) -> Iterator[AssemblyFigure]:
+    """Yield height, reach, bend and load of an actuator with round pockets."""
+    design, laminate = placed.made.design, placed.made.laminate
+    is_papers = is_the_papers_3dof(design.form, laminate)
+
+    def figure(
+        name: str,
+        value: float,
+        unit: str,
+        quantity: Quantity,
+        at: Conditions,
+        paper: str = "",
+        model: ModelId = ModelId.ELASTIC_STACK,
+    ) -> AssemblyFigure:
+        """Return a figure with the measured value beside that of a design's own prediction."""
+        by = ModelId.FILMS if quantity is Quantity.FOLDED_HEIGHT else model
+        beside = counterpart(design.form, quantity, at, by, arm.calibration, is_papers)
+        measured = beside.sentence() if beside else ""
+        return AssemblyFigure(placed.name, name, value, unit, model.words, paper, measured)
+
+    at, alone = Conditions(kpa=pressure), Conditions(kpa=pressure, chambers=1)
+    every = (pressure,) * arm.chambers
+    free, flat = arm.pose(every), arm.flat_height
+    # As in a design's own prediction: the stack's maps are approximate.
+    stroke = free_rise(Counter(balloons_of(design, laminate, factors_of(design))), pressure).stroke
+    paper = "about 1 (Sec. 6)"
+    yield figure("height, flat", flat, "mm", Quantity.FOLDED_HEIGHT, ANYWHERE, paper)
+    high, paper, balloon = flat + stroke, "about 20 (Sec. 5)", ModelId.ELASTIC_BALLOON
+    yield figure("height, inflated", high, "mm", Quantity.FREE_HEIGHT, at, paper, balloon)
+    push = arm.pose(every, plate=flat + 0.75 * stroke).force
+    blocked = Conditions(kpa=pressure, share=0.75)
+    yield figure("push at 75 % of its stroke", push, "N", Quantity.BLOCKED_FORCE, blocked)
+    if arm.chambers > 1:
+        single = arm.pose((pressure, *(0.0,) * (arm.chambers - 1)))
+        yield figure("bend by one chamber", single.bend, "deg", Quantity.BEND, alone)
+        aside = float(np.hypot(*single.tip[:2]))
+        yield figure("maximum lateral tip displacement", aside, "mm", Quantity.ASIDE, alone)
+    if load_g > 0:
+        hung = arm.pose(every, tip_load=(load_g * 1e-3 * GRAVITY, 0.0, 0.0), near=free)
+        sag = float(np.linalg.norm(hung.tip - free.tip))
+        paper = "lifts 1.2 g (Sec. 5)" if load_g == MARBLE_G else ""
+        words = f"sag of the tip, {load_g:g} g across it"
+        # Sag is load over stiffness.
+        yield figure(words, sag, "mm", Quantity.HELD_STIFFNESS, at, paper)
+
+
+# A radial actuator in the assembly's lumen.
+
+
 class Grip(NamedTuple):
     """A radial actuator: diameters ``deflated``, inflated ``free``, out of any lumen, and ``most``,
     the upper end, in mm.
@@ -352,135 +265,6 @@ class Grip(NamedTuple):
         )
 
 
-def predict_assembly(
-    assembled: Assembled,
-    pressure_kpa: float = 10.0,
-    load_g: float = MARBLE_G,
-    pause: Callable[[], None] = lambda: None,
-) -> AssemblyPrediction:
-    """Predict the parts at one pressure, with a mass at the tips; the paper's marble has 1.2 g.
-
-    ``pause`` is called between parts of the work, which takes seconds; an exception from it stops
-    the work. Raises DesignError for pressures beyond the models or a part's estimated burst.
-    """
-    near = []
-    for placed in assembled.parts:
-        if isinstance(placed, PlacedSba):
-            refuse_beyond_burst(placed.made.laminate, pressure_kpa)
-            near += [placed.name] if is_near_burst(placed.made.laminate, pressure_kpa) else []
-    figures: list[AssemblyFigure] = []
-    touches: list[Touch] = []
-    left_out: list[str] = []
-    bent: list[BentTouch] = []
-    stacks = _stacks(assembled)
-    rises = {
-        name: _rise(assembled[name], part_stack, pressure_kpa)
-        for name, part_stack in stacks.items()
-    }
-    for placed in assembled.parts:
-        if not isinstance(placed, PlacedSba):
-            continue
-        pause()
-        pockets = placed.made.design.form.pockets
-        if isinstance(pockets, Slots):
-            hold = grip(assembled, placed)
-            assert hold is not None
-            figures += _grip_figures(hold, placed.made.design.form.stacks, pressure_kpa, load_g)
-            if hold.push is None:
-                left_out.append(f"{placed.name}, {', '.join(IN_THE_LUMEN)}: {hold.why_none}")
-        elif isinstance(pockets, Discs):
-            figures += _arm(placed, stacks[placed.name], pressure_kpa, load_g)
-            touches += _touches(assembled, placed, stacks, rises, pressure_kpa)
-            pause()
-            for bend in bent_arms(assembled, placed, stacks, rises, pressure_kpa, pause):
-                if isinstance(bend, Clearance):
-                    clearance = f"clearance to {bend.other}, bent by {bend.chambers}"
-                    figures.append(
-                        AssemblyFigure(placed.name, clearance, bend.gap, "mm", STACK_WORDS)
-                    )
-                else:
-                    bent.append(bend)
-        else:
-            left_out.append(f"{placed.name}: no model knows the form of a drawn pocket outline")
-    if assembled.assembly.name not in PAPERS:
-        figures = [replace(figure, paper="") for figure in figures]
-    return AssemblyPrediction(
-        assembled.assembly.name,
-        pressure_kpa,
-        load_g,
-        tuple(figures),
-        tuple(touches),
-        tuple(left_out),
-        tuple(bent),
-        tuple(near),
-    )
-
-
-def _arm(
-    placed: PlacedSba, arm_stack: Stack, pressure: float, load_g: float
-) -> Iterator[AssemblyFigure]:
-    """Height, reach, bend and load of an actuator with round pockets."""
-    for figure, predicted in _figures_of_arm(placed, arm_stack, pressure, load_g):
-        form = placed.made.design.form
-        of_papers = is_the_papers_3dof(form, placed.made.laminate)
-        beside = counterpart(form, *predicted, arm_stack.calibration, of_papers)
-        yield replace(figure, measured=beside.sentence() if beside else "")
-
-
-def _figures_of_arm(
-    placed: PlacedSba, arm_stack: Stack, pressure: float, load_g: float
-) -> Iterator[tuple[AssemblyFigure, FigureKey]]:
-    """Yield figures, each with the matching figure of a design's own prediction."""
-    name, weight = placed.name, load_g * 1e-3 * GRAVITY
-    at, stack_model = Conditions(kpa=pressure), ModelId.ELASTIC_STACK
-
-    def key(quantity: Quantity, model: ModelId = stack_model, **where: float) -> FigureKey:
-        return FigureKey(quantity, at._replace(**where), model)  # type: ignore[arg-type]
-
-    def figure(words: str, value: float, unit: str, paper: str = "") -> AssemblyFigure:
-        return AssemblyFigure(name, words, value, unit, stack_model.words, paper)
-
-    every = (pressure,) * arm_stack.chambers
-    free = arm_stack.pose(every)
-    flat = arm_stack.flat_height
-    yield (
-        figure("height, flat", flat, "mm", "about 1 (Sec. 6)"),
-        FigureKey(Quantity.FOLDED_HEIGHT, ANYWHERE, ModelId.FILMS),
-    )
-    stroke = _free_stroke(placed, pressure)
-    balloon = ModelId.ELASTIC_BALLOON
-    yield (
-        replace(
-            figure("height, inflated", flat + stroke, "mm", "about 20 (Sec. 5)"),
-            model=balloon.words,
-        ),
-        key(Quantity.FREE_HEIGHT, balloon),
-    )
-    push = arm_stack.pose(every, plate=flat + 0.75 * stroke).force
-    blocked = key(Quantity.BLOCKED_FORCE, share=0.75)
-    yield figure("push at 75 % of its stroke", push, "N"), blocked
-    if arm_stack.chambers > 1:
-        single = arm_stack.pose((pressure, *(0.0,) * (arm_stack.chambers - 1)))
-        yield figure("bend by one chamber", single.bend, "deg"), key(Quantity.BEND, chambers=1)
-        aside = float(np.hypot(*single.tip[:2]))
-        bent = key(Quantity.ASIDE, chambers=1)
-        yield figure("maximum lateral tip displacement", aside, "mm"), bent
-    if weight > 0:
-        hung = arm_stack.pose(every, tip_load=(weight, 0.0, 0.0), near=free)
-        sag = float(np.linalg.norm(hung.tip - free.tip))
-        paper = "lifts 1.2 g (Sec. 5)" if load_g == MARBLE_G else ""
-        words = f"sag of the tip, {load_g:g} g across it"
-        # Sag is load over stiffness.
-        yield figure(words, sag, "mm", paper), key(Quantity.HELD_STIFFNESS)
-
-
-def _free_stroke(placed: PlacedSba, pressure: float) -> float:
-    """Return the free stroke in mm as in ``predict``: the stack's maps are approximate."""
-    design, laminate = placed.made.design, placed.made.laminate
-    kinds = Counter(balloons_of(design, laminate, factors_of(design)))
-    return free_rise(kinds, pressure).stroke
-
-
 def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
     """Return hold of a radial actuator in the assembly's lumen; None for other forms."""
     design, laminate = placed.made.design, placed.made.laminate
@@ -509,83 +293,277 @@ def _grip_figures(
     hold: Grip, stacks: int, pressure: float, load_g: float
 ) -> Iterator[AssemblyFigure]:
     """Diameter of a radial actuator, and the hold of its stacks in the assembly's lumen."""
-    name, paper = hold.part, "about 28 (Sec. 2.1)"
-    diameters = (
-        ("diameter, deflated", hold.deflated, "tube and films", "15.33 (Sec. 2.1)"),
-        ("diameter, inflated free", hold.free, ModelId.LENS.words, paper),
-        ("diameter, inflated at most", hold.most, ModelId.CYLINDER.words, paper),
-    )
-    for diameter, value, model, paper in diameters:
-        yield AssemblyFigure(name, diameter, value, "mm", model, paper)
+
+    def figure(
+        name: str, value: float, unit: str, model: str = STATIC, paper: str = ""
+    ) -> AssemblyFigure:
+        return AssemblyFigure(hold.part, name, value, unit, model, paper)
+
+    widest = "about 28 (Sec. 2.1)"
+    yield figure("diameter, deflated", hold.deflated, "mm", "tube and films", "15.33 (Sec. 2.1)")
+    yield figure("diameter, inflated free", hold.free, "mm", ModelId.LENS.words, widest)
+    yield figure("diameter, inflated at most", hold.most, "mm", ModelId.CYLINDER.words, widest)
     if hold.room is None or hold.push is None:
         return
     force = pressure * hold.push
     height, push, friction = IN_THE_LUMEN
-    lumen = f"{height} of {hold.lumen:g} mm"
-    yield AssemblyFigure(name, lumen, hold.room, "mm", STATIC)
-    yield AssemblyFigure(name, push, force, "N", LENS, "holds (Sec. 5)")
+    yield figure(f"{height} of {hold.lumen:g} mm", hold.room, "mm")
+    yield figure(push, force, "N", LENS, "holds (Sec. 5)")
     if load_g > 0:
         needed = load_g * 1e-3 * GRAVITY / (stacks * force)
-        needed_friction = f"{friction} that holds {load_g:g} g along the lumen"
-        yield AssemblyFigure(name, needed_friction, needed, "", STATIC)
+        yield figure(f"{friction} that holds {load_g:g} g along the lumen", needed, "")
 
 
-def _stacks(assembled: Assembled) -> dict[str, Stack]:
-    """Return the stacks of all actuators with round pockets, by part; shared within a design."""
-    by_design: dict[int, Stack] = {}
-    by_part = {}
-    for placed in assembled.parts:
-        if isinstance(placed, PlacedSba) and isinstance(placed.made.design.form.pockets, Discs):
-            key = id(placed.made)
-            if key not in by_design:
-                design = placed.made.design
-                factors = factors_of(design)
-                by_design[key] = stack(design, placed.made.laminate, factors=factors)
-            by_part[placed.name] = by_design[key]
-    return by_part
+# Contacts and clearances between parts, of arms upright and bent by some of their chambers.
+#
+# Each chamber alone and each pair of neighbours are pressurised, the others empty, while every
+# other actuator is inflated; parts on the arm move with its tip.
 
 
-def _rise(placed: PlacedPart, part_stack: Stack, pressure: float) -> NDArray[np.float64]:
-    """Return the vector (3,), mm, by which an actuator lifts the parts on its top."""
-    free = part_stack.pose((pressure,) * part_stack.chambers)
-    ends = np.array([[0.0, 0.0, part_stack.flat_height], [0.0, 0.0, free.height]])
-    low, high = placed.upright(ends)
-    lift: NDArray[np.float64] = high - low
-    return lift
+TOUCHING = 0.05
+"""Overlap in mm3 that still counts as touching, as in the check of the deflated assembly."""
+FARTHEST = 10.0
+"""Clearances are computed up to this distance, mm."""
+SLIGHTEST = 0.1
+"""Lowest pressure at which an arm is checked, kPa."""
+HALVINGS = 5
+FOOT = 3
+"""Levels from below that may rest on the part under the arm."""
 
 
-def _touches(
-    assembled: Assembled,
-    placed: PlacedSba,
-    stacks: Mapping[str, Stack],
-    rises: Mapping[str, NDArray[np.float64]],
-    pressure: float,
-) -> Iterator[Touch]:
-    """Other parts that an actuator meets when all are upright."""
-    names = [part.name for part in assembled.parts]
-    solid_parts = _upright(placed, stacks[placed.name], pressure, lifted(assembled, placed, rises))
-    moved = carried(assembled, placed.name)
-    for neighbour in assembled.parts:
+class _Arm(NamedTuple):
+    """An arm, the solids ``carried`` on its top when it is flat, and the parts ``beside`` it."""
+
+    placed: PlacedSba
+    stack: Stack
+    carried: Solids
+    beside: dict[str, Solids]
+
+
+class _Bent(NamedTuple):
+    """A bent arm with the parts on it: solids of its lowest levels, which may rest on the part
+    ``on``, and the others.
+    """
+
+    pose: Pose
+    on: str | None
+    foot: Solids
+    rest: Solids
+
+    def facing(self, part: str) -> Solids:
+        """Return the solids that must not meet a part."""
+        return self.rest if part == self.on else self.foot + self.rest
+
+
+class _Scene:
+    """The parts of an assembly as solids at one pressure.
+
+    ``stacks`` are those of actuators with round pockets, and ``rises`` the vectors (3,) in mm by
+    which these lift the parts on their tops.
+    """
+
+    def __init__(self, assembled: Assembled, pressure: float) -> None:
+        self.assembled, self.pressure = assembled, pressure
+        made = cache(_stack_of)
+        self.stacks = {
+            placed.name: made(placed.made)
+            for placed in assembled.parts
+            if isinstance(placed, PlacedSba) and isinstance(placed.made.design.form.pockets, Discs)
+        }
+        self.rises: dict[str, Array] = {}
+        for name, its_stack in self.stacks.items():
+            heights = its_stack.flat_height, self._free(its_stack).height
+            low, high = assembled[name].upright(np.array([[0.0, 0.0, z] for z in heights]))
+            self.rises[name] = high - low
+
+    def _free(self, its_stack: Stack) -> Pose:
+        return its_stack.pose((self.pressure,) * its_stack.chambers)
+
+    def _lift(self, placed: PlacedPart) -> Array:
+        """Return the vector (3,), mm, by which the actuators under a part lift it."""
+        lift = np.zeros(3)
+        while placed.part.on is not None:
+            if placed.part.at == "top":
+                lift = lift + self.rises.get(placed.part.on, 0.0)
+            placed = self.assembled[placed.part.on]
+        return lift
+
+    def _solids(self, placed: PlacedPart, lift: Array | None = None) -> Solids:
+        """Return a part lifted, by default by what is under it, with all others inflated."""
+        lift = self._lift(placed) if lift is None else lift
+        if isinstance(placed, PlacedSba) and placed.name in self.stacks:
+            its_stack = self.stacks[placed.name]
+            return _posed(placed, its_stack, self._free(its_stack), lift)
+        return _as_it_is(placed, lift)
+
+    def _carried(self, name: str) -> set[str]:
+        """Return a part and everything fixed on it, directly or not."""
+        names = {name}
+        for part in self.assembled.parts:
+            if part.part.on in names:
+                names.add(part.name)
+        return names
+
+    def touches(self, placed: PlacedSba) -> Iterator[Touch]:
+        """Yield the parts that an actuator meets when all are upright, each pair once."""
+        own = self._solids(placed)
         # Parts on it move along; the part under it touches it as when flat.
-        if (
-            neighbour.name in moved
-            or neighbour.name == placed.part.on
-            or neighbour.part.kind == "line"
-        ):
-            continue
-        lift = lifted(assembled, neighbour, rises)
-        if isinstance(neighbour, PlacedSba) and neighbour.name in stacks:
-            if names.index(neighbour.name) < names.index(placed.name):
-                continue  # each pair once
-            theirs = _upright(neighbour, stacks[neighbour.name], pressure, lift)
-        else:
-            theirs = as_it_is(neighbour, lift)
-        volume = shared_volume(solid_parts, theirs)
-        if volume > TOUCHING:
-            yield Touch(placed.name, neighbour.name, volume)
+        apart = {*self._carried(placed.name), placed.part.on}
+        is_earlier = True
+        for other in self.assembled.parts:
+            is_earlier = is_earlier and other.name != placed.name
+            if (
+                other.name in apart
+                or other.part.kind == "line"
+                or (is_earlier and other.name in self.stacks)
+            ):
+                continue
+            volume = _shared_volume(own, self._solids(other))
+            if volume > TOUCHING:
+                yield Touch(placed.name, other.name, volume)
+
+    def bends(
+        self, placed: PlacedSba, pause: Callable[[], None]
+    ) -> Iterator[AssemblyFigure | BentTouch]:
+        """Yield each bend at which an arm meets another part, then the least clearance to others.
+
+        No clearance is given for the part under the arm and for parts farther away than
+        ``FARTHEST``.
+        """
+        its_stack = self.stacks[placed.name]
+        if its_stack.chambers < 2:
+            return
+        arm = self._arm(placed)
+        nearest: dict[str, tuple[float, str]] = {}
+        met = set()
+        for chambers in _ways(its_stack.chambers):
+            pause()
+            names = " and ".join(placed.made.laminate.chambers[i].name for i in chambers)
+            bent = self._bent(arm, chambers, self.pressure)
+            for part, theirs in arm.beside.items():
+                volume = _shared_volume(bent.facing(part), theirs)
+                if volume > TOUCHING:
+                    met.add(part)
+                    first = self._first(arm, part, chambers, bent.pose)
+                    start, measured = max(first.pressures), its_stack.counterparts.get("bend", "")
+                    yield BentTouch(placed.name, part, names, volume, start, first.bend, measured)
+                elif part != placed.part.on:
+                    least = nearest.get(part, (FARTHEST, ""))
+                    gap = _gap(bent.facing(part), theirs, least[0])
+                    nearest[part] = least if gap >= least[0] else (gap, names)
+        for part, (gap, names) in nearest.items():
+            if part not in met and gap < FARTHEST:
+                words = f"clearance to {part}, bent by {names}"
+                yield AssemblyFigure(placed.name, words, gap, "mm", STACK)
+
+    def _arm(self, placed: PlacedSba) -> _Arm:
+        arm = _Arm(placed, self.stacks[placed.name], [], {})
+        moving = self._carried(placed.name)
+        for part in self.assembled.parts:
+            if part.name == placed.name or part.part.kind == "line":
+                continue
+            if part.name in moving:
+                arm.carried.extend(self._solids(part, self._lift(part) - self.rises[placed.name]))
+            else:
+                arm.beside[part.name] = self._solids(part)
+        return arm
+
+    def _bent(self, arm: _Arm, chambers: Sequence[int], pressure: float) -> _Bent:
+        """Return the arm bent by some chambers, and the parts on it."""
+        count = range(arm.stack.chambers)
+        pose = arm.stack.pose(tuple(pressure if i in chambers else 0.0 for i in count))
+        lift = self._lift(arm.placed)
+        places = arm.placed.upright(pose.frames[0]) + lift
+        levels = (places[1:] + places[:-1]) / 2
+        bent = _Bent(pose, arm.placed.part.on, [], [])
+        for solid in _posed(arm.placed, arm.stack, pose, lift):
+            middle = np.array(solid.bounding_box()).reshape(2, 3).mean(0)
+            level = int(np.linalg.norm(levels - middle, axis=1).argmin())
+            (bent.foot if level < FOOT else bent.rest).append(solid)
+        # From the flat arm's top to the bent one's, in the arm's own frame, then in the assembly's.
+        tip = np.eye(4)
+        tip[:3, :3] = pose.frames[1][-1]
+        tip[:3, 3] = pose.tip - tip[:3, :3] @ np.array([0.0, 0.0, arm.stack.flat_height])
+        corners = arm.placed.upright(np.concatenate([np.zeros((1, 3)), np.eye(3)]))
+        frame = np.eye(4)
+        frame[:3, 3] = corners[0] + lift
+        frame[:3, :3] = (corners[1:] - corners[0]).T
+        rows = np.ascontiguousarray((frame @ tip @ np.linalg.inv(frame))[:3])
+        bent.rest.extend(solid.transform(rows) for solid in arm.carried)
+        return bent
+
+    def _first(self, arm: _Arm, part: str, chambers: Sequence[int], pose: Pose) -> Pose:
+        """Return approximately the first pose in contact with another part, at the latest this."""
+        low, high = min(SLIGHTEST, self.pressure / 2), self.pressure
+        for _ in range(HALVINGS):
+            middle = math.sqrt(low * high)
+            tried = self._bent(arm, chambers, middle)
+            if _shared_volume(tried.facing(part), arm.beside[part]) > TOUCHING:
+                high, pose = middle, tried.pose
+            else:
+                low = middle
+        return pose
 
 
-def _upright(
-    placed: PlacedSba, part_stack: Stack, pressure: float, lift: NDArray[np.float64]
-) -> Solids:
-    return solids(placed, part_stack, part_stack.pose((pressure,) * part_stack.chambers), lift)
+def _stack_of(made: PartDesign) -> Stack:
+    return stack(made.design, made.laminate, factors=factors_of(made.design))
+
+
+def _ways(chambers: int) -> list[tuple[int, ...]]:
+    """Return the sets of pressurised chambers: each alone, and each two side by side."""
+    alone: list[tuple[int, ...]] = [(i,) for i in range(chambers)]
+    return alone + [(i, (i + 1) % chambers) for i in range(chambers) if chambers > 2]
+
+
+def _posed(placed: PlacedSba, its_stack: Stack, pose: Pose, lift: Array) -> Solids:
+    """Return an inflated actuator's balloons and webs in a pose, in place."""
+    pieces = []
+    for part in inflated(placed.made.laminate, its_stack, pose, COARSE):
+        points = placed.upright(part.surface.points) + lift
+        pieces += _manifold(replace(part.surface, points=points)).decompose()
+    return pieces
+
+
+def _manifold(surface: Surface) -> manifold3d.Manifold:
+    import manifold3d
+
+    faces = np.ascontiguousarray(surface.faces.astype(np.uint64))
+    return manifold3d.Manifold(manifold3d.Mesh64(np.ascontiguousarray(surface.points), faces))
+
+
+def _as_it_is(placed: PlacedPart, lift: Array) -> Solids:
+    """A part without an elastic stack, its pockets filled; one around a tube is its free inflated
+    cylinder.
+    """
+    if placed.made is not None:
+        widest = sizes(placed.made.design, placed.made.laminate).get("inflated_diameter")
+        if widest is not None:
+            import manifold3d
+
+            _, low, _, high = placed.made.laminate.layers[0].profile.turned(placed.turn).bounds
+            cylinder = manifold3d.Manifold.cylinder(high - low, widest / 2)
+            rows = np.column_stack([np.array(placed.pose.rows), np.array(placed.pose.shift) + lift])
+            return [cylinder.translate((0.0, 0.0, low)).transform(rows)]
+    surface = placed_surface(placed, filled=True)
+    return [_manifold(replace(surface, points=surface.points + lift))]
+
+
+def _shared_volume(first: Solids, second: Solids) -> float:
+    """Return the volume of their intersection, mm3."""
+    return sum(float((a ^ b).volume()) for a in first for b in second if _box_gap(a, b) <= 0)
+
+
+def _box_gap(a: manifold3d.Manifold, b: manifold3d.Manifold) -> float:
+    """Return the distance between the boxes of two solids, mm; 0 or less if they meet."""
+    box_a, box_b = (np.array(solid.bounding_box()).reshape(2, 3) for solid in (a, b))
+    return float(np.maximum(box_a[0] - box_b[1], box_b[0] - box_a[1]).max())
+
+
+def _gap(arm: Solids, theirs: Solids, least: float) -> float:
+    """Return the distance in mm between the nearest two, at most ``least``."""
+    pairs = ((_box_gap(a, b), a, b) for a in arm for b in theirs)
+    for boxes, a, b in sorted(pairs, key=lambda pair: pair[0]):
+        if boxes >= least:
+            break
+        least = min(least, float(a.min_gap(b, least)))
+    return least

@@ -1,16 +1,16 @@
-"""Raster pictures: a canvas of flat colours, a depth buffer for surfaces, a length bar (Pillow)."""
+"""Raster pictures (Pillow): a depth buffer for surfaces, edges in it, words and a length bar."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from io import BytesIO
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from textwrap import wrap
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.geometry.edges import Point
 from sbafab.meshing.surface import Surface
 
 if TYPE_CHECKING:
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw as Draw
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
-Tone = Literal["film", "bond", "cut film", "cut bond", "shade", "line"]
-Colour = tuple[int, int, int]
+Floats = NDArray[np.float64]
+RGB = tuple[int, int, int]
 
-COLOURS: dict[Tone, Colour] = {
+COLOURS: dict[str, RGB] = {
     "film": (164, 206, 235),
     "bond": (118, 174, 216),
     "cut film": (224, 238, 248),
@@ -29,150 +29,19 @@ COLOURS: dict[Tone, Colour] = {
     "shade": (72, 84, 98),
     "line": (58, 104, 142),
 }
-KEY: tuple[tuple[Tone, str], ...] = (
+KEY = (
     ("film", "TPE"),
     ("cut film", "film, cut"),
     ("cut bond", "bond, cut"),
     ("shade", "open gap"),
 )
-"""Meaning of the colours, in the picture's foot and beside it on a page."""
-LEVELS = 60
-PAPER = (255, 255, 255)
-INK = (40, 44, 50)
-SHADOW = 70
-SMALLEST = 15
-"""Least letter size, pixels: pages often show a picture smaller than it is."""
-BLUR = 8
-STRIP = 64
-"""Rows reduced at once: enlarged and in full colour they are large."""
-
-
-class Canvas:
-    """Later paint covers earlier paint. One byte per pixel keeps the fills fast."""
-
-    def __init__(self, width: int, height: int, supersample: int) -> None:
-        from PIL import Image, ImageDraw
-
-        self._size = width, height
-        self._enlarged = supersample
-        self._image = Image.new("P", (width * supersample, height * supersample), 0)
-        self._draw = ImageDraw.Draw(self._image)
-        self._index: dict[Colour, int] = {PAPER: 0}
-        self._known: dict[tuple[Tone, int], int] = {}
-
-    def fill(self, points: Sequence[Point], tone: Tone, level: float) -> None:
-        """Fills a polygon; ``level`` darkens the tone (1: as it is)."""
-        self._draw.polygon(points, fill=self._colour(tone, level))
-
-    def outline(self, points: Sequence[Point]) -> None:
-        closed = [*points, *points[:1]]
-        self._draw.line(closed, fill=self._colour("line", 1.0), width=self._enlarged)
-
-    def _colour(self, tone: Tone, level: float) -> int:
-        steps = round(level * LEVELS)
-        number = self._known.get((tone, steps))
-        if number is None:
-            r, g, b = (min(255, round(part * (steps / LEVELS))) for part in COLOURS[tone])
-            number = self._index.setdefault((r, g, b), len(self._index))
-            self._known[tone, steps] = number
-        return number
-
-    def png(self, footprint: Sequence[Sequence[Point]], caption: str, films: str) -> bytes:
-        """The picture over the soft shadow of ``footprint``, with caption and key of ``films``."""
-        self._image.putpalette([part for colour in self._index for part in colour])
-        picture = self._backdrop(footprint).convert("RGB")
-        # Unpainted pixels are backdrop.
-        whole = self._enlarged
-        x0, top, right, bottom = self._image.getbbox() or (0, 0, *self._image.size)
-        last = -(-bottom // whole)
-        for row in range(top // whole, last, STRIP):
-            strip = x0 // whole, row, -(-right // whole), min(row + STRIP, last)
-            picture.paste(self._reduced(strip, picture.crop(strip)), strip[:2])
-        self._write(picture, caption, films)
-        out = BytesIO()
-        picture.save(out, "PNG", compress_level=6)
-        return out.getvalue()
-
-    def _reduced(self, box: tuple[int, int, int, int], behind: Image) -> Image:
-        """Return the paint within the ``box`` of the picture, over the picture ``behind`` it."""
-        from PIL import ImageChops
-
-        whole = self._enlarged
-        x0, top, right, bottom = box
-        inside = self._image.crop((whole * x0, whole * top, whole * right, whole * bottom))
-        painted = inside.convert("RGB").reduce(whole)
-        empty = inside.point([255] + [0] * 255, "L").reduce(whole).convert("RGB")
-        # The empty canvas is white: subtracting the backdrop's difference from white, in
-        # proportion, leaves no bright rim around the solid.
-        lack = ImageChops.multiply(ImageChops.invert(behind), empty)
-        return ImageChops.subtract(painted, lack)
-
-    def _backdrop(self, footprint: Sequence[Sequence[Point]]) -> Image:
-        from PIL import Image, ImageDraw, ImageFilter
-
-        width, height = self._size
-        coarse = 4
-        shrink = self._enlarged * coarse
-        small = Image.new("L", (width // coarse, height // coarse), 255)
-        draw = ImageDraw.Draw(small)
-        for ring in footprint:
-            draw.polygon([(x / shrink + 2, y / shrink + 4) for x, y in ring], fill=255 - SHADOW)
-        return small.filter(ImageFilter.GaussianBlur(BLUR)).resize(self._size)
-
-    def _write(self, picture: Image, caption: str, films: str) -> None:
-        """Caption and colour key along the foot, in Pillow's own font."""
-        from PIL import ImageDraw, ImageFont
-
-        width, height = self._size
-        size = max(SMALLEST, round(height / 52))
-        font = ImageFont.load_default(size)
-        draw = ImageDraw.Draw(picture)
-        x, y = round(0.03 * width), height - 2 * size
-        lines = [""]
-        for word in caption.split():
-            longer = f"{lines[-1]} {word}".strip()
-            if draw.textlength(longer, font=font) <= width - 2 * x:
-                lines[-1] = longer
-            else:
-                lines.append(word)
-        for above, line in enumerate(reversed(lines)):
-            draw.text((x, y - (1.7 + 1.3 * above) * size), line, fill=INK, font=font)
-        for tone, meaning in KEY:
-            words = films if tone == "film" else meaning
-            draw.rectangle((x, y, x + 1.6 * size, y + size), fill=COLOURS[tone], outline=INK)
-            draw.text((x + 2.1 * size, y - 0.1 * size), words, fill=INK, font=font)
-            x += round(3.6 * size + draw.textlength(words, font=font))
-
-
-def keyhole(rings: Sequence[Sequence[Point]]) -> list[Point]:
-    """One closed ring for a piece with holes: a slit joins each hole to the contour right of it."""
-    merged = list(rings[0])
-    for hole in sorted(rings[1:], key=lambda ring: -max(ring)[0]):
-        first = max(range(len(hole)), key=lambda i: hole[i])
-        x, y = hole[first]
-        after, landing = _first_right_of(merged, x, y)
-        turned = [*hole[first:], *hole[:first]]
-        merged[after:after] = [landing, *turned, (x, y), landing]
-    return merged
-
-
-def _first_right_of(ring: Sequence[Point], x: float, y: float) -> tuple[int, Point]:
-    """Return first point at which a ray to the right meets the ring, and the vertex after it."""
-    best: tuple[float, int] | None = None
-    for i, (x1, y1) in enumerate(ring):
-        x0, y0 = ring[i - 1]
-        if (y0 <= y) == (y1 <= y):
-            continue
-        meets = x0 + (x1 - x0) * (y - y0) / (y1 - y0)
-        if meets >= x and (best is None or meets < best[0]):
-            best = meets, i
-    assert best is not None, "a hole lies inside its outer ring"
-    return best[1], (best[0], y)
-
-
-# Triangulated surfaces on a picture, nearest first: a depth buffer filled by sample points.
-
-
+"""Meaning of the colours, in the solid's foot and beside it on a page."""
+PAPER: RGB = (255, 255, 255)
+INK: RGB = (40, 44, 50)
+BAR_INK: RGB = (34, 34, 34)
+BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
+ENLARGED = 2
+"""Pictures are painted larger by this factor and reduced, which smooths their edges."""
 DENSITY = 1.45
 """Samples per pixel along a triangle's side: more than the root of 2, so none is missed."""
 MOST = 4_000_000
@@ -183,11 +52,11 @@ AMBIENT = 0.58
 class View(NamedTuple):
     """A parallel projection: mm to pixels, the three axes as rows (right, up, toward the eye)."""
 
-    axes: NDArray[np.float64]
+    axes: Floats
     scale: float
     centre: tuple[float, float]
 
-    def flat(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def flat(self, points: Floats) -> Floats:
         """Points (n, 3) as pixels right and down, and mm toward the eye."""
         right, up, toward = (points @ self.axes.T).T
         x = self.centre[0] + self.scale * right
@@ -198,10 +67,10 @@ class View(NamedTuple):
 class Buffer(NamedTuple):
     """For each pixel the depth, the number of the surface seen (-1: none), its face and light."""
 
-    depth: NDArray[np.float64]
+    depth: Floats
     body: NDArray[np.int16]
     face: NDArray[np.int32]
-    light: NDArray[np.float64]
+    light: Floats
 
 
 def view_of(
@@ -226,140 +95,167 @@ def view_of(
     return View(axes, scale, centre)
 
 
+def framed(width: float, height: float, margin: float, foot: float) -> tuple[float, ...]:
+    """The box for ``view_of`` of a picture with a margin and a foot, given as shares of it."""
+    return margin * width, margin * height, (1 - margin) * width, (1 - margin - foot) * height
+
+
 def rasterize(
     surfaces: Sequence[Surface],
     view: View,
     width: int,
     height: int,
     lamp: Sequence[float],
-    normals: Sequence[NDArray[np.float64]] | None = None,
+    normals: Sequence[Floats] | None = None,
 ) -> Buffer:
     """Return the depth buffer of the surfaces; ``lamp`` is the direction to the light, in the view.
 
     Faces are lit one by one, or smoothly if ``normals`` (n, 3) of the points are given.
     """
-    size = width * height
+    shape = height, width
     buffer = Buffer(
-        np.full(size, -np.inf),
-        np.full(size, -1, dtype=np.int16),
-        np.zeros(size, dtype=np.int32),
-        np.zeros(size, dtype=np.float64),
+        np.full(shape, -np.inf),
+        np.full(shape, -1, dtype=np.int16),
+        np.zeros(shape, dtype=np.int32),
+        np.zeros(shape),
     )
     for body, surface in enumerate(surfaces):
-        smooth = None if normals is None else lit(normals[body] @ view.axes.T, np.array(lamp))
-        _paint(buffer, body, surface, view, (width, height), np.array(lamp), smooth)
-    return Buffer(
-        buffer.depth.reshape(height, width),
-        buffer.body.reshape(height, width),
-        buffer.face.reshape(height, width),
-        buffer.light.reshape(height, width),
-    )
+        corners = view.flat(surface.points)[surface.faces]
+        # Pixels count downward, so faces toward the eye run clockwise there.
+        (ab, ac) = (corners[:, i, :2] - corners[:, 0, :2] for i in (1, 2))
+        twice = ac[:, 0] * ab[:, 1] - ac[:, 1] * ab[:, 0]
+        front = np.flatnonzero(twice > 1e-12)
+        faces = surface.faces[front]
+        if normals is None:
+            a, b, c = surface.points.take(faces.T, axis=0)
+            normal = np.cross(b - a, c - a)
+            normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+            light = np.repeat(_lit(normal @ view.axes.T, lamp)[:, None], 3, axis=1)
+        else:
+            light = _lit(normals[body] @ view.axes.T, lamp)[faces]
+        for part in _samples(corners[front], light, twice[front]):
+            _paint(buffer, body, front, part)
+    return buffer
 
 
-def _paint(
-    buffer: Buffer,
-    body: int,
-    surface: Surface,
-    view: View,
-    size: tuple[int, int],
-    lamp: NDArray[np.float64],
-    smooth: NDArray[np.float64] | None,
-) -> None:
-    corners = view.flat(surface.points)[surface.faces]
-    # Pixels count downward, so faces toward the eye run clockwise there.
-    a, b, c = (corners[:, i, :2] for i in range(3))
-    twice = (c - a)[:, 0] * (b - a)[:, 1] - (c - a)[:, 1] * (b - a)[:, 0]
-    front = np.flatnonzero(twice > 1e-12)
-    corners, twice = corners[front], twice[front]
-    if smooth is None:
-        light = np.repeat(_light(corners, view.scale, lamp)[:, None], 3, axis=1)
-    else:
-        light = smooth[surface.faces[front]]
-    corners, light, long = _longest_first(corners, light)
-    along = np.ceil(DENSITY * long).astype(np.int64) + 2
-    across = np.ceil(DENSITY * twice / np.maximum(long, 1e-9)).astype(np.int64) + 2
-    # Triangles of similar size are sampled together.
-    grids = np.column_stack([_power_of_two(along), _power_of_two(across)])
-    for n, m in np.unique(grids, axis=0):
-        samples = np.flatnonzero((grids == (n, m)).all(axis=1))
-        for part in np.array_split(samples, max(1, len(samples) * n * m // MOST)):
-            seen_as = _Triangles(body, front[part], corners[part], light[part])
-            _sample(buffer, seen_as, (int(n), int(m)), size)
-
-
-def _light(
-    corners: NDArray[np.float64], scale: float, lamp: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the light of a triangle, from its normal in the view (right, up, toward)."""
-    true = corners * np.array([1 / scale, -1 / scale, 1.0])
-    normal = np.cross(true[:, 1] - true[:, 0], true[:, 2] - true[:, 0])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return lit(normal, lamp)
-
-
-def lit(normals: NDArray[np.float64], lamp: NDArray[np.float64]) -> NDArray[np.float64]:
+def _lit(normals: Floats, lamp: Sequence[float]) -> Floats:
     """Return the light of faces with normals (n, 3) in the view: from AMBIENT to 1."""
-    light: NDArray[np.float64] = AMBIENT + (1 - AMBIENT) * np.clip(normals @ lamp, 0, 1)
+    light: Floats = AMBIENT + (1 - AMBIENT) * np.clip(normals @ np.array(lamp), 0, 1)
     return light
 
 
-def _longest_first(
-    corners: NDArray[np.float64], light: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Corners and their light, rotated so that the longest side comes first; its length in
-    pixels.
+class _Samples(NamedTuple):
+    """Triangles (by number), their corners (n, 3, 3) and light (n, 3), and points of each: shares
+    ``s`` along the first side and ``t`` from there to the third corner.
     """
+
+    triangles: NDArray[np.int64]
+    corners: Floats
+    light: Floats
+    s: Floats
+    t: Floats
+
+
+def _samples(corners: Floats, light: Floats, twice: Floats) -> Iterator[_Samples]:
+    """Yield points that cover triangles of twice these areas, those of similar size together."""
     sides = np.roll(corners, -1, axis=1)[:, :, :2] - corners[:, :, :2]
     lengths = np.hypot(sides[:, :, 0], sides[:, :, 1])
-    first = lengths.argmax(axis=1)
-    order = (first[:, None] + np.arange(3)) % 3
-    turned = np.take_along_axis(corners, order[:, :, None], axis=1)
-    return turned, np.take_along_axis(light, order, axis=1), lengths.max(axis=1)
+    # The longest side comes first.
+    order = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    corners = np.take_along_axis(corners, order[:, :, None], axis=1)
+    light = np.take_along_axis(light, order, axis=1)
+    long = lengths.max(axis=1)
+    counts = np.column_stack([long, twice / np.maximum(long, 1e-9)])
+    grids = 2 ** np.ceil(np.log2(np.ceil(DENSITY * counts) + 2)).astype(np.int64)
+    for n, m in np.unique(grids, axis=0):
+        s, t = (grid.ravel() for grid in np.meshgrid(*(np.linspace(0, 1, k) for k in (n, m))))
+        alike = np.flatnonzero((grids == (n, m)).all(axis=1))
+        for part in np.array_split(alike, max(1, len(alike) * n * m // MOST)):
+            yield _Samples(part, corners[part], light[part], s, t)
 
 
-def _power_of_two(counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    return 2 ** np.ceil(np.log2(counts)).astype(np.int64)
-
-
-class _Triangles(NamedTuple):
-    """Triangles of one surface: their numbers in it, corners (n, 3, 3) in the view, and light."""
-
-    body: int
-    face: NDArray[np.int64]
-    corners: NDArray[np.float64]
-    light: NDArray[np.float64]
-
-
-def _sample(
-    buffer: Buffer, corners: _Triangles, grid: tuple[int, int], size: tuple[int, int]
-) -> None:
-    """Points of each triangle: along its first side, and from there towards its third corner."""
-    s = np.linspace(0, 1, grid[0])[None, :, None, None]
-    t = np.linspace(0, 1, grid[1])[None, None, :, None]
-    a, b, c = (corners.corners[:, i][:, None, None, :] for i in range(3))
-    points = (1 - t) * (a + s * (b - a)) + t * c
-    number = np.repeat(np.arange(len(corners.face)), grid[0] * grid[1])
-    x, y, depth = points.reshape(-1, 3).T
+def _paint(buffer: Buffer, body: int, front: NDArray[np.int64], part: _Samples) -> None:
+    """Paint the points that are nearest to the eye."""
+    a, b, c = (part.corners[:, i, None, :] for i in range(3))
+    s, t = part.s[:, None], part.t[:, None]
+    x, y, depth = ((1 - t) * (a + s * (b - a)) + t * c).reshape(-1, 3).T
+    height, width = buffer.body.shape
     column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    inside = (column >= 0) & (column < size[0]) & (row >= 0) & (row < size[1])
-    place = row[inside] * size[0] + column[inside]
-    depth, number = depth[inside], number[inside]
-    np.maximum.at(buffer.depth, place, depth)
-    won = depth == buffer.depth[place]
-    place, number = place[won], number[won]
-    at = np.flatnonzero(inside)[won] % (grid[0] * grid[1])
-    p, q = s.ravel()[at // grid[1]], t.ravel()[at % grid[1]]
+    inside = np.flatnonzero((column >= 0) & (column < width) & (row >= 0) & (row < height))
+    place, depth = row[inside] * width + column[inside], depth[inside]
+    nearest = buffer.depth.reshape(-1)
+    np.maximum.at(nearest, place, depth)
+    won = depth == nearest[place]
+    place = place[won]
+    number, at = np.divmod(inside[won], len(part.s))
+    p, q = part.s[at], part.t[at]
     shares = np.stack([(1 - q) * (1 - p), (1 - q) * p, q], axis=-1)
-    buffer.light[place] = (corners.light[number] * shares).sum(axis=1)
-    buffer.face[place] = corners.face[number]
-    buffer.body[place] = corners.body
+    buffer.light.reshape(-1)[place] = (part.light[number] * shares).sum(axis=1)
+    buffer.face.reshape(-1)[place] = front[part.triangles[number]]
+    buffer.body.reshape(-1)[place] = body
 
 
-# A bar of round length under a picture that is true to scale.
+def edges(buffer: Buffer, step: float, borders: bool = False) -> NDArray[np.bool_]:
+    """Return the pixels beside a jump in depth by more than ``step`` mm; ``borders``: also those
+    beside another body.
+    """
+    depth = np.where(buffer.body < 0, -1e9, buffer.depth)
+    found = np.zeros(depth.shape, dtype=bool)
+    for axis in (0, 1):
+        jumps = np.abs(np.diff(depth, axis=axis)) > step
+        if borders:
+            jumps |= np.diff(buffer.body, axis=axis) != 0
+        found[: jumps.shape[0], : jumps.shape[1]] |= jumps
+    return found
 
 
-BAR_INK = (34, 34, 34)
-BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
+def image_of(rgb: Floats) -> Image:
+    """Return colours (height, width, 3) from 0 to 255 as a picture, reduced by ``ENLARGED``."""
+    from PIL import Image
+
+    whole = np.clip(np.rint(rgb), 0, 255).astype(np.uint8)
+    return Image.fromarray(whole, "RGB").reduce(ENLARGED)
+
+
+def png(picture: Image) -> bytes:
+    out = BytesIO()
+    picture.save(out, "PNG", compress_level=6)
+    return out.getvalue()
+
+
+def inscribe(
+    picture: Image,
+    caption: Sequence[str],
+    size: int,
+    legend: Sequence[tuple[RGB, str]] = (),
+    pixels_per_mm: float = 0.0,
+) -> None:
+    """Write a legend along the foot, lines over it, and over those a length bar at the right.
+
+    ``size`` is the letters', pixels, in Pillow's own font; without a scale there is no bar.
+    """
+    from PIL import ImageDraw, ImageFont
+
+    width, height = picture.size
+    font = ImageFont.load_default(size)
+    draw = ImageDraw.Draw(picture)
+    margin = round(0.03 * width)
+    x, y = margin, height - 2 * size
+    for colour, words in legend:
+        needed = round(3.5 * size + draw.textlength(words, font=font))
+        if margin < x and width - margin < x + needed:
+            x, y = margin, y - round(1.5 * size)
+        draw.rectangle((x, y, x + 1.6 * size, y + size), fill=colour, outline=INK)
+        draw.text((x + 2.1 * size, y - 0.1 * size), words, fill=INK, font=font)
+        x += needed
+    y -= round(1.7 * size) if legend else 0
+    for words in reversed(caption):
+        share = (width - 2 * margin) / draw.textlength(words, font=font)
+        for line in reversed(wrap(words, max(20, int(share * len(words))))):
+            draw.text((margin, y), line, fill=INK, font=font)
+            y -= round(1.3 * size)
+    if pixels_per_mm:
+        draw_length_bar(draw, width - margin, y + size, width / 4, pixels_per_mm, font)
 
 
 def draw_length_bar(

@@ -1,4 +1,4 @@
-"""Inflated actuators as surfaces, from poses of the elastic stack; parts of an assembly as solids.
+"""Inflated actuators as surfaces, from poses of the elastic stack or as lenses round a tube.
 
 Each balloon is two films revolved around its chamber's axis on the plane midway between two plates,
 and sheared to the plates, which may be tilted; its meridian is the one between parallel plates at
@@ -8,14 +8,12 @@ this distance (``models.balloon``). The bonded web around the pockets follows th
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
-from sbafab.assemblies.shapes import placed_surface
+from sbafab.assemblies.build import PlacedSba
 from sbafab.design.records import Slots
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, disc, section, strip, union
@@ -23,17 +21,15 @@ from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import Surface
 from sbafab.models.balloon import Balloon, inflate
-from sbafab.models.formulas import sizes
+from sbafab.models.parabola import inverse
+from sbafab.models.pneumatics import FLUIDS, Line
 
 if TYPE_CHECKING:
-    import manifold3d
     from numpy.typing import NDArray
 
     from sbafab.models.stack import Pose, Stack
 
     Array = NDArray[np.float64]
-
-    Solids = list[manifold3d.Manifold]
 
 FINE, COARSE = 56, 28
 """Facets of a balloon around its axis."""
@@ -49,6 +45,8 @@ LEAST_GAP = 0.02
 """Least opening of a balloon, mm, so that its films stay separate."""
 SAME = 100
 """Pressures and gaps that agree to 1 / SAME kPa and mm share a meridian."""
+SUCTION = 1e-3
+"""Pressure below 0 in kPa that counts as none."""
 FLATTEST = 0.12
 """Least share of its height that a film keeps under tilted plates."""
 
@@ -259,126 +257,37 @@ def _normals(surface: Surface) -> Array:
     return normals
 
 
-def pressed(stack: Stack, volumes_ul: Sequence[float], rounds: int = 60) -> Pose:
+def pressed(stack: Stack, volumes_ul: Sequence[float]) -> Pose:
     """The pose whose chambers hold these volumes in ul, found through their pressures.
 
-    Raises DesignError for volumes beyond the stack's highest pressure.
+    Raises DesignError for volumes that take suction or more than the stack's highest pressure.
     """
     volumes = np.asarray(volumes_ul, dtype=float)
     if volumes.shape != (stack.chambers,) or not (np.isfinite(volumes) & (volumes >= 0)).all():
         raise DesignError(
             f"volumes must be {stack.chambers} numbers of ul, 0 or more, one a chamber"
         )
-    p = np.full(stack.chambers, 1.0)
-    pose = stack.pose(tuple(p))
+    motion = stack.motion(line=Line(FLUIDS["water"]))
+    remedy = "volumes that lie nearer together" if np.ptp(volumes) > 0 else ""
     try:
-        for _ in range(rounds):
-            miss = volumes - pose.volumes
-            if (np.abs(miss) <= 1e-3 * np.maximum(volumes, 1.0)).all():
-                return pose
-            slopes = np.empty((stack.chambers, stack.chambers))
-            for number in range(stack.chambers):
-                step = p.copy()
-                step[number] += 0.01 + 0.01 * p[number]
-                there = stack.pose(tuple(step), near=pose)
-                slopes[:, number] = (there.volumes - pose.volumes) / (step[number] - p[number])
-            move = np.linalg.lstsq(slopes, miss, rcond=None)[0]
-            p = np.clip(
-                p + np.clip(move, -0.6 * p - 0.02, 1.5 * p + 0.2), 0.0, 0.98 * stack.most_pressure
-            )
-            pose = stack.pose(tuple(p), near=pose)
-    except DesignError as error:
-        raise _out_of_reach(volumes, pose) from error
-    raise _out_of_reach(volumes, pose)
-
-
-def _out_of_reach(volumes: Array, pose: Pose) -> DesignError:
-    target, nearest = (", ".join(f"{v:.4g}" for v in some) for some in (volumes, pose.volumes))
-    nearer = ", or volumes that lie nearer together" if np.ptp(volumes) > 0 else ""
-    return DesignError(
-        f"no pressures give the volumes {target} ul: the search ended at {nearest} ul; give less"
-        f"{nearer}"
+        pose = motion.step(1.0, flows=(volumes - motion.pose.volumes).tolist())
+    except DesignError:
+        needed = f"more than {stack.most_pressure:g}"
+        remedy = f"less, or {remedy}" if remedy else "less"
+    else:
+        if min(pose.pressures) > -SUCTION:
+            return pose
+        needed, remedy = ", ".join(f"{p:.3g}" for p in pose.pressures), remedy or "more"
+    target = ", ".join(f"{v:.4g}" for v in volumes)
+    raise DesignError(
+        f"no pressures give the volumes {target} ul: they would take {needed} kPa; give {remedy}"
     )
-
-
-# Inflated parts of an assembly as solids, in place.
-
-
-TOUCHING = 0.05
-"""Overlap in mm3 that still counts as touching, as in the check of the deflated assembly."""
-
-
-def shared_volume(first: Solids, second: Solids) -> float:
-    """Return the volume of their intersection, mm3."""
-    return sum(float((a ^ b).volume()) for a in first for b in second if box_gap(a, b) <= 0)
-
-
-def box_gap(a: manifold3d.Manifold, b: manifold3d.Manifold) -> float:
-    """Return the distance between the boxes of two solids, mm; 0 or less if they meet."""
-    box_a, box_b = (np.array(solid.bounding_box()).reshape(2, 3) for solid in (a, b))
-    return float(np.maximum(box_a[0] - box_b[1], box_b[0] - box_a[1]).max())
-
-
-def lifted(
-    assembled: Assembled, placed: PlacedPart, rises: Mapping[str, NDArray[np.float64]]
-) -> NDArray[np.float64]:
-    """Return the vector (3,), mm, by which the actuators under a part lift it."""
-    lift = np.zeros(3)
-    while placed.part.on is not None:
-        if placed.part.at == "top":
-            lift = lift + rises.get(placed.part.on, 0.0)
-        placed = assembled[placed.part.on]
-    return lift
-
-
-def carried(assembled: Assembled, name: str) -> set[str]:
-    """Return a part and everything fixed on it, directly or not."""
-    names = {name}
-    for part in assembled.parts:
-        if part.part.on in names:
-            names.add(part.name)
-    return names
-
-
-def solids(placed: PlacedSba, stack: Stack, pose: Pose, lift: NDArray[np.float64]) -> Solids:
-    """An inflated actuator's balloons and webs in a pose, in place."""
-    pieces = []
-    for part in inflated(placed.made.laminate, stack, pose, COARSE):
-        points = placed.upright(part.surface.points) + lift
-        pieces += manifold(replace(part.surface, points=points)).decompose()
-    return pieces
-
-
-def manifold(surface: Surface) -> manifold3d.Manifold:
-    import manifold3d
-
-    faces = np.ascontiguousarray(surface.faces.astype(np.uint64))
-    return manifold3d.Manifold(manifold3d.Mesh64(np.ascontiguousarray(surface.points), faces))
-
-
-def as_it_is(placed: PlacedPart, lift: NDArray[np.float64]) -> Solids:
-    """A part without an elastic stack, its pockets filled; one around a tube is its free inflated
-    cylinder.
-    """
-    widest = None
-    if placed.made is not None:
-        widest = sizes(placed.made.design, placed.made.laminate).get("inflated_diameter")
-    if widest is None:
-        surface = placed_surface(placed, filled=True)
-        return [manifold(replace(surface, points=surface.points + lift))]
-    import manifold3d
-
-    assert placed.made is not None
-    _, low, _, high = placed.made.laminate.layers[0].profile.turned(placed.turn).bounds
-    round_it = manifold3d.Manifold.cylinder(high - low, widest / 2).translate((0.0, 0.0, low))
-    rows = np.column_stack([np.array(placed.pose.rows), np.array(placed.pose.shift) + lift])
-    return [round_it.transform(rows)]
 
 
 # The balloons of an inflated radial actuator as a surface, for display.
 
 
-ACROSS, ALONG, HALVINGS = 13, 17, 50
+ACROSS, ALONG = 13, 17
 
 
 def gripping(placed: PlacedSba, deflated: float, height: float) -> Surface:
@@ -392,31 +301,24 @@ def gripping(placed: PlacedSba, deflated: float, height: float) -> Surface:
     assert isinstance(pockets, Slots)
     laminate, radius = placed.made.laminate, placed.radius or 0.0
     lens = _lens(pockets, height)
-    points: list[NDArray[np.float64]] = []
-    faces: list[NDArray[np.int_]] = []
+    aside, along, up = lens.points.T
+    balloons = []
     for chamber in laminate.chambers:
         for middle in dict.fromkeys(chamber.centres):
             ((x, y, _),) = placed.turned(np.array([[*middle, 0.0]]))
             angle = x / radius if radius else 0.0
+            cos, sin = math.cos(angle), math.sin(angle)
             for level in range(laminate.balloons):
-                out = deflated / 2 + (level + 0.5) * height + lens.points[:, 2]
-                aside, along = lens.points[:, 0], lens.points[:, 1] + y
-                faces.append(lens.faces + sum(map(len, points)))
-                points.append(
-                    np.column_stack(
-                        [
-                            out * math.cos(angle) - aside * math.sin(angle),
-                            out * math.sin(angle) + aside * math.cos(angle),
-                            along,
-                        ]
-                    )
-                )
-    return Surface(np.concatenate(points), np.concatenate(faces))
+                out = deflated / 2 + (level + 0.5) * height + up
+                points = [out * cos - aside * sin, out * sin + aside * cos, along + y]
+                balloons.append(Surface(np.column_stack(points), lens.faces))
+    return _joined(balloons)
 
 
 def _lens(pockets: Slots, height: float) -> Surface:
     """One balloon about its middle: x across, y along, z up; both films, their rims apart."""
-    half = _half_angle(pockets.width, height)
+    rise = np.array(height / pockets.width)
+    half = float(inverse(lambda b: 2 * np.sin(b / 2) ** 2 / np.maximum(b, 1e-9), rise, math.pi / 2))
     bow = pockets.width / (2 * half)
     long = pockets.run + pockets.width
     t = np.linspace(-1.0, 1.0, ALONG)
@@ -436,17 +338,3 @@ def _lens(pockets: Slots, height: float) -> Surface:
     upper = np.concatenate([np.column_stack([a, b, c]), np.column_stack([b, d, c])])
     lower = upper[:, ::-1] + ALONG * ACROSS
     return Surface(np.concatenate(sheets), np.concatenate([upper, lower]))
-
-
-def _half_angle(width: float, height: float) -> float:
-    """Half the angle of an arc of length ``width`` and rise ``height`` / 2, up to a quarter circle:
-    height = width (1 - cos a) / a.
-    """
-    low, high = 1e-6, math.pi / 2
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        if width * (1 - math.cos(middle)) / middle < height:
-            low = middle
-        else:
-            high = middle
-    return high

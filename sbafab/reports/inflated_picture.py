@@ -7,10 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sbafab.assemblies.shapes import linear
 from sbafab.errors import DesignError
@@ -21,10 +20,17 @@ from sbafab.meshing.surface import Surface
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.reports.canvas import (
     AMBIENT,
-    BAR_INK,
+    ENLARGED,
+    PAPER,
+    RGB,
     Buffer,
+    Floats,
     View,
-    draw_length_bar,
+    edges,
+    framed,
+    image_of,
+    inscribe,
+    png,
     rasterize,
     view_of,
 )
@@ -125,11 +131,7 @@ def write_picture(
 
 def picture_png(laminate: Laminate, stack: Stack, pose: Pose, wish: PictureRequest) -> bytes:
     """One pose, with a caption, as PNG."""
-    parts = inflated(laminate, stack, pose)
-    (image,) = _images([(pose, parts)], laminate, stack.calibration, wish)
-    out = BytesIO()
-    image.save(out, "PNG", compress_level=9)
-    return out.getvalue()
+    return pictures_at_one_scale([(laminate, stack, pose)], wish)[0]
 
 
 def pictures_at_one_scale(
@@ -137,14 +139,13 @@ def pictures_at_one_scale(
 ) -> list[bytes]:
     """Return a picture of each actuator with a caption as PNG, all seen from one place."""
     every = [inflated(laminate, stack, pose) for laminate, stack, pose in shown]
-    surfaces = [part.surface for parts in every for part in parts]
-    pictures = []
-    for (laminate, stack, pose), parts in zip(shown, every, strict=True):
-        (image,) = _images([(pose, parts)], laminate, stack.calibration, wish, within=surfaces)
-        out = BytesIO()
-        image.save(out, "PNG", compress_level=9)
-        pictures.append(out.getvalue())
-    return pictures
+    if not every:
+        return []
+    view = _view([part.surface for parts in every for part in parts], wish)
+    return [
+        png(_image(pose, parts, view, wish, _caption(laminate, pose, stack.calibration)))
+        for (laminate, stack, pose), parts in zip(shown, every, strict=True)
+    ]
 
 
 def animation(
@@ -158,8 +159,15 @@ def animation(
     """Poses one after the other, in an endless loop, as GIF or WebP."""
     from PIL import Image
 
-    shown = [(pose, inflated(laminate, stack, pose, COARSE)) for pose in poses]
-    images = _images(shown, laminate, stack.calibration, wish, progress)
+    every = [inflated(laminate, stack, pose, COARSE) for pose in poses]
+    view = _view([part.surface for parts in every for part in parts], wish)
+    most = max(max(pose.pressures) for pose in poses)
+    caption = [f"{laminate.name}, {_model(laminate, stack.calibration)}"]
+    images = []
+    for pose, parts in zip(poses, every, strict=True):
+        images.append(_image(pose, parts, view, wish, caption, most))
+        if progress is not None:
+            progress(len(images), len(poses))
     out = BytesIO()
     if ending == ".webp":
         images[0].save(
@@ -218,29 +226,24 @@ def _swell(cosine: float) -> float:
     return share
 
 
-def _images(
-    shown: Sequence[tuple[Pose, Sequence[InflatedPart]]],
-    laminate: Laminate,
-    calibration: str,
+def _view(surfaces: Sequence[Surface], wish: PictureRequest) -> View:
+    box = framed(wish.width, wish.height, MARGIN, FOOT)
+    return view_of(surfaces, wish.elevation, wish.azimuth, box)
+
+
+def _image(
+    pose: Pose,
+    parts: Sequence[InflatedPart],
+    view: View,
     wish: PictureRequest,
-    progress: Callable[[int, int], None] | None = None,
-    within: Sequence[Surface] = (),
-) -> list[Image]:
-    """All poses seen from one place at one scale, which also fits the surfaces ``within``."""
-    width, height = wish.width, wish.height
-    box = MARGIN * width, MARGIN * height, (1 - MARGIN) * width, (1 - MARGIN - FOOT) * height
-    every = [*within, *(part.surface for _, parts in shown for part in parts)]
-    view = view_of(every, wish.elevation, wish.azimuth, box)
-    most = max(max(pose.pressures) for pose, _ in shown)
-    images = []
-    for pose, parts in shown:
-        bodies = [LitBody(p.surface, p.normals, _colour(p, pose, most)) for p in parts]
-        image = rendered(bodies, view, width, height, GROUND)
-        _write(image, _caption(laminate, pose, calibration, moving=len(shown) > 1), view.scale)
-        images.append(image)
-        if progress is not None:
-            progress(len(images), len(shown))
-    return images
+    caption: Sequence[str],
+    most: float | None = None,
+) -> Image:
+    """One pose in colours up to the pressure ``most``, by default its highest."""
+    most = max(pose.pressures) if most is None else most
+    image = _rendered(parts, [_colour(part, pose, most) for part in parts], view, wish)
+    inscribe(image, caption, max(11, round(wish.height / 40)), pixels_per_mm=view.scale)
+    return image
 
 
 def _colour(part: InflatedPart, pose: Pose, most: float) -> RGB:
@@ -253,33 +256,22 @@ def _colour(part: InflatedPart, pose: Pose, most: float) -> RGB:
     return r, g, b
 
 
-def _caption(laminate: Laminate, pose: Pose, calibration: str, moving: bool) -> tuple[str, ...]:
-    """Return the caption, above it the paper's measured bend or height beside the model's."""
-    pressures = ", ".join(f"{p:.3g}" for p in pose.pressures)
+def _model(laminate: Laminate, calibration: str) -> str:
     model = "elastic stack" + (f", calibration {calibration}" if calibration else "")
     model += ", ears snipped off" if laminate.registration == "ears" else ""
-    if any(note.startswith("drawn outline") for note in laminate.notes):
-        model += ", drawn pockets as discs"
-    if moving:
-        return (f"{laminate.name}, {model}",)
+    drawn = any(note.startswith("drawn outline") for note in laminate.notes)
+    return model + (", drawn pockets as discs" if drawn else "")
+
+
+def _caption(laminate: Laminate, pose: Pose, calibration: str) -> list[str]:
+    """Return the caption, above it the paper's measured bend or height beside the model's."""
+    pressures = ", ".join(f"{p:.3g}" for p in pose.pressures)
     figure = "bend" if pose.bend > 0.5 else "height"
     bent = f", bent {pose.bend:.0f} degrees" if figure == "bend" else f", {pose.height:.1f} mm high"
+    model = _model(laminate, calibration)
     caption = f"{laminate.name} at {pressures} kPa{bent} ({model})"
     beside = counterparts_of_pose(len(pose.pressures), calibration).get(figure)
-    return (beside.short, caption) if beside else (caption,)
-
-
-def _write(image: Image, caption: Sequence[str], pixels_per_mm: float) -> None:
-    from PIL import ImageDraw, ImageFont
-
-    width, height = image.size
-    size = max(11, round(height / 40))
-    font = ImageFont.load_default(size)
-    draw = ImageDraw.Draw(image)
-    for row, text in enumerate(reversed(caption)):
-        at = round(0.03 * width), height - round((1.9 + 1.3 * row) * size)
-        draw.text(at, text, fill=BAR_INK, font=font)
-    draw_length_bar(draw, 0.97 * width, height - size, width / 5, pixels_per_mm, font)
+    return [beside.short, caption] if beside else [caption]
 
 
 def _write_glb(parts: Sequence[InflatedPart], pose: Pose, path: Path) -> None:
@@ -319,10 +311,8 @@ def write_flat_picture(laminate: Laminate, path: Path, width: int, height: int) 
 # Smooth surfaces as a picture: lit, with shade in crevices and on the ground, anti-aliased.
 
 
-RGB = tuple[int, int, int]
 LAMP = (-0.42, 0.62, 0.66)
 """Direction to the light: right, up, toward the eye."""
-ENLARGED = 2
 CREVICES = ((0.35, 0.5), (1.2, 0.35))
 """Radius in mm within which nearer surfaces shade a place, and the most by which they do."""
 EDGE_MM = 0.5
@@ -330,48 +320,31 @@ EDGE_MM = 0.5
 EDGE = 0.72
 GLOSS, SHARPNESS = 0.22, 14.0
 SHADOW, SOFT_MM = 0.34, 0.9
-PAPER = (255, 255, 255)
 
 
-class LitBody(NamedTuple):
-    """A surface with unit normals (n, 3) of its points, and its colour on the screen."""
-
-    surface: Surface
-    normals: NDArray[np.float64]
-    colour: RGB
-
-
-def rendered(
-    bodies: Sequence[LitBody], view: View, width: int, height: int, ground: float
+def _rendered(
+    parts: Sequence[InflatedPart], colours: Sequence[RGB], view: View, wish: PictureRequest
 ) -> Image:
-    """The bodies on a white background, over a plane z = ``ground`` mm with their shadow.
-
-    ``view`` fits a picture of ``width`` by ``height`` pixels.
-    """
-    from PIL import Image
-
+    """The parts on a white background, with their shadow on the ground."""
     x, y = view.centre
     large = View(view.axes, view.scale * ENLARGED, (ENLARGED * x, ENLARGED * y))
-    size = width * ENLARGED, height * ENLARGED
+    size = wish.width * ENLARGED, wish.height * ENLARGED
     lamp = np.array(LAMP) / np.linalg.norm(LAMP)
-    surfaces = [body.surface for body in bodies]
-    buffer = rasterize(surfaces, large, *size, lamp, [body.normals for body in bodies])
-    palette = np.array([*(body.colour for body in bodies), PAPER], dtype=float)
+    surfaces = [part.surface for part in parts]
+    buffer = rasterize(surfaces, large, *size, lamp, [part.normals for part in parts])
+    palette = np.array([*colours, PAPER], dtype=float)
     is_paper = buffer.body < 0
     share = (buffer.light - AMBIENT) / (1 - AMBIENT)
-    level = 0.62 + 0.42 * share
-    level *= 1 - _crevices(buffer, large.scale)
-    level[_edges(buffer)] *= EDGE
+    level = (0.62 + 0.42 * share) * (1 - _crevices(buffer, large.scale))
+    level[edges(buffer, EDGE_MM) & ~is_paper] *= EDGE
     rgb = palette[buffer.body] * np.where(is_paper, 1.0, level)[:, :, None]
     gloss = GLOSS * np.clip(share, 0, 1) ** SHARPNESS
     rgb += np.where(is_paper, 0.0, gloss)[:, :, None] * (255 - rgb)
-    shadow = _shadow(surfaces, large, size, ground)
-    rgb *= np.where(is_paper, 1 - SHADOW * shadow, 1.0)[:, :, None]
-    image = Image.fromarray(np.clip(np.rint(rgb), 0, 255).astype(np.uint8), "RGB")
-    return image.reduce(ENLARGED)
+    shadow = _shadow(surfaces, large, size)
+    return image_of(rgb * np.where(is_paper, 1 - SHADOW * shadow, 1.0)[:, :, None])
 
 
-def _crevices(buffer: Buffer, scale: float) -> NDArray[np.float64]:
+def _crevices(buffer: Buffer, scale: float) -> Floats:
     """Darkening of pixels that lie behind their surroundings, as a share."""
     far = float(buffer.depth[buffer.body >= 0].min()) if (buffer.body >= 0).any() else 0.0
     depth = np.where(buffer.body < 0, far, buffer.depth)
@@ -382,7 +355,7 @@ def _crevices(buffer: Buffer, scale: float) -> NDArray[np.float64]:
     return np.clip(dark, 0, 0.75)
 
 
-def _blurred(values: NDArray[np.float64], pixels: float) -> NDArray[np.float64]:
+def _blurred(values: Floats, pixels: float) -> Floats:
     """Box means over squares about this many pixels wide, twice, for a soft edge."""
     half = max(1, round(pixels / 2))
     for _ in range(2):
@@ -396,26 +369,14 @@ def _blurred(values: NDArray[np.float64], pixels: float) -> NDArray[np.float64]:
     return values
 
 
-def _edges(buffer: Buffer) -> NDArray[np.bool_]:
-    """Pixels at which one body ends in front of another, or jumps in depth."""
-    depth = np.where(buffer.body < 0, -1e9, buffer.depth)
-    edges = np.zeros(depth.shape, dtype=bool)
-    for axis in (0, 1):
-        before = tuple(slice(0, -1) if i == axis else slice(None) for i in (0, 1))
-        edges[before] |= np.abs(np.diff(depth, axis=axis)) > EDGE_MM
-    return edges & (buffer.body >= 0)
-
-
-def _shadow(
-    surfaces: Sequence[Surface], view: View, size: tuple[int, int], ground: float
-) -> NDArray[np.float64]:
+def _shadow(surfaces: Sequence[Surface], view: View, size: tuple[int, int]) -> Floats:
     """Return the share of the light above that does not reach the ground, by pixel: 0 to 1."""
     points = np.concatenate([surface.points for surface in surfaces])
     # Light comes from above, a little from the left of the picture, wherever the eye is.
     slant = 0.25 * view.axes[0] * np.array([1.0, 1.0, 0.0])
-    rise = points[:, 2] - ground
+    rise = points[:, 2] - GROUND
     fallen = points + rise[:, None] * slant
-    fallen[:, 2] = ground
+    fallen[:, 2] = GROUND
     x, y, _ = view.flat(fallen).T
     inside = (x >= 0) & (x < size[0]) & (y >= 0) & (y < size[1]) & (rise >= -1e-6)
     cell = max(1, round(view.scale * 0.25))

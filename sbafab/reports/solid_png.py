@@ -7,25 +7,46 @@ occlusion; within one prism the walls go far to near, then its top face.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.geometry.edges import Edge, Line, Point
+import numpy as np
+from numpy.typing import NDArray
+
+from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, polygon
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.solid import body_bond, parted
-from sbafab.reports.canvas import Canvas, Tone, keyhole
+from sbafab.meshing.surface import Surface
+from sbafab.reports.canvas import (
+    COLOURS,
+    ENLARGED,
+    KEY,
+    PAPER,
+    RGB,
+    Floats,
+    View,
+    framed,
+    inscribe,
+    png,
+    view_of,
+)
 
-ELEVATION = math.radians(36.0)
+if TYPE_CHECKING:
+    from PIL.Image import Image
+    from PIL.ImageDraw import ImageDraw as Draw
+
+ELEVATION = 36.0
 TURN = math.radians(62.0)
 """Angle of the eye from the face of the cut that runs through the inlet."""
 LIGHT = math.radians(-50.0)
 FACTORS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30)
 HEIGHT_SHARE = 0.6
-SUPERSAMPLE = 2
 MARGIN, FOOT = 0.05, 0.09
 SAGITTA_PX = 0.4
+SHADOW, BLUR, COARSE = 70, 8, 8
+"""Depth of the shadow of 255, its softness, and the pixels across which it is drawn as one."""
 
 
 class Prism(NamedTuple):
@@ -39,100 +60,87 @@ class Prism(NamedTuple):
     bond: bool
 
 
-class Camera(NamedTuple):
-    """A parallel projection: plan and true height in mm to pixels, x right and y down."""
-
-    right: Point
-    toward: Point
-    scale: float
-    rise: float
-    centre: Point
-
-    def flat(self, p: Point) -> Point:
-        """A point of the press plate."""
-        along = p[0] * self.toward[0] + p[1] * self.toward[1]
-        across = p[0] * self.right[0] + p[1] * self.right[1]
-        return (
-            self.centre[0] + self.scale * across,
-            self.centre[1] + self.scale * along * math.sin(ELEVATION),
-        )
-
-    def lift(self, z: float) -> float:
-        """Pixels upward for a true height."""
-        return z * self.rise
-
-
 class Wall(NamedTuple):
-    """One facet of a prism's side that faces the eye, on the press plate, in pixels."""
+    """One facet of a prism's side that faces the eye: its foot at z = 0, in pixels."""
 
     start: Point
     end: Point
-    tone: Tone
-    level: float
+    colour: RGB
 
 
 class Shape(NamedTuple):
-    """A prism's region seen by the camera at z = 0: walls far to near, and pieces with holes."""
+    """A prism seen at z = 0: walls far to near, tops and their shaded places, outlines of tops."""
 
     walls: list[Wall]
-    faces: list[list[list[Point]]]
-    shade: list[list[list[Point]]]
+    tops: list[list[Point]]
+    shades: list[list[Point]]
+    rings: list[list[list[Point]]]
 
 
 def solid_png(laminate: Laminate, width: int = 1600, height: int = 1200) -> bytes:
     """The TPE solid, cut open at one chamber, as PNG; with the height exaggerated as stated in its
     caption.
     """
+    from PIL import ImageDraw
+
     laminate = parted(laminate)
     cut = cutaway(laminate)
-    factor = _factor(laminate)
-    camera = _camera(laminate, cut, factor, width * SUPERSAMPLE, height * SUPERSAMPLE)
-    canvas = Canvas(width, height, SUPERSAMPLE)
+    breadth = math.sqrt(laminate.layers[-1].profile.area)
+    most = HEIGHT_SHARE * breadth / laminate.thickness
+    factor = max(step for step in FACTORS if step <= max(most, 1.0))
+    size = width * ENLARGED, height * ENLARGED
+    view = _view(laminate, cut, factor, size)
     shapes: dict[str, Shape] = {}
-    for prism in _prisms(laminate):
+    prisms = list(_prisms(laminate))
+    for prism in prisms:
         if prism.name not in shapes:
-            shapes[prism.name] = _shape(prism, cut, camera)
-        _paint(prism, shapes[prism.name], camera, canvas)
-    base = next(iter(shapes.values()))
+            shapes[prism.name] = _shape(prism, cut, view)
+    base = shapes[prisms[0].name]
+    picture = _backdrop([rings[0] for rings in base.rings], size)
+    draw = ImageDraw.Draw(picture)
+    for prism in prisms:
+        _paint(prism, shapes[prism.name], factor * view.axes[1, 2] * view.scale, draw)
+    picture = picture.reduce(ENLARGED)
+    films = laminate.bonded_materials
     content = f"{laminate.balloons} balloons" if laminate.balloons > 1 else "one balloon"
     caption = (
-        f"{laminate.name}: {laminate.bonded_materials} solid of {content} before inflation, cut "
+        f"{laminate.name}: {films} solid of {content} before inflation, cut "
         f"open at {cut.chamber}; height exaggerated {factor} times"
         + "".join(f"; {note}" for note in laminate.notes)
     )
-    return canvas.png([rings[0] for rings in base.faces], caption, laminate.bonded_materials)
+    legend = [(COLOURS[tone], films if tone == "film" else words) for tone, words in KEY]
+    inscribe(picture, [caption], max(15, round(height / 52)), legend)
+    return png(picture)
 
 
-def _factor(laminate: Laminate) -> int:
-    """A round factor of exaggeration that gives a pleasing height."""
-    breadth = math.sqrt(laminate.layers[-1].profile.area)
-    most = HEIGHT_SHARE * breadth / laminate.thickness
-    return max(step for step in FACTORS if step <= max(most, 1.0))
-
-
-def _camera(laminate: Laminate, cut: RemovedSector, factor: int, width: int, height: int) -> Camera:
-    """The camera that looks into the cut and fills the picture."""
-    angle = cut.last - TURN
-    toward = math.cos(angle), math.sin(angle)
-    right = -toward[1], toward[0]
-    plain = Camera(right, toward, 1.0, factor * math.cos(ELEVATION), (0.0, 0.0))
-    points = [
-        plain.flat(p)
+def _view(laminate: Laminate, cut: RemovedSector, factor: int, size: tuple[int, int]) -> View:
+    """The view into the cut that fills the picture."""
+    outlines = [
+        (*p, z)
         for layers in laminate.patterns.values()
         if not layers[0].is_mask
         for contour in layers[0].profile.outers
         for p in contour.polygon(0.05)
+        for z in (0.0, factor * laminate.thickness)
     ]
-    low_x, high_x = min(p[0] for p in points), max(p[0] for p in points)
-    low_y, high_y = min(p[1] for p in points), max(p[1] for p in points)
-    low_y -= plain.lift(laminate.thickness)
-    room_x, room_y = width * (1 - 2 * MARGIN), height * (1 - 2 * MARGIN - FOOT)
-    scale = min(room_x / (high_x - low_x), room_y / (high_y - low_y))
-    centre = (
-        width / 2 - scale * (low_x + high_x) / 2,
-        height * (1 - FOOT) / 2 - scale * (low_y + high_y) / 2,
+    outline = Surface(np.array(outlines), np.empty((0, 3), dtype=np.int64))
+    azimuth = math.degrees(cut.last - TURN)
+    return view_of([outline], ELEVATION, azimuth, framed(*size, MARGIN, FOOT))
+
+
+def _backdrop(footprint: Sequence[Sequence[Point]], size: tuple[int, int]) -> Image:
+    """White paper with the soft shadow of the footprint."""
+    from PIL import Image, ImageDraw, ImageFilter
+
+    small = Image.new("L", (size[0] // COARSE, size[1] // COARSE), PAPER[0])
+    draw = ImageDraw.Draw(small)
+    for ring in footprint:
+        draw.polygon([(x / COARSE + 2, y / COARSE + 4) for x, y in ring], fill=PAPER[0] - SHADOW)
+    return (
+        small.filter(ImageFilter.GaussianBlur(BLUR))
+        .resize(size, Image.Resampling.BILINEAR)
+        .convert("RGB")
     )
-    return Camera(right, toward, scale, plain.rise * scale, centre)
 
 
 def _prisms(laminate: Laminate) -> Iterator[Prism]:
@@ -150,64 +158,85 @@ def _prisms(laminate: Laminate) -> Iterator[Prism]:
         yield Prism(f"bond {name}", bond, Region(), interface.z, interface.gap, True)
 
 
-def _shape(prism: Prism, cut: RemovedSector, camera: Camera) -> Shape:
+def _shape(prism: Prism, cut: RemovedSector, view: View) -> Shape:
     region = prism.region - cut.removed
-    sagitta = SAGITTA_PX / camera.scale
-    walls = sorted(_walls(region, prism.bond, cut, camera, sagitta), key=_depth)
+    sagitta = SAGITTA_PX / view.scale
+    rings, shades = (
+        [[_flat(view, ring) for ring in piece] for piece in shown.polygons(sagitta)]
+        for shown in (region, prism.covered - cut.removed)
+    )
+    walls = [
+        wall
+        for contour in region.contours
+        for wall in _walls(np.array(contour.polygon(sagitta)), prism.bond, cut, view)
+    ]
     return Shape(
-        walls,
-        [] if prism.bond else _on_page(region, camera, sagitta),
-        _on_page(prism.covered - cut.removed, camera, sagitta),
+        sorted(walls, key=lambda wall: wall.start[1] + wall.end[1]),
+        [] if prism.bond else [keyhole(piece) for piece in rings],
+        [keyhole(piece) for piece in shades],
+        rings,
     )
 
 
-def _depth(wall: Wall) -> float:
-    return wall.start[1] + wall.end[1]
+def _flat(view: View, points: Sequence[Point] | Floats) -> list[Point]:
+    """Points of the press plate in pixels."""
+    pixels = view.flat(np.column_stack([points, np.zeros(len(points))]))
+    return list(map(tuple, pixels[:, :2].tolist()))
 
 
-def _walls(
-    region: Region, bond: bool, cut: RemovedSector, camera: Camera, sagitta: float
-) -> Iterator[Wall]:
+def _walls(points: Floats, bond: bool, cut: RemovedSector, view: View) -> Iterator[Wall]:
     """The facets that face the eye; material lies on the left of each, so right is outward."""
+    along = np.roll(points, -1, axis=0) - points
+    normals = np.column_stack([along[:, 1], -along[:, 0]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     light = cut.last - TURN + LIGHT
-    for contour in region.contours:
-        points = contour.polygon(sagitta)
-        for start, end in zip(points, points[1:] + points[:1], strict=True):
-            nx, ny = end[1] - start[1], start[0] - end[0]
-            length = math.hypot(nx, ny)
-            if nx * camera.toward[0] + ny * camera.toward[1] <= 1e-6 * length:
-                continue
-            on_cut = cut.on_face(Line(start, end))
-            tone: Tone = "bond" if bond else "film"
-            if on_cut:
-                tone = "cut bond" if bond else "cut film"
-            lit = (nx * math.cos(light) + ny * math.sin(light)) / length
-            level = 0.92 + 0.08 * lit if on_cut else 0.74 + 0.22 * lit
-            yield Wall(camera.flat(start), camera.flat(end), tone, level)
+    lit = normals @ (math.cos(light), math.sin(light))
+    near_cut = cut.on_faces(points)
+    on_cut = np.any(near_cut & np.roll(near_cut, -1, axis=1), axis=0)
+    levels = np.where(on_cut, 0.92 + 0.08 * lit, 0.74 + 0.22 * lit)
+    kind = "bond" if bond else "film"
+    pixels = _flat(view, points)
+    toward = view.axes[2, :2] / np.linalg.norm(view.axes[2, :2])
+    for i in np.flatnonzero(normals @ toward > 1e-6):
+        tone = COLOURS[f"cut {kind}" if on_cut[i] else kind]
+        r, g, b = (min(255, round(part * levels[i])) for part in tone)
+        yield Wall(pixels[i], pixels[(i + 1) % len(pixels)], (r, g, b))
 
 
-def _on_page(region: Region, camera: Camera, sagitta: float) -> list[list[list[Point]]]:
-    return [
-        [[camera.flat(p) for p in ring] for ring in piece] for piece in region.polygons(sagitta)
-    ]
+def _paint(prism: Prism, shape: Shape, rise: float, draw: Draw) -> None:
+    """Paint a prism; ``rise`` is pixels upward per mm of true height."""
+    low, high = rise * prism.z, rise * (prism.z + prism.thickness)
+    for (x0, y0), (x1, y1), colour in shape.walls:
+        draw.polygon([(x0, y0 - low), (x1, y1 - low), (x1, y1 - high), (x0, y0 - high)], colour)
+    for faces, tone in ((shape.tops, "film"), (shape.shades, "shade")):
+        for ring in faces:
+            draw.polygon([(x, y - high) for x, y in ring], COLOURS[tone])
+    for pieces in () if prism.bond else shape.rings:
+        for ring in pieces:
+            closed = [(x, y - high) for x, y in (*ring, ring[0])]
+            draw.line(closed, COLOURS["line"], width=ENLARGED)
 
 
-def _paint(prism: Prism, shape: Shape, camera: Camera, canvas: Canvas) -> None:
-    low, high = camera.lift(prism.z), camera.lift(prism.z + prism.thickness)
-    for (x0, y0), (x1, y1), tone, level in shape.walls:
-        quad = [(x0, y0 - low), (x1, y1 - low), (x1, y1 - high), (x0, y0 - high)]
-        canvas.fill(quad, tone, level)
-    for rings in shape.faces:
-        canvas.fill(_raised(keyhole(rings), high), "film", 1.0)
-    for rings in shape.shade:
-        canvas.fill(_raised(keyhole(rings), high), "shade", 1.0)
-    for rings in shape.faces:
-        for ring in rings:
-            canvas.outline(_raised(ring, high))
+def keyhole(rings: Sequence[Sequence[Point]]) -> list[Point]:
+    """One closed ring for a piece with holes: a slit joins each hole to the contour right of it."""
+    merged = list(rings[0])
+    for hole in sorted(rings[1:], key=lambda ring: -max(ring)[0]):
+        first = max(range(len(hole)), key=lambda i: hole[i])
+        x, y = hole[first]
+        after, landing = _first_right_of(merged, x, y)
+        merged[after:after] = [landing, *hole[first:], *hole[:first], (x, y), landing]
+    return merged
 
 
-def _raised(points: list[Point], lift: float) -> list[Point]:
-    return [(x, y - lift) for x, y in points]
+def _first_right_of(ring: Sequence[Point], x: float, y: float) -> tuple[int, Point]:
+    """Return first point at which a ray to the right meets the ring, and the vertex after it."""
+    meets = (
+        (x1 - (x1 - x0) * (y1 - y) / (y1 - y0), i)
+        for i, ((x0, y0), (x1, y1)) in enumerate(zip((ring[-1], *ring), ring, strict=False))
+        if (y0 <= y) != (y1 <= y)
+    )
+    across, after = min(meet for meet in meets if meet[0] >= x)
+    return after, (across, y)
 
 
 # The sector that the picture cuts away, so that pockets, bores and neck rings show.
@@ -226,14 +255,10 @@ class RemovedSector:
     last: float
     removed: Region
 
-    def on_face(self, edge: Edge) -> bool:
-        """Return True if an edge lies on one of the two faces of the cut."""
-        if not isinstance(edge, Line):
-            return False
-        return any(
-            all(_off_ray(self.apex, angle, p) < 1e-5 for p in (edge.start, edge.end))
-            for angle in (self.first, self.last)
-        )
+    def on_faces(self, points: Floats) -> NDArray[np.bool_]:
+        """Return for each of the two faces of the cut which points (n, 2) lie on it."""
+        rays = np.array([[math.sin(a), -math.cos(a)] for a in (self.first, self.last)])
+        return np.asarray(np.abs(rays @ (points - self.apex).T) < 1e-5)
 
 
 def cutaway(laminate: Laminate) -> RemovedSector:
@@ -267,7 +292,3 @@ def _sector(
     rays = [first, (first + last) / 2, last]
     tips = [(x + reach * math.cos(a), y + reach * math.sin(a)) for a in rays]
     return RemovedSector(chamber, apex, first, last, polygon([apex, *tips]))
-
-
-def _off_ray(apex: Point, angle: float, p: Point) -> float:
-    return abs((p[0] - apex[0]) * math.sin(angle) - (p[1] - apex[1]) * math.cos(angle))
