@@ -1,7 +1,6 @@
 """``manifest.json``: the records that it is written from and read with, and the hashes of files.
 
-A key with a default may be missing in a folder that is read. The claims of a manifest are held
-against the files by ``as_built``, which measures them there and asks nothing that wrote them.
+A key with a default may be missing in a folder that is read.
 """
 
 from __future__ import annotations
