@@ -51,7 +51,7 @@ from sbafab.assemblies.checks import run_checks
 from sbafab.assemblies.files import DESIGN_FILE, load_assembly
 from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import FOLDER as LAYERS
-from sbafab.cutting.properties import CutSettings, curves_of
+from sbafab.cutting.properties import curves_of
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, GeometryError, OutputError
@@ -59,7 +59,6 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.figures import Factors, PredictionRequest
 from sbafab.models.prediction import predict
-from sbafab.nesting.records import parts_of
 from sbafab.output.artefacts import (
     ARTEFACTS,
     PAGES,
@@ -70,21 +69,11 @@ from sbafab.output.artefacts import (
     write_plates,
 )
 from sbafab.output.carry_over import MESH, PREDICTION, PRESS
-from sbafab.output.checked import (
-    EVERYTHING,
-    PICTURES,
-    Checked,
-    DesignPlan,
-    RunPart,
-    check,
-    cut_settings,
-    plan_design,
-    schedule_of,
-)
+from sbafab.output.checked import EVERYTHING, PICTURES, Build, RunPart, check
 from sbafab.output.folder import write_design, write_folder
-from sbafab.output.job import CheckedJob, find_nests, of_assembly, plan_job
+from sbafab.output.job import Order, of_assembly
 from sbafab.output.manifest import JobManifest, Manifest, as_json, file_hashes, file_names
-from sbafab.output.swap import is_among_cut_files
+from sbafab.output.swap import SCHEMA, is_among_cut_files
 from sbafab.process import ignore_progress
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding, Place, Verdict
@@ -150,21 +139,20 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
 class AsBuiltFolder:
     """The folder of a design read back.
 
-    ``checked`` is the design with the findings on it, ``expected`` its laminate and paths.
+    ``build`` is the design with the findings on it, ``expected`` its laminate and paths.
     ``laminate`` has the layers as cut; None if one could not be read.
     """
 
     claims: Manifest
-    checked: Checked
+    build: Build
     expected: ExpectedLaminate
-    settings: CutSettings
     files: tuple[LayerFile, ...]
     laminate: Laminate | None
     problems: tuple[Problem, ...]
 
     @property
     def design(self) -> Design:
-        return self.checked.design
+        return self.build.design
 
 
 def read_folder(folder: Path) -> AsBuiltFolder:
@@ -178,14 +166,13 @@ def read_folder(folder: Path) -> AsBuiltFolder:
         raise OutputError(f"{folder} holds no cut files; write them with sbafab cut or generate")
     design = _design(folder)
     try:
-        checked = check(design)
-        settings = cut_settings(design, checked.waived, curves_of(claims.curves))
-        expected = expected_laminate(checked.laminate, settings)
+        build = check(design, curves=curves_of(claims.curves))
+        expected = expected_laminate(build.laminate, build.settings)
     except DESIGN_ERRORS as error:
         raise DesignError(f"design.toml makes no laminate: {error}") from None
     problems = file_problems(folder, claims)
-    files, errors = read_layers(folder, expected, settings, _has_chords(design))
-    seams, seam_errors = read_seams(folder, expected.laminate.seams, settings)
+    files, errors = read_layers(folder, expected, build.settings, _has_chords(design))
+    seams, seam_errors = read_seams(folder, expected.laminate.seams, build.settings)
     problems += [*errors, *seam_errors, *layer_departures(files, expected)]
     laminate: Laminate | None = None
     if all(file.part is not None for file in files):
@@ -195,9 +182,7 @@ def read_folder(folder: Path) -> AsBuiltFolder:
         except UNMEASURED as error:
             message = f"the layers do not lie over each other as films of one stack ({error})"
             problems.append(Problem(INTEGRITY, message))
-    return AsBuiltFolder(
-        claims, checked, expected, settings, tuple(files), laminate, tuple(problems)
-    )
+    return AsBuiltFolder(claims, build, expected, tuple(files), laminate, tuple(problems))
 
 
 def _design(folder: Path) -> Design:
@@ -242,8 +227,8 @@ def rules_as_cut(built: AsBuiltFolder) -> tuple[Finding, ...]:
             for rule in RULES
             if rule.name != NETS or built.design.has_nets
         )
-    if built.laminate is built.expected.laminate and not built.settings.curves.in_chords:
-        return built.checked.findings
+    if built.laminate is built.expected.laminate and not built.build.curves.in_chords:
+        return built.build.findings
     measures = Measures(built.laminate, built.design)
     return tuple(finding for rule in RULES for finding in _findings_as_cut(rule, measures))
 
@@ -270,17 +255,17 @@ def _check_job(folder: Path, job: JobManifest) -> tuple[Finding, ...]:
         except DesignError as error:
             unusable.append(f"{entry.name}: {error}")
     between: tuple[Finding, ...] = ()
-    whole = CheckedJob(job.schema_name, job.name, tuple(each.checked for each in built))
+    whole = Order(job.schema_name, job.name, tuple(each.build for each in built))
     if is_assembly(job) and not unusable:
         try:
             assembled = assemble(load_assembly(folder / DESIGN_FILE))
             between = run_checks(assembled)
-            whole = of_assembly(assembled, whole.designs)
+            whole = of_assembly(assembled, whole.builds)
         except (DesignError, OSError) as error:
             unusable.append(f"the parts were not put together, for {error or type(error).__name__}")
     if unusable:
         return _by_hashes(folder, job, unusable)
-    problems = [*file_problems(folder, job), *_remade_job_problems(folder, job, whole, built)]
+    problems = [*file_problems(folder, job), *_remade_job_problems(folder, job, whole)]
     findings = [
         replace(finding, design=each.design.name)
         for each in built
@@ -389,16 +374,12 @@ def remade_problems(folder: Path, built: AsBuiltFolder) -> list[Problem]:
     return [*sheets, *problems, *_version_problems(claims.generator)]
 
 
-def _remade_job_problems(
-    folder: Path, job: JobManifest, whole: CheckedJob, built: Sequence[AsBuiltFolder]
-) -> list[Problem]:
+def _remade_job_problems(folder: Path, job: JobManifest, whole: Order) -> list[Problem]:
     """Return the files of a job and of its designs' folders that differ from those made again."""
-    curves = built[0].settings.curves
     with _temporary_folder(folder) as (fresh, problems):
         parts = PICTURES if is_assembly(job) and whole.failed else EVERYTHING
-        designs = [plan_design(each, parts, curves) for each in whole.designs]
-        plan = plan_job(whole, designs, folder, ignore_progress)
-        index = write_folder(plan, fresh, ignore_progress).index
+        nests = whole.nests(folder, ignore_progress) if "cut" in parts else ()
+        index = write_folder(whole, parts, nests, fresh, ignore_progress).index
         problems.extend(_foreign_problems(job, file_names(fresh)))
         problems.extend(_compared(folder, fresh, job.files, job.generator))
         if job.generator == GENERATOR:
@@ -423,22 +404,20 @@ def _remake(folder: Path, fresh: Path, built: AsBuiltFolder, of_job: bool) -> di
 
     A design ``of_job`` has no film sheets and no pages in its own folder.
     """
-    claims, checked, settings = built.claims, built.checked, built.settings
-    parts_of_run = _parts(claims.files)
+    claims, build = built.claims, built.build
+    parts = _parts(claims.files)
     # Pictures come with a run that makes everything: then there is a page as well.
-    if not of_job and (TRAVELLER in claims.files or {"press", "preview"} <= parts_of_run):
-        parts_of_run |= {"press", "preview"}
+    if not of_job and (TRAVELLER in claims.files or {"press", "preview"} <= parts):
+        parts |= {"press", "preview"}
     sheets: list[SheetFile] = []
     if not of_job:
-        design, paths = checked.design, built.expected.paths
-        order = design.order
-        parts = parts_of(checked.laminate, paths, order.quantity, order.spare_parts)
-        nests = find_nests(parts, design, folder, ignore_progress)
-        sheets = write_nested_sheets(nests, design, fresh, settings, ignore_progress)
-    write_plates(checked, fresh, settings)
-    pressing = schedule_of(checked) if "press" in parts_of_run else None
-    plan = DesignPlan(checked, frozenset(parts_of_run), settings, pressing)
-    return write_design(DesignFolder(plan, sheets, fresh, ignore_progress, not of_job))
+        order = Order(SCHEMA, build.design.name, (build,))
+        nests = order.nests(folder, ignore_progress)
+        sheets = write_nested_sheets(nests, build.design, fresh, build.settings, ignore_progress)
+    write_plates(build, fresh)
+    remade = DesignFolder(build, frozenset(parts), sheets, fresh, ignore_progress, not of_job)
+    # The layers' files were read, and are compared as regions.
+    return write_design(remade, [row for row in ARTEFACTS if row.path != LAYERS])
 
 
 def _parts(files: Collection[str]) -> set[RunPart]:
@@ -602,9 +581,9 @@ def _prediction_problems(folder: Path, fresh: Path, built: AsBuiltFolder) -> lis
         written.mkdir()
         prediction = predict(built.design, asked)
         wanted: frozenset[RunPart] = frozenset(("predict",))
-        plan = DesignPlan(built.checked, wanted, built.settings, prediction=prediction)
-        rows = [row for row in ARTEFACTS if row.part == "predict"]
-        write_artefacts(DesignFolder(plan, (), written, ignore_progress), rows)
+        again = DesignFolder(built.build, wanted, (), written, ignore_progress)
+        again.prediction = prediction
+        write_artefacts(again, [row for row in ARTEFACTS if row.part == "predict"])
     except (ValueError, OSError) as error:
         message = f"predict.json does not say what was asked for ({error})"
         return [Problem(DESIGNED, f"{message}; regenerate the folder")]

@@ -15,7 +15,7 @@ from sbafab.design.sections import (
     NAME_PATTERN,
     PART_PATTERN,
     Laser,
-    Order,
+    OrderSection,
     Press,
     Sheets,
     name_of,
@@ -230,7 +230,7 @@ class Assembly(Section):
     """The parts by name; each but the root names what it is fixed on."""
     deploy: Deploy = Deploy.model_construct()
     rules: AssemblyRules = AssemblyRules.model_construct()
-    order: Order = Order.model_construct()
+    order: OrderSection = OrderSection.model_construct()
     kit: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
     """The kit for all parts' designs, overriding theirs: a kit's name, or a file beside this."""
     sheets: Sheets | None = None
@@ -244,7 +244,7 @@ class Assembly(Section):
 
     @field_validator("order")
     @classmethod
-    def _counts_wholes(cls, order: Order) -> Order:
+    def _counts_wholes(cls, order: OrderSection) -> OrderSection:
         if order.good is not None:
             raise ValueError(
                 "has good, which counts the actuators of one design; give order.copies of an "

@@ -44,7 +44,7 @@ from sbafab.laminate.netlist import read_netlist
 from sbafab.models.formulas import size_phrases, sizes
 from sbafab.output.advice import Advice, advise
 from sbafab.output.checked import checks, refuse_undoable
-from sbafab.output.job import CheckedJob, check_job
+from sbafab.output.job import Order, check_job
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
 from sbafab.rules.nets import netlist_findings
@@ -193,28 +193,28 @@ def _check_source(request: CheckRequest) -> CheckOutcome:
         return outcome if request.nets is None else _against_netlist(outcome, job, request.nets)
 
 
-def _against_netlist(outcome: CheckOutcome, job: CheckedJob, file: Path) -> CheckOutcome:
+def _against_netlist(outcome: CheckOutcome, job: Order, file: Path) -> CheckOutcome:
     """Return the outcome with the findings of a design against a netlist."""
-    (checked,) = job.designs
+    (checked,) = job.builds
     netlist = read_netlist(file)
     more = netlist_findings(checked.laminate, checked.design, netlist, file.name)
     findings = (*outcome.findings, *more)
     return outcome._replace(findings=findings, groups=[Group(outcome.name, findings)])
 
 
-def _outcome(job: CheckedJob) -> CheckOutcome:
+def _outcome(job: Order) -> CheckOutcome:
     """Return the outcome; raises DesignError for a design that press or sheets cannot make."""
     if not job.failed:
-        refuse_undoable(job.designs)
+        refuse_undoable(job.builds)
     return CheckOutcome(
         "design",
         job.name,
         job.findings,
-        groups_of(job.designs, job.between),
-        notes_of(job.designs),
-        [each.design for each in job.designs],
-        {each.design.name: sizes(each.design, each.laminate) for each in job.designs},
-        {each.design.name: size_phrases(each.design, each.laminate) for each in job.designs},
+        groups_of(job.builds, job.between),
+        notes_of(job.builds),
+        [each.design for each in job.builds],
+        {each.design.name: sizes(each.design, each.laminate) for each in job.builds},
+        {each.design.name: size_phrases(each.design, each.laminate) for each in job.builds},
     )
 
 

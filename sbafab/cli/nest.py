@@ -52,16 +52,16 @@ def print_job(job: Run) -> None:
     add_batch(table, job)
     console().print(table)
     print_line("")
-    for checked in job.checked:
+    for checked in job.builds:
         if checked.failed:
             print_line(checked.design.name, "bold red")
             print_open(checked.findings)
     if job.failed:
-        findings = [finding for checked in job.checked for finding in checked.findings]
+        findings = [finding for checked in job.builds for finding in checked.findings]
         consequence = f"Nothing was written; {job.folder} is unchanged"
         print_failed(job.folder.name, findings, consequence, "designs")
     else:
-        print_passed(job.folder.name, groups_of(job.checked), written=job.folder)
+        print_passed(job.folder.name, groups_of(job.builds), written=job.folder)
 
 
 class NestedDesign(Document):
@@ -85,5 +85,5 @@ class NestedDocument(Document, schema="sbafab/nested@1"):
 
 def job_json(job: Run) -> dict[str, Any]:
     """Return a job as JSON."""
-    designs = [NestedDesign.read(each, notes=notes_of([each])) for each in job.checked]
+    designs = [NestedDesign.read(each, notes=notes_of([each])) for each in job.builds]
     return NestedDocument.of(job, designs=designs, files=sorted(job.manifest.get("files", ())))

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from sbafab.output.checked import Checked
+    from sbafab.output.checked import Build
 
 NO_BREAK = "\u00a0"
 """No-break space: `print_wrapped` keeps the words on both sides on one line."""
@@ -128,7 +128,7 @@ def print_listed(label: str, phrases: Sequence[str]) -> None:
     out.print(Text(line), soft_wrap=True)
 
 
-def notes_of(checked: Iterable[Checked]) -> list[str]:
+def notes_of(checked: Iterable[Build]) -> list[str]:
     """Return the notes of designs without repeats, each after the names of its designs.
 
     A note of all of them stands without names.
@@ -159,7 +159,7 @@ class Group(NamedTuple):
 
 
 def groups_of(
-    checked: Iterable[Checked], between: Sequence[Finding] | None = None
+    checked: Iterable[Build], between: Sequence[Finding] | None = None
 ) -> tuple[Group, ...]:
     """Return a group of findings for each design, and one for the checks between parts."""
     groups = tuple(Group(design.design.name, design.findings) for design in checked)

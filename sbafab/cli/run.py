@@ -91,7 +91,7 @@ def add_batch(table: Table, run: Run) -> None:
     """Add rows on several designs: copies, verdict, notes, film, meshes and folder."""
     from rich.text import Text
 
-    for checked in run.checked:
+    for checked in run.builds:
         warnings = sorted({f.rule for f in checked.findings if f.verdict == "warn"})
         warned = f"; warnings: {', '.join(warnings)}" if warnings else ""
         waived = f"; waived: {', '.join(checked.waived)}" if checked.waived else ""
@@ -99,7 +99,7 @@ def add_batch(table: Table, run: Run) -> None:
         copies = checked.design.order.quantity
         words = f"{copies} {'copy' if copies == 1 else 'copies'}, {verdict}{waived}{warned}"
         table.add_row(checked.design.name, Text(words))
-    for note in notes_of(run.checked):
+    for note in notes_of(run.builds):
         table.add_row("note", Text(note))
     index = run.manifest
     for film in index.get("films", ()):
@@ -122,7 +122,7 @@ def print_run(run: Run) -> None:
 
 def print_run_verdict(run: Run, change: str) -> None:
     """Print remedies and, last, the verdict; ``change``: "design" or "assembly"."""
-    groups = groups_of(run.checked, run.between)
+    groups = groups_of(run.builds, run.between)
     for group in groups:
         print_open(group.findings)
     if run.failed:
@@ -273,4 +273,4 @@ class RunDocument(Document, schema="sbafab/run@1"):
 def run_json(run: Run) -> dict[str, Any]:
     """Return a run as JSON."""
     files = [] if run.kept else sorted(run.manifest["files"])
-    return RunDocument.of(run, notes=notes_of(run.checked), files=files)
+    return RunDocument.of(run, notes=notes_of(run.builds), files=files)

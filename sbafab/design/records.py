@@ -54,7 +54,7 @@ from sbafab.design.sections import (
     Laser,
     Mask,
     Models,
-    Order,
+    OrderSection,
     Press,
     Registration,
     Rules,
@@ -122,7 +122,7 @@ class Design(Section):
     acceptance: Acceptance = Acceptance.model_construct()
     laser: Laser = Laser.model_construct()
     sheets: Sheets = Sheets.model_construct()
-    order: Order = Order.model_construct()
+    order: OrderSection = OrderSection.model_construct()
     rules: Rules = Rules.model_construct()
     models: Models = Models.model_construct()
     chamber: Chamber = Chamber.model_construct()

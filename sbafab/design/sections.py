@@ -33,7 +33,7 @@ MOST = 1000
 ROUNDING = 1e-9
 
 
-class Order(Section):
+class OrderSection(Section):
     """Number of actuators, customer, and copies at once."""
 
     copies: int = Field(default=1, ge=1, le=MOST)

@@ -34,17 +34,10 @@ from sbafab.models.calibrated import NONE, load_calibration, shipped_names
 from sbafab.models.figures import Prediction, PredictionDocument
 from sbafab.nesting.nest import PLACES, as_dict
 from sbafab.nesting.records import Nest
-from sbafab.output.checked import (
-    Checked,
-    Checks,
-    DesignPlan,
-    RunPart,
-    checks,
-    hole_notes,
-)
+from sbafab.output.checked import Build, Checks, RunPart, checks, hole_notes
 from sbafab.output.manifest import as_json
 from sbafab.output.schema_ids import SIMULATE_SCHEMA
-from sbafab.pressing.cycles import batch_entry, design_runs
+from sbafab.pressing.cycles import batch_entry
 from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json
 from sbafab.process import Progress
 from sbafab.rules.finding import Finding
@@ -53,6 +46,7 @@ from sbafab.simulators.simulator import Name, SimulationRequest, simulator, unde
 from sbafab.version import GENERATOR
 
 if TYPE_CHECKING:
+    from sbafab.meshing.conforming.meshes import ConformingMeshes
     from sbafab.reports.traveller.work import Work
 
 TRAVELLER = "traveller.html"
@@ -65,50 +59,52 @@ PICTURES_OF_A_DESIGN = 3
 
 @dataclass
 class DesignFolder:
-    """A design's folder while it is written from its plan.
+    """The folder of a build while its ``wanted`` parts are written.
 
-    ``sheets`` are the film sheets of its parts, ``has_pages``: whether findings and a traveller
-    belong into it. Writers add the ``meshes`` they wrote, to ``verified`` the sha256 of each cut
-    file that was read back, and to ``left_out`` the meshes and the inputs of simulators that could
-    not be, with the reason.
+    ``sheets`` are the film sheets of its pieces, ``has_pages``: whether findings and a traveller
+    belong into it. ``conforming`` is written in the ``formats`` of these file endings;
+    ``simulated`` is the folder in which a simulator has run. Writers add the ``meshes`` they wrote,
+    to ``verified`` the sha256 of each cut file that was read back, and to ``left_out`` the meshes
+    and the inputs of simulators that could not be, with the reason.
     """
 
-    plan: DesignPlan
+    build: Build
+    wanted: frozenset[RunPart]
     sheets: Sequence[SheetFile]
     path: Path
     progress: Progress
     has_pages: bool = True
+    conforming: ConformingMeshes | None = None
+    formats: tuple[str, ...] = ()
+    prediction: Prediction | None = None
+    simulated: Path | None = None
     meshes: list[MeshFile] = field(default_factory=list)
     verified: dict[str, str] = field(default_factory=dict)
     left_out: list[tuple[str, str]] = field(default_factory=list)
 
     @property
-    def checked(self) -> Checked:
-        return self.plan.checked
-
-    @property
     def design(self) -> Design:
-        return self.plan.checked.design
+        return self.build.design
 
     @property
     def laminate(self) -> Laminate:
-        return self.plan.checked.laminate
+        return self.build.laminate
 
     @cached_property
     def marked(self) -> Laminate:
         """The laminate with notes for its pictures: failed and waived rules, lowered limits."""
-        checked = self.checked
-        failed = dict.fromkeys(f.rule for f in checked.findings if f.verdict == "fail")
+        build = self.build
+        failed = dict.fromkeys(f.rule for f in build.findings if f.verdict == "fail")
         notes = [f"must not be built; failed: {', '.join(failed)}"] if failed else []
-        notes += [f"waived: {', '.join(checked.waived)}"] if checked.waived else []
-        notes += [f"limits lowered: {', '.join(checked.lowered)}"] if checked.lowered else []
-        laminate = checked.laminate
+        notes += [f"waived: {', '.join(build.waived)}"] if build.waived else []
+        notes += [f"limits lowered: {', '.join(build.lowered)}"] if build.lowered else []
+        laminate = build.laminate
         return replace(laminate, notes=(*laminate.notes, *notes)) if notes else laminate
 
     @cached_property
     def work(self) -> Work:
-        """What the pages for the bench are made from; only of a plan with a press schedule."""
-        return work_of(self.plan, self.sheets)
+        """What the pages for the bench are made from."""
+        return work_of(self.build, self.sheets)
 
     @cached_property
     def solid_png(self) -> bytes:
@@ -144,13 +140,12 @@ class Artefact:
 
     def belongs_in(self, folder: DesignFolder) -> bool:
         """Return True if the folder's plan asks for it."""
-        parts = folder.plan.wanted
-        is_wanted = not self.part or (self.part in parts and self.needs <= parts)
+        is_wanted = not self.part or (self.part in folder.wanted and self.needs <= folder.wanted)
         return is_wanted and (folder.has_pages or not self.is_page)
 
 
 def write_artefacts(folder: DesignFolder, artefacts: Iterable[Artefact] | None = None) -> None:
-    """Write the artefacts (by default all of ``ARTEFACTS``) that the folder's plan asks for."""
+    """Write the artefacts (by default all of ``ARTEFACTS``) that belong in the folder."""
     for artefact in ARTEFACTS if artefacts is None else artefacts:
         if artefact.render is None or not artefact.belongs_in(folder):
             continue
@@ -176,22 +171,18 @@ def write_text(path: Path, text: str) -> None:
 
 def _write_layers(folder: DesignFolder) -> None:
     """Write the layer files, the paths of seams and the base plate."""
-    # Without paths the layers' files are not written: they were read back, and are compared.
-    plan = folder.plan
-    if plan.paths:
-        laminate, progress = folder.laminate, partial(folder.progress, "cut files")
-        files = write_layer_files(laminate, plan.paths, folder.path, plan.settings, progress)
-        folder.verified |= {file.path: file.sha256 for file in files}
-        write_plates(plan.checked, folder.path, plan.settings)
+    build, progress = folder.build, partial(folder.progress, "cut files")
+    files = write_layer_files(build.laminate, build.paths, folder.path, build.settings, progress)
+    folder.verified |= {file.path: file.sha256 for file in files}
+    write_plates(build, folder.path)
 
 
-def write_plates(checked: Checked, folder: Path, settings: CutSettings) -> None:
+def write_plates(build: Build, folder: Path) -> None:
     """Write the base plate and the paths of seams."""
-    design, laminate = checked.design, checked.laminate
-    write_seam_files(laminate, folder, settings)
-    places = design_runs(design, laminate).places
-    notes = hole_notes(design, laminate)
-    write_fixture(laminate, folder, settings, design.press.platen, places, notes)
+    design, laminate = build.design, build.laminate
+    write_seam_files(laminate, folder, build.settings)
+    places, notes = build.cycles.places, hole_notes(design, laminate)
+    write_fixture(laminate, folder, build.settings, design.press.platen, places, notes)
 
 
 def write_nested_sheets(
@@ -210,36 +201,30 @@ def write_nested_sheets(
 
 
 def _press_json(folder: DesignFolder) -> str:
-    assert folder.plan.pressing is not None
-    schedule = folder.plan.pressing
-    copies = design_runs(folder.design, folder.laminate).copies
-    if copies > 1:
+    schedule = folder.build.schedule
+    if folder.build.cycles.copies > 1:
         batch = batch_entry(folder.design, folder.laminate, schedule)
         return as_json(press_json(schedule, batch=batch))
     return as_json(press_json(schedule))
 
 
 def _press_csv(folder: DesignFolder) -> str:
-    assert folder.plan.pressing is not None
-    return press_csv(folder.plan.pressing)
+    return press_csv(folder.build.schedule)
 
 
 def _underlay(folder: DesignFolder) -> bytes | None:
     # Only a folder with a traveller has an underlay.
     from sbafab.reports.underlay import underlay_pdf
 
-    places = design_runs(folder.design, folder.laminate).places
-    press = folder.design.press
-    platen = press.platen
-    return underlay_pdf(folder.laminate, design_sha256(folder.design), places, platen)
+    build, platen = folder.build, folder.design.press.platen
+    return underlay_pdf(build.laminate, build.sha256, build.cycles.places, platen)
 
 
 def _seams(folder: DesignFolder) -> bytes | None:
     # Only a folder with a traveller has pages of seams.
     from sbafab.reports.underlay import seams_pdf
 
-    design = folder.design
-    return seams_pdf(folder.laminate, design_sha256(design), design.seam_offsets)
+    return seams_pdf(folder.laminate, folder.build.sha256, folder.design.seam_offsets)
 
 
 # Meshes and pictures.
@@ -250,13 +235,13 @@ def _write_meshes(folder: DesignFolder) -> None:
     written, left_out = write_meshes(folder.laminate, folder.path, progress=progress)
     folder.meshes += written
     folder.left_out += left_out
-    conforming = folder.plan.conforming
+    conforming = folder.conforming
     if conforming is not None:
         # Conforming meshes take the extra "mesh".
         from sbafab.meshing.conforming.meshes import write_conforming
 
         progress = partial(folder.progress, "conforming meshes")
-        folder.meshes += write_conforming(conforming, folder.path, progress, folder.plan.formats)
+        folder.meshes += write_conforming(conforming, folder.path, progress, folder.formats)
 
 
 def _layers_svg(folder: DesignFolder) -> str:
@@ -311,16 +296,16 @@ def prediction_json(design: Design, prediction: Prediction) -> dict[str, Any]:
 
 
 def _predict_json(folder: DesignFolder) -> str:
-    assert folder.plan.prediction is not None
-    return as_json(prediction_json(folder.design, folder.plan.prediction))
+    assert folder.prediction is not None
+    return as_json(prediction_json(folder.design, folder.prediction))
 
 
 def _write_plots(folder: DesignFolder) -> None:
     # Charts are for designs with a prediction.
     from sbafab.reports.charts import relation_svg
 
-    assert folder.plan.prediction is not None
-    relations = folder.plan.prediction.relations
+    assert folder.prediction is not None
+    relations = folder.prediction.relations
     if relations:
         (folder.path / PREDICT).mkdir()
     for relation in relations:
@@ -330,7 +315,7 @@ def _write_plots(folder: DesignFolder) -> None:
 
 def _write_simulation(name: Name, folder: DesignFolder) -> None:
     """Copy a simulator's folder if it has run, else write what it reads."""
-    simulated = folder.plan.simulated
+    simulated = folder.simulated
     if simulated is not None:
         shutil.copytree(simulated, folder.path / name)
         return
@@ -357,9 +342,8 @@ def _tray_pdf(folder: DesignFolder) -> bytes | None:
 
     if not _has_tray(folder):
         return None
-    runs = design_runs(folder.design, folder.laminate)
-    sha256 = design_sha256(folder.design)
-    return tray_pdf(folder.laminate, runs, sha256, folder.design.order.batch)
+    build = folder.build
+    return tray_pdf(build.laminate, build.cycles, build.sha256, folder.design.order.batch)
 
 
 def _tray_html(folder: DesignFolder) -> str | None:
@@ -371,7 +355,7 @@ def _tray_html(folder: DesignFolder) -> str | None:
 
 def _has_tray(folder: DesignFolder) -> bool:
     asked = folder.design.order.tray
-    return design_runs(folder.design, folder.laminate).copies > 1 if asked is None else asked
+    return folder.build.cycles.copies > 1 if asked is None else asked
 
 
 def _bill(folder: DesignFolder) -> str | None:
@@ -396,26 +380,23 @@ def _bench(folder: DesignFolder) -> str:
     return bench_html(work.design.name, work.sha256, [work])
 
 
-def work_of(plan: DesignPlan, sheets: Sequence[SheetFile], folder: str = "") -> Work:
+def work_of(build: Build, sheets: Sequence[SheetFile], folder: str = "") -> Work:
     """Return what the pages for the bench are made from; ``folder`` has the design's files."""
     # `check` and `cut` have no pages for the bench.
     from sbafab.reports.traveller.work import Work
 
-    checked, pressing = plan.checked, plan.pressing
-    assert pressing is not None
-    return Work(checked.design, checked.laminate, pressing, sheets, checked.findings, folder)
+    return Work(build.design, build.laminate, build.schedule, sheets, build.findings, folder)
 
 
 def findings_page(
-    name: str, sha256: str, designs: Sequence[Checked], between: Sequence[Finding]
+    name: str, sha256: str, builds: Sequence[Build], between: Sequence[Finding]
 ) -> str:
     """Return the designer's page: of every design, and of the checks ``between`` its parts."""
     # The page of findings shares its pictures with the traveller.
     from sbafab.reports.traveller.findings import Inspected, findings_html
 
     inspected = [
-        Inspected(checked.design.name, checked.findings, checked.laminate, checked.design)
-        for checked in designs
+        Inspected(each.design.name, each.findings, each.laminate, each.design) for each in builds
     ]
     if between:
         inspected.append(Inspected("Between the parts", between))
@@ -423,12 +404,12 @@ def findings_page(
 
 
 def _findings(folder: DesignFolder) -> str:
-    return findings_page(folder.design.name, design_sha256(folder.design), [folder.checked], ())
+    return findings_page(folder.design.name, folder.build.sha256, [folder.build], ())
 
 
 def _checks(folder: DesignFolder) -> str:
     design = folder.design
-    return as_json(checks(folder.checked.findings, "design", design.name, [design]))
+    return as_json(checks(folder.build.findings, "design", design.name, [design]))
 
 
 def _laminate(folder: DesignFolder) -> str:

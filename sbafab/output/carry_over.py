@@ -12,6 +12,7 @@ from sbafab.design.files import shown
 from sbafab.design.records import Design, dotted, resolved
 from sbafab.errors import OccupiedError, OutputError
 from sbafab.output.artefacts import ARTEFACTS, tops_of
+from sbafab.output.checked import Build
 from sbafab.output.manifest import carried_over, file_hash, file_names, identity
 from sbafab.output.swap import listed_files, read_manifest
 from sbafab.simulators.simulator import NAMES as SIMULATORS
@@ -52,16 +53,14 @@ def removed_files(listed: Sequence[str], index: Mapping[str, Any]) -> tuple[str,
     return tuple(path for path in listed if path not in index["files"])
 
 
-def refuse_to_replace(
-    target: Path, design: Design, waived: Sequence[str], replaced: Collection[str]
-) -> None:
+def refuse_to_replace(target: Path, build: Build, replaced: Collection[str]) -> None:
     """Raises OccupiedError where a run that writes ``replaced`` would lose others' files."""
-    mine = identity(design, waived)
+    mine = identity(build)
     lost = would_replace(target, mine, replaced)
     if lost:
         names = dict.fromkeys(path.partition("/")[0] for path in lost)
         raise OccupiedError(
-            f"{target} holds {', '.join(names)} {_unlike(target, design, mine)}; take "
+            f"{target} holds {', '.join(names)} {_unlike(target, build.design, mine)}; take "
             f"{target / 'design.toml'} for the design that was run there, or give this one a "
             "folder of its own with --set name=NAME or -o"
         )

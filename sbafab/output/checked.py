@@ -1,11 +1,11 @@
-"""A design checked and planned: laminate, findings, settings, press schedule, beam paths."""
+"""A build: a design with its laminate, findings, cut settings, beam paths and press schedule."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -27,7 +27,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.nest import refuse_unfit
 from sbafab.nesting.records import TURNS, NestPart, Stock, parts_of
 from sbafab.pressing import dowels
-from sbafab.pressing.cycles import design_runs
+from sbafab.pressing.cycles import Runs, design_runs
 from sbafab.pressing.schedule import Schedule, plate_holes, schedule
 from sbafab.process import Progress
 from sbafab.rules.deck import has_failed, run_deck
@@ -35,10 +35,6 @@ from sbafab.rules.finding import Finding, Verdict, summary
 from sbafab.rules.limits import CHECKED_AGAINST, lowered
 from sbafab.simulators.simulator import Name
 from sbafab.version import GENERATOR
-
-if TYPE_CHECKING:
-    from sbafab.meshing.conforming.meshes import ConformingMeshes
-    from sbafab.models.figures import Prediction
 
 Micrometres = Annotated[float, AfterValidator(lambda value: round(value, 4))]
 
@@ -67,16 +63,21 @@ class FindingEntry(Document):
     message: str
 
 
-# A design with its laminate and findings.
+# A design and what follows from it.
 
 
-@dataclass(frozen=True)
-class Checked:
-    """A design, its laminate, and the findings of the rules."""
+@dataclass(frozen=True, eq=False)
+class Build:
+    """A design with its laminate and the findings of the rules; what else follows from it is
+    computed when first asked for, and kept.
+
+    ``curves``: how arcs are drawn in its cut files.
+    """
 
     design: Design
     laminate: Laminate
     findings: tuple[Finding, ...]
+    curves: Curves = TRUE_ARCS
 
     @property
     def failed(self) -> bool:
@@ -93,14 +94,69 @@ class Checked:
         """The limits that the design sets below the usual ones."""
         return lowered(self.design)
 
+    @cached_property
+    def sha256(self) -> str:
+        """The hash of the design."""
+        return design_sha256(self.design)
 
-def check(design: Design, progress: Progress | None = None) -> Checked:
+    @cached_property
+    def settings(self) -> CutSettings:
+        """The settings of the cut files."""
+        return cut_settings(self.design, self.waived, self.curves)
+
+    @cached_property
+    def paths(self) -> Mapping[str, Region]:
+        """The beam's path for every pattern. Raises DesignError if the kerf leaves none."""
+        return compensated_paths(self.laminate, self.settings)
+
+    @cached_property
+    def pieces(self) -> tuple[NestPart, ...]:
+        """The pieces for film sheets, with copies and spares."""
+        order = self.design.order
+        return parts_of(self.laminate, self.paths, order.quantity, order.spare_parts)
+
+    @cached_property
+    def cycles(self) -> Runs:
+        """The press cycles that make all copies."""
+        return design_runs(self.design, self.laminate)
+
+    @cached_property
+    def schedule(self) -> Schedule:
+        """The press schedule; first step and warnings name waived rules and lowered limits.
+
+        Raises DesignError if the press cannot do it.
+        """
+        plain = schedule(self.laminate, self.design, self.cycles.cycles)
+        remarks = []
+        if self.waived:
+            rules = ", ".join(self.waived)
+            remarks.append(f"made although it breaks rules that the design waives: {rules}")
+        if self.lowered:
+            remarks.append(f"{CHECKED_AGAINST}{', '.join(self.lowered)}")
+        if not remarks:
+            return plain
+        if not plain.steps:
+            return replace(plain, remarks=tuple(remarks))
+        first, *later = plain.steps
+        words = " ".join(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)
+        marked = replace(first, instructions=f"{words} {first.instructions}")
+        return replace(plain, steps=(marked, *later), remarks=tuple(remarks))
+
+
+def check(design: Design, progress: Progress | None = None, curves: Curves = TRUE_ARCS) -> Build:
     """Build the laminate of a design and run the rule deck on it. Raises DesignError."""
     try:
         laminate = build(design)
-        return Checked(design, laminate, run_deck(laminate, design, progress))
+        return Build(design, laminate, run_deck(laminate, design, progress), curves)
     except GeometryError as error:
         raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
+
+
+def refuse_undoable(builds: Sequence[Build]) -> None:
+    """Raises DesignError if press, kerf or film sheets cannot do designs that pass the rules."""
+    for each in builds:
+        assert each.schedule
+        refuse_unfit(each.pieces, stocks(each.design))
 
 
 class Summary(Document):
@@ -252,7 +308,7 @@ def entries(design: Design) -> dict[Material, Entries]:
     return found
 
 
-# The plan of a design: computed before anything is written.
+# The parts of a run.
 
 
 RunPart = Literal["cut", "press", "mesh", "preview", "predict"] | Name
@@ -260,65 +316,3 @@ RunPart = Literal["cut", "press", "mesh", "preview", "predict"] | Name
 EVERYTHING: tuple[RunPart, ...] = ("cut", "press", "mesh", "preview")
 PICTURES: tuple[RunPart, ...] = ("preview",)
 """What is left, beside the findings, of a design that is not to be cut."""
-
-
-@dataclass(frozen=True)
-class DesignPlan:
-    """The parts ``wanted`` of a design, and all that is computed before its folder is begun.
-
-    ``paths``: the beam's path for every pattern, ``parts``: what goes on film sheets; both empty
-    where nothing is cut. ``conforming`` is written in the ``formats`` of these file endings;
-    ``simulated`` is the folder in which a simulator has run.
-    """
-
-    checked: Checked
-    wanted: frozenset[RunPart]
-    settings: CutSettings
-    pressing: Schedule | None = None
-    paths: Mapping[str, Region] = field(default_factory=dict)
-    parts: tuple[NestPart, ...] = ()
-    conforming: ConformingMeshes | None = None
-    formats: tuple[str, ...] = ()
-    prediction: Prediction | None = None
-    simulated: Path | None = None
-
-
-def plan_design(
-    checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_ARCS
-) -> DesignPlan:
-    """Return the plan of a design. Raises DesignError where press or kerf cannot do it."""
-    design, laminate = checked.design, checked.laminate
-    settings = cut_settings(design, checked.waived, curves)
-    pressing = schedule_of(checked) if "press" in wanted else None
-    planned = DesignPlan(checked, frozenset(wanted), settings, pressing)
-    if "cut" not in wanted:
-        return planned
-    paths = compensated_paths(laminate, settings)
-    parts = parts_of(laminate, paths, design.order.quantity, design.order.spare_parts)
-    return replace(planned, paths=paths, parts=parts)
-
-
-def schedule_of(checked: Checked) -> Schedule:
-    """Return the press schedule; first step and warnings name waived rules and lowered limits."""
-    cycles = design_runs(checked.design, checked.laminate).cycles
-    plain = schedule(checked.laminate, checked.design, cycles)
-    remarks = []
-    if checked.waived:
-        rules = ", ".join(checked.waived)
-        remarks.append(f"made although it breaks rules that the design waives: {rules}")
-    if checked.lowered:
-        remarks.append(f"{CHECKED_AGAINST}{', '.join(checked.lowered)}")
-    if not remarks:
-        return plain
-    if not plain.steps:
-        return replace(plain, remarks=tuple(remarks))
-    first, *later = plain.steps
-    words = " ".join(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)
-    marked = replace(first, instructions=f"{words} {first.instructions}")
-    return replace(plain, steps=(marked, *later), remarks=tuple(remarks))
-
-
-def refuse_undoable(checked: Sequence[Checked]) -> None:
-    """Raises DesignError where press, kerf or film sheets cannot do designs that pass the rules."""
-    for design in checked:
-        refuse_unfit(plan_design(design, ("press", "cut")).parts, stocks(design.design))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -15,10 +15,12 @@ from sbafab.assemblies.shapes import colours, cup_mould, linear, placed_surface
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DefectError
 from sbafab.meshing.formats.surfaces import Node, write_scene, write_stl
+from sbafab.nesting.records import Nest
 from sbafab.output.artefacts import (
     BENCH,
     FINDINGS,
     TRAVELLER,
+    Artefact,
     DesignFolder,
     findings_page,
     work_of,
@@ -26,8 +28,8 @@ from sbafab.output.artefacts import (
     write_nested_sheets,
     write_text,
 )
-from sbafab.output.checked import checks
-from sbafab.output.job import CheckedJob, Plan
+from sbafab.output.checked import RunPart, checks
+from sbafab.output.job import Order
 from sbafab.output.manifest import AssemblyManifest, as_json, file_hashes, job_manifest, manifest
 from sbafab.output.swap import SCHEMA
 from sbafab.process import Progress
@@ -49,42 +51,52 @@ class WrittenFolder:
     left_out: tuple[tuple[str, str], ...] = ()
 
 
-def write_folder(plan: Plan, path: Path, progress: Progress) -> WrittenFolder:
-    """Write film sheets and designs; several designs get a folder each, named after it."""
-    job = plan.job
-    first = plan.designs[0]
-    sheets: list[SheetFile] = []
-    if plan.is_cut:
-        design = first.checked.design
-        sheets = write_nested_sheets(plan.nests, design, path, plan.settings, progress)
-    if job.schema == SCHEMA:
-        folder = DesignFolder(first, sheets, path, progress)
+def write_folder(
+    order: Order,
+    wanted: Collection[RunPart],
+    nests: Sequence[Nest],
+    path: Path,
+    progress: Progress,
+    **extras: Any,
+) -> WrittenFolder:
+    """Write film sheets and designs; several designs get a folder each, named after it.
+
+    ``extras`` are fields of the ``DesignFolder`` of a single design.
+    """
+    parts, first = frozenset(wanted), order.builds[0]
+    sheets = write_nested_sheets(nests, first.design, path, order.settings, progress)
+    verified = {sheet.path: sheet.sha256 for sheet in sheets}
+    if order.schema == SCHEMA:
+        folder = DesignFolder(first, parts, sheets, path, progress, **extras)
         index = write_design(folder)
-        verified = {**folder.verified, **{sheet.path: sheet.sha256 for sheet in sheets}}
-        return WrittenFolder(index, verified, tuple(folder.left_out))
+        return WrittenFolder(index, {**verified, **folder.verified}, tuple(folder.left_out))
     from_below = _from_below(sheets)
     left_out: list[tuple[str, str]] = []
-    verified = {sheet.path: sheet.sha256 for sheet in sheets}
-    for each in plan.designs:
-        subfolder = path / each.checked.design.name
+    for build in order.builds:
+        subfolder = path / build.design.name
         subfolder.mkdir()
         # An assembly has one page for all designs.
-        folder = DesignFolder(each, from_below, subfolder, progress, job.assembled is None)
-        # The folder above has the sheets; a design's own is one without.
+        has_pages = order.assembled is None
+        folder = DesignFolder(build, parts, from_below, subfolder, progress, has_pages)
+        # Sheets are stored in the parent folder only.
         close_folder(subfolder, {**write_design(folder), "sheets": []})
         verified |= {f"{subfolder.name}/{name}": file for name, file in folder.verified.items()}
         left_out += [(f"{subfolder.name}/{name}", reason) for name, reason in folder.left_out]
-    designs = [each.checked.design for each in plan.designs]
-    index = job_manifest(job.schema, job.name, plan.settings, designs, sheets)
-    if job.assembled is not None:
-        index = _write_assembly(plan, job.assembled, sheets, index, path, progress)
+    designs = [build.design for build in order.builds]
+    index = job_manifest(order.schema, order.name, order.settings, designs, sheets)
+    if order.assembled is not None:
+        index = _write_assembly(order, order.assembled, sheets, index, path, progress)
     return WrittenFolder(index, verified, tuple(left_out))
 
 
-def write_design(folder: DesignFolder) -> dict[str, Any]:
+def write_design(
+    folder: DesignFolder, artefacts: Iterable[Artefact] | None = None
+) -> dict[str, Any]:
     """Write a design's artefacts; return its manifest, without the files' hashes."""
-    write_artefacts(folder)
-    return manifest(folder.plan, folder.sheets, folder.meshes)
+    write_artefacts(folder, artefacts)
+    is_cut, conforming = "cut" in folder.wanted, folder.conforming
+    statistics = None if conforming is None else conforming.statistics
+    return manifest(folder.build, is_cut, folder.sheets, folder.meshes, statistics)
 
 
 def close_folder(
@@ -123,7 +135,7 @@ def _from_below(sheets: Sequence[SheetFile]) -> list[SheetFile]:
 
 
 def _write_assembly(
-    plan: Plan,
+    order: Order,
     assembled: Assembled,
     sheets: Sequence[SheetFile],
     index: dict[str, Any],
@@ -134,31 +146,33 @@ def _write_assembly(
     # A design has no picture of an assembly.
     from sbafab.reports.assembly_png import assembly_pngs
 
-    job = plan.job
     progress("assembled", 0, 1)
     (path / "preview").mkdir()
-    picture, bare = assembly_pngs(assembled, _note(job))
+    picture, bare = assembly_pngs(assembled, _note(order))
     (path / PICTURE).write_bytes(picture)
     meshes = []
-    if plan.is_cut:
+    if sheets:
         (path / "mesh").mkdir()
         meshes.append(_write_solid(assembled, path))
         _write_moulds(assembled, path)
-        traveller, bench = _bench_pages(plan, assembled, sheets, bare)
+        traveller, bench = _bench_pages(order, assembled, sheets, bare)
         write_text(path / TRAVELLER, traveller)
         write_text(path / BENCH, bench)
     sha256 = assembly_sha256(assembled)
-    write_text(path / FINDINGS, findings_page(job.name, sha256, job.designs, job.between or ()))
-    designs = [checked.design for checked in job.designs]
-    write_text(path / "checks.json", as_json(checks(job.findings, "design", job.name, designs)))
+    write_text(
+        path / FINDINGS, findings_page(order.name, sha256, order.builds, order.between or ())
+    )
+    designs = [build.design for build in order.builds]
+    found = checks(order.findings, "design", order.name, designs)
+    write_text(path / "checks.json", as_json(found))
     write_text(path / DESIGN_FILE, assembly_toml(assembled))
     index |= {**_claims(assembled), "meshes": meshes, "files": {}}
     return AssemblyManifest.model_validate_json(as_json(index)).as_dict()
 
 
-def _note(job: CheckedJob) -> str:
-    failed = dict.fromkeys(f.rule for f in job.findings if f.verdict == "fail")
-    waived = dict.fromkeys(f.rule for f in job.findings if f.by_user)
+def _note(order: Order) -> str:
+    failed = dict.fromkeys(f.rule for f in order.findings if f.verdict == "fail")
+    waived = dict.fromkeys(f.rule for f in order.findings if f.by_user)
     note = f"; must not be built; failed: {', '.join(failed)}" if failed else ""
     return note + (f"; waived: {', '.join(waived)}" if waived else "")
 
@@ -210,17 +224,15 @@ def _claims(assembled: Assembled) -> dict[str, Any]:
 
 
 def _bench_pages(
-    plan: Plan, assembled: Assembled, sheets: Sequence[SheetFile], picture: bytes
+    order: Order, assembled: Assembled, sheets: Sequence[SheetFile], picture: bytes
 ) -> tuple[str, str]:
     """Return the traveller and the page of the bench."""
     # Nor has it the pages of an assembly, whose modules take 0.1 s to load.
     from sbafab.reports.traveller.assembly_page import AssemblyWork, assembly_html
     from sbafab.reports.traveller.bench import bench_html
 
-    works = [work_of(each, sheets, f"{each.checked.design.name}/") for each in plan.designs]
+    works = [work_of(build, sheets, f"{build.design.name}/") for build in order.builds]
     sha256 = assembly_sha256(assembled)
-    between, lowered = plan.job.between or (), plan.settings.lowered
-    work = AssemblyWork(
-        assembled, sha256, works, sheets, between, plan.job.waived, lowered, picture
-    )
+    between, lowered = order.between or (), order.settings.lowered
+    work = AssemblyWork(assembled, sha256, works, sheets, between, order.waived, lowered, picture)
     return assembly_html(work), bench_html(assembled.assembly.name, sha256, works, assembled)

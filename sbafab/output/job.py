@@ -7,20 +7,21 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.records import Assembly
-from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings
 from sbafab.design.records import Design
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.errors import DefectError, DesignError, GeometryError, OutputError
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import PLACES, from_dict, nest
 from sbafab.nesting.records import Nest, NestPart
-from sbafab.output.checked import Checked, DesignPlan, check, stocks
+from sbafab.output.checked import Build, check, stocks
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, Schema
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.deck import has_failed, run_deck
@@ -37,29 +38,30 @@ MOST_BYTES = 50_000_000
 """Of saved places; more are not read but searched for again."""
 
 
-@dataclass(frozen=True)
-class CheckedJob:
-    """The designs of one output folder with the findings in each.
+@dataclass(frozen=True, eq=False)
+class Order:
+    """What is made together into one folder: the builds of a design, of several, or of the parts of
+    an assembly.
 
-    ``schema`` is that of the folder's manifest: of one design, of a job or of an assembly.
-    ``between``: the findings between the parts of an assembly, None for designs.
+    ``schema`` is that of the folder's manifest. ``between``: the findings between the parts of an
+    assembly, None for designs.
     """
 
     schema: Schema
     name: str
-    designs: tuple[Checked, ...]
+    builds: tuple[Build, ...]
     assembled: Assembled | None = None
     between: tuple[Finding, ...] | None = None
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """The findings of the designs, of several each with its name; then those between parts."""
-        if len(self.designs) == 1 and self.between is None:
-            return self.designs[0].findings
+        if len(self.builds) == 1 and self.between is None:
+            return self.builds[0].findings
         named = (
-            replace(finding, design=checked.design.name)
-            for checked in self.designs
-            for finding in checked.findings
+            replace(finding, design=each.design.name)
+            for each in self.builds
+            for finding in each.findings
         )
         return (*named, *(self.between or ()))
 
@@ -79,43 +81,78 @@ class CheckedJob:
         """The limits of the checks between parts that the assembly weakens."""
         return () if self.assembled is None else lowered_checks(self.assembled.assembly.rules)
 
+    @cached_property
+    def settings(self) -> CutSettings:
+        """The settings of the film sheets: of several designs one hash over all, and the waivers
+        and lowered limits of all.
+        """
+        each = [build.settings for build in self.builds]
+        if self.schema == SCHEMA:
+            return each[0]
+        hashes = "".join(settings.design_sha256 for settings in each)
+        waived = [rule for settings in each for rule in settings.waived]
+        weakened = [limit for settings in each for limit in settings.lowered]
+        return replace(
+            each[0],
+            design=self.name,
+            design_sha256=hashlib.sha256(hashes.encode()).hexdigest(),
+            waived=tuple(dict.fromkeys([*waived, *self.waived])),
+            lowered=tuple(dict.fromkeys([*weakened, *self.lowered])),
+            warnings={name: text for settings in each for name, text in settings.warnings.items()},
+        )
+
+    def nests(self, old_folder: Path, progress: Progress) -> tuple[Nest, ...]:
+        """Return places for all pieces on the film sheets of the first design.
+
+        Places of an earlier run in ``old_folder`` for the same pieces and sheets are taken over.
+        Raises DesignError if pieces do not fit.
+        """
+        progress("nesting", 0, 1)
+        pieces = [piece for build in self.builds for piece in build.pieces]
+        design = self.builds[0].design
+        return _saved(pieces, design, old_folder / PLACES) or _nested(pieces, design)
+
 
 def check_job(
-    source: Design | Assembly | Sequence[Design], name: str = "", progress: Progress | None = None
-) -> CheckedJob:
+    source: Design | Assembly | Sequence[Design],
+    name: str = "",
+    progress: Progress | None = None,
+    curves: Curves = TRUE_ARCS,
+) -> Order:
     """Check a design, an assembly and what lies between its parts, or the designs of job ``name``.
 
-    Raises DesignError where one cannot be built, or where the film sheets, kerf or machine of
-    several are not equal.
+    Raises DesignError if one cannot be built, or if the film sheets, kerf or machine of several are
+    not equal.
     """
     if isinstance(source, Design):
-        return CheckedJob(SCHEMA, source.name, (check(source, progress),))
+        return Order(SCHEMA, source.name, (check(source, progress, curves),))
     if isinstance(source, Assembly):
-        return _check_assembly(source, progress or ignore_progress)
+        return _check_assembly(source, progress or ignore_progress, curves)
     _refuse_names([design.name for design in source], name)
     refuse_other_film(source)
-    return CheckedJob(JOB_SCHEMA, name, tuple(check(design, progress) for design in source))
+    return Order(JOB_SCHEMA, name, tuple(check(design, progress, curves) for design in source))
 
 
-def _check_assembly(assembly: Assembly, progress: Progress) -> CheckedJob:
+def _check_assembly(assembly: Assembly, progress: Progress, curves: Curves) -> Order:
     assembled = assemble(assembly)
-    designs = [part.design for part in assembled.designs]
-    refuse_other_film(designs)
+    refuse_other_film([part.design for part in assembled.designs])
     try:
-        checked = tuple(
-            Checked(part.design, part.laminate, run_deck(part.laminate, part.design, progress))
+        builds = [
+            Build(
+                part.design, part.laminate, run_deck(part.laminate, part.design, progress), curves
+            )
             for part in assembled.designs
-        )
+        ]
     except GeometryError as error:
         raise DesignError(f"assembly {assembly.name} cannot be resolved: {error}") from None
     progress("checks between parts", 0, 1)
-    return of_assembly(assembled, checked)
+    return of_assembly(assembled, builds)
 
 
-def of_assembly(assembled: Assembled, designs: Sequence[Checked]) -> CheckedJob:
-    """Return the checked designs of an assembly with the findings between its parts."""
+def of_assembly(assembled: Assembled, builds: Sequence[Build]) -> Order:
+    """Return the builds of an assembly with the findings between its parts."""
     between = run_checks(assembled)
-    return CheckedJob(ASSEMBLY_SCHEMA, assembled.assembly.name, tuple(designs), assembled, between)
+    return Order(ASSEMBLY_SCHEMA, assembled.assembly.name, tuple(builds), assembled, between)
 
 
 def refuse_other_film(designs: Sequence[Design]) -> None:
@@ -159,65 +196,7 @@ def _refuse_names(names: Sequence[str], name: str) -> None:
         raise DesignError(f"the job is named {name} as one of its folders; choose another --name")
 
 
-# The plan of a folder: its designs' plans with places for all parts on the film sheets.
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A folder before it is written; ``settings`` are those of the film sheets."""
-
-    job: CheckedJob
-    designs: tuple[DesignPlan, ...]
-    settings: CutSettings
-    nests: tuple[Nest, ...]
-
-    @property
-    def is_cut(self) -> bool:
-        return bool(self.nests)
-
-
-def plan_job(
-    job: CheckedJob, designs: Sequence[DesignPlan], old_folder: Path, progress: Progress
-) -> Plan:
-    """Place the parts of planned designs on the film sheets of the first.
-
-    ``old_folder`` may hold the places of an earlier run. Raises DesignError where parts do not fit.
-    """
-    parts = [part for plan in designs for part in plan.parts]
-    nests = find_nests(parts, designs[0].checked.design, old_folder, progress)
-    settings = designs[0].settings if job.schema == SCHEMA else _shared_settings(job, designs)
-    return Plan(job, tuple(designs), settings, nests)
-
-
-def _shared_settings(job: CheckedJob, designs: Sequence[DesignPlan]) -> CutSettings:
-    """Return settings of shared sheets: one hash over all designs, waivers and limits of all."""
-    each = [plan.settings for plan in designs]
-    hashes = "".join(settings.design_sha256 for settings in each)
-    waived = [rule for settings in each for rule in settings.waived]
-    weakened = [limit for settings in each for limit in settings.lowered]
-    return replace(
-        each[0],
-        design=job.name,
-        design_sha256=hashlib.sha256(hashes.encode()).hexdigest(),
-        waived=tuple(dict.fromkeys([*waived, *job.waived])),
-        lowered=tuple(dict.fromkeys([*weakened, *job.lowered])),
-        warnings={name: text for settings in each for name, text in settings.warnings.items()},
-    )
-
-
-def find_nests(
-    parts: Sequence[NestPart], design: Design, old_folder: Path, progress: Progress
-) -> tuple[Nest, ...]:
-    """Return places for the parts on the design's film sheets; none for no parts.
-
-    Places of an earlier run for the same parts and sheets are taken over. Raises DesignError where
-    parts do not fit.
-    """
-    if not parts:
-        return ()
-    progress("nesting", 0, 1)
-    saved = _saved(parts, design, old_folder / PLACES)
-    return saved or _nested(parts, design)
+# Places of pieces on film sheets.
 
 
 def _nested(parts: Sequence[NestPart], design: Design) -> tuple[Nest, ...]:

@@ -27,9 +27,9 @@ from sbafab.laminate.joints import SeamKind, SeamTool
 from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, Role
 from sbafab.meshing.mesh_files import MeshFile
 from sbafab.models.formulas import sizes
-from sbafab.output.checked import DesignPlan, warnings
+from sbafab.output.checked import Build, warnings
 from sbafab.output.swap import SCHEMA, BatchSchema
-from sbafab.pressing.cycles import Runs, design_runs
+from sbafab.pressing.cycles import Runs
 from sbafab.version import GENERATOR
 
 MOST_SIZE = 10_000.0
@@ -293,28 +293,33 @@ def as_json(value: object) -> str:
 
 
 def manifest(
-    plan: DesignPlan, sheets: Sequence[SheetFile], meshes: Sequence[MeshFile]
+    build: Build,
+    is_cut: bool,
+    sheets: Sequence[SheetFile],
+    meshes: Sequence[MeshFile],
+    statistics: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Return the manifest of a design's folder, without the hashes of its files."""
-    checked, is_cut = plan.checked, "cut" in plan.wanted
-    design, laminate = checked.design, checked.laminate
-    curves = said_of(plan.settings.curves) if is_cut else None
+    """Return the manifest of a design's folder, without the hashes of its files.
+
+    ``is_cut``: it has cut files; ``statistics`` are those of conforming meshes.
+    """
+    design, laminate = build.design, build.laminate
+    curves = said_of(build.curves) if is_cut else None
     optional: dict[str, Any] = {}
     if curves is not None:
         optional["curves"] = curves
-    runs = design_runs(design, laminate)
-    if runs.copies > 1:
-        optional["batch"] = _batch(runs)
+    if build.cycles.copies > 1:
+        optional["batch"] = _batch(build.cycles)
     if laminate.seams:
         optional["seams"] = _seams(laminate, is_cut)
-    if plan.conforming is not None:
-        optional["mesh_statistics"] = plan.conforming.statistics
+    if statistics is not None:
+        optional["mesh_statistics"] = statistics
     return Manifest(
         schema=SCHEMA,
         name=laminate.name,
         family=laminate.family,
         units="mm",
-        design_sha256=design_sha256(design),
+        design_sha256=build.sha256,
         generator=GENERATOR,
         kit=KitClaim.model_validate_json(as_json(citation(design))),
         registration=RegistrationClaim(
@@ -325,14 +330,14 @@ def manifest(
             ),
         ),
         kerf={name: kerf_claim(width) for name, width in design.kerf_widths.items()},
-        waived=checked.waived,
-        lowered_limits=checked.lowered,
+        waived=build.waived,
+        lowered_limits=build.lowered,
         sizes={name: round(value, 6) for name, value in sizes(design, laminate).items()},
         notes=laminate.notes,
         copies=design.order.quantity,
         films=_films(laminate, sheets),
         warnings=tuple(dict.fromkeys(warnings(design).values())),
-        layers=tuple(_layer(plan, layer) for layer in laminate.layers),
+        layers=tuple(_layer(build, layer, is_cut) for layer in laminate.layers),
         interfaces=tuple(_interface(interface) for interface in laminate.interfaces),
         bores=tuple(
             BoreClaim(chamber=bore.chamber, **_place(bore.centre), diameter=bore.diameter)
@@ -481,9 +486,8 @@ def _films(laminate: Laminate, sheets: Sequence[SheetFile]) -> tuple[FilmClaim, 
     )
 
 
-def _layer(plan: DesignPlan, layer: Layer) -> LayerClaim:
-    kerf = plan.settings.kerf_width(layer.film.material)
-    laminate = plan.checked.laminate
+def _layer(build: Build, layer: Layer, is_cut: bool) -> LayerClaim:
+    kerf, laminate = build.settings.kerf_width(layer.film.material), build.laminate
     bores, cut = laminate.bores, laminate.layer(laminate.cut_with(layer))
     return LayerClaim(
         index=layer.index,
@@ -493,7 +497,7 @@ def _layer(plan: DesignPlan, layer: Layer) -> LayerClaim:
         balloon=layer.balloon,
         thickness=layer.film.thickness,
         z=layer.z,
-        file=layer_path(cut.name, kerf) if "cut" in plan.wanted else None,
+        file=layer_path(cut.name, kerf) if is_cut else None,
         pattern=layer.pattern,
         area=round(layer.profile.area, 6),
         pieces=len(layer.profile.pieces),
@@ -552,10 +556,9 @@ def file_hash(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def identity(design: Design, waived: Sequence[str]) -> dict[str, Any]:
+def identity(build: Build) -> dict[str, Any]:
     """Return the manifest's keys that identify the design and version of its files."""
-    sha256 = design_sha256(design)
-    return {"design_sha256": sha256, "generator": GENERATOR, "waived": list(waived)}
+    return {"design_sha256": build.sha256, "generator": GENERATOR, "waived": list(build.waived)}
 
 
 def carried_over(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:

@@ -36,7 +36,7 @@ MEASURED: Mapping[str, tuple[Quantity, Conditions]] = {
 
 
 @dataclass(frozen=True)
-class Build:
+class RecordedDesign:
     """A recorded design with its predictions.
 
     ``predicted``: quantity to value and model. ``good_builds``: how many random builds keep every
@@ -90,7 +90,7 @@ def recorded_sha256(built: Design | Assembled) -> str:
     return design_sha256(built) if isinstance(built, Design) else assembly_sha256(built)
 
 
-def promised(built: Design | Assembled) -> Build:
+def promised(built: Design | Assembled) -> RecordedDesign:
     """Return the built design with its predictions and yield. Raises DesignError.
 
     An assembly is good if every part is; no figure is predicted for it.
@@ -107,7 +107,7 @@ def promised(built: Design | Assembled) -> Build:
     shares = [simulate(laminate, design).whole for design, laminate, _ in parts]
     builds = max(share.builds for share in shares)
     good = math.prod(share.value**count for share, (*_, count) in zip(shares, parts, strict=True))
-    return Build(
+    return RecordedDesign(
         sha256=recorded_sha256(built),
         generator=GENERATOR,
         name=name,

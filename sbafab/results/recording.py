@@ -22,7 +22,7 @@ from sbafab.output.schema_ids import HISTORY_SCHEMA
 from sbafab.output.swap import replace_text
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.record_sheet import TESTS_TABLE, RecordTable, record_tables
-from sbafab.results.builds import Build, promised, recorded_sha256
+from sbafab.results.builds import RecordedDesign, promised, recorded_sha256
 from sbafab.results.records import HistoryEntry, LabRow, Record, Row, columns, row_of
 from sbafab.results.store import Contents, Lab
 from sbafab.spreadsheet import csv_text
@@ -170,7 +170,7 @@ def _table_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
 
 
 def matching(
-    text: str, serial: str, stored: Sequence[Row], builds: Mapping[str, Build]
+    text: str, serial: str, stored: Sequence[Row], builds: Mapping[str, RecordedDesign]
 ) -> list[Row]:
     """Return the rows of the design whose hash (eight digits or more of it) the text holds.
 
@@ -235,7 +235,7 @@ def _devices(contents: Contents) -> list[Sequence[LabRow]]:
     )
 
 
-def json_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, Build]) -> str:
+def json_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, RecordedDesign]) -> str:
     """Return a document with the rows grouped by device."""
     listed = []
     for rows in devices:
@@ -248,7 +248,7 @@ def json_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, Build]) 
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
-def csv_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, Build]) -> str:
+def csv_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, RecordedDesign]) -> str:
     """Return a table with one row per row of each device."""
     cells = [_cells(row, builds[rows[0].design_sha256].name) for rows in devices for row in rows]
     return csv_text([CSV_COLUMNS, *([each.get(c) for c in CSV_COLUMNS] for each in cells)])

@@ -1,7 +1,7 @@
 """Evaluation of a lab's records: success, and measured against predicted.
 
-Designs that build the same actuator (``Build.actuator``) count as one. A repaired and retested
-actuator counts by its first attempt.
+Designs that build the same actuator (``RecordedDesign.actuator``) count as one. A repaired and
+retested actuator counts by its first attempt.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sbafab.cutting.calibration import student_t
 from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
-from sbafab.results.builds import Build
+from sbafab.results.builds import RecordedDesign
 from sbafab.results.records import NUMBERS, PASS, Record, standing
 from sbafab.rules.registration_yield import Share
 
@@ -34,7 +34,7 @@ class Built:
     """
 
     design: str
-    build: Build
+    build: RecordedDesign
     records: tuple[Record, ...]
 
     def first(self, name: str) -> str:
@@ -128,7 +128,7 @@ class ReportDocument(Document, schema="sbafab/report@1"):
     measured: list[Comparison] = attribute("comparisons")
 
 
-def report(records: Sequence[Record], builds: Mapping[str, Build]) -> Report:
+def report(records: Sequence[Record], builds: Mapping[str, RecordedDesign]) -> Report:
     """Evaluate the records; every design recorded must be among ``builds``."""
     actuators = items(records, builds)
     tested = [item for item in actuators if item.first("leak")]
@@ -140,7 +140,7 @@ def report(records: Sequence[Record], builds: Mapping[str, Build]) -> Report:
     )
 
 
-def items(records: Iterable[Record], builds: Mapping[str, Build]) -> list[Built]:
+def items(records: Iterable[Record], builds: Mapping[str, RecordedDesign]) -> list[Built]:
     """Return the actuators, by design and serial, in the order of their first record."""
     groups: dict[tuple[str, str], list[Record]] = defaultdict(list)
     for record in standing(records):
@@ -154,7 +154,7 @@ def items(records: Iterable[Record], builds: Mapping[str, Build]) -> list[Built]
     return actuators
 
 
-def _names(builds: Mapping[str, Build]) -> dict[str, str]:
+def _names(builds: Mapping[str, RecordedDesign]) -> dict[str, str]:
     """Names of built designs, by hash; designs of the same name get the hash's first digits."""
     names: dict[str, dict[str, None]] = defaultdict(dict)
     for build in builds.values():
@@ -193,7 +193,9 @@ def _success(tested: Sequence[Built]) -> Iterable[Success]:
             yield Success(by, name, share, later, promised if is_one else None)
 
 
-def _comparisons(actuators: Sequence[Built], builds: Mapping[str, Build]) -> Iterable[Comparison]:
+def _comparisons(
+    actuators: Sequence[Built], builds: Mapping[str, RecordedDesign]
+) -> Iterable[Comparison]:
     newest = {build.actuator: build for build in builds.values()}
     for design, group in _groups(actuators, lambda item: item.design):
         for quantity, unit in NUMBERS.items():
@@ -232,7 +234,7 @@ MOST_DRAWN = 400
 """Most points of a curve; with more actuators only every second, third ... is drawn."""
 
 
-def success_svg(records: Sequence[Record], builds: Mapping[str, Build]) -> str:
+def success_svg(records: Sequence[Record], builds: Mapping[str, RecordedDesign]) -> str:
     """Return the chart of success over the actuators, in the order of their first records.
 
     It shows the cumulative share with its 95 % interval, and the share of the last RECENT. Raises

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 from pydantic import TypeAdapter, ValidationError
 
 from sbafab.errors import DesignError, OutputError
-from sbafab.results.builds import Build
+from sbafab.results.builds import RecordedDesign
 from sbafab.results.records import HistoryEntry, LabRow, Record, Row, row_of, standing
 
 APPLICATION, VERSION = 0x5BAFAB, 4
@@ -39,7 +39,7 @@ _SCHEMA = (
     f"PRAGMA application_id = {APPLICATION}",
     f"PRAGMA user_version = {VERSION}",
 )
-"""``content`` is JSON: the fields of a Build, a Record or a HistoryEntry."""
+"""``content`` is JSON: the fields of a RecordedDesign, a Record or a HistoryEntry."""
 
 
 class Contents(NamedTuple):
@@ -50,7 +50,7 @@ class Contents(NamedTuple):
 
     records: list[Record]
     entries: list[HistoryEntry]
-    builds: dict[str, Build]
+    builds: dict[str, RecordedDesign]
 
     def rows(self, kind: type[Row]) -> list[Row]:
         """Return the records or the entries."""
@@ -84,7 +84,7 @@ class Lab:
             return self._contents(file) if self._is_filled(file) else Contents([], [], {})
 
     def add(
-        self, sha256: str, build: Build | None, rows: Sequence[Row], is_again: bool = False
+        self, sha256: str, build: RecordedDesign | None, rows: Sequence[Row], is_again: bool = False
     ) -> list[Row]:
         """Store rows of a design, all or none; ``build`` is added if it is not stored yet.
 
@@ -221,7 +221,7 @@ def _reason(error: sqlite3.Error) -> str:
     return _REASONS.get(code, f"cannot be used as a file of records: {error}")
 
 
-_BUILD = TypeAdapter(Build)
+_BUILD = TypeAdapter(RecordedDesign)
 
 
 def _rows(file: sqlite3.Connection, kind: type[Row]) -> Iterator[Row]:

@@ -1,6 +1,6 @@
 """One run: a request becomes a folder, written beside the old one, verified, and swapped in whole.
 
-Request -> design -> laminate -> checked -> plan -> artefacts -> folder. Command line, Python
+Request -> order of builds -> artefacts -> folder. Command line, Python
 interface and studio all come through ``generate``.
 """
 
@@ -9,8 +9,8 @@ from __future__ import annotations
 import shutil
 import tempfile
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,16 +26,9 @@ from sbafab.models.figures import Prediction
 from sbafab.notebook import table_html
 from sbafab.output.artefacts import tops_of
 from sbafab.output.carry_over import carry_over, refuse_to_replace, removed_files, would_replace
-from sbafab.output.checked import (
-    EVERYTHING,
-    PICTURES,
-    Checked,
-    RunPart,
-    check,
-    plan_design,
-)
+from sbafab.output.checked import EVERYTHING, PICTURES, Build, RunPart, check
 from sbafab.output.folder import close_folder, write_folder
-from sbafab.output.job import CheckedJob, Plan, check_job, plan_job
+from sbafab.output.job import Order, check_job
 from sbafab.output.manifest import as_json, identity
 from sbafab.output.schema_ids import SIMULATE_SCHEMA
 from sbafab.output.swap import JOB_SCHEMA, SCHEMA, listed_files, refuse_busy, replaced_folder
@@ -86,15 +79,16 @@ class RunRequest:
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """The outcome of a run on one design or several; nothing to cut where it ``failed``.
+    """The outcome of a run on one design or several; nothing to cut if it ``failed``.
 
-    ``manifest`` is empty and ``plan`` None where nothing was written.
+    ``manifest`` is empty if nothing was written. ``conforming``: volume and shell meshes, if they
+    were asked for.
     """
 
-    job: CheckedJob
+    order: Order
     folder: Path
     manifest: dict[str, Any] = field(default_factory=dict)
-    plan: Plan | None = None
+    conforming: ConformingMeshes | None = None
     dropped: tuple[str, ...] = ()
     """Files of an older run of another design or version that this one removed."""
     kept: bool = False
@@ -105,44 +99,40 @@ class Run:
     """Simulators that got no input, with the reason."""
 
     @property
-    def checked(self) -> tuple[Checked, ...]:
+    def builds(self) -> tuple[Build, ...]:
         """The designs with the findings in each."""
-        return self.job.designs
+        return self.order.builds
 
     @property
     def between(self) -> tuple[Finding, ...] | None:
         """The findings between the parts of an assembly."""
-        return self.job.between
+        return self.order.between
 
     @property
     def design(self) -> Design:
         """The design, the first one of several."""
-        return self.checked[0].design
+        return self.builds[0].design
 
     @property
     def laminate(self) -> Laminate:
         """The laminate, that of the first design of several."""
-        return self.checked[0].laminate
+        return self.builds[0].laminate
 
     @property
     def schedule(self) -> Schedule | None:
-        """The press schedule, of the first design of several; None where nothing was written."""
-        return self.plan.designs[0].pressing if self.plan is not None else None
-
-    @property
-    def conforming(self) -> ConformingMeshes | None:
-        """The volume and shell meshes, where they were asked for."""
-        return self.plan.designs[0].conforming if self.plan is not None else None
+        """The press schedule, of the first design of several; None if none was written."""
+        is_written = any(path.endswith("press.json") for path in self.manifest.get("files", ()))
+        return self.builds[0].schedule if is_written else None
 
     @property
     def findings(self) -> Findings:
         """The findings of the rules; of several designs, each with its design's name."""
-        return Findings(self.job.findings)
+        return Findings(self.order.findings)
 
     @property
     def failed(self) -> bool:
         """True if a rule failed that the design does not waive; no cut file was written then."""
-        return self.job.failed
+        return self.order.failed
 
     def __repr__(self) -> str:
         return f"Run({str(self.folder)!r}, {'failed' if self.failed else 'holds'})"
@@ -150,7 +140,7 @@ class Run:
     def _repr_html_(self) -> str:
         files = [(str(self.folder / name),) for name in self.manifest.get("files", ())]
         table = table_html(("files written",), files)
-        pictures = "".join(checked.laminate._repr_html_() for checked in self.checked)
+        pictures = "".join(build.laminate._repr_html_() for build in self.builds)
         return pictures + self.findings._repr_html_() + table
 
 
@@ -166,70 +156,77 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     old folder is then whole.
     """
     progress = progress or ignore_progress
-    job = check_job(request.source, request.name, progress)
-    target = request.out / job.name
+    order = check_job(request.source, request.name, progress, request.curves)
+    target = request.out / order.name
     beside = ""
     try:
-        parts = _parts_to_write(request, job, target)
+        parts = _parts_to_write(request, order, target)
     except OccupiedError as reason:
         if set(request.parts) != {"predict"}:
             raise
         beside = str(reason)
-        target = request.out / f"{job.name}-predict"
-        parts = _parts_to_write(request, job, target)
+        target = request.out / f"{order.name}-predict"
+        parts = _parts_to_write(request, order, target)
     if parts is None:
-        return Run(job, target, kept=True)
-    plan = _plan(request, job, parts, target, progress)
+        return Run(order, target, kept=True)
+    refuse_unmakable(order, parts)
+    nests = order.nests(target, progress) if "cut" in parts else ()
+    extras = {} if order.schema != SCHEMA else _extras(request, order.builds[0], parts, progress)
     listed = listed_files(target)
     with replaced_folder(target) as folder:
-        written = write_folder(plan, folder, progress)
-        if job.schema == SCHEMA and not job.failed:
+        written = write_folder(order, parts, nests, folder, progress, **extras)
+        if order.schema == SCHEMA and not order.failed:
             carry_over(target, folder, written.index)
         close_folder(folder, written.index, written.verified)
     removed = removed_files(listed, written.index)
-    return Run(job, target, written.index, plan, removed, beside=beside, left_out=written.left_out)
+    meshes = extras.get("conforming")
+    return Run(
+        order, target, written.index, meshes, removed, beside=beside, left_out=written.left_out
+    )
 
 
-def _parts_to_write(request: RunRequest, job: CheckedJob, target: Path) -> set[RunPart] | None:
-    """Return the parts to be written, of a job that failed only pictures; None to leave all as is.
+def _parts_to_write(request: RunRequest, order: Order, target: Path) -> set[RunPart] | None:
+    """Return the parts to be written, of an order that failed only pictures; None to leave all as
+    is.
 
-    Raises OutputError where some parts alone would take the place of another design's files.
+    Raises OutputError if some parts alone would take the place of another design's files.
     """
-    parts = set(request.parts) if job.schema == SCHEMA else set(EVERYTHING)
-    checked = job.designs[0]
-    if job.failed:
-        mine = identity(checked.design, checked.waived) if job.schema == SCHEMA else None
-        if job.schema == JOB_SCHEMA or would_replace(target, mine):
+    parts = set(request.parts) if order.schema == SCHEMA else set(EVERYTHING)
+    build = order.builds[0]
+    if order.failed:
+        mine = identity(build) if order.schema == SCHEMA else None
+        if order.schema == JOB_SCHEMA or would_replace(target, mine):
             return None
         return parts & set(PICTURES)
     if not parts >= set(EVERYTHING):
-        written = tops_of(*(parts - set(PICTURES)))
-        refuse_to_replace(target, checked.design, checked.waived, written)
+        refuse_to_replace(target, build, tops_of(*(parts - set(PICTURES))))
     return parts
 
 
-def _plan(
-    request: RunRequest, job: CheckedJob, parts: set[RunPart], target: Path, progress: Progress
-) -> Plan:
-    """Compute schedule, nest and meshes before anything is written: they may refuse the design."""
-    designs = [plan_design(checked, parts, request.curves) for checked in job.designs]
-    for each in designs:
-        if each.paths and request.curves.in_chords:
-            checked = each.checked
-            refuse_coarse(checked.laminate, each.paths, each.settings, checked.design)
-    plan = plan_job(job, designs, target, progress)
-    if job.schema != SCHEMA:
-        return plan
-    (design,) = designs
-    design = replace(design, prediction=request.prediction, simulated=request.simulated)
-    if request.conforming is not None and "mesh" in parts:
-        # Conforming meshes take the extra "mesh".
-        from sbafab.meshing.conforming.meshes import conforming_meshes
+def refuse_unmakable(order: Order, parts: Collection[RunPart]) -> None:
+    """Raises DesignError, before anything is written, if press, kerf or chords cannot do the builds
+    of an order.
+    """
+    for build in order.builds:
+        if "press" in parts:
+            assert build.schedule
+        if "cut" in parts and build.curves.in_chords:
+            refuse_coarse(build.laminate, build.paths, build.settings, build.design)
 
-        progress("meshing", 0, 1)
-        meshes = conforming_meshes(design.checked.laminate, request.conforming.settings)
-        design = replace(design, conforming=meshes, formats=request.conforming.formats)
-    return replace(plan, designs=(design,))
+
+def _extras(
+    request: RunRequest, build: Build, parts: Collection[RunPart], progress: Progress
+) -> dict[str, Any]:
+    """Return what a run on one design writes beside what follows from the design."""
+    extras = {"prediction": request.prediction, "simulated": request.simulated}
+    if request.conforming is None or "mesh" not in parts:
+        return extras
+    # Conforming meshes take the extra "mesh".
+    from sbafab.meshing.conforming.meshes import conforming_meshes
+
+    progress("meshing", 0, 1)
+    meshes = conforming_meshes(build.laminate, request.conforming.settings)
+    return {**extras, "conforming": meshes, "formats": request.conforming.formats}
 
 
 # A simulator run on a design, its results in the design's folder.
@@ -291,20 +288,20 @@ def simulate(
     wish = under_vacuum(name, wish) if design.form.works_under_vacuum else wish
     result = None
     with tempfile.TemporaryDirectory() as temporary:
-        checked = check(design, progress)
-        if checked.failed:
-            return Simulated(checked.findings, None)
+        build = check(design, progress)
+        if build.failed:
+            return Simulated(build.findings, None)
         # Said before a run of hours, not after it.
-        refuse_to_replace(out / design.name, design, checked.waived, (name,))
+        refuse_to_replace(out / design.name, build, (name,))
         refuse_busy(out / design.name)
-        _warn_past_burst(checked.laminate, wish)
+        _warn_past_burst(build.laminate, wish)
         # A folder in the temporary one has the usual rights, the temporary one itself has not.
         folder = Path(temporary) / name
         if export:
-            simulator(name).export(checked.laminate, wish, folder)
+            simulator(name).export(build.laminate, wish, folder)
         else:
             try:
-                result = simulator(name).run(checked.laminate, wish, folder, progress)
+                result = simulator(name).run(build.laminate, wish, folder, progress)
             except OutputError as error:
                 raise _with_log(error, folder, out / f"{design.name}-{name}-failed.log") from None
             text = as_json(result_json(result))
@@ -315,9 +312,9 @@ def simulate(
             if result is None:
                 raise
             return Simulated(
-                checked.findings, _kept(folder, out / f"{design.name}-{name}"), result, str(error)
+                build.findings, _kept(folder, out / f"{design.name}-{name}"), result, str(error)
             )
-    return Simulated(checked.findings, run.folder / name, result)
+    return Simulated(build.findings, run.folder / name, result)
 
 
 def _warn_past_burst(laminate: Laminate, wish: SimulationRequest) -> None:

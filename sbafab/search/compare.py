@@ -28,7 +28,7 @@ from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import MOST_PRESSURE, stack
-from sbafab.output.checked import Checked, check
+from sbafab.output.checked import Build, check
 from sbafab.output.swap import replace_text
 from sbafab.process import Progress, ignore_progress
 from sbafab.reports.html_templates import environment
@@ -68,7 +68,7 @@ class ComparedDesign:
     """
 
     source: str
-    checked: Checked
+    checked: Build
     rules: Mapping[str, RuleMargin]
     figures: tuple[Figure, ...]
 

@@ -17,7 +17,7 @@ from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.mechanisms import ASKED
 from sbafab.models.paper import WATER_FLOW
 from sbafab.models.stack import MOST_PRESSURE
-from sbafab.output.checked import Checked, refuse_undoable
+from sbafab.output.checked import Build, refuse_undoable
 from sbafab.process import Progress
 from sbafab.rules.deck import run_deck
 from sbafab.search.measure import RuleMargin, margins
@@ -243,7 +243,7 @@ def evaluated(problem: SearchProblem, values: Mapping[str, Any], with_rules: boo
         if with_rules or problem.needs_yield:
             findings = run_deck(laminate, design)
             rules = margins(findings)
-            checked = Checked(design, laminate, findings)
+            checked = Build(design, laminate, findings)
             if not checked.failed:
                 refuse_undoable([checked])
         subject = problem.subject(design, laminate)

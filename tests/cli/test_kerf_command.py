@@ -202,7 +202,7 @@ def test_a_calibrated_folder_checks_as_built(
     assert kerf["PTFE"] == {"state": "compensated", "width": [0.1, 0.08]}
     code, out, _ = run(["check", "-v", str(folder)], capsys)
     assert code == 0
-    assert "the manifest's claims hold" in " ".join(out.split())
+    assert "hashes and manifest match the files" in " ".join(out.split())
 
 
 def test_a_kerf_that_takes_a_bore_is_told_with_its_place(

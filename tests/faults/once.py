@@ -21,7 +21,8 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     """
     remake = as_built._remake
     check = _remembered(
-        as_built.check, lambda design: f"{design.model_dump_json()} {id(checked.run_deck)}"
+        as_built.check,
+        lambda design, curves: f"{design.model_dump_json()} {curves} {id(checked.run_deck)}",
     )
     expected = _remembered(
         as_built.expected_laminate, lambda made, settings: f"{made.name} {settings}"
@@ -32,7 +33,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
         asked = [folder / name for name in ("design.toml", "sheets/nest.json")]
         files = [path.read_bytes() if path.exists() else b"" for path in asked]
         claims = built.claims
-        said = repr((sorted(claims.files), claims.curves, built.checked.findings)).encode()
+        said = repr((sorted(claims.files), claims.curves, built.build.findings)).encode()
         key = sha256(b"".join(files) + said).hexdigest()
         if key not in made:
             (root / key).mkdir(parents=True)
@@ -55,10 +56,10 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
 def _remembered(work: Callable[..., Any], key: Callable[..., str]) -> Callable[..., Any]:
     known: dict[str, Any] = {}
 
-    def asked(*args: Any) -> Any:
-        own = key(*args)
+    def asked(*args: Any, **more: Any) -> Any:
+        own = key(*args, **more)
         if own not in known:
-            known[own] = work(*args)
+            known[own] = work(*args, **more)
         return known[own]
 
     return asked

@@ -90,7 +90,7 @@ def test_a_failing_design_stops_the_whole_job(tmp_path: Path) -> None:
     bad = load_design("1dof-10mm", ["bond.width=0.4"])
     stopped = generate(RunRequest([*designs(), bad], tmp_path, name="batch"))
     assert stopped.failed
-    assert [one.failed for one in stopped.checked] == [False, False, True]
+    assert [one.failed for one in stopped.builds] == [False, False, True]
     assert list(tmp_path.iterdir()) == []
 
 

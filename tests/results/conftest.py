@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from sbafab.results.builds import Build
+from sbafab.results.builds import RecordedDesign
 from sbafab.results.records import HistoryEntry, Record
 from sbafab.results.store import Lab
 
 SHA = "c0ffee" + 58 * "0"
 
 
-def build(**changed: object) -> Build:
+def build(**changed: object) -> RecordedDesign:
     """What is stored of a design: predictions chosen by the test."""
     plain = {
         "sha256": SHA,
@@ -29,7 +29,7 @@ def build(**changed: object) -> Build:
         "good_builds": (900, 1000),
         "actuator_sha256": changed.get("sha256", SHA),
     }
-    return Build(**{**plain, **changed})  # type: ignore[arg-type]
+    return RecordedDesign(**{**plain, **changed})  # type: ignore[arg-type]
 
 
 def result(serial: str, leak: str = "", **values: Any) -> Record:
@@ -42,7 +42,7 @@ def step(serial: str = "A1", **values: Any) -> HistoryEntry:
 
 
 @pytest.fixture
-def make_build() -> Callable[..., Build]:
+def make_build() -> Callable[..., RecordedDesign]:
     return build
 
 

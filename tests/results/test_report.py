@@ -13,7 +13,7 @@ from scipy.stats import binomtest
 import sbafab
 from sbafab.design.identity import actuator_sha256, design_sha256
 from sbafab.errors import DesignError
-from sbafab.results.builds import Build, promised
+from sbafab.results.builds import RecordedDesign, promised
 from sbafab.results.recording import matching
 from sbafab.results.records import Record
 from sbafab.results.report import Report, report, success_svg
@@ -43,7 +43,7 @@ LOTS = (
 )
 
 
-def invented(lot: Lot, number: int, seed: int) -> tuple[list[Record], Build]:
+def invented(lot: Lot, number: int, seed: int) -> tuple[list[Record], RecordedDesign]:
     """A record for each actuator of a lot."""
     draw = random.Random(seed)
     sha256 = f"{number:064x}"
