@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.errors import DesignError
 from sbafab.models.joint_chain import JOINTS, joint_values, urdf_text
 from sbafab.models.stack import Stack
 from sbafab.simulators.mujoco.mjcf import ACCURACY, PressedChain, chain_text, length_of
@@ -129,11 +128,6 @@ def test_a_film_without_density_has_a_mass_that_stands_in(stacks: dict[str, Stac
     assert "a film has no density" in text
     model = mujoco.MjModel.from_xml_string(text)
     assert float(model.body_mass.sum()) == pytest.approx(6e-5)
-
-
-def test_pressures_are_one_a_chamber(stacks: dict[str, Stack]) -> None:
-    with pytest.raises(DesignError, match="give one a chamber"):
-        chain_text("lobed", stacks["lobed"], (10.0,))
 
 
 def test_mujoco_reads_the_urdf_as_the_same_chain(stacks: dict[str, Stack]) -> None:

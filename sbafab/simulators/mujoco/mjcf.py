@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,19 +11,12 @@ import numpy as np
 from sbafab.errors import DesignError
 from sbafab.models.derivatives import Linearised, linearised
 from sbafab.models.film_elements import Array
-from sbafab.models.joint_chain import (
-    JOINTS,
-    axis_of,
-    disc_inertia,
-    document,
-    joint_values,
-    number,
-    numbers,
-    plate_mass,
-)
+from sbafab.models.joint_chain import JOINTS, axis_of, disc_inertia, joint_values, plate_mass
 from sbafab.models.stack import Pose, Stack
 from sbafab.models.stack_loads import plate_chain
+from sbafab.simulators.model_files import model_file
 
+TEMPLATE = Path(__file__).parent / "templates" / "chain.xml.j2"
 ACCURACY = 0.02
 """Largest error of the tip's position, as a share of the stack's length."""
 LINEAR_SHARE = 0.9
@@ -58,28 +51,39 @@ def chain_text(name: str, stack: Stack, pressures: Sequence[float]) -> str:
     """
     pose = stack.pose(pressures)
     at = linearised(stack, pose)
+    listed = ", ".join(f"{pressure:g}" for pressure in pose.pressures)
     if np.linalg.eigvalsh(at.matrices).min() <= 0:
         raise DesignError(
-            f"the pose at {_listed(pose.pressures)} kPa is about to buckle, so that no springs "
+            f"the pose at {listed} kPa is about to buckle, so that no springs "
             "hold it; give other --pressures"
         )
     span = valid_range(stack, pose, at)
-    root = ET.Element("mujoco", {"model": name})
-    ET.SubElement(root, "compiler", {"angle": "radian"})
-    option = {"timestep": number(DT), "gravity": "0 0 0", "integrator": "implicit"}
-    ET.SubElement(ET.SubElement(root, "option", option), "flag", {"contact": "disable"})
-    height = pose.height
-    centre = {"center": numbers((0, 0, height / 2)), "extent": number(max(height, 5.0))}
-    ET.SubElement(root, "statistic", centre)
-    _add_plates(ET.SubElement(root, "worldbody"), stack)
-    tendons = ET.SubElement(root, "tendon")
-    _add_springs(tendons, at)
-    _add_chambers(tendons, at)
-    if span:
-        _add_controls(ET.SubElement(root, "actuator"), stack, pose, span)
-    key = {"name": POSE, "qpos": numbers(joint_values(at.freedoms).ravel().round(12))}
-    ET.SubElement(ET.SubElement(root, "keyframe"), "key", key)
-    return document(root, _note(name, stack, pose, span))
+    mass = plate_mass(stack) or MASS
+    across, along = disc_inertia(mass / 2, stack.outline, stack.pitch)
+    center = np.array(pose.pressures)[:, None]
+    ends = np.clip(center + np.array([-span, span]), 0.0, stack.most_pressure) - center
+    return model_file(
+        TEMPLATE,
+        name,
+        pressures=listed,
+        pose=pose,
+        stack=stack,
+        count=len(stack.levels),
+        span=span,
+        share=f"{100 * ACCURACY:g} %",
+        length=length_of(pose),
+        mass=mass,
+        weighs=stack.weight is not None,
+        inertia=(across, across, along),
+        joint_names=JOINTS,
+        axis_of=axis_of,
+        tendons=[*_springs(at), *_chambers(at)],
+        ranges=ends,
+        places=joint_values(at.freedoms).round(12),
+        key=POSE,
+        settling=SETTLING,
+        dt=DT,
+    )
 
 
 def valid_range(stack: Stack, pose: Pose, at: Linearised) -> float:
@@ -112,37 +116,12 @@ def length_of(pose: Pose) -> float:
     return float((pose.freedoms[:, 0] + pose.pitch).sum())
 
 
-def _add_plates(world: ET.Element, stack: Stack) -> None:
-    """Add two bodies per level: the part between its halves, then its upper plate."""
-    mass = plate_mass(stack) or MASS
-    size = numbers((stack.outline, stack.pitch / 4))
-    shape = {"type": "cylinder", "size": size, "contype": "0", "conaffinity": "0", "mass": "0"}
-    paint = {"rgba": "0.35 0.60 0.85 1"}
-    ET.SubElement(world, "geom", {"name": "base", **shape, "rgba": "0.4 0.4 0.4 1"})
-    across, along = disc_inertia(mass / 2, stack.outline, stack.pitch)
-    inertial = {
-        "pos": "0 0 0",
-        "mass": number(mass / 2),
-        "diaginertia": numbers((across, across, along)),
-    }
-    body = world
-    for level in range(1, len(stack.levels) + 1):
-        for title, joints, place in (
-            (f"level{level}", JOINTS[:3], 0.0),
-            (f"plate{level}", JOINTS[3:], stack.pitch),
-        ):
-            body = ET.SubElement(body, "body", {"name": title, "pos": numbers((0, 0, place))})
-            ET.SubElement(body, "inertial", inertial)
-            for joint in joints:
-                kind = "slide" if joint == "rise" else "hinge"
-                parts = {"name": f"level{level}_{joint}", "type": kind, "axis": axis_of(joint)}
-                ET.SubElement(body, "joint", parts)
-        ET.SubElement(body, "geom", {**shape, **paint})
-    ET.SubElement(body, "site", {"name": "tip"})
+Tendon = tuple[str, tuple[float, float] | None, list[tuple[str, float]]]
+"""Name, stiffness and length of its spring, if it has one, and its joints with their factors."""
 
 
-def _add_springs(tendons: ET.Element, at: Linearised) -> None:
-    """Add three springs per level with the energy q H q / 2, where H = L D L^T are the second
+def _springs(at: Linearised) -> Iterator[Tendon]:
+    """Three springs per level with the energy q H q / 2, where H = L D L^T are the second
     derivatives by its freedoms: D holds stiffnesses, and L each spring's length by freedom.
 
     Stiffer springs keep both halves of a tilt equal: MuJoCo's equality constraints ignore dampers,
@@ -150,84 +129,35 @@ def _add_springs(tendons: ET.Element, at: Linearised) -> None:
     """
     lower = np.linalg.cholesky(at.matrices)
     roots = np.diagonal(lower, axis1=1, axis2=2)
-    for level, (columns, stiffnesses) in enumerate(
-        zip(lower / roots[:, None], roots**2, strict=True), start=1
-    ):
-        lengths = at.freedoms[level - 1] @ columns
+    levels = zip(lower / roots[:, None], roots**2, at.freedoms, strict=True)
+    for level, (columns, stiffnesses, freedoms) in enumerate(levels, start=1):
+        lengths = (freedoms @ columns).round(12)
         for spring, ways, stiffness, length in zip(
-            SPRINGS, columns.T, stiffnesses, lengths, strict=True
+            SPRINGS, columns.T, stiffnesses.tolist(), lengths.tolist(), strict=True
         ):
-            tendon = _damped(tendons, f"level{level}_{spring}", stiffness, length)
-            _add_joints(tendon, level, ways)
-        for joints in FREEDOMS[1:]:
-            name = f"level{level}_{joints[0]}_halves"
-            tendon = _damped(tendons, name, MIRROR * float(stiffnesses[1:].max()), 0.0)
-            for joint, sign in zip(joints, ("1", "-1"), strict=True):
-                ET.SubElement(tendon, "joint", {"joint": f"level{level}_{joint}", "coef": sign})
+            yield f"level{level}_{spring}", (stiffness, length), _joints(level, ways)
+        for joint, other in FREEDOMS[1:]:
+            halves = [(f"level{level}_{joint}", 1.0), (f"level{level}_{other}", -1.0)]
+            stiffness = MIRROR * float(stiffnesses[1:].max())
+            yield f"level{level}_{joint}_halves", (stiffness, 0.0), halves
 
 
-def _damped(tendons: ET.Element, name: str, stiffness: float, length: float) -> ET.Element:
-    """Add a spring with its damper, without joints yet."""
-    parts = {
-        "name": name,
-        "stiffness": number(stiffness),
-        "damping": number(stiffness * SETTLING),
-        "springlength": number(round(length, 12)),
-    }
-    return ET.SubElement(tendons, "fixed", parts)
+def _chambers(at: Linearised) -> Iterator[Tendon]:
+    """A tendon per chamber: its length grows like the chamber's volume, in ul."""
+    for chamber, rates in enumerate(at.filling, start=1):
+        parts = [part for level, ways in enumerate(rates, 1) for part in _joints(level, ways)]
+        yield f"chamber{chamber}", None, parts
 
 
-def _add_joints(tendon: ET.Element, level: int, ways: Array) -> None:
-    """Add the joints of one level to a tendon's length, by its freedoms (3,)."""
+def _joints(level: int, ways: Array) -> list[tuple[str, float]]:
+    """The joints of one level with their parts in a tendon's length, by its freedoms (3,)."""
     # Ignore coefficients that are only rounding.
     least = 1e-9 * float(np.abs(ways).max())
-    for joints, way in zip(FREEDOMS, ways.tolist(), strict=True):
-        for joint in joints if abs(way) > least else ():
-            parts = {"joint": f"level{level}_{joint}", "coef": number(way)}
-            ET.SubElement(tendon, "joint", parts)
-
-
-def _add_chambers(tendons: ET.Element, at: Linearised) -> None:
-    """Add a tendon per chamber: its length grows like the chamber's volume, in ul."""
-    for chamber, rates in enumerate(at.filling, start=1):
-        tendon = ET.SubElement(tendons, "fixed", {"name": f"chamber{chamber}"})
-        for level, ways in enumerate(rates, start=1):
-            _add_joints(tendon, level, ways)
-
-
-def _add_controls(actuator: ET.Element, stack: Stack, pose: Pose, span: float) -> None:
-    for chamber, pressure in enumerate(pose.pressures, start=1):
-        ends = np.clip((pressure - span, pressure + span), 0.0, stack.most_pressure) - pressure
-        parts = {"name": f"chamber{chamber}", "tendon": f"chamber{chamber}"}
-        parts |= {"ctrllimited": "true", "ctrlrange": numbers(ends)}
-        ET.SubElement(actuator, "motor", parts)
-
-
-def _listed(pressures: Sequence[float]) -> str:
-    return ", ".join(f"{pressure:g}" for pressure in pressures)
-
-
-def _note(name: str, stack: Stack, pose: Pose, span: float) -> str:
-    share = f"{100 * ACCURACY:g} %"
-    valid = (
-        f"ctrl of a chamber is by how many kPa it is above that. At {span:g} kPa more or less,\n"
-        f"each chamber alone or all together, the tip settles within {share} of the stack's\n"
-        f"length ({length_of(pose):.4g} mm) of the elastic stack's place."
-        if span
-        else "Balloons change so much with pressure there that no range of it keeps the tip\n"
-        f"within {share} of the stack's length: there are no controls."
-    )
-    mass = "the films'" if stack.weight is not None else f"{MASS:g} kg, for a film has no density"
-    return f"""\
-{name}: rigid plates on springs for MuJoCo, for {_listed(pose.pressures)} kPa in its chambers.
-Units: mm, kg, s; so force mN, pressure kPa, volume ul.
-It settles there, with the tip at {numbers(np.round(pose.tip, 4))} mm and bent by
-{pose.bend:.1f} degrees; so it starts in the key "{POSE}", else flat.
-{valid}
-Springs are the elastic stack's second derivatives at that pose, for small motions and loads about
-it; rims that meet or part are not in it. The length of tendon chamber<i> grows with its volume.
-A plate's mass is {mass}. Dampers settle each level in some {SETTLING:g} s,
-as no actuator does: states at rest alone mean something. Not in it: gravity, contact."""
+    return [
+        (f"level{level}_{joint}", way)
+        for joints, way in zip(FREEDOMS, ways.tolist(), strict=True)
+        for joint in (joints if abs(way) > least else ())
+    ]
 
 
 class PressedChain:
