@@ -1,4 +1,4 @@
-"""Files of models in XML, from templates, as several simulators take them."""
+"""Files of models from templates, as several simulators take them."""
 
 from __future__ import annotations
 
@@ -29,12 +29,17 @@ def model_file(
     """
     # Two hyphens in a row would end the comment.
     title = name.replace("--", "- -")
-    made = _environment(template.parent).get_template(template.name)
-    head, end, body = made.render(values, name=name, title=title).partition("-->\n")
+    text = rendered(template, name=name, title=title, **values)
+    head, end, body = text.partition("-->\n")
     root = ET.fromstring(body)
     finish(root)
     ET.indent(root, " ")
     return f"{head}{end}{ET.tostring(root, encoding='unicode')}\n"
+
+
+def rendered(template: Path, **values: object) -> str:
+    """Return a template with its values; the filter ``numbers`` is the function of that name."""
+    return _environment(template.parent).get_template(template.name).render(values)
 
 
 @cache

@@ -18,6 +18,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.meshing.formats.inp import write_inp
 from sbafab.simulators.coarse import elastic_of
+from sbafab.simulators.model_files import rendered, write_files
 from sbafab.simulators.simulator import LARGEST_VACUUM, SimulationRequest, chamber_pressures
 
 Procedure = Literal["dynamic", "static"]
@@ -240,24 +241,10 @@ def _normal(places: NDArray[np.float64]) -> NDArray[np.float64]:
 # Both read the same keywords, except for output requests.
 
 
+TEMPLATE = Path(__file__).parent / "templates" / "deck.inp.j2"
 JOB = "actuator"
 MESH_FILE = "mesh.inp"
 ABAQUS_FILE = "abaqus.inp"
-FIRST, LEAST = 0.1, 1e-7
-"""First increment as a fraction of the output interval, and least one as a fraction of the ramp."""
-DAMPING = -0.3
-"""Numerical damping of high frequencies (Hilber, Hughes and Taylor): the largest possible."""
-MOST_INCREMENTS = 100_000
-ABAQUS_OUTPUTS = """\
-*OUTPUT, FIELD, TIME POINTS=outputs
-*NODE OUTPUT
-U, RF
-*ELEMENT OUTPUT
-S
-*OUTPUT, HISTORY, TIME POINTS=outputs
-*ENERGY OUTPUT
-ALLSE, ALLKE
-"""
 
 
 def write_deck(mesh: Mesh, settings: DeckSettings, folder: Path) -> list[Path]:
@@ -269,12 +256,16 @@ def write_deck(mesh: Mesh, settings: DeckSettings, folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     run_mesh = started(mesh, settings)
     write_inp(run_mesh, folder / MESH_FILE)
-    decks = {f"{JOB}.inp": _ccx_outputs(settings), ABAQUS_FILE: ABAQUS_OUTPUTS}
-    for name, outputs in decks.items():
-        with (folder / name).open("w", encoding="ascii", newline="\n") as file:
-            file.writelines(_lines(run_mesh, settings))
-            file.write(f"{outputs}*END STEP\n")
-    return [*(folder / name for name in decks), folder / MESH_FILE]
+    values = {
+        "settings": settings,
+        "mesh_file": MESH_FILE,
+        "faces": list(_cavity_faces(run_mesh)),
+        "films": list(_films(run_mesh, settings)),
+        "supports": "".join(supports(run_mesh, settings.is_free, settings.is_glued)),
+    }
+    programs = {f"{JOB}.inp": "ccx", ABAQUS_FILE: "abaqus"}
+    texts = {name: rendered(TEMPLATE, program=of, **values) for name, of in programs.items()}
+    return [*write_files(texts, folder), folder / MESH_FILE]
 
 
 def started(mesh: Mesh, settings: DeckSettings) -> Mesh:
@@ -282,72 +273,16 @@ def started(mesh: Mesh, settings: DeckSettings) -> Mesh:
     return replace(mesh, points=uneven(mesh.points, settings.imperfection))
 
 
-def _lines(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
-    pressures = ", ".join(f"{name} {value:g} kPa" for name, value in settings.pressures.items())
-    yield "*HEADING\n"
-    yield "Stacked balloon actuator; units mm, N, MPa, t, s\n"
-    yield f"** Pressures at the end: {pressures}\n"
-    yield f"*INCLUDE, INPUT={MESH_FILE}\n"
-    yield from _cavity_faces(mesh)
-    yield from _sections(mesh, settings)
-    yield from supports(mesh, settings.is_free, settings.is_glued)
-    for name in settings.pressures:
-        yield f"*AMPLITUDE, NAME=ramp_{name}\n"
-        yield "".join(f"{time:.9g}, {settings.share(time):.9g}\n" for time in settings.times())
-    yield from _step(mesh, settings)
-
-
-def _sections(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
-    """The films' materials, and the elements of each."""
+def _films(mesh: Mesh, settings: DeckSettings) -> Iterator[tuple[str, Elastic, list[str]]]:
+    """The name of each film, its material, and the parts of the mesh that are of it."""
     films = {"TPE": settings.film, **settings.others}
-    used = in_order(mesh.materials.values()) or ["TPE"]
-    for name in used:
-        film, elements = films[name], "all_elements"
-        if len(used) > 1:
-            elements = f"material_{name}"
-            yield f"*ELSET, ELSET={elements}\n"
-            yield from (f"{part}\n" for part, of in mesh.materials.items() if of == name)
-        yield f"*MATERIAL, NAME={name}\n"
-        yield f"*ELASTIC\n{film.modulus:g}, {film.poisson:g}\n*DENSITY\n{film.density:g}\n"
-        yield f"*SOLID SECTION, ELSET={elements}, MATERIAL={name}\n"
+    for name in in_order(mesh.materials.values()) or ["TPE"]:
+        yield name, films[name], [part for part, of in mesh.materials.items() if of == name]
 
 
-def _step(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
-    between = settings.ramp / settings.outputs
-    dynamic = f"*DYNAMIC, ALPHA={DAMPING:g}\n"
-    yield "*TIME POINTS, NAME=outputs\n"
-    yield "".join(f"{time:.9g}\n" for time in settings.times()[1:])
-    yield f"*STEP, NLGEOM, INC={MOST_INCREMENTS}\n"
-    yield dynamic if settings.procedure == "dynamic" else "*STATIC\n"
-    yield (
-        f"{FIRST * between:.6g}, {settings.ramp:.9g}, {LEAST * settings.ramp:.6g}, {between:.9g}\n"
-    )
-    for name, kilopascals in settings.pressures.items():
-        yield f"*DLOAD, AMPLITUDE=ramp_{name}\n"
-        for number in _face_numbers(mesh, name):
-            yield f"faces_{name}_{number}, P{number}, {kilopascals / 1000:.9g}\n"
-
-
-def _ccx_outputs(settings: DeckSettings) -> str:
-    energies = "ELSE, ELKE" if settings.procedure == "dynamic" else "ELSE"
-    return (
-        "*NODE FILE, TIME POINTS=outputs\nU\n*EL FILE, TIME POINTS=outputs\nS\n"
-        "*NODE PRINT, NSET=held, TOTALS=ONLY, TIME POINTS=outputs\nRF\n"
-        f"*EL PRINT, ELSET=all_elements, TOTALS=ONLY, TIME POINTS=outputs\n{energies}\n"
-    )
-
-
-def _face_numbers(mesh: Mesh, chamber: str) -> list[int]:
-    """Numbers, from 1, of the element faces that a chamber's air presses on."""
-    faces = mesh.face_sets.get(f"cavity_{chamber}")
-    return [] if faces is None else [int(n) + 1 for n in np.unique(faces[:, 1])]
-
-
-def _cavity_faces(mesh: Mesh) -> Iterator[str]:
-    """An element set for each chamber and face number: each face is in exactly one."""
+def _cavity_faces(mesh: Mesh) -> Iterator[tuple[str, int, list[int]]]:
+    """Chamber, number of an element's face, and the elements with air on it, all from 1."""
     for name, faces in mesh.face_sets.items():
-        chamber = name.removeprefix("cavity_")
-        for number in _face_numbers(mesh, chamber):
-            cells = faces[faces[:, 1] == number - 1, 0] + 1
-            yield f"*ELSET, ELSET=faces_{chamber}_{number}\n"
-            yield "".join(f"{cell}\n" for cell in cells.tolist())
+        for number in np.unique(faces[:, 1]).tolist():
+            cells = faces[faces[:, 1] == number, 0] + 1
+            yield name.removeprefix("cavity_"), number + 1, cells.tolist()

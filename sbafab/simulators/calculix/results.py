@@ -18,9 +18,9 @@ import numpy as np
 from sbafab.errors import OutputError
 from sbafab.geometry.region import disc
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.element_mesh import flat_triangles
+from sbafab.meshing.conforming.element_mesh import flat_triangles, skin
 from sbafab.meshing.conforming.layup import Symmetry, images, sector
-from sbafab.meshing.conforming.mesh import CORNERS, FACES, Mesh
+from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.meshing.formats.vtu import write_fields
 from sbafab.meshing.surface import Surface
 from sbafab.reports.canvas import AMBIENT, draw_length_bar, rasterize, view_of
@@ -314,7 +314,8 @@ def deformed_png(mesh: Mesh, frame: Frame, caption: str) -> bytes:
     """The deformed surface in oblique parallel view with a scale of von Mises stress."""
     from PIL import Image, ImageDraw
 
-    surface = Surface(mesh.points + frame.displacement, _skin(mesh))
+    triangles = flat_triangles(mesh.kind, mesh.cells, skin(mesh))
+    surface = Surface(mesh.points + frame.displacement, triangles)
     width, height = (side * ENLARGED for side in SIZE)
     edge, foot = MARGIN * ENLARGED, FOOT * ENLARGED
     view = view_of([surface], ELEVATION, AZIMUTH, (edge, edge, width - edge, height - edge - foot))
@@ -330,22 +331,6 @@ def deformed_png(mesh: Mesh, frame: Frame, caption: str) -> bytes:
     out = BytesIO()
     picture.save(out, "PNG", compress_level=6)
     return out.getvalue()
-
-
-def _skin(mesh: Mesh) -> NDArray[np.int64]:
-    """Triangles (k, 3) of every element face not shared with another element."""
-    count = len(mesh.cells)
-    faces, keys = [], []
-    for number, local in enumerate(FACES[mesh.kind]):
-        corners = np.full((count, 4), -1)
-        chosen = [node for node in local if node < CORNERS[mesh.kind]]
-        corners[:, : len(chosen)] = mesh.cells[:, chosen]
-        keys.append(np.sort(corners, axis=1))
-        faces.append(np.column_stack([np.arange(count), np.full(count, number)]))
-    _, which, times = np.unique(
-        np.concatenate(keys), axis=0, return_inverse=True, return_counts=True
-    )
-    return flat_triangles(mesh.kind, mesh.cells, np.concatenate(faces)[times[which.ravel()] == 1])
 
 
 def _coloured(share: NDArray[np.float64]) -> NDArray[np.float64]:
