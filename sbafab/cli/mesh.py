@@ -7,7 +7,7 @@ import click
 from sbafab.cli.options import LENGTH, VOLUME, OfChamber, Request, by_chamber, run_options
 from sbafab.cli.run import run_parts
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
-from sbafab.meshing.formats.registry import CONFORMING_ENDINGS
+from sbafab.meshing.formats import CONFORMING_ENDINGS
 from sbafab.runs.run import Conforming
 
 

@@ -10,8 +10,7 @@ from typing import Literal
 
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.formats.registry import MESH_FORMATS
-from sbafab.meshing.formats.surfaces import write_stl
+from sbafab.meshing.formats import MESH_FORMATS, write_stl
 from sbafab.meshing.solid import SAGITTA, cavity, sealed, solid
 from sbafab.meshing.surface import Surface
 from sbafab.meshing.wrap import TubeWrap, tube_wrap, wrapped

@@ -14,7 +14,7 @@ from sbafab.assemblies.records import Cup
 from sbafab.assemblies.shapes import colours, cup_mould, linear, placed_surface
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DefectError
-from sbafab.meshing.formats.surfaces import Node, write_scene, write_stl
+from sbafab.meshing.formats import Node, write_scene, write_stl
 from sbafab.nesting.records import Nest
 from sbafab.output.artefacts import (
     BENCH,

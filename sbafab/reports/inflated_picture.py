@@ -14,7 +14,7 @@ import numpy as np
 from sbafab.assemblies.shapes import linear
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.formats.surfaces import Node, write_glb, write_scene
+from sbafab.meshing.formats import Node, write_glb, write_scene
 from sbafab.meshing.solid import solid
 from sbafab.meshing.surface import Surface
 from sbafab.models.paper import counterparts_of_pose

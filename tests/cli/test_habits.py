@@ -339,7 +339,7 @@ def test_known_keys_are_those_that_a_file_may_hold(
 def test_mesh_formats_are_called_as_they_are_written() -> None:
     """The version of Gmsh's format, wherever it is named, is the one in the files' first lines."""
     root = Path(__file__).parents[2]
-    writer = (root / "sbafab/meshing/formats/msh.py").read_text(encoding="utf-8")
+    writer = (root / "sbafab/meshing/formats.py").read_text(encoding="utf-8")
     version = re.findall(r"MeshFormat.n(\d\.\d)", writer)[0]
     places = [*root.glob("docs/*.md"), *root.glob("docs/scripts/*.py"), root / "README.md"]
     named = [

@@ -11,7 +11,7 @@ from random import Random
 from typing import Any
 from zipfile import ZipFile
 
-from sbafab.meshing.formats.three_mf import _write_zip
+from sbafab.meshing.formats import write_zip
 
 Change = Callable[[bytes, Random], bytes]
 NUMBER = re.compile(r"(?<![\w.#-])-?\d+(?:\.\d+)?(?![\w.])")
@@ -233,7 +233,7 @@ def zipped_number(data: bytes, draw: Random) -> bytes:
     new = changed_number(match[0], draw)
     parts["3D/3dmodel.model"] = model[: match.start()] + new + model[match.end() :]
     out = BytesIO()
-    _write_zip(out, parts)  # type: ignore[arg-type]
+    write_zip(out, parts)  # type: ignore[arg-type]
     return out.getvalue()
 
 

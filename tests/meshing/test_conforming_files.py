@@ -18,7 +18,7 @@ from sbafab.meshing.conforming.meshes import (
     conforming_meshes,
     write_conforming,
 )
-from sbafab.meshing.formats.registry import CONFORMING_ENDINGS
+from sbafab.meshing.formats import CONFORMING_ENDINGS
 from sbafab.meshing.mesh_files import MeshFile
 
 Written = tuple[ConformingMeshes, list[MeshFile], Path]

@@ -49,7 +49,7 @@ FACES: dict[ElementKind, tuple[tuple[int, ...], ...]] = {
 triangle's faces are its lower side (SNEG) and its upper one (SPOS)."""
 
 CORNERS: dict[ElementKind, int] = {"triangle6": 3, "tetra10": 4, "wedge15": 6}
-VTK_TYPES = {"triangle": 5, "triangle6": 22, "tetra10": 24, "wedge15": 26}
+VTK_TYPES = {"triangle": 5, "triangle6": 22, "tetra": 10, "tetra10": 24, "wedge15": 26}
 
 _REFERENCE: dict[ElementKind, tuple[tuple[float, ...], ...]] = {
     "triangle6": ((0, 0), (1, 0), (0, 1)),

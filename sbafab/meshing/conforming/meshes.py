@@ -23,7 +23,7 @@ from sbafab.meshing.conforming.element_mesh import (
 from sbafab.meshing.conforming.fill import Fill, filled, formed, pockets
 from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshSettings, Symmetry, flat, layup
 from sbafab.meshing.conforming.mesh import Mesh, aspects, jacobians, scaled_jacobians, volumes
-from sbafab.meshing.formats.registry import CONFORMING_ENDINGS, MESH_FORMATS
+from sbafab.meshing.formats import CONFORMING_ENDINGS, MESH_FORMATS
 from sbafab.meshing.mesh_files import MeshFile, MeshKind
 
 HEIGHTS = {

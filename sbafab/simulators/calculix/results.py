@@ -21,7 +21,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.element_mesh import flat_triangles, skin
 from sbafab.meshing.conforming.layup import Symmetry, images, sector
 from sbafab.meshing.conforming.mesh import Mesh
-from sbafab.meshing.formats.vtu import write_fields
+from sbafab.meshing.formats import write_fields
 from sbafab.meshing.surface import Surface
 from sbafab.reports.canvas import AMBIENT, draw_length_bar, rasterize, view_of
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
