@@ -46,24 +46,30 @@ def open_edges(surface: Surface) -> NDArray[np.float64]:
 
     Points are merged as in a single-precision file. Empty for a watertight surface.
     """
-    faces = _merged(surface.points)[surface.faces]
-    size = len(surface.points)
-    tails = faces.ravel()
-    heads = np.roll(faces, -1, axis=1).ravel()
+    wrong = unpaired_edges(_merged(surface.points)[surface.faces])
+    starts = surface.faces.ravel()[wrong]
+    ends = np.roll(surface.faces, -1, axis=1).ravel()[wrong]
+    middles: NDArray[np.float64] = (surface.points[starts] + surface.points[ends]) / 2
+    return middles
+
+
+def unpaired_edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Indices, of all corners of faces (m, 3) in a row, at which an edge starts that does not join
+    exactly two consistently oriented faces.
+    """
+    size = int(faces.max(initial=0)) + 1
+    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     # One key per edge; its last bit is the direction, so sorting puts opposite edges side by side.
     low, high = np.minimum(tails, heads), np.maximum(tails, heads)
     keys = np.sort((low * size + high) * 2 + (tails > heads))
     ways = keys[::2]
     is_paired = len(keys) == 2 * len(ways) and not np.any(ways & 1)
     if is_paired and np.array_equal(keys[1::2], ways + 1) and np.all(ways[1:] != ways[:-1]):
-        return np.empty((0, 3))
+        return np.empty(0, dtype=np.int64)
     forth, back = tails * size + heads, heads * size + tails
     once, first, times = np.unique(forth, return_index=True, return_counts=True)
-    wrong = first[(times != 1) | ~np.isin(once, back)]
-    starts = surface.faces.ravel()[wrong]
-    ends = np.roll(surface.faces, -1, axis=1).ravel()[wrong]
-    middles: NDArray[np.float64] = (surface.points[starts] + surface.points[ends]) / 2
-    return middles
+    wrong: NDArray[np.int64] = first[(times != 1) | ~np.isin(once, back)]
+    return wrong
 
 
 def _merged(points: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -5,7 +5,7 @@ Bonded faces share their nodes. Each mesh is checked: elements, skin, volumes an
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -27,7 +27,7 @@ from sbafab.meshing.conforming.mesh import (
 )
 from sbafab.meshing.conforming.plane import Plane
 from sbafab.meshing.conforming.round_tube import round_tube
-from sbafab.meshing.surface import Surface
+from sbafab.meshing.surface import Surface, unpaired_edges
 
 # The sweep: nodes and prisms of every film.
 
@@ -82,8 +82,11 @@ def sweep(layup: Layup, forms: Sequence[FormedFilm], full_middles: bool) -> Swee
         nonlocal prism_count
         chosen = np.flatnonzero(cells)
         of[chosen] = np.arange(prism_count, prism_count + len(chosen))
-        prisms.append(_prisms(triangles[chosen], *levels))
+        prisms.append(np.hstack([level[triangles[chosen]] for level in levels]))
         prism_count += len(chosen)
+
+    def half_up(nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        return nodes if full_middles else nodes[nodes < layup.plane.corners]
 
     for k, (ply, form) in enumerate(zip(layup.plies, forms, strict=True)):
         covered = np.unique(triangles[ply.cells])
@@ -93,9 +96,9 @@ def sweep(layup: Layup, forms: Sequence[FormedFilm], full_middles: bool) -> Swee
         place(lower[k], covered[lower[k, covered] < 0], form.at(0.0))
         if ply.gap:
             below = forms[k - 1].at(layup.plies[k - 1].thickness)
-            place(joints[k], _half_up(layup, bonded, full_middles), (below + form.at(0.0)) / 2)
+            place(joints[k], half_up(bonded), (below + form.at(0.0)) / 2)
             fill(joint_of[k], ply.bonded, upper[k - 1], joints[k], lower[k])
-        place(middle[k], _half_up(layup, covered, full_middles), form.at(ply.thickness / 2))
+        place(middle[k], half_up(covered), form.at(ply.thickness / 2))
         place(upper[k], covered, form.at(ply.thickness))
         fill(prism_of[k], ply.cells, lower[k], middle[k], upper[k])
     return Sweep(
@@ -108,14 +111,6 @@ def sweep(layup: Layup, forms: Sequence[FormedFilm], full_middles: bool) -> Swee
         prism_of,
         joint_of,
     )
-
-
-def _half_up(layup: Layup, nodes: NDArray[np.int64], full: bool) -> NDArray[np.int64]:
-    return nodes if full else nodes[nodes < layup.plane.corners]
-
-
-def _prisms(triangles: NDArray[np.int64], *levels: NDArray[np.int64]) -> NDArray[np.int64]:
-    return np.hstack([level[triangles] for level in levels])
 
 
 def wedges(prisms: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -174,6 +169,17 @@ def wetted(
     return np.concatenate(faces_of_void)
 
 
+def _sides(
+    plane: Plane, triangles: NDArray[np.int64], sides: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Nodes (k, 3) of sides of triangles: start, end, middle."""
+    nodes = plane.triangles[triangles]
+    rows = np.arange(len(nodes))
+    return np.column_stack(
+        [nodes[rows, sides], nodes[rows, (sides + 1) % 3], nodes[rows, 3 + sides]]
+    )
+
+
 def mouths(
     layup: Layup, void: MeshedVoid, beyond: NDArray[np.int64]
 ) -> list[tuple[int, NDArray[np.int64]]]:
@@ -185,12 +191,7 @@ def mouths(
     openings = []
     for k, cells in sorted(void.under.items()):
         closed = np.append(cells | layup.plies[k].bonded, False)
-        triangles, sides = np.nonzero(cells[:, None] & ~closed[beyond])
-        nodes = plane.triangles[triangles]
-        rows = np.arange(len(nodes))
-        edges = np.column_stack(
-            [nodes[rows, sides], nodes[rows, (sides + 1) % 3], nodes[rows, 3 + sides]]
-        )
+        edges = _sides(plane, *np.nonzero(cells[:, None] & ~closed[beyond]))
         edges = edges[~on_symmetry[:, edges[:, :2]].all(axis=2).any(axis=0)]
         if len(edges):
             openings.append((k, edges))
@@ -232,11 +233,8 @@ def lids(
             hole = cells & ~layup.plies[ply].cells
             if ply in void.in_films:
                 hole &= ~void.in_films[ply]
-            triangles, sides = bordering(hole, ~hole, beyond)
-            nodes = layup.plane.triangles[triangles]
-            rows = np.arange(len(nodes))
-            ends = nodes[rows, sides], nodes[rows, 3 + sides], nodes[rows, (sides + 1) % 3]
-            after = {a: (middle, b) for a, middle, b in np.column_stack(ends).tolist()}
+            edges = _sides(layup.plane, *bordering(hole, ~hole, beyond))
+            after = {a: (middle, b) for a, b, middle in edges.tolist()}
             while after:
                 rim = [next(iter(after))]
                 while rim[-1] in after:
@@ -288,18 +286,6 @@ def faces_of_tetrahedra(
     return rows[np.lexsort((rows[:, 1], rows[:, 0]))]
 
 
-def open_sides(triangles: NDArray[np.int64]) -> int:
-    """Return the number of triangle sides not shared with exactly one opposite side."""
-    size = int(triangles.max(initial=0)) + 1
-    heads = np.roll(triangles, -1, axis=1)
-    forth = np.sort((triangles * size + heads).ravel())
-    back = np.sort((heads * size + triangles).ravel())
-    if np.array_equal(forth, back) and np.all(forth[1:] != forth[:-1]):
-        return 0
-    _, times = np.unique(forth, return_counts=True)
-    return int(np.count_nonzero(~np.isin(forth, back)) + np.count_nonzero(times > 1))
-
-
 # Named parts of a mesh.
 
 
@@ -335,36 +321,10 @@ VOLUME_TOLERANCE = 0.001
 
 
 def check_mesh(mesh: Mesh, expected: Mapping[str, float]) -> None:
-    """Raises OutputError if an element is inverted, the skin is not manifold or a volume is off.
+    """Raises OutputError if an element is inverted, skin or cavities are open, or a volume is off.
 
     ``expected`` gives the exact volume in mm3 of cell sets.
     """
-    _check_jacobians(mesh)
-    if mesh.kind != "triangle6":
-        _check_skin(mesh)
-    if expected:
-        sizes = volumes(mesh.kind, mesh.points, mesh.cells)
-        for name, volume in expected.items():
-            meshed = float(sizes[mesh.cell_sets[name]].sum())
-            if not abs(meshed - volume) <= VOLUME_TOLERANCE * volume:
-                raise OutputError(
-                    f"The {mesh.name} mesh of {name} holds {meshed:.5f} mm3 where area x thickness "
-                    f"is {volume:.5f} mm3; ask for a smaller h."
-                )
-
-
-def check_cavities(mesh: Mesh) -> None:
-    """Raises OutputError if a cavity's surface is not closed."""
-    for name, triangles in mesh.cavities.items():
-        gaps = open_sides(triangles)
-        if gaps:
-            raise OutputError(
-                f"The cavity {name} of the {mesh.name} mesh is open at {gaps} edges; move apart "
-                "profiles that touch in one point."
-            )
-
-
-def _check_jacobians(mesh: Mesh) -> None:
     least = scaled_jacobians(mesh.kind, mesh.points, mesh.cells)
     worst = int(least.argmin())
     if least[worst] <= 0:
@@ -373,6 +333,29 @@ def _check_jacobians(mesh: Mesh) -> None:
             f"{int((least <= 0).sum())} elements of the {mesh.name} mesh are inverted, the worst "
             f"at x {x:.3f}, y {y:.3f}, z {z:.3f}; ask for a smaller h or less fill."
         )
+    # Flat triangles through all nodes tell two sides between the same corners apart.
+    if mesh.kind != "triangle6" and len(
+        unpaired_edges(flat_triangles(mesh.kind, mesh.cells, skin(mesh)))
+    ):
+        raise OutputError(
+            f"The skin of the {mesh.name} mesh is not closed and manifold; move apart profiles "
+            "that touch in one point, or change h."
+        )
+    sizes = volumes(mesh.kind, mesh.points, mesh.cells) if expected else np.empty(0)
+    for name, volume in expected.items():
+        meshed = float(sizes[mesh.cell_sets[name]].sum())
+        if not abs(meshed - volume) <= VOLUME_TOLERANCE * volume:
+            raise OutputError(
+                f"The {mesh.name} mesh of {name} holds {meshed:.5f} mm3 where area x thickness "
+                f"is {volume:.5f} mm3; ask for a smaller h."
+            )
+    for name, triangles in mesh.cavities.items():
+        gaps = len(unpaired_edges(triangles))
+        if gaps:
+            raise OutputError(
+                f"The cavity {name} of the {mesh.name} mesh is open at {gaps} edges; move apart "
+                "profiles that touch in one point."
+            )
 
 
 def skin(mesh: Mesh) -> NDArray[np.int64]:
@@ -398,32 +381,6 @@ def skin_surface(mesh: Mesh) -> Surface:
     triangles = flat_triangles(mesh.kind, mesh.cells, skin(mesh))
     nodes, faces = np.unique(triangles, return_inverse=True)
     return Surface(mesh.points[nodes], faces.reshape(-1, 3))
-
-
-def _check_skin(mesh: Mesh) -> None:
-    size = len(mesh.points)
-    outer = skin(mesh)
-    sides = []
-    for number, local in enumerate(FACES[mesh.kind]):
-        corners = [n for n in local if n < CORNERS[mesh.kind]]
-        nodes = mesh.cells[outer[outer[:, 1] == number, 0]][:, list(local)]
-        for place in range(len(corners)):
-            a, b = nodes[:, place], nodes[:, (place + 1) % len(corners)]
-            # The middle node distinguishes two sides between the same corners.
-            middle = nodes[:, len(corners) + place]
-            sides.append(np.column_stack([a * size + b, b * size + a, middle]))
-    forth, back, middle = np.concatenate(sides).T
-    there = np.lexsort((middle, forth))
-    here = np.lexsort((middle, back))
-    is_closed = np.array_equal(forth[there], back[here]) and np.array_equal(
-        middle[there], middle[here]
-    )
-    pairs = np.column_stack([forth[there], middle[there]])
-    if not is_closed or (len(pairs) > 1 and (pairs[1:] == pairs[:-1]).all(axis=1).any()):
-        raise OutputError(
-            f"The skin of the {mesh.name} mesh is not closed and manifold; move apart profiles "
-            "that touch in one point, or change h."
-        )
 
 
 # The shell mesh: mid-surfaces of second order, bonded films as one shell.
@@ -475,40 +432,51 @@ def shell_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
         cell_of,
         np.full_like(cell_of, NONE),
     )
-    mesh = _with_sets(stack, swept)
-    check_mesh(mesh, {})
-    check_cavities(mesh)
-    return mesh
-
-
-def _with_sets(stack: Layup, swept: Sweep) -> Mesh:
-    named_nodes = node_sets(stack, swept)
-    face_sets, cavities = {}, {}
-    beyond = neighbours(stack.plane)
-    for name, void in stack.voids.items():
-        pockets = MeshedVoid({}, void.under, void.volume)
-        faces = _one_sided(wetted(stack, swept, pockets, beyond))
-        face_sets[f"cavity_{name}"] = faces
-        patches = [
-            mouth_patch(stack, swept, ply, edges) for ply, edges in mouths(stack, pockets, beyond)
-        ]
-        if patches:
-            named_nodes[f"inlet_{name}"] = np.unique(np.concatenate(patches))
-        if stack.sector is None:
-            walls = flat_triangles("triangle6", swept.prisms, faces)[:, ::-1]
-            cavities[name] = np.concatenate([walls, *patches, *lids(stack, swept, void, beyond)])
+    pockets = {name: MeshedVoid({}, void.under, void.volume) for name, void in stack.voids.items()}
+    nodes, faces, cavities = _air(stack, swept, pockets, "triangle6", swept.prisms, _one_sided)
     films, sections, thickness = _shell_cell_sets(stack, swept)
-    return Mesh(
+    mesh = Mesh(
         "shell",
         "triangle6",
         swept.points,
         swept.prisms,
-        named_nodes,
+        nodes,
         {**films, **sections},
-        face_sets,
+        faces,
         cavities,
         thickness,
     )
+    check_mesh(mesh, {})
+    return mesh
+
+
+Sets = dict[str, NDArray[np.int64]]
+
+
+def _air(
+    stack: Layup,
+    swept: Sweep,
+    voids: Mapping[str, MeshedVoid],
+    kind: ElementKind,
+    cells: NDArray[np.int64],
+    faces_of: Callable[[NDArray[np.int64]], NDArray[np.int64]],
+) -> tuple[Sets, Sets, Sets]:
+    """Node sets, face sets and cavities of a mesh; ``faces_of`` turns faces of prisms into its."""
+    named, face_sets, cavities = node_sets(stack, swept), {}, {}
+    beyond = neighbours(stack.plane)
+    for name, void in voids.items():
+        faces = faces_of(wetted(stack, swept, void, beyond))
+        face_sets[f"cavity_{name}"] = faces
+        patches = [
+            mouth_patch(stack, swept, ply, edges) for ply, edges in mouths(stack, void, beyond)
+        ]
+        if patches:
+            named[f"inlet_{name}"] = np.unique(np.concatenate(patches))
+        if stack.sector is None:
+            walls = flat_triangles(kind, cells, faces)[:, ::-1]
+            covers = lids(stack, swept, stack.voids[name], beyond)
+            cavities[name] = np.concatenate([walls, *patches, *covers])
+    return named, face_sets, cavities
 
 
 def _one_sided(faces: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -549,38 +517,26 @@ def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     cells = wedges(swept.prisms)
     if is_tet:
         cells = tetrahedra(swept.prisms, _corners_under(stack, swept))
-    named_nodes = node_sets(stack, swept)
-    face_sets, cavities = {}, {}
-    beyond = neighbours(stack.plane)
-    for name, void in stack.voids.items():
-        faces = wetted(stack, swept, void, beyond)
-        if is_tet:
-            faces = faces_of_tetrahedra(swept.prisms, cells, faces)
-        face_sets[f"cavity_{name}"] = faces
-        patches = [
-            mouth_patch(stack, swept, ply, edges) for ply, edges in mouths(stack, void, beyond)
-        ]
-        if patches:
-            named_nodes[f"inlet_{name}"] = np.unique(np.concatenate(patches))
-        if stack.sector is None:
-            walls = flat_triangles(kind, cells, faces)[:, ::-1]
-            cavities[name] = np.concatenate([walls, *patches, *lids(stack, swept, void, beyond)])
-    cell_sets, expected = _cell_sets(
-        stack, swept, 3 if is_tet else 1, [form.growth for form in forms]
-    )
+
+    def faces_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+        return faces_of_tetrahedra(swept.prisms, cells, faces) if is_tet else faces
+
+    nodes, faces, cavities = _air(stack, swept, stack.voids, kind, cells, faces_of)
+    growths = [form.growth for form in forms]
+    cell_sets, expected = _cell_sets(stack, swept, 3 if is_tet else 1, growths)
+    materials = {name: of for name, of in _materials(stack).items() if name in cell_sets}
     mesh = Mesh(
         "volume",
         kind,
         swept.points,
         cells,
-        named_nodes,
+        nodes,
         cell_sets,
-        face_sets,
+        faces,
         cavities,
-        materials={name: of for name, of in _materials(stack).items() if name in cell_sets},
+        materials=materials,
     )
     check_mesh(mesh, expected)
-    check_cavities(mesh)
     return mesh
 
 
