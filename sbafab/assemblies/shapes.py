@@ -13,7 +13,7 @@ from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.solid import Slab, closed_surface, solid_slabs
 from sbafab.meshing.surface import Surface
-from sbafab.meshing.wrap import bent
+from sbafab.meshing.wrap import TubeWrap, wrapped
 
 SAGITTA = 0.02
 """mm: an assembly is seen whole, so its arcs are coarser than a single solid's."""
@@ -29,22 +29,28 @@ def placed_surface(placed: PlacedPart, filled: bool = False) -> Surface:
 
 def bent_surface(placed: PlacedPart, filled: bool = False) -> Surface:
     """Return the surface before its pose: turned about its own axis and bent round its tube."""
-    surface = own_surface(placed, filled)
-    turned = Surface(placed.turned(surface.points), surface.faces)
-    return turned if placed.radius is None else bent(turned, placed.radius)
+    if placed.radius is None:
+        surface = own_surface(placed, filled)
+        return Surface(placed.turned(surface.points), surface.faces)
+    wrap = TubeWrap(placed.radius)
+    slabs = [
+        slab._replace(region=slab.region.turned(placed.turn)) for slab in _slabs(placed, filled)
+    ]
+    return wrapped(closed_surface(f"parts.{placed.name}", slabs, SAGITTA, wrap.step), wrap)
 
 
 def own_surface(placed: PlacedPart, filled: bool = False) -> Surface:
     """Return the closed surface of a part in its own frame."""
-    part = placed.part
-    if isinstance(part, Cup):
-        return _bell(part)
-    if placed.made is not None:
-        laminate = placed.made.laminate
-        slabs = filled_slabs(laminate) if filled else solid_slabs(laminate)
-    else:
-        slabs = [Slab(face(part), 0.0, placed.height)]
-    return closed_surface(f"parts.{placed.name}", slabs, SAGITTA)
+    if isinstance(placed.part, Cup):
+        return _bell(placed.part)
+    return closed_surface(f"parts.{placed.name}", _slabs(placed, filled), SAGITTA)
+
+
+def _slabs(placed: PlacedPart, filled: bool) -> list[Slab]:
+    if placed.made is None:
+        return [Slab(face(placed.part), 0.0, placed.height)]
+    laminate = placed.made.laminate
+    return filled_slabs(laminate) if filled else solid_slabs(laminate)
 
 
 def filled_slabs(laminate: Laminate) -> list[Slab]:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
 from sbafab.errors import OutputError
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate import Chamber, Laminate
 from sbafab.meshing.formats import MESH_FORMATS, write_stl
 from sbafab.meshing.solid import SAGITTA, cavity, sealed, solid
 from sbafab.meshing.surface import Surface
@@ -17,7 +16,6 @@ from sbafab.meshing.wrap import TubeWrap, tube_wrap, wrapped
 
 MeshKind = Literal["solid", "cavity", "volume", "shell", "skin"]
 Writer = Callable[[Surface, Path, str], None]
-_SurfaceFiles = tuple[list[tuple[str, Writer]], MeshKind, str | None, Callable[[], Surface]]
 
 
 @dataclass(frozen=True)
@@ -52,50 +50,41 @@ def write_meshes(
     area x thickness.
     """
     (folder / "mesh").mkdir(parents=True, exist_ok=True)
-    surfaces = _surfaces(laminate, sagitta)
+    wrap = tube_wrap(laminate)
     written: list[MeshFile] = []
     left_out: list[tuple[str, str]] = []
-    total = sum(len(rows) for rows, *_ in surfaces)
-    for rows, kind, chamber, make in surfaces:
-        try:
-            surface = make()
-        except OutputError as error:
-            left_out += [(file, str(error)) for file, _ in rows]
-            continue
-        for file, write in rows:
-            write(surface, folder / file, laminate.bonded_materials)
-            written.append(MeshFile(file, kind, chamber, 0.0, surface.volume, len(surface.faces)))
-            if progress is not None:
-                progress(len(written), total)
+    solids = [(row.ending, row.solid) for row in MESH_FORMATS if row.solid]
+    shapes: list[tuple[str, Chamber | None, list[tuple[str, Writer]]]] = [("solid", None, solids)]
+    shapes += [(f"cavity_{c.name}", c, [("stl", write_stl)]) for c in laminate.chambers]
+    suffixes = [""] if wrap is None else ["", "_wrapped"]
+    total = len(suffixes) * sum(len(writers) for *_, writers in shapes)
+    for stem, chamber, writers in shapes:
+        for suffix in suffixes:
+            files = [(f"mesh/{stem}{suffix}.{ending}", write) for ending, write in writers]
+            try:
+                surface = _surface(laminate, chamber, sagitta, wrap if suffix else None)
+            except OutputError as error:
+                left_out += [(file, str(error)) for file, _ in files]
+                continue
+            kind: MeshKind = "solid" if chamber is None else "cavity"
+            name = None if chamber is None else chamber.name
+            for file, write in files:
+                write(surface, folder / file, laminate.bonded_materials)
+                written.append(MeshFile(file, kind, name, 0.0, surface.volume, len(surface.faces)))
+                if progress is not None:
+                    progress(len(written), total)
     return written, left_out
 
 
-def _surfaces(laminate: Laminate, sagitta: float) -> list[_SurfaceFiles]:
-    """Return each surface's files with their writers, its kind and chamber, and its maker."""
-    wrap = tube_wrap(laminate)
-
-    def of_solid(suffix: str) -> list[tuple[str, Writer]]:
-        rows = ((row.ending, row.solid) for row in MESH_FORMATS)
-        return [(f"mesh/solid{suffix}.{ending}", write) for ending, write in rows if write]
-
-    def round_tube(name: str, flat: Callable[..., Surface], wrap: TubeWrap) -> Surface:
-        return sealed(f"{name} round its tube", wrapped(flat(sagitta, wrap.cuts), wrap))
-
-    shapes: dict[str | None, tuple[str, Callable[..., Surface]]] = {
-        None: ("the solid", partial(solid, laminate))
-    }
-    for chamber in laminate.chambers:
-        name = f"the cavity of chamber {chamber.name}"
-        shapes[chamber.name] = (name, partial(cavity, laminate, chamber))
-    found: list[_SurfaceFiles] = []
-    for chamber_name, (name, flat) in shapes.items():
-        kind: MeshKind = "solid" if chamber_name is None else "cavity"
-        ways: dict[str, Callable[[], Surface]] = {"": partial(flat, sagitta)}
-        if wrap is not None:
-            ways["_wrapped"] = partial(round_tube, name, flat, wrap)
-        for suffix, make in ways.items():
-            rows = of_solid(suffix)
-            if chamber_name is not None:
-                rows = [(f"mesh/cavity_{chamber_name}{suffix}.stl", write_stl)]
-            found.append((rows, kind, chamber_name, make))
-    return found
+def _surface(
+    laminate: Laminate, chamber: Chamber | None, sagitta: float, wrap: TubeWrap | None
+) -> Surface:
+    step = 0.0 if wrap is None else wrap.step
+    if chamber is None:
+        surface = solid(laminate, sagitta, step)
+    else:
+        surface = cavity(laminate, chamber, sagitta, step)
+    if wrap is None:
+        return surface
+    name = "the solid" if chamber is None else f"the cavity of chamber {chamber.name}"
+    return sealed(f"{name} round its tube", wrapped(surface, wrap))

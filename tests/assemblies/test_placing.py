@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from sbafab.actuators import build, load_design
 from sbafab.assemblies.build import (
     FLIPPED,
     LYING,
@@ -31,7 +30,7 @@ from sbafab.assemblies.shapes import (
 from sbafab.geometry.region import rectangle
 from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import open_edges
-from sbafab.meshing.wrap import bent, cut_along
+from sbafab.meshing.wrap import TubeWrap, wrapped
 
 
 @pytest.mark.parametrize(
@@ -69,27 +68,14 @@ def test_both_halves_of_a_mould_leave_room_for_the_cup_alone() -> None:
 
 
 def test_a_bent_slab_is_closed_and_has_the_volume_of_its_ring_sector() -> None:
-    slab = fuse([Slab(rectangle((-6, -4), (8, 5)), 0.1, 0.6)], 0.01)
-    curved = bent(slab, 7.5, 0.0005)
+    slab = Slab(rectangle((-6, -4), (8, 5)), 0.1, 0.6)
+    curved = wrapped(fuse([slab], 0.01, 0.17), TubeWrap(7.5))
     assert len(open_edges(curved)) == 0
     inner, outer = 7.6, 8.1
     assert curved.volume == pytest.approx((14 / 7.5) / 2 * (outer**2 - inner**2) * 9, rel=1e-3)
     radii = np.hypot(curved.points[:, 0], curved.points[:, 1])
     assert radii.min() == pytest.approx(inner)
     assert radii.max() == pytest.approx(outer)
-
-
-def test_a_cut_adds_edges_and_changes_no_shape() -> None:
-    laminate = build(load_design("radial-15mm"))
-    from sbafab.meshing.solid import solid
-
-    before = solid(laminate, 0.02)
-    after = cut_along(before, 3.21)
-    assert len(after.faces) > len(before.faces)
-    assert after.volume == pytest.approx(before.volume, rel=1e-9)
-    corners = after.points[after.faces][:, :, 0] - 3.21
-    assert not ((corners.min(axis=1) < -1e-2) & (corners.max(axis=1) > 1e-2)).any()
-    assert len(open_edges(after)) == 0
 
 
 def test_parts_stand_where_the_file_says() -> None:
