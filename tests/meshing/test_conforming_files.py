@@ -144,17 +144,6 @@ def test_inp_keeps_nodes_elements_and_sets(written: Written, name: str) -> None:
     assert longest <= 16
 
 
-def test_meshio_reads_the_shell_of_an_inp_file(written: Written) -> None:
-    meshes, _, folder = written
-    read = meshio.read(folder / "shell.inp")
-    assert {block.type for block in read.cells} == {"triangle6"}
-    assert np.allclose(read.points, meshes.shell.points, rtol=0, atol=1e-8)
-    cells = np.concatenate([block.data for block in read.cells])
-    wanted = np.concatenate([meshes.shell.cells[c] for c in meshes.shell.parts.values()])
-    assert np.array_equal(cells, wanted)
-    assert np.array_equal(np.sort(read.point_sets["tip"]), meshes.shell.node_sets["tip"])
-
-
 def read_inp(path: Path) -> tuple[np.ndarray, np.ndarray, dict[tuple[str, str], list[str]]]:
     """Nodes, elements and sets of an Abaqus input file, as its manual describes them."""
     nodes: list[list[float]] = []

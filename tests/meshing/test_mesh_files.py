@@ -5,7 +5,6 @@ import math
 import os
 import subprocess
 import sys
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.mesh_files import write_meshes
 from sbafab.meshing.solid import MASKLESS_GAP, cavity_slabs, solid, solid_slabs
 
-TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
+TEMPLATES = ["1dof-5mm", "radial-15mm"]
 
 
 @pytest.fixture(scope="module")
@@ -63,15 +62,6 @@ def test_the_lumen_and_three_necks_a_joint_are_the_only_handles(lobed: Laminate)
     assert len(surface.points) - len(surface.faces) // 2 == 2 - 2 * handles
 
 
-def test_the_stl_holds_what_the_list_says(lobed: Laminate, tmp_path: Path) -> None:
-    for mesh in write_meshes(lobed, tmp_path)[0]:
-        if mesh.file.endswith(".stl"):
-            data = (tmp_path / mesh.file).read_bytes()
-            assert not data.startswith(b"solid")
-            assert int.from_bytes(data[80:84], "little") == mesh.elements
-            assert len(data) == 84 + 50 * mesh.elements
-
-
 def test_same_bytes_again_under_another_hash_seed_and_time_zone(
     lobed: Laminate, tmp_path: Path
 ) -> None:
@@ -88,12 +78,6 @@ def test_same_bytes_again_under_another_hash_seed_and_time_zone(
     root = Path(__file__).parents[2]
     subprocess.run([sys.executable, "-c", script, there], check=True, env=environment, cwd=root)
     assert digests(here) == digests(there)
-
-
-def test_the_3mf_carries_no_date_of_the_day(lobed: Laminate, tmp_path: Path) -> None:
-    write_meshes(lobed, tmp_path)
-    with zipfile.ZipFile(tmp_path / "mesh" / "solid.3mf") as archive:
-        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
 
 
 def test_the_outline_stays_within_a_micrometre(lobed: Laminate) -> None:
