@@ -1,8 +1,7 @@
-"""Labels of sheet maps and names in the top view: on their place, off each other and off holes."""
+"""Labels of sheet maps: on their part, off each other and off windows."""
 
 from __future__ import annotations
 
-import random
 import re
 from dataclasses import replace
 from typing import Any
@@ -12,11 +11,8 @@ import shapely
 from lxml import html as lxml_html
 
 from sbafab.cutting.sheets import SheetFile
-from sbafab.geometry.edges import Bounds
 from sbafab.nesting.records import Nest
-from sbafab.reports.traveller import step_pictures
 from sbafab.reports.traveller.sheet_map import sheet_map
-from sbafab.reports.traveller.step_pictures import FAR, STEPS, PlanName
 from tests.reports.pages import built
 
 
@@ -92,27 +88,3 @@ def test_a_long_sheet_is_drawn_in_rows_across_the_page(sheet_files: Any) -> None
     assert moved.bounds == pytest.approx((*corner, *far), abs=0.01)
     # Turned, not mirrored: the page's y points down, so the determinant stays negative.
     assert a * d - b * c < 0
-
-
-def crowd(seed: int) -> list[Bounds]:
-    draw = random.Random(seed)
-    corners = [(draw.uniform(-12, 12), draw.uniform(-9, 9)) for _ in range(3 * seed)]
-    return [(x - 2, y - 1.5, x + 2, y + 1.5) for x, y in corners]
-
-
-def test_a_name_stands_where_it_costs_least() -> None:
-    """The cheapest of all places, though most of them are not looked at."""
-    half, room = (3.0, 1.0), (-20.0, -15.0, 20.0, 15.0)
-    name = PlanName("pin", (1.0, 2.0), 1.5, (0.6, 0.8))
-    distances = set()
-    for seed in range(12):
-        taken = crowd(seed)
-        costs = {
-            (middle, away): step_pictures._cost(name, middle, half, room, taken) + FAR * away
-            for away in STEPS
-            for middle in step_pictures._places(name, half, away)
-        }
-        best = step_pictures._best(name, half, room, taken)
-        assert costs[best] == min(costs.values())
-        distances.add(best[1])
-    assert len(distances) > 2

@@ -145,19 +145,19 @@ def _fold_picture(laminate: Laminate, opened: Opened, name: str) -> str:
 
     colours = ink(laminate.layer(opened.fold.lower).film)
     matrix = " ".join(map(coord, flat(scale, at(0.0, 0.0))))
-    for half in opened.halves:
-        picture.add(
-            f'<path d="{path_data(half)}" transform="matrix({matrix})" fill="{colours.fill}" '
-            'fill-rule="evenodd"/>',
-        )
-    whole = union(opened.halves)
+    moved = f'transform="matrix({matrix})"'
     picture.add(
-        f'<path d="{path_data(whole)}" transform="matrix({matrix})" fill="none" '
-        f'stroke="{colours.line}" stroke-width="{coord(0.22 / scale)}"/>'
+        *(
+            draw.path(path_data(half), f"{draw.style(fill=colours.fill)} {moved}")
+            for half in opened.halves
+        ),
+        draw.path(
+            path_data(union(opened.halves)), f"{draw.style(colours.line, 0.22 / scale)} {moved}"
+        ),
     )
     (left, y), (right, _) = at(low_x, 0.0), at(high_x, 0.0)
     ends = f"M{coord(left - PAST_FOLD)} {coord(y)}L{coord(right + PAST_FOLD)} {coord(y)}"
-    picture.add(f'<path d="{ends}" {draw.fold_style()}/>')
+    picture.add(draw.path(ends, draw.fold_style()))
     numbers = opened.fold.lower, opened.fold.upper
     for number, way, length in zip(numbers, (1, -1), opened.lengths, strict=True):
         middle = (low_x + high_x) / 2

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cache
-from heapq import heappop, heappush, merge
-from itertools import tee
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
+
+import numpy as np
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.geometry.edges import Bounds, Point
@@ -195,29 +194,24 @@ def _label(
     visible: Sequence[tuple[Placement, Region]],
 ) -> None:
     """Label every part; equal parts get equal labels unless labels would collide."""
-    by_placement: dict[tuple[int, int], tuple[Bounds, Iterator[PlacedLabel]]] = {}
+    places: dict[tuple[int, int], tuple[Point, list[PlacedLabel]]] = {}
     taken: list[Bounds] = []
-    page = (*strip.corner, *_far(strip))
+    (left, top), (wide, high) = strip.corner, strip.size
+    page = left, top, left + wide, top + high
     for placement, region in visible:
         part = sheet.nest.parts[placement.part]
         words = marked(part.design, part.pattern, marks)
+        x, y = strip.at(region.bounds[:2])
         key = placement.part, placement.turn
-        if key not in by_placement:
+        if key not in places:
             shape = region.mapped(strip.at, strip.scale, mirror=True)
-            by_placement[key] = region.bounds, labels(words, shape)
-        bounds, places = by_placement[key]
-        places, copy = tee(places)
-        by_placement[key] = bounds, copy
-        (x, y), (first_x, first_y) = strip.at(region.bounds[:2]), strip.at(bounds[:2])
-        moved = (place.moved(x - first_x, y - first_y) for place in places)
-        free = first_free(moved, page, taken)
-        if free is not None:
-            taken.append(free.box)
-            picture.add(label(free.at, words, free.size))
-
-
-def _far(strip: _Strip) -> Point:
-    return strip.corner[0] + strip.size[0], strip.corner[1] + strip.size[1]
+            places[key] = (x, y), labels(words, shape)
+        (first_x, first_y), found = places[key]
+        for place in (one.moved(x - first_x, y - first_y) for one in found):
+            if _within(place.box, page) and not any(_meet(place.box, box) for box in taken):
+                taken.append(place.box)
+                picture.add(label(place.at, words, place.size))
+                break
 
 
 def _meets(bounds: Bounds, strip: _Strip) -> bool:
@@ -235,15 +229,19 @@ def marked(design: str, pattern: str, marks: Mapping[str, str]) -> str:
 
 LEGIBLE = 1.5
 """Smallest legible label on the page, mm."""
-STEPS = 6
+STEPS = 4
 """Positions tried from the middle of a part to each of its ends."""
 SIZES = (1.0, 0.8, 0.6)
 OVER = 1.1
 """Share of its part's width that a label may fill."""
 HIGH = 0.8
 """Height of a label, in font sizes."""
-OUTSIDE, HOLE = 3.0, 1.0
-"""Cost of a corner off the part, and of a covered hole; the distance from the middle costs 1."""
+OFF = 2.0
+"""Cost of a label off the film of its part; as far from the middle as the corners costs 1."""
+SAMPLES = 7
+"""Points along a label at which its part is looked up."""
+CHORD = 0.05
+"""Distance of a chord from an arc of a part, mm on the page."""
 
 
 class PlacedLabel(NamedTuple):
@@ -259,114 +257,36 @@ class PlacedLabel(NamedTuple):
         return PlacedLabel((x + dx, y + dy), self.size, box)
 
 
-def labels(words: str, part: Region) -> Iterator[PlacedLabel]:
-    """Yield positions for a text on a drawn part, the best first.
-
-    They are off its holes if possible, near its middle and as large as possible; illegible ones are
-    not yielded. Positions are measured lazily: the first one is nearly always taken.
+def labels(words: str, part: Region) -> list[PlacedLabel]:
+    """Return legible positions for a text on a drawn part, the best first: on its film, near its
+    middle and large.
     """
-    low_x, _, high_x, _ = part.bounds
-    width = OVER * (high_x - low_x)
-    most = min(draw.SMALL * width / draw.text_width(words, draw.SMALL), draw.SMALL)
-    holes = [hole.bounds for hole in part.holes]
+    import shapely
+
+    low_x, low_y, high_x, high_y = part.bounds
     em = draw.text_width(words, 1.0)
-    middles = list(_middles(part.bounds))
-    sizes = [(1 - share, share * most) for share in SIZES if share * most >= LEGIBLE]
-    # Nearest first for each size, so labels are only made when needed.
-    fresh = merge(*([(far + less, at, size) for far, at in middles] for less, size in sizes))
-    ahead = next(fresh, None)
-    waiting: list[_Candidate] = []
-    while waiting or ahead is not None:
-        while ahead is not None and (not waiting or ahead[0] <= waiting[0].cost):
-            far, middle, size = ahead
-            heappush(waiting, _Candidate(far, _placed_label(em, middle, size), far))
-            ahead = next(fresh, None)
-        best = heappop(waiting)
-        if best.sides is None:
-            covered = [hole for hole in holes if _meet(best.label.box, hole)]
-            heappush(waiting, best.covering(len(covered), _sides(best.label.box, covered)))
-        elif best.sides:
-            heappush(waiting, best.beside(part))
-        else:
-            yield best.label
-
-
-class _Candidate(NamedTuple):
-    """A label with its least possible cost: ``far`` from the middle and small, holes ``covered``,
-    points ``off`` the part; quickly measured costs come first.
-
-    ``sides``: points of its box not yet tested against the part; None if the holes have not been
-    counted either.
-    """
-
-    cost: float
-    label: PlacedLabel
-    far: float
-    covered: int = 0
-    off: int = 0
-    sides: tuple[Point, ...] | None = None
-
-    def covering(self, covered: int, sides: tuple[Point, ...]) -> _Candidate:
-        return self._measured(covered, 0, sides)
-
-    def beside(self, part: Region) -> _Candidate:
-        """Return the candidate measured up to its first point off the part, which costs much."""
-        assert self.sides is not None
-        for number, point in enumerate(self.sides):
-            if not part.contains(point):
-                return self._measured(self.covered, self.off + 1, self.sides[number + 1 :])
-        return self._measured(self.covered, self.off, ())
-
-    def _measured(self, covered: int, off: int, sides: tuple[Point, ...]) -> _Candidate:
-        cost = self.far + (HOLE * covered + OUTSIDE * off)
-        return _Candidate(cost, self.label, self.far, covered, off, sides)
-
-
-def first_free(
-    candidates: Iterable[PlacedLabel], page: Bounds, taken: Sequence[Bounds]
-) -> PlacedLabel | None:
-    """Return the first label that is on the page and off the boxes of other labels; None if none
-    is.
-    """
-    return next(
-        (
-            label
-            for label in candidates
-            if _within(label.box, page) and not any(_meet(label.box, box) for box in taken)
-        ),
-        None,
-    )
-
-
-def _placed_label(em: float, middle: Point, size: float) -> PlacedLabel:
-    """Return the label of a text that is ``em`` font sizes wide."""
-    x, y = middle
+    most = min(OVER * (high_x - low_x) / em, draw.SMALL)
+    shares = [share for share in SIZES if share * most >= LEGIBLE]
+    grid = np.arange(-STEPS, STEPS + 1) / (STEPS + 1)
+    u, v, share = (axis.ravel() for axis in np.meshgrid(grid, grid, shares))
+    x = (low_x + high_x) / 2 + u * (high_x - low_x) / 2
+    y = (low_y + high_y) / 2 + v * (high_y - low_y) / 2
+    size = share * most
     wide, high = size * em / 2, HIGH * size / 2
-    box = x - wide, y - high, x + wide, y + high
-    return PlacedLabel((x, y + 0.35 * size), size, box)
-
-
-def _middles(bounds: Bounds) -> Iterator[tuple[float, Point]]:
-    """Yield distance from the middle, 0 to 1, and point, over a part's box; nearest first."""
-    low_x, low_y, high_x, high_y = bounds
-    x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
-    for off, u, v in _grid():
-        yield off, (x + u * (high_x - low_x) / 2, y + v * (high_y - low_y) / 2)
-
-
-@cache
-def _grid() -> list[tuple[float, float, float]]:
-    """Return distances and coordinates of a grid over a box from -1 to 1, nearest first."""
-    steps = range(-STEPS, STEPS + 1)
-    grid = [(i / (STEPS + 1), j / (STEPS + 1)) for i in steps for j in steps]
-    nearest = sorted(grid, key=lambda p: (p[0] ** 2 + p[1] ** 2, p))
-    return [(((u**2 + v**2) / 2) ** 0.5, u, v) for u, v in nearest]
-
-
-def _sides(box: Bounds, holes: Sequence[Bounds]) -> tuple[Point, ...]:
-    """Return corners and middles of the text's box that are off the part's holes."""
-    points = [(x, y) for y in (box[1], box[3]) for x in (box[0], (box[0] + box[2]) / 2, box[2])]
-    return tuple([p for p in points if not any(_meet((*p, *p), hole) for hole in holes)])
+    film = part.shapely(CHORD)
+    shapely.prepare(film)
+    at = np.linspace(-1, 1, SAMPLES)
+    across, down = np.meshgrid(at, at[::2])
+    on = shapely.contains_xy(
+        film,
+        x + wide * across.reshape(-1, 1),
+        y + high * down.reshape(-1, 1),
+    )
+    cost = np.sqrt((u**2 + v**2) / 2) + (1 - share) + OFF * (1 - on.mean(axis=0))
+    bounds = x - wide, y - high, x + wide, y + high
+    rows = np.stack([x, y + 0.35 * size, size, *bounds], axis=1)
+    ranked = rows[np.argsort(cost.round(9), kind="stable")].tolist()
+    return [PlacedLabel((at_x, at_y), size, tuple(box)) for at_x, at_y, size, *box in ranked]
 
 
 def _meet(a: Bounds, b: Bounds) -> bool:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.cutting.fixture import shown
 from sbafab.geometry.cache import cached
@@ -13,7 +17,7 @@ from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import coord, section
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers, stack_count
 from sbafab.laminate.laminate import Inlet, Laminate, Layer, Pin
-from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, UNDERLAY, BuildUpPart
+from sbafab.pressing.build_up import BASE_PLATE, PAD, RELEASE, UNDERLAY
 from sbafab.pressing.dowels import PinSetting, push_out
 from sbafab.pressing.schedule import Step
 from sbafab.reports import drawing as draw
@@ -32,13 +36,12 @@ from sbafab.reports.traveller.shapes import (
 
 DIRECTIONS = 16
 STEPS = (0.0, 2.0, 4.0, 6.5, 9.0)
-"""Distances of a name from touching its place, mm, in the order tried."""
+"""Distances of a name from touching its place, mm."""
 LED = 1.5
 """Distance from which a thin line leads from the name to its place, mm."""
-ASIDE, FAR = 0.4, 0.25
-"""Cost of a name out of its direction, and of a mm of distance, in mm2 of covering."""
-ROUNDED = 1e-6
-"""Tolerance on sums of costs, mm2: far above their rounding errors."""
+ASIDE, FAR, OUTSIDE = 0.4, 0.25, 4.0
+"""Cost of a name out of its direction, of a mm of distance, and of a mm2 outside the picture, in
+mm2 of covering."""
 
 
 # Names beside the places of a picture, covering neither each other nor the places.
@@ -56,69 +59,34 @@ class PlanName(NamedTuple):
 def named(names: list[PlanName], size: float, room: Bounds, taken: list[Bounds]) -> list[str]:
     """Return the names as SVG, each where it covers least of ``taken`` and of earlier names."""
     taken, drawn = list(taken), []
+    away = np.repeat(STEPS, DIRECTIONS)
+    turns = np.tile(2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS, len(STEPS))
     for name in names:
-        half = draw.text_width(name.words, size) / 2, size / 2
-        middle, away = _best(name, half, room, taken)
-        taken.append(_box(middle, half))
-        if away >= LED:
-            drawn.append(draw.line([name.at, middle], width=0.12))
-        drawn.append(label((middle[0], middle[1] + 0.35 * size), name.words, size))
+        half = np.array([draw.text_width(name.words, size) / 2, size / 2])
+        turn = turns + math.atan2(name.out[1], name.out[0])
+        way = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        middles = np.array(name.at) + (name.clear + away[:, None] + half) * way
+        boxes = np.concatenate([middles - half, middles + half], axis=1)
+        covered = sum(_shared(boxes, box) for box in taken)
+        outside = 4 * half[0] * half[1] - _shared(boxes, room)
+        off = middles - name.at
+        along = off @ np.array(name.out) / np.linalg.norm(off, axis=1)
+        cost = covered + OUTSIDE * outside + ASIDE * (1 - along) + FAR * away
+        best = int(np.argmin(cost.round(6)))
+        x, y = middles[best].tolist()
+        taken.append(tuple(boxes[best].tolist()))
+        if away[best] >= LED:
+            drawn.append(draw.line([name.at, (x, y)], width=0.12))
+        drawn.append(label((x, y + 0.35 * size), name.words, size))
     return drawn
 
 
-def _best(
-    name: PlanName, half: Point, room: Bounds, taken: Sequence[Bounds]
-) -> tuple[Point, float]:
-    """Return the middle of the cheapest position and its distance; the first of equals.
-
-    ``half`` of the name's width and height.
-    """
-    least, best = math.inf, (name.at, 0.0)
-    for away in STEPS:
-        # The distance alone is the least cost, up to rounding.
-        if FAR * away > least + ROUNDED:
-            break
-        for middle in _places(name, half, away):
-            cost = _cost(name, middle, half, room, taken) + FAR * away
-            if cost < least:
-                least, best = cost, (middle, away)
-    return best
-
-
-def _places(name: PlanName, half: Point, away: float) -> Iterator[Point]:
-    """Yield middles of the name at a distance, around from its preferred direction."""
-    reach = name.clear + away
-    for step in range(DIRECTIONS):
-        turn = 2 * math.pi * step / DIRECTIONS + math.atan2(name.out[1], name.out[0])
-        u, v = math.cos(turn), math.sin(turn)
-        yield name.at[0] + (reach + half[0]) * u, name.at[1] + (reach + half[1]) * v
-
-
-def _box(middle: Point, half: Point) -> Bounds:
-    x, y = middle
-    return x - half[0], y - half[1], x + half[0], y + half[1]
-
-
-def _cost(
-    name: PlanName, middle: Point, half: Point, room: Bounds, taken: Sequence[Bounds]
-) -> float:
-    """Return the cost of a position without its distance, mm2."""
-    box = _box(middle, half)
-    covered = sum([_shared(box, neighbour) for neighbour in taken])
-    outside = _area(box) - _shared(box, room)
-    u, v = middle[0] - name.at[0], middle[1] - name.at[1]
-    along = (u * name.out[0] + v * name.out[1]) / (math.hypot(u, v) or 1.0)
-    return covered + 4 * outside + ASIDE * (1 - along)
-
-
-def _area(box: Bounds) -> float:
-    return (box[2] - box[0]) * (box[3] - box[1])
-
-
-def _shared(a: Bounds, b: Bounds) -> float:
-    width = min(a[2], b[2]) - max(a[0], b[0])
-    height = min(a[3], b[3]) - max(a[1], b[1])
-    return width * height if width > 0 and height > 0 else 0.0
+def _shared(boxes: NDArray[np.float64], other: Bounds) -> NDArray[np.float64]:
+    """Return the area that each box shares with another one, mm2."""
+    low = np.maximum(boxes[:, :2], other[:2])
+    high = np.minimum(boxes[:, 2:], other[2:])
+    shared: NDArray[np.float64] = np.prod(np.clip(high - low, 0, None), axis=1)
+    return shared
 
 
 # The step seen from above: plate, layers, pins in or out, inlet tabs.
@@ -139,6 +107,11 @@ AT_DATUM = 1e-3
 """Distance from the datum within which a pin hides it, mm."""
 
 
+PINS = {
+    is_in: draw.style(draw.DARK, 0.3, fill=draw.DARK if is_in else "#ffffff")
+    for is_in in (True, False)
+}
+"""Looks of a pin that is in, and of one that is not."""
 _section = cached(section)
 """Every step of a laminate needs the same."""
 
@@ -174,31 +147,29 @@ def _view(bounds: Bounds) -> _View:
 def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: str) -> str:
     """Return the step from above; earlier stacks grey, new layers in their film's colour."""
     plate = shown(laminate)
-    view = _view(plate.bounds if plate is not None else _widened(laminate.bounds))
-    state = "pins in" if step.pins else "no pins"
+    low_x, low_y, high_x, high_y = laminate.bounds
+    wide = low_x - FREE, low_y - FREE, high_x + FREE, high_y + FREE
+    view = _view(wide if plate is None else plate.bounds)
+    matrix, is_pinned = flat(view.scale, view.origin), bool(step.pins)
+    state = "pins in" if is_pinned else "no pins"
     words = f"step {step.number} from above, {state}; the text beside it says the same"
     picture = Picture(name, view.width, view.height, words)
     if plate is not None:
-        picture.plate(plate, flat(view.scale, view.origin), bool(step.pins))
+        picture.plate(plate, matrix, is_pinned)
     for bed in lying:
+        look = "made" if bed.made_in else "clear"
         for layer in distinct_layers(laminate, bed.layers):
-            look = "made" if bed.made_in else "clear"
-            picture.part(
-                pattern_id(layer.pattern),
-                layer.film,
-                flat(view.scale, view.origin),
-                look,
-            )
+            picture.part(pattern_id(layer.pattern), layer.film, matrix, look)
     inlets = inlets_in(laminate, step.layers)
     # An arrow at its tab also names the pin of a chamber.
     arrow_names = {inlet.chamber for inlet in inlets}
     names, taken = [], []
     for pin in laminate.pins:
-        at, r = view.at(pin.centre), _radius(pin, view)
-        picture.add(_pin(at, r, pin in step.pins))
-        taken.append((at[0] - r, at[1] - r, at[0] + r, at[1] + r))
+        at, radius = view.at(pin.centre), max(pin.diameter * view.scale / 2, 0.7)
+        picture.add(draw.circle(at, radius, PINS[pin in step.pins]))
+        taken.append((at[0] - radius, at[1] - radius, at[0] + radius, at[1] + radius))
         if pin in step.pins and pin.name not in arrow_names:
-            names.append(PlanName(pin.name, at, r + 0.6, _outward(pin)))
+            names.append(PlanName(pin.name, at, radius + 0.6, _outward(pin)))
     arrows = []
     for inlet in inlets:
         start, tip = _arrow(inlet, _reach(laminate, inlet), view)
@@ -208,37 +179,16 @@ def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: s
         arrows.append(PlanName(inlet.chamber, tip, 0.9, (u, -v)))
     room = 0.5, HEAD + 0.3, view.width - 0.5, view.height - FOOT + 1.0
     picture.add(*named([*arrows, *names], NAMES, room, taken))
-    at_datum = next((pin.name for pin in step.pins if math.hypot(*pin.centre) < AT_DATUM), None)
-    if at_datum is None:
-        picture.add(*_datum(view))
-    datum = "+ datum" if at_datum is None else f"datum: middle of pin {at_datum}"
-    picture.add(*_captions(view, plate is not None, bool(step.pins), datum))
+    picture.add(*_datum(view, step, plate is not None))
+    if plate is not None:
+        picture.add(*_captions(view, is_pinned))
     return picture.svg()
-
-
-def _widened(bounds: Bounds) -> Bounds:
-    low_x, low_y, high_x, high_y = bounds
-    return low_x - FREE, low_y - FREE, high_x + FREE, high_y + FREE
-
-
-def _radius(pin: Pin, view: _View) -> float:
-    return max(pin.diameter * view.scale / 2, 0.7)
 
 
 def _outward(pin: Pin) -> Point:
     """Return the direction on the page from the datum to a pin; upward for the pin at the datum."""
     far = math.hypot(*pin.centre)
     return (pin.centre[0] / far, -pin.centre[1] / far) if far > AT_DATUM else (0.0, -1.0)
-
-
-def _pin(at: Point, r: float, is_in: bool) -> str:
-    """Return a pin that is in as a filled circle, a removed one as a hollow circle."""
-    x, y = at
-    fill = draw.DARK if is_in else "#ffffff"
-    return (
-        f'<circle cx="{coord(x)}" cy="{coord(y)}" r="{coord(r)}" fill="{fill}" '
-        f'stroke="{draw.DARK}" stroke-width="0.3"/>'
-    )
 
 
 def _reach(laminate: Laminate, inlet: Inlet) -> float:
@@ -255,33 +205,33 @@ def _arrow(inlet: Inlet, reach: float, view: _View) -> tuple[Point, Point]:
     return (x + 0.8 * u, y + 0.8 * v), (x + 4.0 * u, y + 4.0 * v)
 
 
-def _datum(view: _View) -> list[str]:
-    """Return the cross at the actuator's axis, as in every cut file."""
+def _datum(view: _View, step: AssemblyStep, has_plate: bool) -> list[str]:
+    """Return the cross at the actuator's axis, as in every cut file, unless a pin stands there, and
+    its words under the picture.
+    """
+    at = EDGE + KEY * has_plate, view.height - 1.2
+    for pin in step.pins:
+        if math.hypot(*pin.centre) < AT_DATUM:
+            return [draw.text(at, f"datum: middle of pin {pin.name}", size=2.2)]
     x, y = view.origin
     return [
         draw.line([(x - 1.6, y), (x + 1.6, y)], width=0.2),
         draw.line([(x, y - 1.6), (x, y + 1.6)], width=0.2),
+        draw.text(at, "+ datum", size=2.2),
     ]
 
 
-def _captions(view: _View, plate: bool, pinned: bool, datum: str) -> list[str]:
-    """Return the key of the marks under the picture, and the words on the plate above it."""
+def _captions(view: _View, is_pinned: bool) -> list[str]:
+    """Return the key of the pins under the picture, and the words on the plate above it."""
     y = view.height - 1.2
-    parts = [draw.text((EDGE + KEY * plate, y), datum, size=2.2)]
-    if not plate:
-        return parts
-    mark = '<circle cx="{}" cy="{}" r="0.8" fill="{}" stroke="#1a1a1a" stroke-width="0.3"/>'
-    parts += [
-        mark.format(coord(EDGE + 0.8), coord(y - 0.8), draw.DARK),
+    words = "on the base plate, cut corner back right" if is_pinned else "no pins"
+    return [
+        draw.circle((EDGE + 0.8, y - 0.8), 0.8, PINS[True]),
         draw.text((EDGE + 2.4, y), "pin", size=2.2),
-        mark.format(coord(EDGE + 8.0), coord(y - 0.8), "#ffffff"),
+        draw.circle((EDGE + 8.0, y - 0.8), 0.8, PINS[False]),
         draw.text((EDGE + 9.6, y), "no pin", size=2.2),
+        draw.text((EDGE, HEAD - 1.2), f"from above, {words}", size=2.2),
     ]
-    words = (
-        "from above, on the base plate, cut corner back right" if pinned else "from above, no pins"
-    )
-    parts.append(draw.text((EDGE, HEAD - 1.2), words, size=2.2))
-    return parts
 
 
 # The step taken apart: every layer or finished stack in its place over the plate.
@@ -485,23 +435,18 @@ STACK = 8.0, 19.0
 GAP = 3.0
 LEAST = 24.0
 """Room for the text beside the section, mm on the page."""
-INKS = {
-    "platen": "#c9ccd1",
-    BASE_PLATE: "#e3e5e8",
-    "film": "#e0872f",
-    LAMINATE: "#bcd3ea",
-    PAD: "#f3ddd6",
-    UNDERLAY: "#ffffff",
-}
+LAMINATE_ROW = 3
+"""Place of the laminate among the labels, from above."""
+PLATEN_INK, PLATE_INK, FILM_INK = "#c9ccd1", "#e3e5e8", "#e0872f"
 
 
 def factor(step: Step) -> int:
     """Return the magnification of films: pins above the stack must end inside the pad."""
-    pad = next(item.thickness_mm for item in step.build_up if item.part == PAD) * THICK
+    thick = {item.part: item.thickness_mm for item in step.build_up}
     over = max((pin.stands_mm for pin in step.pin_settings), default=step.top_mm) - step.top_mm
-    paper = sum(item.thickness_mm for item in step.build_up if item.part == UNDERLAY)
-    films = step.stack_mm + paper
-    fits = (by for by in FACTORS if films * by <= TALLEST_LAMINATE and over * by <= PIN_REACH * pad)
+    films = step.stack_mm + thick.get(UNDERLAY, 0.0)
+    room = PIN_REACH * thick[PAD] * THICK
+    fits = (by for by in FACTORS if films * by <= TALLEST_LAMINATE and over * by <= room)
     return next(fits, FACTORS[-1])
 
 
@@ -511,62 +456,45 @@ def build_up_svg(step: Step, name: str) -> str:
     Base plate and press pad are drawn 1:2; films, laminate and the pins above the plate are
     magnified by a factor stated in the picture. Widths are not to scale.
     """
-    thick = {item.part: item for item in step.build_up}
-    by = factor(step)
-    plate, pad = thick[BASE_PLATE].thickness_mm * THICK, thick[PAD].thickness_mm * THICK
-    release = thick["release film"].thickness_mm * by
-    stack = step.stack_mm * by
-    drawn = pad + 2 * release + stack + plate + 2 * PLATEN
-    start = SECTION_EDGE + max(0.0, LEAST - drawn) / 2
-    top = start + PLATEN
-    over = top + pad
-    upper = over + release
-    lower = upper + stack
-    paper = thick[UNDERLAY].thickness_mm * by if UNDERLAY in thick else 0.0
-    bed = lower + release
-    face = bed + paper
-    bottom = face + plate
-    end = max(bottom + PLATEN, SECTION_EDGE + LEAST)
-    low, high = STACK
+    thick = {item.part: item.thickness_mm for item in step.build_up}
+    by, paper = factor(step), thick.get(UNDERLAY, 0.0)
+    pad, plate, film = thick[PAD] * THICK, thick[BASE_PLATE] * THICK, thick[RELEASE] * by
+    laminate = step.stack_mm * by
+    heights = [PLATEN, pad, film, laminate, film, paper * by, plate, PLATEN]
+    start = SECTION_EDGE + max(0.0, LEAST + paper * by - sum(heights)) / 2
+    tops = [*accumulate(heights, initial=start)]
+    top, over, upper, lower, bed, face, bottom, end = tops[1:]
+    end = max(end, SECTION_EDGE + LEAST)
     words = "; ".join(f"{item.part} {item.thickness_mm:g} mm" for item in reversed(step.build_up))
-    picture = Picture(
-        name, SECTION_WIDE + SECTION_LABELS, end + 5.0, f"build-up of step {step.step}: {words}"
-    )
-    for y in (start, bottom):
-        picture.add(
-            draw.box(
-                (SECTION_EDGE, y), (SECTION_WIDE, y + PLATEN), fill=INKS["platen"], stroke=draw.DARK
-            )
-        )
+    words = f"build-up of step {step.step}: {words}"
+    picture = Picture(name, SECTION_WIDE + SECTION_LABELS, end + 5.0, words)
+    low, high = STACK
     picture.add(
-        draw.box(
-            (SECTION_EDGE, face), (SECTION_WIDE, bottom), fill=INKS[BASE_PLATE], stroke=draw.DARK
-        ),
-        *_underlay(bed, face),
-        _pad(top, over, bed - 2 * release, low, high),
-        *_release(upper, bed, release, low, high),
-        draw.box((low, upper), (high, lower), fill=INKS[LAMINATE], stroke=draw.DARK),
-        *_section_pins(step.pin_settings, face, bottom, by, low, high),
+        _bar(start, top, PLATEN_INK),
+        _bar(bottom, bottom + PLATEN, PLATEN_INK),
+        _bar(face, bottom, PLATE_INK),
+        _bar(bed, face, "#ffffff", 0.1) if paper else "",
+        _pad(top, over, bed - 2 * film),
+        *_release(upper, bed, film),
+        draw.box((low, upper), (high, lower), fill="#bcd3ea", stroke=draw.DARK),
+        *_section_pins(step.pin_settings, face, bottom, by),
     )
+    state = "pins in" if step.pin_settings else "no pins"
+    heat, release = temperature(step.temperature_c), millimetres(thick[RELEASE])
     labels = [
-        (start + PLATEN / 2, f"upper platen, {temperature(step.temperature_c)}"),
-        (
-            top + pad / 2,
-            f"press pad {millimetres(thick[PAD].thickness_mm)}",
-        ),
-        (upper - release / 2, _release_words(step)),
-        (
-            upper + stack / 2,
-            f"laminate {millimetres(step.stack_mm)}, ~{step.film_kpa:.0f} kPa",
-        ),
-        (bed - release / 2, "release film"),
-        *_underlay_words(thick, (bed + face) / 2),
-        (face + plate / 2, _plate_words(step, thick[BASE_PLATE].thickness_mm)),
-        (bottom + PLATEN / 2, f"lower platen, {temperature(step.temperature_c)}"),
+        f"upper platen, {heat}",
+        f"press pad {millimetres(thick[PAD])}",
+        f"release film {release}",
+        f"laminate {millimetres(step.stack_mm)}, ~{step.film_kpa:.0f} kPa",
+        "release film",
+        f"underlay {millimetres(paper)}, paper" if paper else "",
+        f"base plate {millimetres(thick[BASE_PLATE])}, {state}",
+        f"lower platen, {heat}",
     ]
-    rows = draw.spread([y for y, _ in labels], GAP, SECTION_EDGE + 2.0, end)
-    for (y, text), row in zip(labels, rows, strict=True):
-        x = high - 1.5 if "laminate" in text else SECTION_WIDE - 1.5
+    lines = [(y + h / 2, text) for y, h, text in zip(tops, heights, labels, strict=False) if text]
+    rows = draw.spread([y for y, _ in lines], GAP, SECTION_EDGE + 2.0, end)
+    for place, ((y, text), row) in enumerate(zip(lines, rows, strict=True)):
+        x = (high if place == LAMINATE_ROW else SECTION_WIDE) - 1.5
         picture.add(*draw.leader((x, y), (SECTION_WIDE + 2.0, row), (SECTION_WIDE + 3.5, row)))
         picture.add(draw.text((SECTION_WIDE + 4.2, row + 0.8), text, size=2.3))
     scale = f"plate and pad 1:2; what lies between {by}:1; widths not to scale"
@@ -574,83 +502,51 @@ def build_up_svg(step: Step, name: str) -> str:
     return picture.svg()
 
 
-def _underlay(top: float, bottom: float) -> list[str]:
-    """Return the printed paper between plate and release film; empty without one."""
-    if top == bottom:
-        return []
-    return [
-        draw.box(
-            (SECTION_EDGE, top),
-            (SECTION_WIDE, bottom),
-            fill=INKS[UNDERLAY],
-            stroke=draw.DARK,
-            width=0.1,
-        )
-    ]
+def _bar(top: float, bottom: float, fill: str, width: float = draw.THIN) -> str:
+    """Return a part as wide as the platen."""
+    ends = (SECTION_EDGE, top), (SECTION_WIDE, bottom)
+    return draw.box(*ends, fill=fill, stroke=draw.DARK, width=width)
 
 
-def _underlay_words(thick: Mapping[str, BuildUpPart], y: float) -> list[tuple[float, str]]:
-    if UNDERLAY not in thick:
-        return []
-    return [(y, f"underlay {millimetres(thick[UNDERLAY].thickness_mm)}, paper")]
-
-
-def _release_words(step: Step) -> str:
-    film = next(item for item in step.build_up if item.part == "release film")
-    return f"release film {millimetres(film.thickness_mm)}"
-
-
-def _plate_words(step: Step, plate: float) -> str:
-    return f"base plate {millimetres(plate)}, {'pins in' if step.pin_settings else 'no pins'}"
-
-
-def _pad(top: float, over: float, beside: float, low: float, high: float) -> str:
+def _pad(top: float, over: float, beside: float) -> str:
     """Return the pad, compressed above the laminate; beside it, it meets the plate."""
-    slope = min(4.0, beside - over)
+    (low, high), slope = STACK, min(4.0, beside - over)
     path = (
         f"M{SECTION_EDGE} {top}H{SECTION_WIDE}V{beside:.3f}H{high + slope:.3f}L{high} {over:.3f}"
         f"H{low}L{low - slope:.3f} {beside:.3f}H{SECTION_EDGE}Z"
     )
-    return f'<path d="{path}" fill="{INKS[PAD]}" stroke="{draw.DARK}" stroke-width="{draw.THIN}"/>'
+    return f'<path d="{path}" fill="#f3ddd6" stroke="{draw.DARK}" stroke-width="{draw.THIN}"/>'
 
 
-def _release(upper: float, bed: float, release: float, low: float, high: float) -> list[str]:
+def _release(upper: float, bed: float, release: float) -> list[str]:
     """Return the flat lower film and the upper one, which rises over the laminate."""
-    slope = min(4.0, bed - 2 * release - (upper - release))
+    (low, high), slope = STACK, min(4.0, bed - release - upper)
     beside, over = bed - 1.5 * release, upper - release / 2
     ends = [(SECTION_EDGE, beside), (low - slope, beside), (low, over), (high, over)]
     ends += [(high + slope, beside), (SECTION_WIDE, beside)]
     flat = bed - release / 2
     return [
-        draw.line([(SECTION_EDGE, flat), (SECTION_WIDE, flat)], colour=INKS["film"], width=release),
-        draw.line(ends, colour=INKS["film"], width=release),
+        draw.line([(SECTION_EDGE, flat), (SECTION_WIDE, flat)], colour=FILM_INK, width=release),
+        draw.line(ends, colour=FILM_INK, width=release),
     ]
 
 
 def _section_pins(
-    settings: tuple[PinSetting, ...],
-    face: float,
-    bottom: float,
-    by: int,
-    low: float,
-    high: float,
+    settings: tuple[PinSetting, ...], face: float, bottom: float, by: int
 ) -> list[str]:
     """The pins on the shoulders of their holes, seat 1:2, the part above the plate magnified.
 
     Below each is its push-out hole; the tips press into the pad.
     """
-    parts = []
+    (low, high), parts = STACK, []
     for place, pin in enumerate(settings[:4]):
         x = low + (high - low) * (place + 1) / (min(len(settings), 4) + 1)
-        half = pin.diameter_mm / 2
         tip, shoulder = face - pin.stands_mm * by, face + pin.seat_mm * THICK
-        narrow = push_out(pin.diameter_mm) / 2
-        parts += [
-            draw.box(
-                (x - narrow, shoulder), (x + narrow, bottom), fill="#ffffff", stroke=draw.DARK
-            ),
-            draw.box((x - half, tip), (x + half, shoulder), fill="#6d737c", stroke=draw.DARK),
-        ]
+        for half, top, end, fill in (
+            (push_out(pin.diameter_mm) / 2, shoulder, bottom, "#ffffff"),
+            (pin.diameter_mm / 2, tip, shoulder, "#6d737c"),
+        ):
+            parts.append(draw.box((x - half, top), (x + half, end), fill=fill, stroke=draw.DARK))
     return parts
 
 
