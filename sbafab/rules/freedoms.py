@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
@@ -55,15 +56,7 @@ class Freedom(NamedTuple):
 
         A seam's place depends on its tool, as a cut edge's place depends on the laser.
         """
-        if self.seam:
-            return False
-        return self.centre is not None or self.pins == 0
-
-    def lever(self, p: Point, normal: Point) -> float:
-        """Return the body's displacement along ``normal`` at ``p`` per radian of its turn, mm."""
-        if self.centre is None:
-            return 1.0
-        return (p[0] - self.centre[0]) * normal[1] - (p[1] - self.centre[1]) * normal[0]
+        return not self.seam and (self.centre is not None or self.pins == 0)
 
     def like(self) -> tuple[object, ...]:
         """Equal for freedoms that differ in step and body only."""
@@ -71,27 +64,28 @@ class Freedom(NamedTuple):
         return self.most, centre, self.pins, bool(self.seam)
 
 
-class Freedoms(dict[Part, tuple[Freedom, ...]]):
+Ways = tuple[Freedom, ...]
+
+
+class Freedoms(dict[Part, Ways]):
     """Freedoms of each piece of each layer; pieces that share a freedom share the object."""
 
-    def __init__(self, by_part: Mapping[Part, tuple[Freedom, ...]]) -> None:
+    def __init__(self, by_part: Mapping[Part, Ways]) -> None:
         super().__init__(by_part)
-        self._of_layer: dict[int, list[tuple[Freedom, ...]]] = {}
+        self._of_layer: dict[int, list[Ways]] = {}
         for part, ways in by_part.items():
             self._of_layer.setdefault(part.layer, []).append(ways)
-        self._unshared: dict[tuple[int, ...], list[tuple[Freedom, ...]]] = {}
+        self._unshared: dict[tuple[int, ...], list[Ways]] = {}
 
-    def unshared(self, layers: tuple[int, ...]) -> list[tuple[Freedom, ...]]:
+    def unshared(self, layers: tuple[int, ...]) -> list[Ways]:
         """Freedoms of each piece of these layers, in order, without those shared by all pieces."""
-        result = self._unshared.get(layers)
-        if result is None:
+        if layers not in self._unshared:
             every = [ways for layer in layers for ways in self._of_layer[layer]]
-            shared = set(map(id, every[0]))
-            for ways in every[1:]:
-                shared.intersection_update(map(id, ways))
-            result = [tuple([way for way in ways if id(way) not in shared]) for ways in every]
-            self._unshared[layers] = result
-        return result
+            shared = set.intersection(*(set(map(id, ways)) for ways in every))
+            self._unshared[layers] = [
+                tuple([way for way in ways if id(way) not in shared]) for ways in every
+            ]
+        return self._unshared[layers]
 
 
 class Laid(NamedTuple):
@@ -136,14 +130,14 @@ def freedoms(laminate: Laminate, design: Design, laid: Sequence[Laid]) -> Freedo
     ``lay_up``.
     """
     counts = {name: len(layers[0].profile.pieces) for name, layers in laminate.patterns.items()}
-    by_part: dict[Part, tuple[Freedom, ...]] = {
+    by_part: dict[Part, Ways] = {
         Part(layer.index, piece): ()
         for layer in laminate.layers
         for piece in range(counts[layer.pattern])
     }
-    registration, on_pins = design.registration, error_on_pins(design, laminate)
+    on_pins = error_on_pins(design, laminate)
     for number, item in enumerate(laid, 1):
-        ways = () if item.stays else _body_freedoms(item, number, registration, on_pins)
+        ways = () if item.stays else _body_freedoms(item, number, design.registration, on_pins)
         if item.under is not None:
             ways = (*by_part[item.under], *ways)
         for part in item.body:
@@ -159,37 +153,33 @@ def seam_part(seam: Seam, piece: int = 0) -> Part:
 
 
 def _of_seam(
-    laminate: Laminate, seam: Seam, by_part: Mapping[Part, Sequence[Freedom]], design: Design
-) -> dict[Part, tuple[Freedom, ...]]:
+    laminate: Laminate, seam: Seam, by_part: Mapping[Part, Ways], design: Design
+) -> dict[Part, Ways]:
     """Freedoms of a seam: the upper film's, since its path is laid on that film, and its tool's."""
     films = laminate.layer(seam.above).profile.pieces
     under = next((n for n, film in enumerate(films) if not (film & seam.region).is_empty), 0)
-    step = next(
-        (s.number for s in laying(laminate) if s.joining and s.joining.seam is seam), seam.order
-    )
-    most, (layer, _) = design.registration.error_of_seam(seam.tool), seam_part(seam)
+    steps = (s.number for s in laying(laminate) if s.joining and s.joining.seam is seam)
+    most, layer = design.registration.error_of_seam(seam.tool), seam_part(seam).layer
+    step = next(steps, seam.order)
     off = Freedom(step, layer, seam.below, seam.above, 0, most, seam=seam.name)
     ways = (*by_part[Part(seam.above, under)], *((off,) if most > 0 else ()))
     return {seam_part(seam, piece): ways for piece in range(len(seam.region.pieces))}
 
 
-def _body_freedoms(
-    laid: Laid, number: int, hand: Registration, on_pins: float
-) -> tuple[Freedom, ...]:
+def _body_freedoms(laid: Laid, number: int, hand: Registration, on_pins: float) -> Ways:
     """Freedoms that a step gives a body; ``on_pins`` mm off its place on its pins."""
     pins = laid.pins
-    lowest, highest = min(laid.body).layer, max(laid.body).layer
-
-    def freedom(most: float, centre: Point | None = None) -> Freedom:
-        return Freedom(laid.step, number, lowest, highest, len(pins), most, centre)
-
-    loose = min(pins.values(), default=0.0)
-    shift = freedom(on_pins + loose if pins else hand.hand_placement)
+    shift = on_pins + min(pins.values()) if pins else hand.hand_placement
+    turn, centre = math.radians(hand.hand_turn), laid.centre
     if len(pins) >= 2:
-        both = [shift, freedom(*_turn_on(pins))]
-    else:
-        both = [shift, freedom(math.radians(hand.hand_turn), laid.centre)]
-    return tuple(way for way in both if way.most > 0)
+        turn, centre = _turn_on(pins)
+    lowest, highest = min(laid.body).layer, max(laid.body).layer
+    both = ((shift, None), (turn, centre))
+    return tuple(
+        Freedom(laid.step, number, lowest, highest, len(pins), most, about)
+        for most, about in both
+        if most > 0
+    )
 
 
 def _turn_on(pins: Mapping[Point, float]) -> tuple[float, Point]:
@@ -212,31 +202,24 @@ class _Shapes:
 
     def __init__(self, laminate: Laminate) -> None:
         self.laminate = laminate
-        self.pieces: dict[str, tuple[Region, ...]] = {
-            pattern: layers[0].profile.pieces for pattern, layers in laminate.patterns.items()
-        }
-        self.centres: dict[tuple[str, int], Point] = {}
-        self.holders: dict[tuple[str, int], dict[str, float]] = {}
-        self.overlaps: dict[tuple[str, int, str, int], bool] = {}
-        self.meeting: dict[tuple[str, str], list[tuple[int, int]]] = {}
-        self.pattern = {layer.index: layer.pattern for layer in laminate.layers}
+        pieces = {name: layers[0].profile.pieces for name, layers in laminate.patterns.items()}
+        self.pieces = {layer.index: pieces[layer.pattern] for layer in laminate.layers}
+        # Not methods: what is cached must not hold these shapes. Equal patterns share regions.
+        self.centroid = cache(centroid)
+        self.meet = cache(_overlap)
+        self.play = cache(lambda region: _play_on_pins(laminate, region))
 
     def parts(self, layer: int) -> list[Part]:
-        return [Part(layer, i) for i in range(len(self.pieces[self.pattern[layer]]))]
+        return [Part(layer, i) for i in range(len(self.pieces[layer]))]
 
     def _region(self, part: Part) -> Region:
-        return self.pieces[self.pattern[part.layer]][part.piece]
+        return self.pieces[part.layer][part.piece]
 
     def pins(self, body: Iterable[Part], step: AssemblyStep) -> dict[Point, float]:
         """Centres of the step's pins that hold a part of the body, and its play on each, mm."""
-        if not step.pins:
-            return {}
         play: dict[str, float] = {}
-        for part in body:
-            key = self.pattern[part.layer], part.piece
-            if key not in self.holders:
-                self.holders[key] = _play_on_pins(self.laminate, self._region(part))
-            for name, loose in self.holders[key].items():
+        for part in body if step.pins else ():
+            for name, loose in self.play(self._region(part)).items():
                 play[name] = min(loose, play.get(name, loose))
         return {pin.centre: play[pin.name] for pin in step.pins if pin.name in play}
 
@@ -244,71 +227,46 @@ class _Shapes:
         """The body's centre of area, all its parts counted."""
         area = x = y = 0.0
         for part in body:
-            region, key = self._region(part), (self.pattern[part.layer], part.piece)
-            if key not in self.centres:
-                self.centres[key] = centroid(region)
-            px, py = self.centres[key]
+            region = self._region(part)
+            px, py = self.centroid(region)
             area, x, y = area + region.area, x + px * region.area, y + py * region.area
         return x / area, y / area
-
-    def overlap(self, a: Part, b: Part) -> bool:
-        """Return True if two parts lie over each other."""
-        key = (self.pattern[a.layer], a.piece, self.pattern[b.layer], b.piece)
-        if key not in self.overlaps:
-            region_a, region_b = self._region(a), self._region(b)
-            self.overlaps[key] = (
-                boxes_meet(region_a.bounds, region_b.bounds) and not (region_a & region_b).is_empty
-            )
-        return self.overlaps[key]
-
-    def meet(self, lower: int, upper: int) -> list[tuple[int, int]]:
-        """The pieces of two layers that lie over each other."""
-        key = self.pattern[lower], self.pattern[upper]
-        if key not in self.meeting:
-            self.meeting[key] = [
-                (a.piece, b.piece)
-                for a in self.parts(lower)
-                for b in self.parts(upper)
-                if self.overlap(a, b)
-            ]
-        return self.meeting[key]
 
     def under(self, body: Sequence[Part], present: Sequence[Sequence[Part]]) -> Part | None:
         """The part that a body placed by hand lies on: the highest film of the body below."""
         lowest = min(body).layer
-        feet = [part for part in body if part.layer == lowest]
+        feet = [self._region(part) for part in body if part.layer == lowest]
         below = [(part, lower) for lower in present for part in lower if part.layer < lowest]
         for part, lower in sorted(below, reverse=True):
-            if any(self.overlap(part, foot) for foot in feet):
+            if any(self.meet(self._region(part), foot) for foot in feet):
                 films = [p for p in lower if not self.laminate.layer(p.layer).is_mask]
                 return max(films or lower)
         return None
 
     def joined(self, present: Sequence[list[Part]]) -> list[list[Part]]:
         """Return the bodies after a step: parts that lie on each other have become one."""
-        home: dict[int, dict[int, int]] = {}
-        for index, body in enumerate(present):
-            for layer, piece in body:
-                home.setdefault(layer, {})[piece] = index
-        leader = list(range(len(present)))
+        leader = {part: body[0] for body in present for part in body}
 
-        def first(index: int) -> int:
-            while leader[index] != index:
-                index = leader[index]
-            return index
+        def first(part: Part) -> Part:
+            while leader[part] != part:
+                part = leader[part]
+            return part
 
-        for lower, upper in pairwise(sorted(home)):
-            ours, theirs = home[lower], home[upper]
-            for a, b in self.meet(lower, upper):
-                leader_a, leader_b = first(ours[a]), first(theirs[b])
-                if leader_a < leader_b:
-                    leader[leader_b] = leader_a
-                else:
-                    leader[leader_a] = leader_b
-        merged: dict[int, list[Part]] = {}
-        for part in sorted(part for body in present for part in body):
-            merged.setdefault(first(home[part.layer][part.piece]), []).append(part)
+        for lower, upper in pairwise(sorted({part.layer for part in leader})):
+            for a in self.parts(lower):
+                for b in self.parts(upper):
+                    if self.meet(self._region(a), self._region(b)):
+                        low, high = sorted((first(a), first(b)))
+                        leader[high] = low
+        merged: dict[Part, list[Part]] = {}
+        for part in sorted(leader):
+            merged.setdefault(first(part), []).append(part)
         return list(merged.values())
+
+
+def _overlap(a: Region, b: Region) -> bool:
+    """Return True if two regions lie over each other."""
+    return boxes_meet(a.bounds, b.bounds) and not (a & b).is_empty
 
 
 def _play_on_pins(laminate: Laminate, part: Region) -> dict[str, float]:

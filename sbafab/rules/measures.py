@@ -19,11 +19,10 @@ from sbafab.rules.finding import Place
 from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
 from sbafab.rules.margins import (
     SHARP,
-    InterfaceGroup,
-    InterfaceMargins,
-    LinearForms,
+    Group,
+    Margins,
     group_interfaces,
-    linear_forms,
+    margins_of,
     narrow_places,
 )
 from sbafab.rules.seam_overlaps import SeamEnds, seam_ends
@@ -51,7 +50,7 @@ class Measures:
         Places that are narrow with the rougher hand include every narrow place of a steadier one.
         """
         steadier = Measures(self.laminate, design, self.pause)
-        steadier.margins, steadier.laid = self.margins, self.laid
+        steadier.groups, steadier.laid = self.groups, self.laid
         steadier.seam_ends = self.seam_ends
         return steadier
 
@@ -90,7 +89,7 @@ class Measures:
         return lay_up(self.laminate)
 
     @cached_property
-    def _equal_interfaces(self) -> list[list[Interface]]:
+    def _equal_interfaces(self) -> list[tuple[Interface, ...]]:
         return group_interfaces(self.laminate, self.facing, self.moves)
 
     @cached_property
@@ -100,25 +99,23 @@ class Measures:
         return seam_ends(self.laminate, first, self.design.registration.error_of_seam)
 
     @cached_property
-    def margins(self) -> list[InterfaceMargins]:
-        """The narrow places of every interface."""
-        design = self.design
-        groups = [
-            InterfaceGroup.of(interfaces, design, self.moves, self.bond(interfaces[0]))
-            for interfaces in self._equal_interfaces
-        ]
-        reaches = [self.reaches(group.interfaces[0]) for group in groups]
-        overlaps = [ends.overlaps for ends in self.seam_ends]
-        places_of_groups = narrow_places(groups, self.laminate.pins, design, reaches, overlaps)
-        return [
-            InterfaceMargins(group.interfaces, places)
-            for group, places in zip(groups, places_of_groups, strict=True)
-        ]
+    def groups(self) -> list[Group]:
+        """Equal interfaces, with their narrow places."""
+        interfaces = self._equal_interfaces
+        return narrow_places(
+            interfaces,
+            [self.bond(first) for first, *_ in interfaces],
+            [self.reaches(first) for first, *_ in interfaces],
+            [ends.overlaps for ends in self.seam_ends],
+            self.laminate.pins,
+            self.design,
+            self.moves,
+        )
 
     @cached_property
-    def forms(self) -> LinearForms:
-        """The margins as linear forms."""
-        return linear_forms(self.margins, self.moves)
+    def margins(self) -> list[Margins]:
+        """The margins of all interfaces, as linear forms."""
+        return margins_of(self.groups, self.moves)
 
 
 def _bond(bond: Region) -> Width | None:

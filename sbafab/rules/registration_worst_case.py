@@ -9,23 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from itertools import groupby
 from typing import NamedTuple
 
 from sbafab.design.records import Design
-from sbafab.geometry.on_demand import np
+from sbafab.geometry.edges import Point
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict, judged
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import holds, least_passing
-from sbafab.rules.margins import (
-    InterfaceMargins,
-    Margin,
-    MarginKind,
-    Push,
-    bonding_seams,
-    pushes,
-)
+from sbafab.rules.margins import MarginKind, Margins, bonding_seams
 from sbafab.rules.measures import DistinctInterface, Measures, interface_name, place_in
 from sbafab.rules.rule import Rule
 from sbafab.rules.seam_overlaps import EdgeBond
@@ -42,65 +36,68 @@ class Remaining(NamedTuple):
 
     ``pinned`` is the least that remains anywhere in it without the errors of the hand. Places that
     are short as drawn do not count for it: bond-width and mask-overhang report those. ``number`` is
-    the place of the margin in its ``group``.
+    the column of the worst among the ``margins`` between the same owners.
     """
 
     worst: float
     pinned: float
-    quantity: MarginKind
-    group: InterfaceMargins
+    margins: Margins
     number: int
 
     @property
-    def margin(self) -> Margin:
-        return self.group[self.number]
+    def quantity(self) -> MarginKind:
+        return self.margins.quantity
 
     @property
     def interfaces(self) -> tuple[Interface, ...]:
-        return self.group.interfaces
+        return self.margins.group.interfaces
 
     @property
-    def distinct(self) -> DistinctInterface:
-        return DistinctInterface(self.interfaces[0], len(self.interfaces))
+    def middle(self) -> Point:
+        places = self.margins.group.places[self.quantity]
+        return places.middle(int(self.margins.numbers[self.number]))
+
+    @property
+    def is_overlap(self) -> bool:
+        """True if it is the depth by which a seam runs into another one."""
+        return not self.margins.cut_edges
+
+    @property
+    def dearest(self) -> list[tuple[Freedom, float]]:
+        """The bodies that can move, with the mm that shift and turn take together, most first."""
+        total: dict[tuple[int, int], tuple[Freedom, float]] = {}
+        costs = self.margins.costs[:, self.number].tolist()
+        for (freedom, _), cost in zip(self.margins.moves, costs, strict=True):
+            first, before = total.get((freedom.step, freedom.body), (freedom, 0.0))
+            total[freedom.step, freedom.body] = first, before + cost
+        return sorted(total.values(), key=lambda push: -round(push[1], 9))
 
 
 def least_remaining(measures: Measures) -> list[Remaining]:
     """Return the worst place of every group of equal interfaces, for bond and overhang."""
-    forms, design = measures.forms, measures.design
-    begins = forms.begins[:-1]
-    drawn = forms.by_quantity(
-        {
-            "bond": least_passing(design.rules.bond_width),
-            "overhang": least_passing(design.rules.mask_overhang),
-        }
-    )
-    # Both edges are cut: two contours, or one that is off on either side.
-    cut = forms.nominal - forms.cut_edges * design.registration.cutting_error
-    is_counted = (forms.nominal >= drawn) | (forms.cut_edges == 0)
-    firm = np.where(is_counted, cut - forms.pinned_loss, math.inf)
-    pinned = np.minimum.reduceat(firm, begins).tolist()
-    worst = cut - forms.loss
-    (near,) = (worst <= np.minimum.reduceat(worst, begins)[forms.run] + SAME).nonzero()
-    values = worst[near].tolist()
-    # Many are equal, and rounding takes time.
-    rounded = {value: round(value, 9) for value in set(values)}
-    least = [math.inf] * len(forms.runs)
-    first = [0] * len(forms.runs)
-    for run, value, number in zip(forms.run[near].tolist(), values, near.tolist(), strict=True):
-        if rounded[value] < least[run]:
-            least[run], first[run] = rounded[value], number
-    return [
-        Remaining(
-            float(worst[number]),
-            least_pinned,
-            run.quantity,
-            measures.margins[run.group],
-            run.first + number - begin,
-        )
-        for run, begin, least_pinned, number in zip(
-            forms.runs, begins.tolist(), pinned, first, strict=True
-        )
-    ]
+    runs = groupby(measures.margins, key=lambda margins: (id(margins.group), margins.quantity))
+    return [_least([*run], measures.design) for _, run in runs]
+
+
+def _least(run: Sequence[Margins], design: Design) -> Remaining:
+    """Return the worst of all margins of one quantity of an interface."""
+    bond, overhang = design.rules.bond_width, design.rules.mask_overhang
+    drawn = least_passing(bond if run[0].quantity == "bond" else overhang)
+    pinned = math.inf
+    rows: list[tuple[float, int, float, Margins, int]] = []
+    for margins in run:
+        # Both edges are cut: two contours, or one that is off on either side.
+        cut = margins.nominal - margins.cut_edges * design.registration.cutting_error
+        counted = (margins.nominal >= drawn) | (margins.cut_edges == 0)
+        firm = cut[counted] - margins.pinned_loss
+        pinned = min(pinned, float(firm.min(initial=math.inf)))
+        worst = cut - margins.costs.sum(axis=0)
+        (near,) = (worst <= worst.min() + SAME).nonzero()
+        for number in near.tolist():
+            value = float(worst[number])
+            rows.append((round(value, 9), int(margins.numbers[number]), value, margins, number))
+    _, _, value, margins, number = min(rows, key=lambda row: row[:2])
+    return Remaining(value, pinned, margins, number)
 
 
 def check(measures: Measures) -> list[Finding]:
@@ -137,18 +134,17 @@ def _finding(
         verdict = "fail"
     elif not holds(worst.worst, limit):
         verdict = "warn"
-    margin = worst.margin
-    dearest = costs(pushes(margin, worst.group.first, measures.moves))
+    dearest = worst.dearest
     by_seams = any(freedom.seam for freedom, _ in dearest)
-    pinned, first = least_pinned.pinned, least_pinned.interfaces[0]
+    pinned, interface = least_pinned.pinned, worst.interfaces[0]
     facts = {
         "rest": _mm(worst.worst),
-        "nominal": margin.nominal,
-        "what": _what(margin, worst.group.first),
-        "where": worst.distinct.name,
-        "cause": _cause(dearest, margin, measures.design),
+        "nominal": float(worst.margins.nominal[worst.number]),
+        "what": _what(worst),
+        "where": DistinctInterface(interface, len(worst.interfaces)).name,
+        "cause": _cause(worst, measures.design),
         "firm": _mm(pinned),
-        "firm_where": interface_name(first),
+        "firm_where": interface_name(least_pinned.interfaces[0]),
         "count": sum(len(place.interfaces) for place in places if not holds(place.worst, limit)),
         "why": say(f"{NAME}.{'drawn-short' if math.isinf(pinned) else 'firm-leaves'}"),
         "mending": say(f"{NAME}.{'steadier' if by_seams else f'wider-{quantity}'}"),
@@ -159,7 +155,7 @@ def _finding(
     if quantity == "bond":
         facts["plate"] = _plate(verdict == "fail", measures.laminate, measures.design)
     sentence = {"pass": "kept", "warn": "short", "fail": "fails"}[verdict]
-    place, value = place_in(worst.interfaces[0], margin.middle), max(0.0, worst.worst)
+    place, value = place_in(interface, worst.middle), max(0.0, worst.worst)
     return judged(NAME, verdict, limit, value, "mm", place, sentence, **facts)
 
 
@@ -176,21 +172,22 @@ def _plate(failed: bool, laminate: Laminate, design: Design) -> Clause:
     return say(f"{NAME}.{sentence}", command=command, pin_error=design.pin_error)
 
 
-def _cause(dearest: Sequence[Push], margin: Margin, design: Design) -> Clause:
+def _cause(worst: Remaining, design: Design) -> Clause:
     """Return the largest contribution to a loss."""
-    if dearest:
-        freedom, cost = dearest[0]
+    if worst.dearest:
+        freedom, cost = worst.dearest[0]
         return say(f"{NAME}.largest", source=_source(freedom), cost=cost)
-    if margin.is_overlap:
+    if worst.is_overlap:
         return say(f"{NAME}.still")
     return say(f"{NAME}.cutting", cutting_mm=2 * design.registration.cutting_error)
 
 
-def _what(margin: Margin, interface: Interface) -> Clause:
-    if not margin.is_overlap:
-        return say(f"{NAME}.{margin.quantity}")
-    seams = bonding_seams(interface)
-    of, on = (seams[owner.seat - 2 - len(interface.masks)].name for owner in margin.owners)
+def _what(worst: Remaining) -> Clause:
+    if not worst.is_overlap:
+        return say(f"{NAME}.{worst.quantity}")
+    interface = worst.interfaces[0]
+    seams, first = bonding_seams(interface), 2 + len(interface.masks)
+    of, on = (seams[owner.seat - first].name for owner in worst.margins.owners)
     return say(f"{NAME}.overlap", of=of, on=on)
 
 
@@ -207,16 +204,6 @@ def _at_edge(bond: EdgeBond, design: Design) -> Finding:
     return judged(NAME, False, limit, bond.width, "mm", place, "edge", **facts)
 
 
-def costs(acting: Iterable[Push]) -> list[Push]:
-    """Return the cost of each body, shift and turn together, the largest first."""
-    total: dict[tuple[int, int], Push] = {}
-    for push in acting:
-        key = push.freedom.step, push.freedom.body
-        first = total.get(key, Push(push.freedom, 0.0))
-        total[key] = Push(first.freedom, first.cost + push.cost)
-    return sorted(total.values(), key=lambda push: -round(push.cost, 9))
-
-
 def _moved(freedom: Freedom) -> Clause:
     """Return the layers of a freedom."""
     sentence = "layer" if freedom.lowest == freedom.highest else "layers"
@@ -231,7 +218,9 @@ def _source(freedom: Freedom) -> Clause:
     return say(f"{NAME}.{cause}", moved=_moved(freedom), step=freedom.step)
 
 
-def _advice(quantity: MarginKind, dearest: Iterable[Push], laminate: Laminate) -> Clause:
+def _advice(
+    quantity: MarginKind, dearest: Iterable[tuple[Freedom, float]], laminate: Laminate
+) -> Clause:
     """Return the remedy for the hand's errors."""
     wider = say(f"{NAME}.wider-{quantity}")
     loose = next((freedom for freedom, _ in dearest if freedom.pins < 2 and not freedom.seam), None)

@@ -106,8 +106,7 @@ Sample = tuple[Point, Point, float, Point]
 def samples(edge: Edge, others: Sequence[Edge], within: float) -> list[Sample]:
     """Start, outward normal, distance and end of each ray that meets another edge."""
     rays = Rays.of([edge])
-    parts = [(len(rays.edge), len(others))]
-    ray, value, end = first_met(rays, EdgeTable.of(others), within, parts)
+    ray, value, end = first_met(rays, EdgeTable.of(others), within)
     columns = rays.start[:, ray], rays.outward[:, ray], value, end
     return list(zip(*(column.T.tolist() for column in columns), strict=True))
 

@@ -17,10 +17,9 @@ from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding
-from sbafab.rules.freedoms import Freedom, Part
-from sbafab.rules.margins import Push
+from sbafab.rules.freedoms import Part
 from sbafab.rules.measures import Measures
-from sbafab.rules.registration_worst_case import check, costs, least_remaining
+from sbafab.rules.registration_worst_case import check, least_remaining
 from tests.designs import PAPER, errors
 
 Good = Callable[..., Laminate]
@@ -47,7 +46,7 @@ def left(laminate: Laminate, interface: int, quantity: str, tolerances: dict[str
     return next(
         place.worst
         for place in least_remaining(Measures(laminate, PAPER.with_(registration=tolerances)))
-        if place.margin.quantity == quantity and interface in {i.index for i in place.interfaces}
+        if place.quantity == quantity and interface in {i.index for i in place.interfaces}
     )
 
 
@@ -266,7 +265,7 @@ def test_more_balloons_cost_no_more_patterns(good: Good) -> None:
     few = least_remaining(Measures(good("1dof-5mm", "stack.balloons=6"), PAPER))
     many = least_remaining(Measures(good("1dof-5mm", "stack.balloons=60"), PAPER))
     assert [place.worst for place in many] == pytest.approx([place.worst for place in few])
-    assert sum(len(p.interfaces) for p in many if p.margin.quantity == "bond") == 119
+    assert sum(len(p.interfaces) for p in many if p.quantity == "bond") == 119
 
 
 # Why, by how much, and what helps: the facts of a finding.
@@ -381,11 +380,3 @@ def test_a_plate_that_takes_a_jig_borer_names_the_command_for_a_mill(good: Good)
         assert facts(bond)["plate"].id == f"{RULE}.{sentence}"
         assert facts(overhang)["plate"].id == f"{RULE}.no-plate"
         assert (bond.verdict == "fail") == (design is milled)
-
-
-def test_shift_and_turn_of_a_body_count_together() -> None:
-    shift, turn, other = (
-        Freedom(step, 1, 1, 1, 0, most) for step, most in ((1, 0.1), (1, 0.2), (2, 0.15))
-    )
-    pushes = [Push(shift, 0.1), Push(other, 0.15), Push(turn, 0.2)]
-    assert costs(pushes) == [(shift, pytest.approx(0.3)), (other, 0.15)]
