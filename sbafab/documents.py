@@ -101,7 +101,7 @@ def json_schema(record: type, identity: str) -> dict[str, Any]:
     else:
         body = TypeAdapter(record).json_schema(mode="serialization")
     body["properties"] = {"schema": {"const": identity}, **body["properties"]}
-    return {**body, "required": ["schema", *body["required"]]}
+    return {**body, "required": ["schema", *body.get("required", ())]}
 
 
 class _Joined:

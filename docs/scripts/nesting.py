@@ -33,7 +33,7 @@ from sbafab.nesting.check import check_nest
 from sbafab.nesting.engines import bottom_left
 from sbafab.nesting.nest import materials_of, nest, of_material
 from sbafab.nesting.records import NestPart, Stock
-from sbafab.output.checked import check, plan_design, stocks
+from sbafab.output.checked import check, stocks
 
 COPIES = (1, 4, 8, 20)
 SECONDS = 25
@@ -61,7 +61,7 @@ def rows() -> Iterator[dict[str, Any]]:
             except DesignError:
                 # An assembly, whose designs are templates themselves.
                 break
-            parts = plan_design(check(design), ("cut",)).parts
+            parts = check(design).pieces
             for film in materials_of(parts):
                 stock = stocks(design)[film].model_copy(update={"most": 1000})
                 entry = {"design": name, "copies": copies, "film": film}

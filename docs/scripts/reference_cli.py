@@ -27,7 +27,7 @@ Templates, files, keys of `--set`, rules and options are completed:
 
 def page() -> str:
     """The whole page, as MyST Markdown."""
-    top = click.Context(app, info_name="sbafab")
+    top = click.Context(app, info_name="sbafab", show_default=True)
     parts = [HEAD]
     for name in app.list_commands(top):
         command = app.commands[name]

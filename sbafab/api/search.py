@@ -9,15 +9,15 @@ from typing import Any
 from sbafab.api.designs import Source, command, load, numbers
 from sbafab.design.files import Change, changed_keys
 from sbafab.design.records import Design, Free
-from sbafab.search.compare import DesignComparison, load_compared, write_page
+from sbafab.search.compare import DesignComparison, ReachedYield, load_compared, write_page
 from sbafab.search.compare import compare as run_compare
-from sbafab.search.find import FindRequest, FoundDesign
+from sbafab.search.compare import reach_yield as run_reach_yield
+from sbafab.search.find import FoundDesign
 from sbafab.search.find import find as run_find
+from sbafab.search.quantities import read_all
+from sbafab.search.space import FindRequest, free_of
 from sbafab.search.sweep import SweepRequest, SweptDesigns
 from sbafab.search.sweep import sweep as run_sweep
-from sbafab.search.target_yield import ReachedYield
-from sbafab.search.target_yield import reach_yield as run_reach_yield
-from sbafab.search.trial import free_of, read_all
 from sbafab.search.vary import varied_keys
 
 

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Iterator, MutableMapping
 from importlib import import_module
 from importlib.util import find_spec
-from keyword import iskeyword
 from typing import Any
 
 import click
@@ -56,12 +55,14 @@ GROUPS = {
 }
 """The commands in the order a newcomer needs them, in groups, with the first line of their help.
 
-A module has the name of its command. The summaries stand here so that ``sbafab --help`` and the
-completion of a command's name load no command.
+A module has the name of its command, unless HOMES names another. The summaries stand here so that
+``sbafab --help`` and the completion of a command's name load no command.
 """
 SUMMARIES = {name: summary for group in GROUPS.values() for name, summary in group.items()}
 BUILTIN = {"map": "map_", "import": "import_"}
-"""Functions that cannot have the name of their command; nor can a module be named ``import``."""
+"""Functions that cannot have the name of their command."""
+HOMES = {**dict.fromkeys(GROUPS["Make"], "make"), "schema": "formats", "import": "import_"}
+"""Modules with another name than their command."""
 
 
 class CommandTable(MutableMapping[str, click.Command]):
@@ -73,7 +74,7 @@ class CommandTable(MutableMapping[str, click.Command]):
     def __getitem__(self, name: str) -> click.Command:
         command = self._loaded[name]
         if command is None:
-            module = import_module(f"sbafab.cli.{BUILTIN[name] if iskeyword(name) else name}")
+            module = import_module(f"sbafab.cli.{HOMES.get(name, name)}")
             command = self._loaded[name] = getattr(module, BUILTIN.get(name, name))
             add_verbosity(command)
         return command
@@ -171,7 +172,11 @@ def similar_commands(name: str) -> list[str]:
 @click.group(
     cls=CommandGroup,
     commands=COMMANDS,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    context_settings={
+        "help_option_names": ["-h", "--help"],
+        "max_content_width": 100,
+        "show_default": True,
+    },
 )
 @click.version_option(__version__, prog_name="sbafab")
 def app() -> None:

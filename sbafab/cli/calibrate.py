@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,14 +12,13 @@ import click
 
 from sbafab.calibration.fit import Fit, HeldOutPoint, calibration_text, fit
 from sbafab.cli.options import folder_option, json_option
-from sbafab.cli.printing import print_json, print_verdict
+from sbafab.cli.printing import print_json, print_table, print_verdict
 from sbafab.cli.progress import shown_progress
 from sbafab.design.files import shown
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.errors import DesignError, OutputError
 from sbafab.models.calibrated import NONE, shipped_names
 from sbafab.models.unknowns import UNKNOWNS
-from sbafab.output.schema_ids import CALIBRATE_SCHEMA
 from sbafab.output.swap import replace_text
 from sbafab.results.evidence import load_source
 
@@ -28,7 +28,6 @@ from sbafab.results.evidence import load_source
 @click.option(
     "--name",
     default="lab",
-    show_default=True,
     metavar="NAME",
     help="Name of the calibration, and of its file, NAME.toml.",
 )
@@ -48,10 +47,9 @@ def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) ->
     with shown_progress(as_json) as progress:
         fitted = fit(name, sources, progress)
     path = out / f"{name}.toml"
-    text = calibration_text(fitted.calibration)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        replace_text(path, text)
+        replace_text(path, calibration_text(fitted.calibration))
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror}") from None
     if as_json:
@@ -80,24 +78,21 @@ def _check_name(name: str) -> None:
 
 def _print(fitted: Fit) -> None:
     calibration = fitted.calibration
-    click.echo("unknown                              median   90 % interval     prior")
+    rows = []
     for unknown in UNKNOWNS:
         low, high = calibration.bounds(unknown.field)
         value = unknown.shown(calibration.values[unknown.field])
-        interval = f"{low:.3g} to {high:.3g}"
         prior = f"{unknown.shown(unknown.middle)}: {unknown.source}"
-        click.echo(f"{unknown.title:<34}{value:>10}   {interval:<16}  {prior}")
-    click.echo("")
+        rows.append((unknown.title, str(value), f"{low:.3g} to {high:.3g}", prior))
+    print_table("Unknowns", ("", "median", "90 % interval", "prior"), rows)
     for sentence in calibration.sentences:
         click.echo(f"Not distinguished by the evidence: {sentence}")
     missed = ", ".join(
         f"{group} {100 * spread:.0f} %" for group, spread in calibration.discrepancy.items()
     )
     click.echo(f"What the models miss beyond that (one standard deviation): {missed}")
-    if fitted.points:
-        click.echo("\nleft out                     measured      predicted   90 % interval")
-        for point in fitted.points:
-            click.echo(_line(point))
+    names = ("", "measured", "predicted", "90 % interval", "")
+    print_table("Left out", names, [*map(_held_out, fitted.points)])
     for set_ups in fitted.open_set_ups:
         shares = ", ".join(f"{name} {100 * share:.0f} %" for name, share in set_ups.probabilities)
         click.echo(f"Left open by {set_ups.curve}: {shares}")
@@ -105,24 +100,22 @@ def _print(fitted: Fit) -> None:
         click.echo(f"Not fitted: {curve}: {reason}")
 
 
-def _line(point: HeldOutPoint) -> str:
+def _held_out(point: HeldOutPoint) -> Sequence[str]:
     at = "" if point.place is None else f" at {point.place:g}"
     interval = f"{point.low:.3g} to {point.high:.3g} {point.unit}".rstrip()
-    outside = "" if point.is_inside else "   outside"
-    return (
-        f"{point.curve + at:<28}{point.measured:>9.3g}{point.median:>15.3g}   {interval}{outside}"
-    )
+    outside = "" if point.is_inside else "outside"
+    return point.curve + at, f"{point.measured:.3g}", f"{point.median:.3g}", interval, outside
 
 
 def _as_json(fitted: Fit, path: Path) -> dict[str, Any]:
+    left_open = fitted.open_set_ups
     return {
-        "schema": CALIBRATE_SCHEMA,
+        "schema": "sbafab/calibrate@1",
         "file": str(path),
         "calibration": fitted.calibration.as_dict(),
         "held_out": [{**asdict(point), "inside": point.is_inside} for point in fitted.points],
         "left_open": [
-            {"curve": each.curve, "probabilities": dict(each.probabilities)}
-            for each in fitted.open_set_ups
+            {"curve": e.curve, "probabilities": dict(e.probabilities)} for e in left_open
         ],
         "not_fitted": [{"curve": curve, "reason": reason} for curve, reason in fitted.left_out],
     }

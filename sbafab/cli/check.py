@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
@@ -15,7 +15,7 @@ from sbafab.actuators import load_design
 from sbafab.assemblies.files import load
 from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.cli.options import (
-    designs_or_folders,
+    designs,
     json_option,
     set_option,
     target_yield_option,
@@ -43,8 +43,9 @@ from sbafab.errors import DesignError, SbafabError
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.formulas import size_phrases, sizes
 from sbafab.output.advice import Advice, advise
-from sbafab.output.checked import checks, refuse_undoable
+from sbafab.output.checked import Build, checks, refuse_undoable
 from sbafab.output.job import Order, check_job
+from sbafab.process import Progress
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
 from sbafab.rules.nets import netlist_findings
@@ -54,42 +55,26 @@ DEFAULT_KIT = "paper"
 """The kit of a design that names none."""
 
 
-class CheckRequest(NamedTuple):
-    """Arguments and options of the command."""
-
-    source: str
-    assignments: tuple[str, ...]
-    waivers: tuple[str, ...]
-    target: float | None
-    as_json: bool
-    verbose: bool
-    nets: Path | None = None
-
-    @property
-    def is_folder(self) -> bool:
-        return self.source not in template_names() and Path(self.source).is_dir()
-
-
 class CheckOutcome(NamedTuple):
-    """Result of a check: ``kind`` is "design" or "as-built".
+    """Result of a check: ``findings`` in the designs of ``job``, or in a folder without one.
 
-    ``sizes`` and ``size_descriptions`` are by design; ``has_target`` is True if the design itself
-    sets ``rules.target_yield``.
+    ``has_target`` is True if the design itself sets ``rules.target_yield``.
     """
 
-    kind: str
     name: str
     findings: Sequence[Finding]
     groups: Sequence[Group]
-    notes: Sequence[str] = ()
-    designs: Sequence[Design] = ()
-    sizes: Mapping[str, Mapping[str, float]] = {}
-    size_descriptions: Mapping[str, Sequence[str]] = {}
+    job: Order | None = None
+    advice: Advice | None = None
     has_target: bool = False
+
+    @property
+    def designs(self) -> Sequence[Build]:
+        return () if self.job is None else self.job.builds
 
 
 @click.command()
-@click.argument("source", metavar="DESIGN|FOLDER", shell_complete=designs_or_folders)
+@click.argument("source", metavar="DESIGN|FOLDER", shell_complete=designs)
 @set_option
 @waive_option("Accept the failure of this rule; cut files would state it. Repeatable.")
 @target_yield_option(
@@ -119,130 +104,120 @@ def check(  # noqa: PLR0913, PLR0917 - one an option
 
     Nothing is written. FOLDER was written by sbafab generate; the files on disk are checked.
     """
-    request = CheckRequest(source, assignments, waivers, target_yield, as_json, verbose, nets)
-    if watch:
+
+    def run() -> bool:
+        """Check and print the outcome; return True if a rule failed."""
+        if is_folder:
+            outcome = _check_folder(Path(source), nets)
+        else:
+            with shown_progress(as_json) as progress:
+                outcome = _check_source(source, assignments, waivers, target_yield, nets, progress)
         if as_json:
-            raise click.UsageError("--watch and --json exclude each other; leave one out")
-        watch_source(lambda: _run_check(request), Path(source))
-    elif _run_check(request):
+            _print_json(outcome)
+        else:
+            _print(outcome, verbose)
+        return has_failed(outcome.findings)
+
+    is_folder = source not in template_names() and Path(source).is_dir()
+    if is_folder and (assignments or waivers or target_yield is not None):
+        raise DesignError(
+            "--set, --waive and --target-yield go with a design; leave them out to check a folder"
+        )
+    if watch and as_json:
+        raise click.UsageError("--watch and --json exclude each other; leave one out")
+    if watch:
+        watch_source(run, Path(source))
+    elif run():
         click.get_current_context().exit(RULE_FAILED)
 
 
-def _run_check(request: CheckRequest) -> bool:
-    """Check and print the outcome; return True if a rule failed."""
-    outcome = _check_folder(request) if request.is_folder else _check_source(request)
-    advice = None if request.target is None else _advice(request, request.target)
-    if request.as_json:
-        more: dict[str, object] = {"sizes": outcome.sizes} if outcome.sizes else {}
-        more |= {"notes": outcome.notes} | ({"advice": advice} if advice else {})
-        print_json(checks(outcome.findings, outcome.kind, outcome.name, outcome.designs, **more))
-    else:
-        _print(outcome, advice, request.verbose)
-    return has_failed(outcome.findings)
+def _print_json(outcome: CheckOutcome) -> None:
+    more: dict[str, object] = {"notes": notes_of(outcome.designs)}
+    if outcome.job is not None:
+        more["sizes"] = {
+            each.design.name: sizes(each.design, each.laminate) for each in outcome.designs
+        }
+    if outcome.advice is not None:
+        more["advice"] = outcome.advice
+    kind = "as-built" if outcome.job is None else "design"
+    designs = [each.design for each in outcome.designs]
+    print_json(checks(outcome.findings, kind, outcome.name, designs, **more))
 
 
-def _print(outcome: CheckOutcome, advice: Advice | None, verbose: bool) -> None:
+def _print(outcome: CheckOutcome, verbose: bool) -> None:
     """Print sizes, kit, notes and findings, and last the verdict."""
-    if outcome.kind == "as-built":
+    if outcome.job is None:
         print_line(f"as built: {outcome.name}")
-    for name, phrases in outcome.size_descriptions.items():
-        print_listed(f"{name}, size" if len(outcome.size_descriptions) > 1 else "size", phrases)
-    kits = [cited(design) for design in outcome.designs if verbose or design.kit != DEFAULT_KIT]
+    for each in outcome.designs:
+        label = "size" if len(outcome.designs) == 1 else f"{each.design.name}, size"
+        print_listed(label, size_phrases(each.design, each.laminate))
+    designs = [each.design for each in outcome.designs]
+    kits = [cited(design) for design in designs if verbose or design.kit != DEFAULT_KIT]
     for line in dict.fromkeys(kits):
         print_wrapped(line)
-    for note in outcome.notes:
+    for note in notes_of(outcome.designs):
         print_wrapped(f"note: {note}")
     print_findings(outcome.groups, verbose)
-    if advice:
-        print_wrapped(advice.sentence)
+    if outcome.advice:
+        print_wrapped(outcome.advice.sentence)
     failed = {finding.rule for finding in outcome.findings if finding.verdict == "fail"}
-    if advice and failed == {YIELD_RULE} and not outcome.has_target:
+    if outcome.advice and failed == {YIELD_RULE} and not outcome.has_target:
         print_failure(
-            f"{outcome.name} failed: yield below the requested {advice.target:g}. Without "
+            f"{outcome.name} failed: yield below the requested {outcome.advice.target:g}. Without "
             "--target-yield all rules pass, and it may be cut"
         )
     elif failed:
-        change = FILES if outcome.kind == "as-built" else "design"
+        change = FILES if outcome.job is None else "design"
         print_failed(outcome.name, outcome.findings, "It must not be cut", change)
     else:
         print_passed(outcome.name, outcome.groups, "" if verbose else "-v")
 
 
-def _check_source(request: CheckRequest) -> CheckOutcome:
-    """Check a design or an assembly."""
-    source = load(request.source, request.assignments, request.waivers)
-    with shown_progress(request.as_json) as progress:
-        if not isinstance(source, Design):
-            if request.target is not None:
-                raise DesignError(
-                    "--target-yield goes with a design, and this is an assembly; check its "
-                    "parts' designs one by one"
-                )
-            if request.nets is not None:
-                raise DesignError(
-                    "--nets goes with a design, and this is an assembly; check its parts' designs "
-                    "one by one"
-                )
-            return _outcome(check_job(source, progress=progress))
+def _check_source(
+    name: str,
+    assignments: tuple[str, ...],
+    waivers: tuple[str, ...],
+    target: float | None,
+    nets: Path | None,
+    progress: Progress,
+) -> CheckOutcome:
+    """Check a design or an assembly. Raises DesignError, also if press or sheets cannot make it."""
+    source = load(name, assignments, waivers)
+    for option, value in (("--target-yield", target), ("--nets", nets)):
+        if value is not None and not isinstance(source, Design):
+            raise DesignError(
+                f"{option} goes with a design, and this is an assembly; check its parts' designs "
+                "one by one"
+            )
+    advice, has_target = None, False
+    if target is not None and isinstance(source, Design):
+        wanted = (*assignments, f"rules.target_yield={target}")
+        advice = advise(load_design(name, wanted), target, progress)
         has_target = source.rules.target_yield is not None
-        if request.target is not None:
-            assignments = _with_target(request, request.target)
-            source = load_design(request.source, assignments, request.waivers)
-        job = check_job(source, progress=progress)
-        outcome = _outcome(job)._replace(has_target=has_target)
-        return outcome if request.nets is None else _against_netlist(outcome, job, request.nets)
-
-
-def _against_netlist(outcome: CheckOutcome, job: Order, file: Path) -> CheckOutcome:
-    """Return the outcome with the findings of a design against a netlist."""
-    (checked,) = job.builds
-    netlist = read_netlist(file)
-    more = netlist_findings(checked.laminate, checked.design, netlist, file.name)
-    findings = (*outcome.findings, *more)
-    return outcome._replace(findings=findings, groups=[Group(outcome.name, findings)])
-
-
-def _outcome(job: Order) -> CheckOutcome:
-    """Return the outcome; raises DesignError for a design that press or sheets cannot make."""
+        source = load_design(name, wanted, waivers)
+    job = check_job(source, progress=progress)
     if not job.failed:
         refuse_undoable(job.builds)
-    return CheckOutcome(
-        "design",
-        job.name,
-        job.findings,
-        groups_of(job.builds, job.between),
-        notes_of(job.builds),
-        [each.design for each in job.builds],
-        {each.design.name: sizes(each.design, each.laminate) for each in job.builds},
-        {each.design.name: size_phrases(each.design, each.laminate) for each in job.builds},
-    )
+    findings, groups = job.findings, groups_of(job.builds, job.between)
+    if nets is not None:
+        (checked,) = job.builds
+        more = netlist_findings(checked.laminate, checked.design, read_netlist(nets), nets.name)
+        findings = (*findings, *more)
+        groups = (Group(job.name, findings),)
+    return CheckOutcome(job.name, findings, groups, job, advice, has_target)
 
 
-def _advice(request: CheckRequest, target: float) -> Advice:
-    """Return the advice on bond and overhang for a target yield."""
-    with shown_progress(request.as_json) as progress:
-        return advise(load_design(request.source, _with_target(request, target)), target, progress)
-
-
-def _with_target(request: CheckRequest, target: float) -> tuple[str, ...]:
-    return (*request.assignments, f"rules.target_yield={target}")
-
-
-def _check_folder(request: CheckRequest) -> CheckOutcome:
+def _check_folder(folder: Path, nets: Path | None) -> CheckOutcome:
     """Check the files of an output folder."""
     import logging
 
     # Reading a folder back takes as long to load as all that checks a design.
     from sbafab.as_built.check import check_folder
 
-    if request.assignments or request.waivers or request.target is not None:
-        raise DesignError(
-            "--set, --waive and --target-yield go with a design; leave them out to check a folder"
-        )
     # A broken file becomes a finding; the log of ezdxf would repeat it on the screen.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
-    findings = check_folder(Path(request.source), request.nets)
-    return CheckOutcome("as-built", request.source, findings, [Group(request.source, findings)])
+    findings = check_folder(folder, nets)
+    return CheckOutcome(str(folder), findings, [Group(str(folder), findings)])
 
 
 # Checking again after every change of a file, until Ctrl-C.
@@ -278,18 +253,12 @@ def watch_source(action: Callable[[], object], source: Path, polls: int | None =
 def file_states(source: Path) -> FileStates:
     """Return time, ns, and size, bytes, of every file that the source may consist of."""
     states: FileStates = {}
-    for path in _watched_files(source):
+    is_folder = source.is_dir()
+    for path in source.rglob("*") if is_folder else source.parent.glob("*"):
+        is_watched = path.is_file() if is_folder else path.suffix.lower() in WATCHED_SUFFIXES
         # A file that an editor is replacing is there again at the next poll.
         with suppress(OSError):
-            state = path.stat()
-            states[path] = state.st_mtime_ns, state.st_size
+            if is_watched:
+                state = path.stat()
+                states[path] = state.st_mtime_ns, state.st_size
     return states
-
-
-def _watched_files(source: Path) -> Iterator[Path]:
-    if source.is_dir():
-        yield from (path for path in source.rglob("*") if path.is_file())
-    elif source.parent.is_dir():
-        yield from (
-            path for path in source.parent.iterdir() if path.suffix.lower() in WATCHED_SUFFIXES
-        )

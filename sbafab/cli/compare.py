@@ -8,14 +8,14 @@ from pathlib import Path
 import click
 
 from sbafab.cli.options import (
-    PRESSURE,
-    designs_or_folders,
+    designs,
     flow_option,
     json_option,
     out_option,
+    pressures_option,
     set_option,
 )
-from sbafab.cli.printing import print_json, print_table, print_verdict
+from sbafab.cli.printing import print_json, print_table, print_verdict, several
 from sbafab.cli.progress import shown_progress
 from sbafab.search.compare import (
     PAGE,
@@ -30,17 +30,9 @@ from sbafab.search.compare import compare as compared
 
 
 @click.command()
-@click.argument("first", metavar="A", shell_complete=designs_or_folders)
-@click.argument("second", metavar="B", shell_complete=designs_or_folders)
-@click.option(
-    "--pressure",
-    "pressures",
-    type=PRESSURE.read,
-    multiple=True,
-    metavar="P",
-    help="Pressure of the figures, and the first of them of the pictures, kPa or with a unit. "
-    "Repeatable.  [default: 10]",
-)
+@click.argument("first", metavar="A", shell_complete=designs)
+@click.argument("second", metavar="B", shell_complete=designs)
+@pressures_option("Pressure of the figures, and the first of them of the pictures", "10")
 @flow_option("Flow for the times")
 @out_option
 @set_option
@@ -59,35 +51,24 @@ def compare(
     A and B are templates, design files, output folders, or rows of a sweep by number, such as
     out/1dof-5mm-sweep/sweep.csv:12. OUT/compare/compare.html has pictures of both side by side.
     """
-    designs = [load_compared(source, assignments) for source in (first, second)]
+    a, b = (load_compared(source, assignments) for source in (first, second))
     with shown_progress(as_json) as progress:
-        comparison = compared(
-            designs[0], designs[1], (first, second), pressures or None, flow_ml_min, progress
-        )
+        comparison = compared(a, b, (first, second), pressures or None, flow_ml_min, progress)
         folder = write_page(comparison, out)
     if as_json:
         print_json({**comparison.as_dict(), "folder": str(folder)})
         return
-    print_comparison(comparison)
-    keys, rules = len(comparison.keys), len(comparison.rules)
-    figures = sum(pair.differs for pair in comparison.figures)
-    print_verdict(
-        f"{comparison.names[0]} and {comparison.names[1]} differ in {_counted(keys, 'key')}, "
-        f"{_counted(rules, 'rule')} and {_counted(figures, 'figure')}. Written to {folder}: {PAGE}",
-        folder,
-    )
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
-def print_comparison(comparison: DesignComparison) -> None:
-    """Print keys and rules that differ, and the main figures of both designs."""
     names = ("", *comparison.names)
     print_table("Keys", names, [(r.key, *map(value_text, r.values)) for r in comparison.keys])
     print_table("Rules", names, [(r.rule, *map(margin_text, r.margins)) for r in comparison.rules])
     print_figures(comparison, names)
+    keys, rules = several(len(comparison.keys), "key"), several(len(comparison.rules), "rule")
+    figures = several(sum(pair.differs for pair in comparison.figures), "figure")
+    print_verdict(
+        f"{comparison.names[0]} and {comparison.names[1]} differ in {keys}, {rules} and {figures}. "
+        f"Written to {folder}: {PAGE}",
+        folder,
+    )
 
 
 def print_figures(comparison: DesignComparison, names: Sequence[str]) -> None:

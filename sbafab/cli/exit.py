@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, NamedTuple, NoReturn
+from typing import NamedTuple, NoReturn
 
 import click
 
@@ -27,11 +27,10 @@ from sbafab.errors import (
     VoidError,
 )
 
-if TYPE_CHECKING:
-    pass
-
 RULE_FAILED = 1
 BAD_INPUT = 2
+KINDS = {DefectError: "defect", VoidError: "void", TooLargeError: "too-large"}
+"""Errors that end as a failed rule does; all others are of the input."""
 RAISE_AGAIN_SECONDS = 0.01
 """Seconds after which a lost interrupt is raised again."""
 
@@ -91,13 +90,10 @@ def exit_plainly(as_json: bool = False) -> Iterator[None]:
             see = " See" if sentence.endswith("?") else "; see"
             sentence += f"{see} {error.ctx.command_path} --help"
         end(Exit("usage", sentence, BAD_INPUT), as_json)
-    except DefectError as error:
-        end(Exit("defect", str(error), RULE_FAILED), as_json)
-    except (TooLargeError, VoidError) as error:
-        kind = "void" if isinstance(error, VoidError) else "too-large"
-        end(Exit(kind, str(error), RULE_FAILED), as_json)
     except SbafabError as error:
-        end(Exit("input", str(error), BAD_INPUT), as_json)
+        kind = next((name for kind, name in KINDS.items() if isinstance(error, kind)), "input")
+        code = BAD_INPUT if kind == "input" else RULE_FAILED
+        end(Exit(kind, str(error), code), as_json)
     except KeyboardInterrupt as stop:
         code = BY_SIGNAL + (stop.args[0] if stop.args else signal.SIGINT)
         sentence = stop.sentence if isinstance(stop, Stopped) else STOPPED

@@ -5,15 +5,20 @@ from __future__ import annotations
 import difflib
 import json
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
+from sbafab import actuators
+from sbafab.assemblies.records import Assembly
 from sbafab.cli.options import completions, json_option
 from sbafab.cli.printing import print_facts, print_json
-from sbafab.output.schema_ids import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
+from sbafab.documents import Document
 from sbafab.rules.deck import EXPLAINED
+from sbafab.rules.sentences import Explanation
+from sbafab.search.quantities import QUANTITIES, QuantityName
 
 MEASURED = "a text with its unit"
 NAMED = "NAME"
@@ -53,7 +58,8 @@ TERMS: Mapping[str, str] = {
 """Flags of figures, and options of predictions, each in two sentences."""
 
 
-class DesignKey(NamedTuple):
+@dataclass(frozen=True)
+class DesignKey:
     """A key of design files, as one or several families have it; texts as a person reads them."""
 
     key: str
@@ -67,6 +73,25 @@ def _completed(ctx: click.Context, param: click.Parameter, typed: str) -> list[C
     return completions(typed, ((name, None) for name in explainable_names()))
 
 
+class ExplainDocument(Document, schema="sbafab/explain@1"):
+    """What ``explain NAME --json`` prints: of a rule, of keys, of quantities or of a term."""
+
+    rule: str = ""
+    holds: str = ""
+    why: str = ""
+    mend: str = ""
+    keys: tuple[str, ...] | tuple[DesignKey, ...] = ()
+    quantities: tuple[QuantityName, ...] = ()
+    term: str = ""
+    meaning: str = ""
+
+
+class ExplainedDocument(Document, schema="sbafab/explained@1"):
+    """What ``explain --json`` prints of all rules."""
+
+    rules: dict[str, Explanation]
+
+
 @click.command()
 @click.argument("name", required=False, shell_complete=_completed)
 @json_option
@@ -76,81 +101,59 @@ def explain(name: str | None, as_json: bool) -> None:
     Without NAME: list all rules and checks, a line each. A section such as chamber lists its keys.
     """
     if name is None:
-        _explain_all(as_json)
-    elif name in EXPLAINED:
         if as_json:
-            print_json({"schema": EXPLAIN_SCHEMA, "rule": name, **EXPLAINED[name]._asdict()})
+            print_json(ExplainedDocument.of(None, rules=EXPLAINED))
         else:
-            _print_rule(name)
-    elif (term := name.replace("_", "-")) in TERMS:
-        if as_json:
-            print_json({"schema": EXPLAIN_SCHEMA, "term": term, "meaning": TERMS[term]})
-        else:
-            print_facts((("term", term), ("meaning", TERMS[term])))
-    elif not (_explain_quantity(name, as_json) or _explain_keys(name, as_json)):
-        near = difflib.get_close_matches(name, explainable_names(), 1)
-        hint = f"did you mean {near[0]}?" if near else "sbafab explain lists all rules"
-        raise click.BadParameter(f"{name!r} is no rule, key or quantity; {hint}", param_hint="NAME")
-
-
-def _explain_all(as_json: bool) -> None:
-    if as_json:
-        rules = {name: explanation._asdict() for name, explanation in EXPLAINED.items()}
-        print_json({"schema": EXPLAINED_SCHEMA, "rules": rules})
+            _print_listed({rule: each.holds for rule, each in EXPLAINED.items()})
         return
-    width = max(map(len, EXPLAINED))
-    for name, explanation in EXPLAINED.items():
-        click.echo(f"{name:<{width}}  {explanation.holds}")
+    document = _explained(name)
+    if as_json:
+        print_json(ExplainDocument.of(None, **document))
+    elif "rule" in document:
+        keys = ", ".join(document["keys"]) or "none"
+        heads = {"rule": "rule", "holds": "passes when", "why": "because", "mend": "if it fails"}
+        print_facts([*((head, document[key]) for key, head in heads.items()), ("keys", keys)])
+    elif "term" in document:
+        print_facts(document.items())
+    elif "quantities" in document:
+        for row in document["quantities"]:
+            print_facts(
+                [("quantity", row.written), ("unit", row.unit or "none"), ("meaning", row.meaning)]
+            )
+    elif any(row.key != name for row in document["keys"]):
+        _print_listed({row.key: row.meaning for row in document["keys"]})
+    else:
+        for row in document["keys"]:
+            print_facts({**asdict(row), "families": ", ".join(row.families)}.items())
 
 
-def _print_rule(rule: str) -> None:
-    explanation = EXPLAINED[rule]
-    print_facts(
-        (
-            ("rule", rule),
-            ("passes when", explanation.holds),
-            ("because", explanation.why),
-            ("if it fails", explanation.mend),
-            ("keys", ", ".join(explanation.keys) or "none"),
-        )
-    )
-
-
-def _explain_quantity(name: str, as_json: bool) -> bool:
-    """Explain a quantity; return False if there is none of the name."""
-    from sbafab.search.quantities import QUANTITIES
-
-    rows = [row for row in QUANTITIES if row.name == name.partition("@")[0].replace("-", "_")]
-    if as_json and rows:
-        print_json({"schema": EXPLAIN_SCHEMA, "quantities": [row._asdict() for row in rows]})
-        return True
-    for row in rows:
-        facts = (("quantity", row.written), ("unit", row.unit or "none"), ("meaning", row.meaning))
-        print_facts(facts)
-    return bool(rows)
-
-
-def _explain_keys(name: str, as_json: bool) -> bool:
-    """Explain a key, or list those of a section; return False if there is neither."""
+def _explained(name: str) -> dict[str, Any]:
+    """Return the keys of ExplainDocument for a name. Raises BadParameter with the nearest one."""
+    if name in EXPLAINED:
+        return {"rule": name, **asdict(EXPLAINED[name])}
+    if (term := name.replace("_", "-")) in TERMS:
+        return {"term": term, "meaning": TERMS[term]}
+    written = name.partition("@")[0].replace("-", "_")
+    if quantities := [row for row in QUANTITIES if row.name == written]:
+        return {"quantities": quantities}
     keys = design_keys()
     section = [row for row in keys if row.key.startswith(f"{name}.")]
-    chosen = section or [row for row in keys if row.key == name]
-    if as_json and chosen:
-        print_json({"schema": EXPLAIN_SCHEMA, "keys": [row._asdict() for row in chosen]})
-    elif section:
-        width = max(len(row.key) for row in section)
-        for row in section:
-            click.echo(f"{row.key:<{width}}  {row.meaning}")
-    else:
-        for row in chosen:
-            print_facts(tuple({**row._asdict(), "families": ", ".join(row.families)}.items()))
-    return bool(chosen)
+    if chosen := section or [row for row in keys if row.key == name]:
+        return {"keys": chosen}
+    near = difflib.get_close_matches(name, explainable_names(), 1)
+    hint = f"did you mean {near[0]}?" if near else "sbafab explain lists all rules"
+    raise click.BadParameter(f"{name!r} is no rule, key or quantity; {hint}", param_hint="NAME")
+
+
+def _print_listed(meanings: Mapping[str, str]) -> None:
+    """Print a line for each name."""
+    width = max(map(len, meanings))
+    for name, meaning in meanings.items():
+        click.echo(f"{name:<{width}}  {meaning}")
 
 
 def explainable_names() -> list[str]:
     """Return the names of all rules, checks, keys, quantities and terms."""
-    from sbafab.search.quantities import QUANTITIES
-
     keys = dict.fromkeys(row.key for row in design_keys())
     return [*EXPLAINED, *keys, *(row.name for row in QUANTITIES), *TERMS]
 
@@ -160,9 +163,6 @@ def design_keys(schema: Mapping[str, Any] | None = None) -> list[DesignKey]:
 
     A key that two families have alike stands once, with both names.
     """
-    from sbafab import actuators
-    from sbafab.assemblies.records import Assembly
-
     schema = schema or actuators.schema(Assembly)
     families: dict[DesignKey, list[str]] = {}
     for reference in schema["oneOf"]:
@@ -170,7 +170,7 @@ def design_keys(schema: Mapping[str, Any] | None = None) -> list[DesignKey]:
         name = record["properties"]["family"]["const"]
         for row in _keys("", record, schema):
             families.setdefault(row, []).append(name)
-    return [row._replace(families=tuple(names)) for row, names in families.items()]
+    return [replace(row, families=tuple(names)) for row, names in families.items()]
 
 
 def _keys(prefix: str, record: Mapping[str, Any], schema: Mapping[str, Any]) -> Iterator[DesignKey]:

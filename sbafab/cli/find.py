@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, TypeVar
 
 import click
 
@@ -29,17 +31,13 @@ from sbafab.cli.printing import (
 )
 from sbafab.cli.progress import shown_progress
 from sbafab.design.files import changed_keys, name_of, template_names
-from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError
-from sbafab.models.figures import FLAGS, FlagList
+from sbafab.models.figures import FLAGS
 from sbafab.models.formulas import MOST_PRESSURE, is_near_burst
-from sbafab.models.paper import CounterpartEntry
+from sbafab.process import Progress
 from sbafab.search.find import (
-    FOUND,
-    Binding,
-    FindRequest,
     FoundDesign,
-    Spare,
+    find_document,
     found_toml,
     free_keys,
     refuse_existing,
@@ -47,27 +45,20 @@ from sbafab.search.find import (
 )
 from sbafab.search.find import find as search
 from sbafab.search.quantities import (
-    RequestedQuantity,
+    Goal,
+    Requirement,
     quantity_lines,
+    read_all,
     read_sure,
     shown_interval,
     shown_value,
 )
-from sbafab.search.trial import (
-    Goal,
-    Requirement,
-    figure_text,
-    keys_said,
-    read_all,
-    read_free,
-    value_said,
-)
+from sbafab.search.space import FindRequest, figure_text, read_free
+from sbafab.search.vary import format_keys, format_value
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from sbafab.process import Progress
-
+Value = TypeVar("Value")
+FOUND = "found.toml"
+"""The default file name in the folder of ``-o``."""
 HELP = """Find the best design that meets requirements.
 
 Without DESIGN the search starts from every family. If no design meets all requirements, the nearest
@@ -81,12 +72,6 @@ which round pockets have of the paper's film alone:
 """
 
 
-def _with_quantities(command: Callable[..., None]) -> Callable[..., None]:
-    """Set the help text of a command, with all quantities and their units."""
-    command.__doc__ = HELP.format(quantities=quantity_lines())
-    return command
-
-
 def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float | None:
     if text is None:
         return None
@@ -96,7 +81,7 @@ def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float
         raise click.BadParameter(f"{text!r} {error}", ctx, param) from None
 
 
-@click.command()
+@click.command(help=HELP.format(quantities=quantity_lines()))
 @click.argument("source", metavar="[DESIGN]", required=False)
 @click.option(
     "--min",
@@ -122,7 +107,6 @@ def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float
 @click.option(
     "--best",
     default="mass",
-    show_default=True,
     metavar="QUANTITY",
     help="Goal among the designs that meet all: largest stroke, bend, force, yield or lumen, or "
     "smallest of another quantity.",
@@ -142,7 +126,7 @@ def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float
     help="Do not vary this key; keys of --set are not varied either. Repeatable.",
 )
 @click.option(
-    "--tries", type=click.IntRange(4, 100_000), default=240, show_default=True, metavar="N",
+    "--tries", type=click.IntRange(4, 100_000), default=240, metavar="N",
     help="Largest number of designs to try, for each family.",
 )  # fmt: skip
 @click.option("--optuna", is_flag=True, help='Search with Optuna (pip install "sbafab[optuna]").')
@@ -155,7 +139,6 @@ def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float
 @file_option(FOUND)
 @set_option
 @json_option
-@_with_quantities
 def find(source: str | None, **options: Any) -> None:
     if options["storage"] is not None and not options["optuna"]:
         raise click.UsageError("--storage goes with --optuna; add it")
@@ -177,7 +160,7 @@ def find(source: str | None, **options: Any) -> None:
             target,
         )
     if options["as_json"]:
-        print_json(as_json(result, origin, target))
+        print_json(find_document(result, origin, target))
     else:
         print_result(result, origin, target)
     if not result.holds:
@@ -189,63 +172,58 @@ def _requests(source: str | None, options: dict[str, Any]) -> dict[str, FindRequ
 
     Families without the requested quantities are left out. Raises DesignError if none remains.
     """
-    requirements, goal = read_all(
-        options["least"], options["most"], options["best"], options["flow_ml_min"]
-    )
-    requests: dict[str, FindRequest] = {}
-    problems: list[str] = []
-    for name in [source] if source else _family_templates():
+    limits = (options[name] for name in ("least", "most", "best", "flow_ml_min"))
+    requirements, goal = read_all(*limits)
+    assigned = options["assignments"]
+    settings = {name: options[name] for name in ("tries", "optuna", "storage", "sure")}
+
+    def request(name: str) -> FindRequest:
+        design = load_design(name, assigned)
+        free = read_free(design, options["free"], options["fixed"], tuple(changed_keys(assigned)))
+        wanted = FindRequest(design, requirements, goal, free, **settings)
+        free_keys(wanted)  # raises DesignError for keys that cannot vary
+        return wanted
+
+    return _each([source] if source else _family_templates(), request)
+
+
+def _each(names: Iterable[str], value: Callable[[str], Value]) -> dict[str, Value]:
+    """Return a value for each name that has one. Raises DesignError if none has."""
+    values: dict[str, Value] = {}
+    problems = []
+    for name in names:
         try:
-            requests[name] = _request(name, requirements, goal, options)
+            values[name] = value(name)
         except DesignError as error:
             problems.append(str(error))
-    if not requests:
+    if not values:
         raise DesignError("; ".join(dict.fromkeys(problems)))
-    return requests
-
-
-def _request(
-    name: str, requirements: tuple[Requirement, ...], goal: Goal, options: dict[str, Any]
-) -> FindRequest:
-    assignments = options["assignments"]
-    design = load_design(name, assignments)
-    free = read_free(design, options["free"], options["fixed"], tuple(changed_keys(assignments)))
-    settings = {name: options[name] for name in ("tries", "optuna", "storage", "sure")}
-    request = FindRequest(design, requirements, goal, free, **settings)
-    free_keys(request)  # raises DesignError for keys that cannot vary
-    return request
+    return values
 
 
 def _best_result(requests: dict[str, FindRequest], progress: Progress) -> tuple[str, FoundDesign]:
     """Run the searches; return the best result and the design that it started from."""
-    results: list[tuple[str, FoundDesign]] = []
-    problems = []
-    for number, (name, request) in enumerate(requests.items()):
+    names = list(requests)
 
-        def report(stage: str, done: int, total: int, searched: int = number) -> None:
-            progress(stage, searched * total + done, len(requests) * total)
+    def result(name: str) -> FoundDesign:
+        def report(stage: str, done: int, total: int) -> None:
+            progress(stage, names.index(name) * total + done, len(names) * total)
 
-        try:
-            results.append((name, search(request, report)))
-        except DesignError as error:
-            problems.append(str(error))
-    if not results:
-        raise DesignError("; ".join(dict.fromkeys(problems)))
-    return min(results, key=lambda result: result[1].best.rank)
+        return search(requests[name], report)
+
+    return min(_each(names, result).items(), key=lambda item: item[1].best.rank)
 
 
 def _family_templates() -> list[str]:
     """Return the first template of each family."""
     templates: dict[type, str] = {}
     for name in template_names():
-        try:
+        with suppress(DesignError):
             templates.setdefault(type(load_design(name)), name)
-        except DesignError:
-            continue
     return list(templates.values())
 
 
-# Printing of a result, and its JSON.
+# Printing of a result.
 
 
 TABS_HINT = (
@@ -261,119 +239,54 @@ def _counts_tabs(request: FindRequest) -> bool:
     return "overall_diameter" in names and "inlet.tab_length" not in free
 
 
-class TrialEntry(Document):
-    """A design that was tried."""
-
-    keys: dict[str, Any] = attribute("values")
-    """keys of the design that were found"""
-    figures: dict[str, PlainNumber]
-    """quantities in mm, deg, N, N/mm, s, g or a share"""
-
-
-class RequirementEntry(Document):
-    """A requirement, with the figures of the best design."""
-
-    quantity: str = attribute("quantity.label")
-    unit: str = attribute("quantity.unit")
-    sense: Literal["at least", "at most"]
-    limit: PlainNumber
-    median: PlainNumber
-    """of the best; force below 0 where it rises less"""
-    bound: PlainNumber | None
-    """kept with the probability `sure`, and held against the limit"""
-    holds: bool
-
-
-class RangeEndEntry(Document):
-    """A key that only its range stops."""
-
-    key: str
-    value: Any
-    low: PlainNumber
-    high: PlainNumber
-
-
-class FindDocument(Document, schema="sbafab/find@1"):
-    """What ``find --json`` prints; by quantity where names are keys."""
-
-    holds: bool
-    file: str | None
-    """the design file, null where none holds"""
-    started_from: str
-    tries: int
-    is_cut_short: bool
-    """whether more tries might lead further"""
-    sure: PlainNumber | None = attribute("problem.sure")
-    """probability with which requirements must hold"""
-    best: TrialEntry
-    intervals: dict[str, tuple[float, float]]
-    """90 % intervals of the best, where a calibration says so"""
-    flags: dict[str, FlagList]
-    """what figures of the best are not to be trusted for"""
-    requirements: list[RequirementEntry]
-    measured: dict[str, CounterpartEntry]
-    missed: list[str]
-    binds: list[Binding]
-    range_ends: list[RangeEndEntry] = attribute("ends")
-    without_room: list[Spare]
-    front: list[TrialEntry]
-    on_front: int
-
-
-def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
-    """Return a result as JSON."""
-    return FindDocument.of(
-        result,
-        file=str(target) if result.holds else None,
-        started_from=origin,
-        requirements=[_requirement(result, row) for row in result.problem.requirements],
-        measured={name: row.entry() for name, row in result.measured.items()},
-    )
-
-
-def _requirement(result: FoundDesign, requirement: Requirement) -> RequirementEntry:
-    """Return a requirement with the figures of the best design; ``bound`` is null without sure."""
-    best = result.best
-    bound = best.judged(requirement)
-    return RequirementEntry.read(
-        requirement,
-        sense="at least" if requirement.at_least else "at most",
-        median=best.value(requirement),
-        bound=bound if requirement.quantity.label in best.intervals else None,
-        holds=requirement.holds(bound),
-    )
-
-
 def print_result(result: FoundDesign, origin: str, target: Path) -> None:
     """Print the design with its figures, what binds and the front; or the nearest miss."""
-    keys = keys_said(result.best.values)
     title = "Best design" if result.holds else "Nearest miss"
-    print_line(f"{title}: {keys}, from {origin}", "bold" if result.holds else "bold red")
+    style = "bold" if result.holds else "bold red"
+    print_line(f"{title}: {format_keys(result.best.values)}, from {origin}", style)
     _print_quantities(result)
-    for rule in result.broken_rules:
+    for rule in result.best.broken_rules:
         print_line(f"  {rule}")
-    if result.binds or result.ends or (result.holds and result.without_room):
+    limits = list(_binding_limits(result))
+    if limits:
         print_line("Binding limits", "bold")
-    for bind in result.binds:
-        print_line(f"  {bind.key} = {value_said(bind.value)}: {bind.breaks}")
-    _print_ends(result)
+    for limit in limits:
+        print_line(f"  {limit}")
+    if result.holds and len(result.front) > 1:
+        _print_front(result)
+    if result.is_cut_short:
+        more = f"--tries {2 * result.tries} may find a better design"
+        print_line(f"All {result.tries} tries were used; {more}")
     if not result.holds:
-        _print_miss(result)
+        print_failure(
+            f"Search failed: none of {result.tries} designs meets all requirements; nothing was "
+            f"written. Relax a requirement{_more_pressure(result)}, or vary more keys with --free "
+            "KEY=LOW:HIGH:STEP"
+        )
         return
-    for spare in result.without_room:
-        print_line(f"  {spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, at its limit")
-    _print_front(result)
-    _print_more_tries(result)
-    count = _counted_requirements(result)
-    print_verdict(
-        f"{target} meets {count}. Next: sbafab generate {shlex.quote(str(target))}",
-        target,
-    )
+    command = f"sbafab generate {shlex.quote(str(target))}"
+    print_verdict(f"{target} meets {_counted_requirements(result)}. Next: {command}", target)
+
+
+def _binding_limits(result: FoundDesign) -> Iterator[str]:
+    """Yield what single steps would break, ranges, and rules without room of a design that
+    holds.
+    """
+    for bind in result.binds:
+        yield f"{bind.key} = {format_value(bind.value)}: {bind.breaks}"
+    for end in result.ends:
+        low, high = end.wider
+        yield (
+            f"{end.key} = {end.value:g} is at the end of its range, {end.low:g} to {end.high:g}; "
+            f"widen it with --free {end.key}={low:g}:{high:g}:{end.step:g}"
+        )
+    for spare in result.without_room if result.holds else ():
+        yield f"{spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, at its limit"
 
 
 def _counted_requirements(result: FoundDesign) -> str:
-    rows = result.problem.requirements
-    is_sure = result.problem.sure is not None
+    rows = result.request.requirements
+    is_sure = result.request.sure is not None
     is_median = not is_sure and any(row.quantity.label in result.intervals for row in rows)
     every = "the requirement" if len(rows) == 1 else f"all {len(rows)} requirements"
     return f"{every if rows else 'all rules'}{' in the median' if is_median else ''}"
@@ -381,23 +294,23 @@ def _counted_requirements(result: FoundDesign) -> str:
 
 def _print_quantities(result: FoundDesign) -> None:
     """Print the required quantities and the goal of the best design."""
-    requirements = result.problem.requirements
-    for requirement in requirements:
-        value = figure_text(result.problem, result.best, requirement)
-        value += "" if result.problem.sure else _interval_text(result, requirement)
-        is_met = requirement.holds(result.best.judged(requirement))
-        missed = "" if is_met else ": MISSED"
-        print_line(f"  {requirement.quantity.label} {value}; {requirement.bound}{missed}")
-        _print_measured(result, requirement.quantity)
-    goal = result.problem.goal
+    request, best = result.request, result.best
+    is_sure = request.sure is not None
+    shown = set()
+    for row in request.requirements:
+        value = figure_text(request, best, row) + ("" if is_sure else _interval_text(result, row))
+        missed = "" if best.meets(row) else ": MISSED"
+        print_line(f"  {row.quantity.label} {value}; {row.bound}{missed}")
+        shown.add(row.quantity.label)
+        _print_trust(result, row.quantity.label)
+    goal = request.goal
     label = goal.label if result.holds else goal.quantity.label
-    value = shown_value(goal.quantity, result.best.value(goal)) + _interval_text(result, goal)
+    value = shown_value(goal.quantity, best.value(goal)) + _interval_text(result, goal)
     print_line(f"  {label}: {value}")
-    if goal.quantity.label not in [requirement.quantity.label for requirement in requirements]:
-        _print_measured(result, goal.quantity)
-    is_sure = result.problem.sure is not None
+    if goal.quantity.label not in shown:
+        _print_trust(result, goal.quantity.label)
     if goal.quantity.label in result.intervals or (result.intervals and not is_sure):
-        hint = "" if is_sure else "; --sure 0.9 asks that each requirement holds so"
+        hint = "" if is_sure else "; --sure 0.9 requires each requirement with that probability"
         note = f"in parentheses the 90 % interval of what would be measured{hint}"
         print_wrapped(note, indent="  ")
 
@@ -410,64 +323,36 @@ def _interval_text(result: FoundDesign, subject: Requirement | Goal) -> str:
     return f" ({shown_interval(interval)})"
 
 
-def _print_measured(result: FoundDesign, quantity: RequestedQuantity) -> None:
-    for flag in result.flags.get(quantity.label, ()):
+def _print_trust(result: FoundDesign, label: str) -> None:
+    """Print the flags of a quantity, and the paper's measured value."""
+    for flag in result.flags.get(label, ()):
         print_wrapped(f"({FLAGS[flag]})", indent="    ")
-    measured = result.measured.get(quantity.label)
-    if measured is not None:
-        print_wrapped(f"({measured.sentence()})", indent="    ")
-
-
-def _print_more_tries(result: FoundDesign) -> None:
-    if result.is_cut_short:
-        more = 2 * result.tries
-        print_line(f"All {result.tries} tries were used; --tries {more} may find a better design")
-
-
-def _print_ends(result: FoundDesign) -> None:
-    for end in result.ends:
-        low, high = end.wider
-        print_line(
-            f"  {end.key} = {end.value:g} is at the end of its range, {end.low:g} to {end.high:g}; "
-            f"widen it with --free {end.key}={low:g}:{high:g}:{end.step:g}"
-        )
-
-
-def _print_miss(result: FoundDesign) -> None:
-    """Print the verdict of a search without success."""
-    _print_more_tries(result)
-    print_failure(
-        f"Search failed: none of {result.tries} designs meets all requirements; nothing was "
-        f"written. Relax a requirement{_more_pressure(result)}, or vary more keys with --free "
-        "KEY=LOW:HIGH:STEP"
-    )
-
-
-def _more_pressure(result: FoundDesign) -> str:
-    """Return the advice for a missed force: the same one at more pressure; empty for others."""
-    for row in result.problem.requirements:
-        quantity, laminate = row.quantity, result.best.laminate
-        if quantity.name != "force" or not row.at_least or laminate is None:
-            continue
-        kpa = max(USEFUL_KPA, 2 * (quantity.kpa or 0.0))
-        is_allowed = kpa <= MOST_PRESSURE and not is_near_burst(laminate, kpa)
-        if is_allowed and not row.holds(result.best.judged(row)):
-            return f", ask for the force at more pressure, {replace(quantity, kpa=kpa).label}"
-    return ""
+    if label in result.measured:
+        print_wrapped(f"({result.measured[label].sentence()})", indent="    ")
 
 
 USEFUL_KPA = 50.0
 """Pressure that is proposed for a force, unless it was missed at half of it or more."""
 
 
+def _more_pressure(result: FoundDesign) -> str:
+    """Return the advice for a missed force: the same one at more pressure; empty for others."""
+    for row in result.request.requirements:
+        quantity, laminate = row.quantity, result.best.laminate
+        if quantity.name != "force" or not row.at_least or laminate is None:
+            continue
+        kpa = max(USEFUL_KPA, 2 * (quantity.kpa or 0.0))
+        is_allowed = kpa <= MOST_PRESSURE and not is_near_burst(laminate, kpa)
+        if is_allowed and not result.best.meets(row):
+            return f", ask for the force at more pressure, {replace(quantity, kpa=kpa).label}"
+    return ""
+
+
 def _print_front(result: FoundDesign) -> None:
-    """Print the Pareto front, if it has several designs."""
-    if len(result.front) < 2:
-        return
     part = f"{len(result.front)} of " if result.on_front > len(result.front) else ""
     print_line(f"Pareto front, {part}{result.on_front} of the {result.tries} designs tried", "bold")
     for trial in result.front:
         figures = ", ".join(f"{name} {value:.4g}" for name, value in trial.figures.items())
-        print_line(f"  {keys_said(trial.values)}: {figures}")
+        print_line(f"  {format_keys(trial.values)}: {figures}")
     for name, measured in result.measured.items():
         print_wrapped(f"({name}: {measured.sentence()})", indent="    ")

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import click
 
-from sbafab.cli.options import LENGTH, finite, folder_option, json_option
+from sbafab.cli.options import LENGTH, FiniteRange, folder_option, json_option
 from sbafab.cli.printing import (
     print_facts,
     print_failure,
@@ -31,8 +32,7 @@ MOST_LINES = 20
 @click.option("--sheet", metavar="NAME", help="Sheet or layer in the picture, e.g. TPE_1.")
 @click.option(
     "--dpi",
-    type=click.FloatRange(50, 20000),
-    callback=finite,
+    type=FiniteRange(50, 20000),
     metavar="N",
     help="Resolution of the scan.  [default: as the file states it]",
 )
@@ -45,22 +45,19 @@ MOST_LINES = 20
     "--paper",
     type=click.Choice(["dark", "light"]),
     default="dark",
-    show_default=True,
     help="What the film lies on: darker or lighter than film.",
 )
 @folder_option("Folder of the files.", "inspection")
 @json_option
-def inspect(  # noqa: PLR0913, PLR0917 - one an option
+def inspect(
     folder: Path,
     picture: Path,
     sheet: str | None,
-    dpi: float | None,
-    bar: float | None,
-    pins: bool,
     photo: bool,
     paper: str,
     out: Path,
     as_json: bool,
+    **reference: Any,
 ) -> None:
     """Compare a scan or photograph of a cut sheet with its cut file.
 
@@ -76,10 +73,9 @@ def inspect(  # noqa: PLR0913, PLR0917 - one an option
     from sbafab.inspection.inspection import InspectionDocument, inspect_picture
     from sbafab.inspection.picture import read_picture
 
-    cut = read_cut_sheet(folder, sheet)
-    seen = read_picture(picture)
-    reference = _reference(seen, dpi, bar, pins, photo)
-    inspection = inspect_picture(seen, cut, reference, photo, paper == "dark")
+    cut, seen = read_cut_sheet(folder, sheet), read_picture(picture)
+    scale = _reference(seen, photo, **reference)
+    inspection = inspect_picture(seen, cut, scale, photo, paper == "dark")
     paths = write_inspection(inspection, out)
     if as_json:
         print_json({**InspectionDocument.of(inspection), "files": [str(path) for path in paths]})
@@ -90,18 +86,15 @@ def inspect(  # noqa: PLR0913, PLR0917 - one an option
 
 
 def _reference(
-    picture: ScanPicture, dpi: float | None, bar: float | None, pins: bool, photo: bool
+    picture: ScanPicture, photo: bool, dpi: float | None, bar: float | None, pins: bool
 ) -> Reference:
-    from sbafab.inspection.scale import Reference
-
     if bar is not None and bar <= 0:
         raise DesignError(f"--bar is {bar:g} mm; give the length of a bar, above 0")
     if bar is not None and pins:
         raise DesignError("give --bar or --pins, not both")
-    if photo:
-        return Reference(None if dpi is None else (dpi, dpi), bar, pins)
-    resolution = picture.dpi if dpi is None else (dpi, dpi)
-    if resolution is None and bar is None and not pins:
+    stated = None if photo else picture.dpi
+    resolution = stated if dpi is None else (dpi, dpi)
+    if not photo and resolution is None and bar is None and not pins:
         raise DesignError(
             f"{picture.path} states no resolution; give --dpi as scanned, --bar or --pins, or "
             "--photo to take the scale from the cut edges themselves"
@@ -116,16 +109,17 @@ def write_inspection(inspection: Inspection, out: Path) -> list[Path]:
 
     out.mkdir(parents=True, exist_ok=True)
     stem = f"{inspection.sheet.name.replace('/', '_')}-{inspection.picture.path.stem}"
-    result = json.dumps(InspectionDocument.of(inspection), indent=1, ensure_ascii=False) + "\n"
+    result, entry = InspectionDocument.of(inspection), history(inspection)
     texts = {
-        ".json": result,
-        "_history.json": json.dumps(history(inspection), indent=1, ensure_ascii=False) + "\n",
+        ".json": json.dumps(result, indent=1, ensure_ascii=False) + "\n",
+        "_history.json": json.dumps(entry, indent=1, ensure_ascii=False) + "\n",
         ".svg": drawing(inspection),
         "_sizes.csv": sizes_csv(inspection),
     }
-    for ending, text in texts.items():
-        replace_text(out / f"{stem}{ending}", text)
-    return [out / f"{stem}{ending}" for ending in texts]
+    paths = {out / f"{stem}{ending}": text for ending, text in texts.items()}
+    for path, text in paths.items():
+        replace_text(path, text)
+    return list(paths)
 
 
 def print_inspection(inspection: Inspection, paths: list[Path]) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import click
 
-from sbafab.cli.options import finite, json_option
-from sbafab.cli.printing import print_json, print_verdict
+from sbafab.cli.options import FiniteRange, json_option
+from sbafab.cli.printing import print_json, print_verdict, several
 from sbafab.cutting.calibration import (
     Calibration,
     Estimate,
@@ -29,7 +29,7 @@ class KerfEstimate(Document):
     scale: Value | None
     scaled: bool = attribute("is_scaled")
     offsets: Mapping[str, Value]
-    """mm that each instrument reads too much; empty where it cannot be told"""
+    """excess of each instrument's readings, mm; empty if the sizes do not determine it"""
     count: int
 
 
@@ -48,13 +48,21 @@ class KerfDocument(Document, schema="sbafab/kerf@1"):
     """lines for the design file"""
 
 
+def _film(context: click.Context, option: click.Parameter, name: str) -> str:
+    """Return the name of a film; raises BadParameter for one that no film can have."""
+    if not FILM_NAME.fullmatch(name):
+        raise click.BadParameter(
+            f"{name!r} is not the name of a film; give tpe, ptfe or a table of [films]"
+        )
+    return name
+
+
 @click.command()
 @click.argument("measurements", type=click.Path(path_type=Path))
 @click.option(
     "--material",
-    callback=lambda context, option, name: _film(name),
+    callback=_film,
     default="tpe",
-    show_default=True,
     metavar="FILM",
     help="Film of the coupon: tpe, ptfe or another film of a kit.",
 )
@@ -65,8 +73,7 @@ class KerfDocument(Document, schema="sbafab/kerf@1"):
 )
 @click.option(
     "--resolution",
-    type=click.FloatRange(0, 1),
-    callback=finite,
+    type=FiniteRange(0, 1),
     metavar="MM",
     help="Resolution of the instrument.  [default: calliper 0.01, scanner 0.0106 (2400 "
     "dpi), microscope 0.001]",
@@ -93,69 +100,37 @@ def kerf(
     """
     sizes = read_measurements(measurements, instrument or "")
     calibration = calibrated(sizes, resolution)
-    if split_xy and (calibration.x is None or calibration.y is None):
+    pair = [estimate for estimate in (calibration.x, calibration.y) if estimate is not None]
+    if split_xy and len(pair) < 2:
         raise DesignError("--split-xy needs two sizes along x and two along y; fill in more rows")
-    widths = _widths(calibration, split_xy)
-    warnings = _warnings(calibration, widths)
-    remarks = [
-        _remark(calibration, widths),
-        *_offset_remarks(calibration.overall),
-        *_contact_remark(sizes),
-    ]
-    block = _toml_block(*_place_in_design(material), widths, warnings)
+    is_split = calibration.differs if split_xy is None else split_xy
+    widths = pair if is_split and len(pair) == 2 else [calibration.overall]
+    warnings = [*_warnings(calibration, widths)]
+    remarks = [*_remarks(calibration, widths, sizes)]
+    block = _toml_block(material, widths, warnings)
     if as_json:
         sentences = {"warnings": warnings, "remarks": remarks, "toml": block}
         print_json(KerfDocument.of(calibration, **sentences))
         return
-    for name, estimate in (
-        ("all", calibration.overall),
-        ("along x", calibration.x),
-        ("along y", calibration.y),
-    ):
+    names = {"all": calibration.overall, "along x": calibration.x, "along y": calibration.y}
+    for name, estimate in names.items():
         if estimate is not None:
-            click.echo(
-                f"{name:8} kerf {_with_interval(estimate.kerf)}, from {estimate.count} sizes"
-            )
-    for remark in remarks:
-        click.echo(remark)
-    for warning in warnings:
-        click.echo(f"warning: {warning}")
+            kerf_text = _with_interval(estimate.kerf)
+            click.echo(f"{name:8} kerf {kerf_text}, from {estimate.count} sizes")
+    for line in (*remarks, *(f"warning: {warning}" for warning in warnings)):
+        click.echo(line)
     read_first = "Read the warnings before you paste" if warnings else "Paste into the design file"
     click.echo(f"\n{read_first}:\n\n{block}")
     values = ", ".join(f"{estimate.kerf.value:.3f}" for estimate in widths)
-    count = f", {len(warnings)} warning{'s' if len(warnings) > 1 else ''}" if warnings else ""
+    count = f", {several(len(warnings), 'warning')}" if warnings else ""
     # A comment, so that all from the table on may be pasted.
     print_verdict(f"# {material} kerf: {values} mm from {calibration.overall.count} sizes{count}")
 
 
-def _film(name: str) -> str:
-    """Return the name of a film; raises BadParameter for one that no film can have."""
-    if not FILM_NAME.fullmatch(name):
-        raise click.BadParameter(
-            f"{name!r} is not the name of a film; give tpe, ptfe or a table of [films]"
-        )
-    return name
-
-
-def _place_in_design(film: str) -> tuple[str, str]:
-    """Return table and key of a film's kerf in a design file."""
-    return ("[laser]", f"kerf_{film}") if film in ("tpe", "ptfe") else (f"[films.{film}]", "kerf")
-
-
-Widths = tuple["Estimate"] | tuple["Estimate", "Estimate"]
-"""The kerf, or those along x and along y."""
-
-
-def _widths(calibration: Calibration, split_xy: bool | None) -> Widths:
-    """Return a pair if ``split_xy``, or if it is None and x and y differ; else the common kerf."""
-    is_split = calibration.differs if split_xy is None else split_xy
-    if is_split and calibration.x is not None and calibration.y is not None:
-        return calibration.x, calibration.y
-    return (calibration.overall,)
-
-
-def _toml_block(table: str, key: str, widths: Widths, warnings: list[str]) -> str:
+def _toml_block(film: str, widths: Sequence[Estimate], warnings: Sequence[str]) -> str:
     """Return the lines for the design file, with the warnings as comments."""
+    is_usual = film in ("tpe", "ptfe")
+    table, key = ("[laser]", f"kerf_{film}") if is_usual else (f"[films.{film}]", "kerf")
     values = [f"{estimate.kerf.value:.3f}" for estimate in widths]
     value = values[0] if len(values) == 1 else f"[{', '.join(values)}]"
     doubts = "".join(f"# warning: {warning}\n" for warning in warnings)
@@ -170,92 +145,68 @@ def _with_interval(value: Value) -> str:
     )
 
 
-def _remark(calibration: Calibration, widths: Widths) -> str:
+def _remarks(
+    calibration: Calibration, widths: Sequence[Estimate], sizes: Sequence[Measurement]
+) -> Iterator[str]:
+    """Yield sentences on x and y, on significant reading errors, and on calliper jaws, whose effect
+    no fit detects.
+    """
     if calibration.difference is None:
-        return "x and y cannot be compared: measure two sizes along each"
-    if not calibration.differs:
-        return "x and y do not differ significantly"
-    advice = "" if len(widths) == 2 else "; a common kerf does not correct this"
-    return f"x and y differ by {_with_interval(calibration.difference)}{advice}"
+        yield "x and y cannot be compared: measure two sizes along each"
+    elif not calibration.differs:
+        yield "x and y do not differ significantly"
+    else:
+        advice = "" if len(widths) == 2 else "; a common kerf does not correct this"
+        yield f"x and y differ by {_with_interval(calibration.difference)}{advice}"
+    for name, offset in calibration.overall.offsets.items():
+        if offset.differs_from(0.0):
+            low, high = offset.interval
+            yield (
+                f"the {name or 'instrument'} reads {abs(offset.value):.4f} mm too "
+                f"{'much' if offset.value > 0 else 'little'} (95 % interval {low:+.4f} to "
+                f"{high:+.4f}); the kerf is corrected for it"
+            )
+    if {size.instrument for size in sizes} & {"", "calliper"}:
+        yield (
+            "the jaws of a calliper compress thin film: outsides read small and windows large, "
+            "which cannot be separated from the kerf; a scanner or a microscope avoids this "
+            "(--instrument)"
+        )
 
 
-def _warnings(calibration: Calibration, widths: Widths) -> list[str]:
-    """Return sentences on doubts about these widths."""
-    places = ("",) if len(widths) == 1 else (" along x", " along y")
-    warnings = [
-        _interval_warning(estimate, place)
-        for estimate, place in zip(widths, places, strict=True)
-        if estimate.is_vague
-    ]
+def _warnings(calibration: Calibration, widths: Sequence[Estimate]) -> Iterator[str]:
+    """Yield sentences on doubts about these widths: intervals, reading errors, scale."""
+    is_pair = len(widths) == 2
+    for estimate, place in zip(widths, (" along x", " along y") if is_pair else ("",), strict=True):
+        low, high = estimate.kerf.interval
+        if estimate.is_vague:
+            yield (
+                f"the kerf{place} {'may be zero' if low <= 0 else 'is too uncertain'}: its 95 % "
+                f"interval is {low:.3f} to {high:.3f} mm from {estimate.count} sizes; measure more "
+                "sizes, or repeat each, before you cut with it"
+            )
     if not is_kerf(widths[0].kerf.value, widths[-1].kerf.value):
-        warnings.append(
+        yield (
             "one kerf is over ten times the other, which no design may have; measure again, or use "
             "--no-split-xy"
         )
-    return [*warnings, *_offset_warning(calibration, widths), *_scale_warnings(calibration)]
-
-
-def _interval_warning(estimate: Estimate, place: str) -> str:
-    low, high = estimate.kerf.interval
-    why = "may be zero" if low <= 0 else "is too uncertain"
-    return (
-        f"the kerf{place} {why}: its 95 % interval is {low:.3f} to {high:.3f} mm from "
-        f"{estimate.count} sizes; measure more sizes, or repeat each, before you cut with it"
-    )
-
-
-def _offset_warning(calibration: Calibration, widths: Widths) -> list[str]:
-    """Return a warning if the sizes do not separate a constant reading error from the kerf."""
-    if all(estimate.offsets for estimate in widths):
-        return []
-    along = " along each axis" if len(widths) == 2 else ""
-    return [
-        f"a constant reading error cannot be separated from the kerf and is assumed to be zero; "
-        f"measure outsides and windows, three sizes or more{along}"
-    ]
-
-
-def _scale_warnings(calibration: Calibration) -> list[str]:
-    """Return warnings of a scale error: along x or y if it is significant there, else overall."""
-    axes = [(" along x", calibration.x), (" along y", calibration.y)]
-    along = [
-        _scale_warning(estimate, where)
-        for where, estimate in axes
-        if estimate and estimate.is_scaled
-    ]
-    if along or not calibration.overall.is_scaled:
-        return along
-    return [_scale_warning(calibration.overall, "")]
-
-
-def _scale_warning(estimate: Estimate, where: str) -> str:
-    assert estimate.scale is not None
-    scale = estimate.scale.value
-    low, high = estimate.scale.interval
-    return (
-        f"sizes{where} are {scale:.4f} times the drawn ones, 95 % interval {low:.4f} to "
-        f"{high:.4f}, after correction of kerf and constant reading error. The laser, the film or "
-        "the instrument may cause it; cut files do not correct it. Check the instrument with a "
-        "gauge of known length and cut a second coupon before you adjust the laser"
-    )
-
-
-def _offset_remarks(estimate: Estimate) -> list[str]:
-    """Return sentences on significant reading errors of the instruments."""
-    return [
-        f"the {name or 'instrument'} reads {abs(offset.value):.4f} mm too "
-        f"{'much' if offset.value > 0 else 'little'} (95 % interval {offset.interval[0]:+.4f} to "
-        f"{offset.interval[1]:+.4f}); the kerf is corrected for it"
-        for name, offset in estimate.offsets.items()
-        if offset.differs_from(0.0)
-    ]
-
-
-def _contact_remark(sizes: Sequence[Measurement]) -> list[str]:
-    """Return a remark on calliper jaws if one was used, since no fit detects their effect."""
-    if not {size.instrument for size in sizes} & {"", "calliper"}:
-        return []
-    return [
-        "the jaws of a calliper compress thin film: outsides read small and windows large, which "
-        "cannot be separated from the kerf; a scanner or a microscope avoids this (--instrument)"
-    ]
+    if not all(estimate.offsets for estimate in widths):
+        yield (
+            "a constant reading error cannot be separated from the kerf and is assumed to be zero; "
+            f"measure outsides and windows, three sizes or more{' along each axis' * is_pair}"
+        )
+    # Along x or y if the scale is significant there, else overall.
+    axes = {" along x": calibration.x, " along y": calibration.y}
+    scaled = {where: each for where, each in axes.items() if each and each.is_scaled}
+    if not scaled and calibration.overall.is_scaled:
+        scaled = {"": calibration.overall}
+    for where, estimate in scaled.items():
+        assert estimate.scale is not None
+        low, high = estimate.scale.interval
+        yield (
+            f"sizes{where} are {estimate.scale.value:.4f} times the drawn ones, 95 % interval "
+            f"{low:.4f} to {high:.4f}, after correction of kerf and constant reading error. The "
+            "laser, the film or the instrument may cause it; cut files do not correct it. Check "
+            "the instrument with a gauge of known length and cut a second coupon before you adjust "
+            "the laser"
+        )

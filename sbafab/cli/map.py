@@ -39,7 +39,6 @@ MODEL_PRESSURE = 10.0
     "--pressure",
     type=PRESSURE.read,
     default="110 kPa",
-    show_default=True,
     metavar="P",
     help="Highest pressure of the map.",
 )
@@ -47,7 +46,6 @@ MODEL_PRESSURE = 10.0
     "--points",
     type=click.IntRange(2, 1000),
     default=31,
-    show_default=True,
     metavar="N",
     help="Number of pressures, and of heights, in CSV and JSON.",
 )
@@ -84,8 +82,7 @@ def map_(
     refuse_beyond_burst(build(design), pressure)
     actuator = stack(design, most_pressure=pressure, factors=factors_of(design, factors))
     if form == MUJOCO:
-        each = _listed(pressures, actuator.chambers)
-        text = chain_text(design.name, actuator, each)
+        text = chain_text(design.name, actuator, _listed(pressures, actuator.chambers))
     else:
         text = map_text(design.name, actuator, form, points)
     if to is None:

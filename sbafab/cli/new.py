@@ -20,7 +20,7 @@ OTHERS = {
     COUPON: "the kerf's calibration piece",
     KIT: "films, tubes, press, laser, limits",
 }
-"""What is no design, with a summary."""
+"""Files to start from other than designs, with a summary."""
 
 
 def templates(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
@@ -45,21 +45,19 @@ def new(template: str | None, file: Path | None, as_json: bool) -> None:
         raise click.UsageError("--json lists the templates; leave TEMPLATE out")
     if template is None:
         _list(as_json)
-        return
-    if template == COUPON:
+    elif template == COUPON:
         _coupon(file or Path(COUPON))
-        return
-    if template == KIT:
-        _kit(file or Path("kit.toml"))
-        return
-
-    written = write_new(template, file)
-    path = shlex.quote(str(written))
-    click.echo(f"{written} written. Edit it, then: sbafab generate {path}")
+    elif template == KIT:
+        path = shlex.quote(str(write_kit(file or Path("kit.toml"))))
+        click.echo(f'{path} written. Edit it, then: sbafab generate DESIGN --set kit="{path}"')
+    else:
+        written = write_new(template, file)
+        path = shlex.quote(str(written))
+        click.echo(f"{written} written. Edit it, then: sbafab generate {path}")
 
 
 def _list(as_json: bool) -> None:
-    """Print the designs that ship, and in words what else may be written."""
+    """Print the designs that ship, and in words the other files."""
     designs = template_summaries()
     if as_json:
         print_json([{"name": name, "summary": summary} for name, summary in designs.items()])
@@ -68,11 +66,6 @@ def _list(as_json: bool) -> None:
     width = max(map(len, every))
     for name, summary in every.items():
         click.echo(f"{name:<{width}}  {summary}")
-
-
-def _kit(file: Path) -> None:
-    path = shlex.quote(str(write_kit(file)))
-    click.echo(f'{path} written. Edit it, then: sbafab generate DESIGN --set kit="{path}"')
 
 
 def _coupon(folder: Path) -> None:

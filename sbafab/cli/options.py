@@ -5,10 +5,10 @@ from __future__ import annotations
 import functools
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 import click
 from click.shell_completion import CompletionItem
@@ -76,21 +76,29 @@ def by_chamber(
     return chambers
 
 
+class _Finite(click.ParamType):  # type: ignore[type-arg]  # generic in newer clicks only
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail("must be a finite number", param, ctx)
+        return number
+
+
+class FiniteFloat(_Finite, click.types.FloatParamType):
+    """A finite number."""
+
+
+class FiniteRange(_Finite, click.FloatRange):
+    """A finite number in a range; ``FloatRange`` accepts nan."""
+
+
 # Shell completion: templates and files, keys with their values, rules.
 
 
 def designs(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
-    """Complete the names of templates, and files."""
-    templates = [
-        CompletionItem(name, help=summary)
-        for name, summary in template_summaries().items()
-        if name.startswith(typed)
-    ]
+    """Complete the names of templates, and files or folders."""
+    templates = completions(typed, template_summaries().items())
     return [*templates, CompletionItem(typed, type="file")]
-
-
-designs_or_folders = designs
-"""A shell completes folders among files."""
 
 
 def rules(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
@@ -104,9 +112,9 @@ def rules(ctx: click.Context, param: click.Parameter, typed: str) -> list[Comple
 def assignments(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete ``KEY=``, and after it the values of a key that has a choice."""
     key, equals, _ = typed.partition("=")
-    if not equals:
-        return completions(typed, ((f"{name}=", None) for name in _keys()))
-    return completions(typed, ((f"{key}={value}", None) for value in _choices(_keys().get(key))))
+    ends = _choices(_keys().get(key)) if equals else ()
+    names = (f"{key}={value}" for value in ends) if equals else (f"{name}=" for name in _keys())
+    return completions(typed, ((name, None) for name in names))
 
 
 def completions(typed: str, candidates: Iterable[tuple[str, str | None]]) -> list[CompletionItem]:
@@ -121,21 +129,16 @@ def _keys() -> dict[str, object]:
     # `sbafab new` has options too, and needs no family.
     from sbafab.actuators import records
 
-    keys: dict[str, object] = {}
-    for record in records().values():
-        keys |= key_paths(record)
+    keys = {key: kind for record in records().values() for key, kind in key_paths(record).items()}
     tables = {path.rpartition(".")[0] for path in keys}
     return {path: keys[path] for path in sorted(keys) if path not in tables}
 
 
-def _choices(annotation: Any) -> Iterator[str]:
-    """Yield the values of a ``Literal`` or a boolean."""
-    from typing import Literal, get_args, get_origin
-
+def _choices(annotation: Any) -> tuple[str, ...]:
+    """Return the values of a ``Literal`` or a boolean."""
     if annotation is bool:
-        yield from ("true", "false")
-    elif get_origin(annotation) is Literal:
-        yield from map(str, get_args(annotation))
+        return "true", "false"
+    return tuple(map(str, get_args(annotation))) if get_origin(annotation) is Literal else ()
 
 
 # Arguments and options.
@@ -146,16 +149,27 @@ Command = Callable[..., Any]
 _GIVEN = click.core.ParameterSource.COMMANDLINE
 
 
-def set_option(command: Command) -> Command:
-    """Add ``--set``."""
+set_option = click.option(
+    "--set",
+    "assignments",
+    metavar="KEY=VALUE",
+    multiple=True,
+    shell_complete=assignments,
+    help="Override a key of the design, e.g. --set chamber.diameter=6. Repeatable.",
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+
+
+def pressures_option(words: str, default: str) -> Callable[[Command], Command]:
+    """Return ``--pressure``, repeatable, whose help begins with ``words``."""
     return click.option(
-        "--set",
-        "assignments",
-        metavar="KEY=VALUE",
+        "--pressure",
+        "pressures",
+        type=PRESSURE.read,
         multiple=True,
-        shell_complete=assignments,
-        help="Override a key of the design, e.g. --set chamber.diameter=6. Repeatable.",
-    )(command)
+        metavar="P",
+        help=f"{words}, kPa or with a unit. Repeatable.  [default: {default}]",
+    )
 
 
 def calibration_options(command: Command) -> Command:
@@ -185,7 +199,6 @@ def flow_option(words: str) -> Callable[[Command], Command]:
         "flow_ml_min",
         type=FLOW.read,
         default="35 ml/min",
-        show_default=True,
         metavar="Q",
         help=f"{words}, ml/min or with a unit.",
     )
@@ -205,9 +218,9 @@ def waive_option(words: str) -> Callable[[Command], Command]:
 
 def _target(_: click.Context, __: click.Parameter, text: str | None) -> float | None:
     """Return a share from 0.95 or 95%; raises BadParameter for none, all and other text."""
-    match = None if text is None else _WRITTEN.fullmatch(text)
     if text is None:
         return None
+    match = _WRITTEN.fullmatch(text)
     share = float(match[1]) / (100 if match[2] else 1) if match and match[2] in ("", "%") else 0.0
     if not 0 < share < 1:
         raise click.BadParameter(f"{text!r} must be a share above 0 and below 1, as 0.95 or 95%")
@@ -254,7 +267,7 @@ def folder_option(words: str, default: str = ".") -> Callable[[Command], Command
         "--out",
         type=click.Path(path_type=Path, readable=False),
         default=Path(default),
-        show_default="this folder" if default == "." else True,
+        show_default="this folder" if default == "." else None,
         callback=_refuse_file,
         metavar="OUT",
         help=words,
@@ -284,9 +297,6 @@ def design_file(to: Path | None, out: Path, name: str) -> Path:
     return to
 
 
-json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-
-
 @dataclass(frozen=True)
 class Request:
     """Arguments and options of a command that writes a folder."""
@@ -297,43 +307,40 @@ class Request:
     waivers: tuple[str, ...]
     as_json: bool
 
-
-def run_options(command: Command) -> Command:
-    """Add DESIGN and the options of a writing command, passed to it as a Request."""
-    argument = click.argument("designs", metavar="DESIGN", nargs=1, shell_complete=designs)
-    return _with_request(command, argument)
-
-
-def several_run_options(command: Command) -> Command:
-    """Add any number of DESIGNs and the options of a writing command, passed as a Request."""
-    argument = click.argument(
-        "designs",
-        metavar="DESIGN...",
-        nargs=-1,
-        required=True,
-        shell_complete=designs,
-    )
-    return _with_request(command, argument)
+    @property
+    def design(self) -> str:
+        """The design, the first one of several."""
+        return self.designs[0]
 
 
-def _with_request(command: Command, argument: Callable[[Command], Command]) -> Command:
-    @functools.wraps(command)
-    def gathered(
-        designs: str | tuple[str, ...],
-        out: Path,
-        assignments: tuple[str, ...],
-        waivers: tuple[str, ...],
-        as_json: bool,
-        **parameters: Any,
-    ) -> Any:
-        named = (designs,) if isinstance(designs, str) else designs
-        return command(request=Request(named, out, assignments, waivers, as_json), **parameters)
+def run_options(is_several: bool = False) -> Callable[[Command], Command]:
+    """Add DESIGN, or any number of them, and the options of a writing command, passed to it as a
+    Request.
+    """
 
-    decorated: Command = gathered
-    waive = waive_option(WAIVE_HELP.get(command.__name__, WAIVE_CUT))
-    for option in (json_option, waive, set_option, out_option, argument):
-        decorated = option(decorated)
-    return decorated
+    def add(command: Command) -> Command:
+        @functools.wraps(command)
+        def gathered(**parameters: Any) -> Any:
+            request = Request(
+                **{field.name: parameters.pop(field.name) for field in fields(Request)}
+            )
+            return command(request=request, **parameters)
+
+        argument = click.argument(
+            "designs",
+            metavar="DESIGN..." if is_several else "DESIGN",
+            nargs=-1 if is_several else 1,
+            callback=lambda _, __, value: (value,) if isinstance(value, str) else value,
+            required=True,
+            shell_complete=designs,
+        )
+        waive = waive_option(WAIVE_HELP.get(command.__name__, WAIVE_CUT))
+        decorated: Command = gathered
+        for option in (json_option, waive, set_option, out_option, argument):
+            decorated = option(decorated)
+        return decorated
+
+    return add
 
 
 def sheet_options(command: Command) -> Command:
@@ -362,28 +369,19 @@ def refuse_options(why: str, *names: str) -> None:
             raise click.UsageError(f"{max(param.opts, key=len)} {why}")
 
 
-def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
-    """Return a finite value or None: a callback, since ``FloatRange`` accepts nan."""
-    if value is not None and not math.isfinite(value):
-        raise click.BadParameter("must be a finite number", ctx, param)
-    return value
-
-
 def dxf_options(command: Command) -> Command:
     """Add ``--dxf-profile`` and ``--chord-error``, for readers that cannot read bulges."""
     chord = click.option(
         "--chord-error",
-        type=click.FloatRange(0.0001, 0.1),
-        callback=finite,
+        type=FiniteRange(0.0001, 0.1),
         metavar="MM",
         help="Largest distance of a chord from its arc, with --dxf-profile chords.  "
         "[default: 0.005]",
     )
     profile = click.option(
         "--dxf-profile",
-        type=click.Choice(["bulges", "arcs", "chords"]),
+        type=click.Choice(get_args(DxfProfile)),
         default="bulges",
-        show_default=True,
         help="Write arcs as polyline bulges, ARC entities or chords.",
     )
 
@@ -391,10 +389,7 @@ def dxf_options(command: Command) -> Command:
     def with_curves(dxf_profile: DxfProfile, chord_error: float | None, **parameters: Any) -> Any:
         if chord_error is not None and dxf_profile != "chords":
             raise click.UsageError("--chord-error goes with --dxf-profile chords; add it")
-
-        curves = Curves(dxf_profile)
-        if chord_error is not None:
-            curves = curves._replace(chord_error=chord_error)
+        curves = Curves(dxf_profile, chord_error or Curves().chord_error)
         return command(curves=curves, **parameters)
 
     return profile(chord(with_curves))

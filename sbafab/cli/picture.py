@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, get_args
 
 import click
 
@@ -10,9 +11,9 @@ from sbafab.actuators import build, load_design
 from sbafab.cli.options import (
     PRESSURE,
     VOLUME,
+    FiniteFloat,
     OfChamber,
     by_chamber,
-    finite,
     refuse_options,
     set_option,
 )
@@ -66,25 +67,20 @@ from sbafab.reports.inflated_picture import (
 )
 @click.option(
     "--motion",
-    type=click.Choice(["inflate", "circle"]),
+    type=click.Choice(get_args(Movement)),
     default="inflate",
-    show_default=True,
     help="Animation: from flat and back, or pressure circling through the chambers.",
 )
 @click.option(
     "--elevation",
-    type=float,
-    callback=finite,
+    type=FiniteFloat(),
     default=18.0,
-    show_default=True,
     help="Viewing angle above the bench, degrees.",
 )
 @click.option(
     "--azimuth",
-    type=float,
-    callback=finite,
+    type=FiniteFloat(),
     default=-60.0,
-    show_default=True,
     help="Viewing angle round the vertical axis, degrees.",
 )
 @click.option(
@@ -92,16 +88,14 @@ from sbafab.reports.inflated_picture import (
     type=click.IntRange(100, 4000),
     help="Pixels; the height is 4/5 of the width.  [default: 1000, animation 480]",
 )
-def picture(  # noqa: PLR0913, PLR0917 - one an option
+def picture(
     design: str,
     assignments: tuple[str, ...],
     pressures: dict[str, float],
     volumes: dict[str, float],
     path: Path | None,
-    motion: Movement,
     width: int | None,
-    elevation: float,
-    azimuth: float,
+    **view: Any,
 ) -> None:
     """Draw the inflated actuator as picture, animation or scene.
 
@@ -116,15 +110,8 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     is_inflated = has_balloons(model_form(loaded))
     path = path or Path(f"{loaded.name}-{'inflated' if is_inflated else 'flat'}.png")
     pixels = width or (480 if path.suffix.lower() in MOVING else 1000)
-    wish = PictureRequest(
-        pressures or {"": 5.0},
-        volumes or None,
-        elevation=elevation,
-        azimuth=azimuth,
-        width=pixels,
-        height=pixels * 4 // 5,
-        motion=motion,
-    )
+    view |= {"width": pixels, "height": pixels * 4 // 5}
+    wanted = PictureRequest(pressures or {"": 5.0}, volumes or None, **view)
     _refuse_unused(path.suffix.lower())
     if not is_inflated:
         refuse_options(
@@ -132,20 +119,20 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
             *("pressures", "volumes", "elevation", "azimuth"),
         )
     try:
-        (_draw_inflated if is_inflated else _draw_flat)(loaded, wish, path)
+        (_draw_inflated if is_inflated else _draw_flat)(loaded, wanted, path)
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror}") from error
 
 
-def _draw_flat(design: Design, wish: PictureRequest, path: Path) -> None:
-    write_flat_picture(build(design), path, wish.width, wish.height)
+def _draw_flat(design: Design, wanted: PictureRequest, path: Path) -> None:
+    write_flat_picture(build(design), path, wanted.width, wanted.height)
     print_verdict(f"{design.name} drawn flat, since {WHY}. Written to {path}", path)
 
 
-def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
+def _draw_inflated(design: Design, wanted: PictureRequest, path: Path) -> None:
     laminate = build(design)
     with shown_progress(False) as progress:
-        pressures = wish.pressures_kpa.values()
+        pressures = wanted.pressures_kpa.values()
         refuse_pressure([*pressures])
         refuse_beyond_burst(laminate, max(pressures))
         most = max(MOST_PRESSURE, *pressures)
@@ -153,7 +140,7 @@ def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
         pose = write_picture(
             laminate,
             inflated,
-            wish,
+            wanted,
             path,
             lambda done, total: progress("frames", done, total),
         )

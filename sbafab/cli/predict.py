@@ -5,20 +5,22 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import load
+from sbafab.assemblies.records import Assembly
 from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.cli.options import (
-    PRESSURE,
     VOLUME,
+    FiniteFloat,
+    FiniteRange,
     Request,
     calibration_options,
-    finite,
     flow_option,
+    pressures_option,
     refuse_options,
     run_options,
 )
@@ -28,6 +30,7 @@ from sbafab.cli.printing import (
     print_json,
     print_line,
     print_listed,
+    print_table,
     print_verdict,
     print_wrapped,
     wrapped,
@@ -50,12 +53,8 @@ from sbafab.models.formulas import size_phrases, usual_pressures
 from sbafab.models.prediction import predict as predicted
 from sbafab.models.sensitivities import SensitivityRow, sensitivity_table
 from sbafab.output.artefacts import prediction_json
-from sbafab.output.schema_ids import ASSEMBLY_PREDICT_SCHEMA
-from sbafab.reports.assembly_prediction import AssemblyPrediction, predict_assembly
+from sbafab.reports.assembly_prediction import SCHEMA, AssemblyPrediction, predict_assembly
 from sbafab.runs.run import RunRequest, generate
-
-if TYPE_CHECKING:
-    from sbafab.assemblies.records import Assembly
 
 ELASTIC_OPTIONS = ("pocket_loss", "modulus_mpa", "sensitivity")
 """Options of the model of elastic balloons alone."""
@@ -64,15 +63,10 @@ FORMULA_OPTIONS = ("flow_ml_min", "volumes", "contact_factor")
 
 
 @click.command()
-@run_options
-@click.option(
-    "--pressure",
-    "pressures",
-    type=PRESSURE.read,
-    multiple=True,
-    metavar="P",
-    help="Gauge pressure of force and work, kPa or with a unit; a vacuum is negative. Repeatable.  "
-    "[default: 10, 100; of a design that works under a vacuum -10, -100]",
+@run_options()
+@pressures_option(
+    "Gauge pressure of force and work, negative for a vacuum",
+    "10, 100; of a design that works under a vacuum -10, -100",
 )
 @flow_option("Flow for the actuation time")
 @click.option(
@@ -85,16 +79,14 @@ FORMULA_OPTIONS = ("flow_ml_min", "volumes", "contact_factor")
 )
 @click.option(
     "--press-factor",
-    type=float,
-    callback=finite,
+    type=FiniteFloat(),
     metavar="F",
     help="Measured thickness after the press over that before, of films that melt in it.  "
     "[default: the calibration's]",
 )
 @click.option(
     "--contact-factor",
-    type=float,
-    callback=finite,
+    type=FiniteFloat(),
     metavar="F",
     help="Measured ratio of force to Eqs. 1-4.  [default: 1, off]",
 )
@@ -102,10 +94,8 @@ FORMULA_OPTIONS = ("flow_ml_min", "volumes", "contact_factor")
 @click.option(
     "--load",
     "load_g",
-    type=click.FloatRange(min=0, max=1000),
-    callback=finite,
+    type=FiniteRange(min=0, max=1000),
     default=1.2,
-    show_default=True,
     metavar="G",
     help="Assemblies: mass at the tips, g; the default is the paper's marble.",
 )
@@ -134,21 +124,22 @@ def predict(
     Of an assembly it prints reach, load, grip in its lumen, and collisions of inflated parts, at
     one pressure (default 10 kPa).
     """
-    design = load(request.designs[0], request.assignments, request.waivers)
+    design = load(request.design, request.assignments, request.waivers)
     if not isinstance(design, Design):
         _refuse_for_assembly(design, pressures)
         _predict_assembly(design, request, pressures[0] if pressures else 10.0, load_g)
         return
     _refuse_for_design(design)
-    wish = PredictionRequest(
+    wanted = PredictionRequest(
         pressures or usual_pressures(design.form), flow_ml_min, volumes, overrides=factors
     )
     with shown_progress(request.as_json) as progress:
         progress("predicting", 0, 1)
-        prediction = predicted(design, wish)
-        wanted = RunRequest(design, request.out, ("predict",), prediction=prediction)
+        prediction = predicted(design, wanted)
         try:
-            run = generate(wanted, progress)
+            run = generate(
+                RunRequest(design, request.out, ("predict",), prediction=prediction), progress
+            )
         except OutputError:
             # The prediction exists, though it cannot be written.
             if not request.as_json:
@@ -157,18 +148,17 @@ def predict(
         rows = []
         if sensitivity:
             progress("sensitivity", 0, 1)
-            rows = sensitivity_table(design, wish.pressures_kpa[0])
+            rows = sensitivity_table(design, wanted.pressures_kpa[0])
     failed = sorted({finding.rule for finding in run.findings if finding.verdict == "fail"})
     if request.as_json:
-        document = prediction_json(design, prediction)
-        if sensitivity:
-            document["sensitivity"] = [asdict(row) for row in rows]
+        more = {"sensitivity": [asdict(row) for row in rows]} if sensitivity else {}
+        document = {**prediction_json(design, prediction), **more}
         print_json({**document, "failed": failed, "folder": str(run.folder)})
     else:
         print_listed("size", size_phrases(design, run.laminate, prediction.asked.factors))
         print_prediction(prediction, verbose)
         if sensitivity:
-            _print_sensitivity(rows, wish.pressures_kpa[0])
+            _print_sensitivity(rows, wanted.pressures_kpa[0])
         if not run.failed:
             details = "" if verbose else " Details: -v"
             print_verdict(
@@ -224,7 +214,7 @@ def _predict_assembly(
 ) -> None:
     prediction = predict_assembly(assemble(assembly), pressure_kpa, load_g)
     if request.as_json:
-        print_json({"schema": ASSEMBLY_PREDICT_SCHEMA, **asdict(prediction)})
+        print_json({"schema": SCHEMA, **asdict(prediction)})
     else:
         print_assembly_prediction(prediction)
     if prediction.touches:
@@ -267,18 +257,17 @@ def _print_figures(prediction: Prediction) -> None:
     main = [figure for figure in prediction.figures if not figure.other]
     alternatives = [figure for figure in prediction.figures if figure.other]
     models = list(dict.fromkeys(figure.model for figure in (*main, *alternatives)))
-
-    def print_part(title: str, lines: Iterator[str]) -> None:
-        print_line(f"\n{title}", "bold")
-        for line in lines:
+    for title, figures in ((MAIN_TITLE, main), (ALTERNATIVES_TITLE, alternatives)):
+        if figures:
+            print_line(f"\n{title}", "bold")
+        for line in figure_lines(figures, models, width):
             # The heading of a group starts at the margin.
-            is_head = title in (MAIN_TITLE, ALTERNATIVES_TITLE) and not line.startswith(" ")
-            print_line(line, "bold" if is_head else "")
-
-    print_part(MAIN_TITLE, figure_lines(main, models, width))
-    if alternatives:
-        print_part(ALTERNATIVES_TITLE, figure_lines(alternatives, models, width))
-    print_part("Models and validity", _numbered(models, width))
+            print_line(line, "" if line.startswith(" ") else "bold")
+    print_line("\nModels and validity", "bold")
+    for number, model in enumerate(models, start=1):
+        text = f"{model.title}: {model.trust}"
+        for line in wrapped(text, width, f"[{number}]".ljust(5), " " * 5):
+            print_line(line)
     print_line("")
 
 
@@ -313,51 +302,29 @@ def figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int)
                 yield from wrapped(figure.aside, width, "    ", "    ") if figure.aside else ()
 
 
-def _numbered(models: Sequence[Model], width: int) -> Iterator[str]:
-    """Yield the lines of the numbered list of models."""
-    for number, model in enumerate(models, start=1):
-        text = f"{model.title}: {model.trust}"
-        yield from wrapped(text, width, f"[{number}]".ljust(5), " " * 5)
-
-
 def print_assembly_prediction(prediction: AssemblyPrediction) -> None:
     """Print the figures of an assembly and, last, the parts that collide when inflated."""
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("part", no_wrap=True)
-    table.add_column("figure")
-    table.add_column("value", justify="right", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
-    table.add_column("model")
-    table.add_column("paper")
-    previous = ""
+    pressure = f"at {prediction.pressure_kpa:g} kPa"
+    rows, previous = [], ""
     for figure in prediction.figures:
-        table.add_row(
-            "" if figure.part == previous else figure.part,
-            Text(figure.name),
-            f"{figure.value:.4g}",
-            figure.unit,
-            Text(figure.model),
-            Text(figure.paper),
-        )
+        part = "" if figure.part == previous else figure.part
         previous = figure.part
-    out = console()
-    out.print(Text(f"{prediction.name} at {prediction.pressure_kpa:g} kPa", style="bold"))
-    out.print(table)
-    for measured in dict.fromkeys(
-        figure.measured for figure in prediction.figures if figure.measured
-    ):
-        names = [figure.name for figure in prediction.figures if figure.measured == measured]
-        print_wrapped(f"{'; '.join(dict.fromkeys(names))}: {measured}")
+        value = f"{figure.value:.4g}"
+        rows.append((part, figure.name, value, figure.unit, figure.model, figure.paper))
+    names = ("part", "figure", "value", "unit", "model", "paper")
+    print_table(f"{prediction.name} {pressure}", names, rows)
+    measured: dict[str, dict[str, None]] = {}
+    for figure in prediction.figures:
+        if figure.measured:
+            measured.setdefault(figure.measured, {})[figure.name] = None
+    for sentence, figures in measured.items():
+        print_wrapped(f"{'; '.join(figures)}: {sentence}")
     for reason in prediction.left_out:
         print_line(f"left out: {reason}")
     for part in prediction.near_burst:
         print_line(f"{part}: {FLAGS[NEAR_BURST]}")
     for sentence in prediction.met():
         print_line(sentence)
-    pressure = f"at {prediction.pressure_kpa:g} kPa"
     if prediction.touches:
         print_failure(f"{prediction.name} failed: inflated parts collide {pressure}")
     else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,11 +13,10 @@ import click
 from sbafab.cli.exit import print_error
 from sbafab.cli.progress import QUIET, is_requested, print_result
 from sbafab.rules.deck import AS_BUILT
-from sbafab.rules.finding import Finding, Verdict, counted, decisive
+from sbafab.rules.finding import Finding, counted, decisive
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
     from sbafab.output.checked import Build
 
@@ -85,22 +84,20 @@ def print_table(title: str, names: Sequence[str], rows: Sequence[Sequence[str]])
 
 def print_facts(facts: Iterable[tuple[str, str]]) -> None:
     """Print a table of labels and texts."""
+    from rich.table import Table
     from rich.text import Text
 
-    table = facts_table()
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(no_wrap=True, style="bold")
+    table.add_column(ratio=1, overflow="fold")
     for label, text in facts:
         table.add_row(label, Text(text))
     console().print(table)
 
 
-def facts_table() -> Table:
-    """Return an empty table with a column of bold labels and one of texts."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, show_header=False)
-    table.add_column(no_wrap=True, style="bold")
-    table.add_column(ratio=1, overflow="fold")
-    return table
+def cell_text(value: str | float | None) -> str:
+    """Return a value for a table: a number in four digits, None as an empty cell."""
+    return "" if value is None else value if isinstance(value, str) else f"{value:.4g}"
 
 
 FILES = "files"
@@ -115,17 +112,14 @@ def print_json(value: object) -> None:
 
 def print_listed(label: str, phrases: Sequence[str]) -> None:
     """Print ``label: a, b, c``, with lines broken between phrases only."""
-    from rich.text import Text
+    text = ", ".join(phrase.replace(" ", NO_BREAK) for phrase in phrases)
+    for line in wrapped(text, console().width, f"{label}: ", " " * (len(label) + 2)):
+        print_line(line.replace(NO_BREAK, " "))
 
-    out = console()
-    line = f"{label}: {phrases[0]}"
-    for phrase in phrases[1:]:
-        if len(f"{line}, {phrase},") > out.width:
-            out.print(Text(f"{line},"), soft_wrap=True)
-            line = f"{' ' * len(label)}  {phrase}"
-        else:
-            line += f", {phrase}"
-    out.print(Text(line), soft_wrap=True)
+
+def several(number: int, noun: str, plural: str = "") -> str:
+    """Return a number with its noun."""
+    return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
 
 
 def notes_of(checked: Iterable[Build]) -> list[str]:
@@ -133,14 +127,14 @@ def notes_of(checked: Iterable[Build]) -> list[str]:
 
     A note of all of them stands without names.
     """
-    names: dict[str, list[str]] = {}
-    designs = list(checked)
-    for design in designs:
-        for note in design.laminate.notes:
-            names.setdefault(note, []).append(design.design.name)
+    notes = {each.design.name: each.laminate.notes for each in checked}
+    names = {
+        note: [name for name, of in notes.items() if note in of]
+        for of in notes.values()
+        for note in of
+    }
     return [
-        note if len(of) == len(designs) else f"{', '.join(of)}: {note}"
-        for note, of in names.items()
+        note if len(of) == len(notes) else f"{', '.join(of)}: {note}" for note, of in names.items()
     ]
 
 
@@ -168,16 +162,13 @@ def groups_of(
 
 def print_findings(groups: Sequence[Group], verbose: bool = False) -> None:
     """Print a line for every rule (of several groups only if ``verbose``), and the remedies."""
-    out = console()
     for group in groups:
         if len(groups) > 1:
-            out.print(f"{group.name}: {counted(group.findings)}", style="bold", markup=False)
-        if verbose:
+            print_line(f"{group.name}: {counted(group.findings)}", "bold")
+        if verbose or len(groups) == 1:
             print_lines(group.findings, verbose)
-            continue
-        if len(groups) == 1:
-            print_lines(group.findings)
-        print_open(group.findings)
+        if not verbose:
+            print_open(group.findings)
 
 
 def print_lines(findings: Sequence[Finding], verbose: bool = False) -> None:
@@ -204,15 +195,14 @@ def print_lines(findings: Sequence[Finding], verbose: bool = False) -> None:
 
 def print_open(findings: Sequence[Finding]) -> None:
     """Print the remedy, or the message, of each warning, failure and rule waived by the user."""
+    sentences = {
+        f"{finding.rule}: {finding.remedy or finding.message}": finding.verdict
+        for finding in findings
+        if finding.verdict in ("fail", "warn") or finding.by_user
+    }
     # Bond and overhang may have one remedy.
-    for sentence, verdict in dict.fromkeys(_open_sentences(findings)):
+    for sentence, verdict in sentences.items():
         print_wrapped(sentence, COLOURS[verdict])
-
-
-def _open_sentences(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]]:
-    for finding in findings:
-        if finding.verdict in ("fail", "warn") or finding.by_user:
-            yield f"{finding.rule}: {finding.remedy or finding.message}", finding.verdict
 
 
 def print_verdict(sentence: str, written: Path | None = None) -> None:

@@ -11,9 +11,8 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import dataclass
 from functools import wraps
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
@@ -99,8 +98,7 @@ def shown_progress(quiet: bool) -> Iterator[Progress]:
         yield plain_lines(is_requested(VERBOSE))
 
 
-@dataclass(frozen=True)
-class Pace:
+class Pace(NamedTuple):
     """Progress of a stage; seconds elapsed since the start of the command and of the stage."""
 
     stage: str
@@ -117,29 +115,20 @@ class Pace:
         return self.stage_elapsed * (self.total - self.done) / self.done
 
     @property
-    def is_shown(self) -> bool:
-        """True if the command has run long enough for a line on a terminal."""
-        return self.elapsed >= SHOWN_AFTER_SECONDS
-
-    @property
     def text(self) -> str:
         """Stage, counts, rate, time elapsed and time left in a line."""
-        parts = [self.stage]
-        if self.total > 1:
-            parts[0] += f": {self.done} of {self.total}"
+        counts = f": {self.done} of {self.total}" if self.total > 1 else ""
+        parts = [f"{self.stage}{counts}"]
         if self.remaining is not None and self.total > 1:
-            parts.append(_rate(self.done / self.stage_elapsed))
+            per_second = self.done / self.stage_elapsed
+            is_slow = per_second < 1
+            unit = "minute" if is_slow else "second"
+            parts.append(f"{60 * per_second if is_slow else per_second:.3g} per {unit}")
         parts.append(f"{_clock(self.elapsed)} elapsed")
         if self.remaining is not None:
             less = self.remaining < 1
             parts.append("less than 1 s left" if less else f"about {_clock(self.remaining)} left")
         return ", ".join(parts)
-
-
-def _rate(per_second: float) -> str:
-    if per_second >= 1:
-        return f"{per_second:.3g} per second"
-    return f"{60 * per_second:.3g} per minute"
 
 
 def _clock(seconds: float) -> str:
@@ -189,15 +178,13 @@ def live_line() -> Iterator[Progress]:
 
     def line() -> Any:
         pace = stages.pace()
-        if not pace.is_shown:
-            return Text("")
         spinner.update(text=Text(pace.text))
-        return spinner
+        return spinner if pace.elapsed >= SHOWN_AFTER_SECONDS else Text("")
 
     def progress(stage: str, done: int, total: int) -> None:
         stages.report(stage, done, total)
 
-    # Four times a second, so that the clock runs between reports.
+    # Four times a second, so that the clock runs between reports; the command prints as it likes.
     with Live(
         get_renderable=line,
         console=Console(stderr=True),

@@ -10,11 +10,21 @@ from typing import Any
 import click
 
 from sbafab.cli.options import LENGTH, PRESSURE, Command, json_option, set_option
-from sbafab.cli.printing import print_json, print_table, print_verdict
+from sbafab.cli.printing import cell_text, print_json, print_table, print_verdict, several
 from sbafab.errors import DesignError
-from sbafab.output.schema_ids import RECORDS_SCHEMA
 from sbafab.results import recording
-from sbafab.results.records import ERRORS, HistoryEntry, LabRow, Record, columns, row_of
+from sbafab.results.records import (
+    ERRORS,
+    HistoryEntry,
+    HistoryRow,
+    LabRow,
+    Record,
+    RecordEntry,
+    RecordsDocument,
+    RowEntry,
+    columns,
+    row_of,
+)
 from sbafab.results.report import Report, ReportDocument, report, success_svg
 from sbafab.results.store import Contents, Lab
 
@@ -40,12 +50,9 @@ RESULTS = tuple(column for _, column, *_ in MEASUREMENTS)
 def _measurement_options(command: Command) -> Command:
     """Add the options of measurements, in the order of the help; errors are repeatable."""
     for flag, column, kind, word, words in reversed(MEASUREMENTS):
-        several = column in ERRORS
-        text = f"{words} Repeatable." if several else words
-        option = click.option(
-            *(flag, column), type=kind, metavar=word or None, multiple=several, help=text
-        )
-        command = option(command)
+        settings = {"type": kind, "metavar": word or None, "multiple": column in ERRORS}
+        text = f"{words} Repeatable." if column in ERRORS else words
+        command = click.option(flag, column, **settings, help=text)(command)
     return command
 
 
@@ -115,7 +122,6 @@ def _row_key(
     type=click.Path(path_type=Path, dir_okay=False),
     default=Path("lab.sqlite"),
     envvar="SBAFAB_LAB",
-    show_default=True,
     show_envvar=True,
     metavar="FILE",
     help="File of the lab's records.",
@@ -150,7 +156,7 @@ def record(
             print_verdict(str(values["chart"]))
     elif task == "export":
         count = recording.write_history(_matches(store, values), values["export"])
-        print_verdict(f"{values['export']}: {count} device{'s' if count != 1 else ''}")
+        print_verdict(f"{values['export']}: {several(count, 'device')}")
     elif task == "find":
         found = _matches(store, values)
         print_rows([*found.entries, *found.records], store, as_json, "found in")
@@ -264,28 +270,23 @@ def _matches(store: Lab, values: Mapping[str, Any]) -> Contents:
 def print_rows(rows: Sequence[LabRow], store: Lab, as_json: bool, action: str) -> None:
     """Print a line for each row, and their count with ``action``."""
     records, entries, builds = store.contents()
-    newer = {(row.NOUN, row.corrects): row for row in (*records, *entries)}
-    documents: dict[str, list[dict[str, Any]]] = {"record": [], "entry": []}
-    lines = []
+    newer = {(row.NOUN, row.corrects): row.id for row in (*records, *entries)}
+    documents: dict[str, list[RowEntry]] = {"record": [], "entry": []}
     for row in rows:
-        build, correction = builds[row.design_sha256], newer.get((row.NOUN, row.id))
-        corrected_by = None if correction is None else correction.id
+        build, corrected_by = builds[row.design_sha256], newer.get((row.NOUN, row.id))
+        kind = HistoryRow if isinstance(row, HistoryEntry) else RecordEntry
         more = {"design": build.name, "corrected_by": corrected_by}
-        document = {**row.as_dict(), **more, "actuator_sha256": build.actuator}
-        documents[row.NOUN].append(document)
-        lines += [_line(row, build.name, corrected_by), *_warnings(row)]
+        documents[row.NOUN].append(kind.read(row, actuator_sha256=build.actuator, **more))
+        if not as_json:
+            click.echo(_line(row, build.name, corrected_by))
+            _print_expired(row)
     if as_json:
-        listed = {"records": documents["record"], "entries": documents["entry"]}
-        print_json({"schema": RECORDS_SCHEMA, **listed})
+        lists = {"records": documents["record"], "entries": documents["entry"]}
+        print_json(RecordsDocument.of(None, **lists))
         return
-    for line in lines:
-        click.echo(line)
-    counts = [
-        f"{len(each)} {noun if len(each) == 1 else plural}"
-        for (noun, each), plural in zip(documents.items(), ("records", "entries"), strict=True)
-        if each
-    ]
-    print_verdict(f"{' and '.join(counts)} {action} {store.path}")
+    counts = {"record": "records", "entry": "entries"}
+    each = [several(len(documents[noun]), noun, counts[noun]) for noun in counts if documents[noun]]
+    print_verdict(f"{' and '.join(each)} {action} {store.path}")
 
 
 def _line(row: LabRow, design: str, corrected_by: int | None) -> str:
@@ -298,14 +299,14 @@ def _line(row: LabRow, design: str, corrected_by: int | None) -> str:
     return f"{head}, serial {row.serial}: {', '.join(parts)}"
 
 
-def _warnings(row: LabRow) -> list[str]:
-    if not isinstance(row, HistoryEntry) or not row.is_expired or row.withdrawn:
-        return []
-    day = row.date or row.recorded[:10]
-    return [
-        f"warning: entry {row.number}: {row.item} lot {row.lot} expired on {row.expires}, before "
-        f"{day}"
-    ]
+def _print_expired(row: LabRow) -> None:
+    """Print a warning if the lot of an entry had expired."""
+    if isinstance(row, HistoryEntry) and row.is_expired and not row.withdrawn:
+        day = row.date or row.recorded[:10]
+        click.echo(
+            f"warning: entry {row.number}: {row.item} lot {row.lot} expired on {row.expires}, "
+            f"before {day}"
+        )
 
 
 TITLES = {
@@ -330,7 +331,7 @@ def print_report(report: Report, as_json: bool) -> None:
         rows = [{k: v for k, v in row.items() if k not in NOT_PRINTED} for row in document[name]]
         if rows:
             names = [key.removeprefix("passed_") for key in rows[0]]
-            print_table(title, names, [[*map(_shown, row.values())] for row in rows])
+            print_table(title, names, [[*map(cell_text, row.values())] for row in rows])
             click.echo()
     off: dict[str, list[str]] = {}
     for compared in report.comparisons:
@@ -338,10 +339,5 @@ def print_report(report: Report, as_json: bool) -> None:
             off.setdefault(compared.design, []).append(compared.quantity)
     for design, quantities in off.items():
         click.echo(f"{design}: sbafab calibrate fits the models to its {', '.join(quantities)}")
-    actuators = "1 actuator" if report.items == 1 else f"{report.items} actuators"
-    records = "1 record" if report.records == 1 else f"{report.records} records"
+    actuators, records = several(report.items, "actuator"), several(report.records, "record")
     print_verdict(f"Report on {actuators}, {records}")
-
-
-def _shown(value: str | float | None) -> str:
-    return "" if value is None else value if isinstance(value, str) else f"{value:.4g}"

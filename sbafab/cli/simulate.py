@@ -16,10 +16,10 @@ from sbafab.cli.options import (
     LENGTH,
     PRESSURE,
     VOLUME,
+    FiniteRange,
     OfChamber,
     Request,
     by_chamber,
-    finite,
     run_options,
 )
 from sbafab.cli.printing import Group, print_failed, print_findings, print_json, print_verdict
@@ -33,7 +33,7 @@ MOST_MINUTES = 10_000
 
 
 @click.command()
-@run_options
+@run_options()
 @click.option("--with", "simulator", type=click.Choice(NAMES), required=True, help="Simulator.")
 @click.option(
     "--pressure",
@@ -53,10 +53,8 @@ MOST_MINUTES = 10_000
 )
 @click.option(
     "--minutes",
-    type=click.FloatRange(0, MOST_MINUTES, min_open=True),
-    callback=finite,
+    type=FiniteRange(0, MOST_MINUTES, min_open=True),
     default=120,
-    show_default=True,
     help="Time limit, minutes; results up to then are kept.",
 )
 @click.option(
@@ -103,10 +101,10 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
     results are kept and the exit code is 1. A result that cannot be, such as air below 0, is void:
     the reason is printed, nothing is written, and the exit code is 1.
     """
-    wish = SimulationRequest(**settings)
-    design = load_design(request.designs[0], request.assignments, request.waivers)
+    wanted = SimulationRequest(**settings)
+    design = load_design(request.design, request.assignments, request.waivers)
     with shown_progress(request.as_json) as progress, _printed_warnings():
-        simulation = run(design, simulator, wish, request.out, progress, export)
+        simulation = run(design, simulator, wanted, request.out, progress, export)
     if simulation.folder is None:
         if request.as_json:
             print_json(checks(simulation.findings, "design", design.name))

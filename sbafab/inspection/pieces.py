@@ -48,6 +48,8 @@ REACH = 40.0
 """Search range for edges around a place, mm."""
 STRAY = 0.5
 """Displacement that is reported, mm."""
+NEAR = 1.0
+"""Largest distance between an edge and a covered piece that is fitted to it, mm."""
 HOLE_PLACE = 0.6
 """Largest distance between a hole and its place, mm."""
 
@@ -82,14 +84,17 @@ class Blob(NamedTuple):
 
 
 class Match(NamedTuple):
-    """A shape fitted to a blob: degrees counter-clockwise and mm from its own place, after
-    mirroring if it is mirrored; ``misfit`` mm is the 95th percentile of distances.
+    """A shape fitted to edges: degrees counter-clockwise and mm from the place, after mirroring if
+    it is mirrored.
+
+    ``share`` of its edges lies on measured ones; ``misfit`` mm is the 95th percentile of distances.
     """
 
     name: str
     is_mirrored: bool
     turn: float
     shift: float
+    share: float
     misfit: float
 
 
@@ -252,7 +257,8 @@ def _crowded(
         message = "is still in the sheet" if is_skeleton else "is missing"
         return _finding(place, "missing", message)
     shapes = (place, *_others(sheet, place))
-    matches = [m for shape in shapes for m in _partial_matches(shape, place, near)]
+    measured = np.vstack([_dense(points) for points in near])
+    matches = [m for shape in shapes for m in _matches(shape, place, measured)]
     best = max(matches, key=lambda m: (round(m.share, 2), m.name == place.name), default=None)
     if best is None or best.share < COVERED_SHARE:
         return _finding(place, "unknown", "cannot be told from the pieces that it touches")
@@ -275,46 +281,6 @@ def _reaches_out(picture: ScanPicture, fit: EdgeFit, piece: Region) -> bool:
     pixels = fit.warp(np.array(corners))
     rows, columns = picture.pixels.shape
     return bool((pixels < 1).any() or (pixels > (columns - 2, rows - 2)).any())
-
-
-class PartialMatch(NamedTuple):
-    """A shape fitted to edges that others partly cover; ``share`` of its edges is visible."""
-
-    name: str
-    is_mirrored: bool
-    turn: float
-    shift: float
-    share: float
-
-
-def _partial_matches(
-    shape: SheetShape, place: SheetShape, near: Sequence[PointArray]
-) -> Iterator[PartialMatch]:
-    """Yield the shape, unmirrored and mirrored, fitted to the edges around a place."""
-    from scipy.spatial import cKDTree
-
-    measured = np.vstack([_dense(points) for points in near])
-    tree = cKDTree(measured)
-    contours = [c for c in shape.region.contours if not c.is_hole or -c.area > SMALLEST]
-    drawn = np.vstack([polyline(contour, 0.3) for contour in contours])
-    drawn -= _middle(shape.region)
-    start = _middle(place.region)
-    for is_mirrored in (False, True):
-        arms = drawn * (-1, 1) if is_mirrored else drawn
-        guesses = sorted(
-            (-float((tree.query(arms @ _spun(a).T + start)[0] < 0.5).mean()), abs(a), a)
-            for a in np.deg2rad(np.arange(-180, 180, ANGLE_STEP))
-        )
-        best: PartialMatch | None = None
-        for _, _, angle in guesses[:3]:
-            matrix, shift = _aligned(tree, measured, arms, (_spun(angle), start), 1.0)
-            share = float((tree.query(arms @ matrix.T + shift)[0] < SAME_SHAPE).mean())
-            turn = math.degrees(math.atan2(matrix[1, 0], matrix[0, 0]))
-            if best is None or share > best.share + 0.01:
-                off = math.dist(shift, start)
-                best = PartialMatch(shape.name, is_mirrored, turn, off, share)
-        if best is not None:
-            yield best
 
 
 def _dense(points: PointArray) -> PointArray:
@@ -363,17 +329,17 @@ def _unknown(place: SheetShape, blob: Blob, is_skeleton: bool) -> str:
 
 def best_match(sheet: DrawnSheet, place: SheetShape, blob: Blob, is_skeleton: bool) -> Match | None:
     """Return the shape of a blob, mirrored or not, or None; the expected one if in doubt."""
+    measured = np.vstack([_sparse(points) for points in (blob.outline, *blob.holes)])
     matches = [
         match
         for shape in (place, *_others(sheet, place))
-        for match in _matches(shape, blob, is_skeleton)
+        if _has_size(shape, blob, is_skeleton)
+        for match in _matches(shape, place, measured, blob, is_skeleton)
         if match.misfit < SAME_SHAPE
     ]
-    if not matches:
-        return None
-    least = min(match.misfit for match in matches)
+    least = min((match.misfit for match in matches), default=0.0)
     as_good = [match for match in matches if match.misfit <= least + AS_GOOD]
-    return min(as_good, key=lambda m: (m.name != place.name, m.is_mirrored, m.misfit))
+    return min(as_good, key=lambda m: (m.name != place.name, m.is_mirrored, m.misfit), default=None)
 
 
 def _others(sheet: DrawnSheet, place: SheetShape) -> Iterator[SheetShape]:
@@ -381,54 +347,78 @@ def _others(sheet: DrawnSheet, place: SheetShape) -> Iterator[SheetShape]:
     yield from (shape for shape in sheet.shapes if shape.name not in expected)
 
 
-def _matches(shape: SheetShape, blob: Blob, is_skeleton: bool) -> Iterator[Match]:
-    """Yield the shape fitted to a blob, unmirrored and mirrored, if sizes and holes agree."""
-    holes = [] if is_skeleton else [h for h in shape.region.holes if -h.area > SMALLEST]
+def _has_size(shape: SheetShape, blob: Blob, is_skeleton: bool) -> bool:
+    """Return True if area and number of holes agree."""
+    holes = 0 if is_skeleton else sum(-hole.area > SMALLEST for hole in shape.region.holes)
     outer = sum(contour.area for contour in shape.region.outers)
     room = SAME_AREA * outer + 0.15 * sum(c.length for c in shape.region.outers)
-    if len(holes) != len(blob.holes) or abs(blob.area - outer) > room:
-        return
-    contours = [*shape.region.outers, *holes]
-    drawn = np.vstack([polyline(contour, 0.15) for contour in contours])
-    measured = np.vstack([_sparse(points) for points in (blob.outline, *blob.holes)])
-    for is_mirrored in (False, True):
-        laid = drawn * (-1, 1) if is_mirrored else drawn
-        turn, shift, misfit = laid_on(laid, measured, blob.outline)
-        yield Match(shape.name, is_mirrored, turn, shift, misfit)
+    return holes == len(blob.holes) and abs(blob.area - outer) <= room
 
 
-def _sparse(points: PointArray) -> PointArray:
-    return points[:: max(1, len(points) // 150)]
-
-
-def laid_on(
-    drawn: PointArray, measured: PointArray, outline: PointArray
-) -> tuple[float, float, float]:
-    """Return degrees and mm of the rigid motion from drawn to measured points, and the misfit.
-
-    The shift is that of the drawn points' middle.
+def _matches(
+    shape: SheetShape,
+    place: SheetShape,
+    measured: PointArray,
+    blob: Blob | None = None,
+    is_skeleton: bool = False,
+) -> Iterator[Match]:
+    """Yield the shape, unmirrored and mirrored, fitted to the points of a blob, or to the edges
+    around its place that others partly cover.
     """
     from scipy.spatial import cKDTree
 
     tree = cKDTree(measured)
-    _, middle = moments(outline)
-    start = drawn.mean(axis=0)
-    # Centroids of outlines agree at any turn.
-    _, centre = moments(drawn[: max(3, len(drawn))])
-    arms = drawn - centre
+    holes = [] if is_skeleton else [h for h in shape.region.holes if -h.area > SMALLEST]
+    outlines = [polyline(contour, 0.2) for contour in (*shape.region.outers, *holes)]
+    drawn = np.vstack(outlines) - _middle(shape.region)
+    centroid = moments(outlines[0])[1] - _middle(shape.region)
+    start, reach = _middle(place.region), NEAR if blob is None else math.inf
+    for is_mirrored in (False, True):
+        flip = np.array([-1.0 if is_mirrored else 1.0, 1.0])
+        arms = drawn * flip
+        best: Match | None = None
+        for angle, middle in _guesses(tree, _sparse(arms), reach, start, blob, centroid * flip):
+            matrix, shift = _aligned(tree, measured, arms, (_spun(angle), middle), reach)
+            laid = arms @ matrix.T + shift
+            distances = [tree.query(laid)[0]]
+            distances += [] if blob is None else [cKDTree(laid).query(measured)[0]]
+            misfit = max(float(np.percentile(each, 95)) for each in distances)
+            share = float((distances[0] < SAME_SHAPE).mean())
+            turn = math.degrees(math.atan2(matrix[1, 0], matrix[0, 0]))
+            # Of equally good turns, the smallest.
+            if best is None or share > best.share + 0.01:
+                off = math.dist(shift, start)
+                best = Match(shape.name, is_mirrored, turn, off, share, misfit)
+        if best is not None:
+            yield best
 
-    sparse = _sparse(arms)
-    angles = np.deg2rad(np.arange(-180, 180, ANGLE_STEP))
-    angles = angles[np.argsort(np.abs(angles), kind="stable")]
-    costs = [float(tree.query(sparse @ _spun(a).T + middle)[0].mean()) for a in angles]
-    # Of equally good turns, the smallest.
-    best = next(a for a, c in zip(angles, costs, strict=True) if c <= min(costs) + AS_GOOD)
-    matrix, shift = _aligned(tree, measured, arms, (_spun(float(best)), middle), math.inf)
-    laid = arms @ matrix.T + shift
-    there, back = tree.query(laid)[0], cKDTree(laid).query(measured)[0]
-    misfit = float(max(np.percentile(there, 95), np.percentile(back, 95)))
-    moved = laid.mean(axis=0) - start
-    return math.degrees(math.atan2(matrix[1, 0], matrix[0, 0])), math.hypot(*moved), misfit
+
+def _guesses(
+    tree: Any,
+    arms: PointArray,
+    reach: float,
+    start: PointArray,
+    blob: Blob | None,
+    centroid: PointArray,
+) -> list[tuple[float, PointArray]]:
+    """Return the likeliest turns, rad, and where each puts the middle of a shape; of equally good
+    ones the smallest first.
+
+    Centroids of outlines agree at any turn, unless others cover a part.
+    """
+    guesses = []
+    for angle in np.deg2rad(np.arange(-180, 180, ANGLE_STEP)):
+        turned = _spun(angle)
+        middle = start if blob is None else blob.centroid - turned @ centroid
+        distances = tree.query(arms @ turned.T + middle)[0]
+        guesses.append((float(np.minimum(distances, reach).mean()), float(angle), middle))
+    least = min(cost for cost, *_ in guesses) + AS_GOOD
+    guesses.sort(key=lambda guess: (max(guess[0], least), abs(guess[1])))
+    return [(angle, middle) for _, angle, middle in guesses[:3]]
+
+
+def _sparse(points: PointArray) -> PointArray:
+    return points[:: max(1, len(points) // 150)]
 
 
 def _spun(radians: float) -> NDArray[np.float64]:

@@ -36,13 +36,18 @@ from sbafab.nesting.nest import PLACES, as_dict
 from sbafab.nesting.records import Nest
 from sbafab.output.checked import Build, Checks, RunPart, checks, hole_notes
 from sbafab.output.manifest import as_json
-from sbafab.output.schema_ids import SIMULATE_SCHEMA
 from sbafab.pressing.cycles import batch_entry
 from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json
 from sbafab.process import Progress
 from sbafab.rules.finding import Finding
 from sbafab.simulators.simulator import NAMES as SIMULATORS
-from sbafab.simulators.simulator import Name, SimulationRequest, simulator, under_vacuum
+from sbafab.simulators.simulator import (
+    Name,
+    SimulateDocument,
+    SimulationRequest,
+    simulator,
+    under_vacuum,
+)
 from sbafab.version import GENERATOR
 
 if TYPE_CHECKING:
@@ -471,7 +476,7 @@ ARTEFACTS: tuple[Artefact, ...] = (
             name,
             f"from `sbafab simulate --with {name}`: what it reads; `result.json` what it found",
             partial(_write_simulation, name),
-            SIMULATE_SCHEMA,
+            SimulateDocument.SCHEMA,
         )
         for name in SIMULATORS
     ),

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Solids = list[manifold3d.Manifold]
 
+SCHEMA = "sbafab/assembly-predict@1"
+"""Id of a prediction of an assembly as JSON."""
 GRAVITY = 9.80665
 MARBLE_G = 1.2
 """Mass of the marble that the paper's brace lifts, g (Sec. 5)."""

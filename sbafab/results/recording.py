@@ -18,12 +18,20 @@ from sbafab.design.files import Change
 from sbafab.design.identity import kit_of
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
-from sbafab.output.schema_ids import HISTORY_SCHEMA
 from sbafab.output.swap import replace_text
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.record_sheet import TESTS_TABLE, RecordTable, record_tables
 from sbafab.results.builds import RecordedDesign, promised, recorded_sha256
-from sbafab.results.records import HistoryEntry, LabRow, Record, Row, columns, row_of
+from sbafab.results.records import (
+    DeviceEntry,
+    HistoryDocument,
+    HistoryEntry,
+    LabRow,
+    Record,
+    Row,
+    columns,
+    row_of,
+)
 from sbafab.results.store import Contents, Lab
 from sbafab.spreadsheet import csv_text
 from sbafab.version import GENERATOR
@@ -240,11 +248,11 @@ def json_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, Recorded
     listed = []
     for rows in devices:
         build = builds[rows[0].design_sha256]
-        head = {"serial": rows[0].serial, "design": build.name, "actuator_sha256": build.actuator}
-        records = [row.as_dict() for row in rows if isinstance(row, Record)]
-        entries = [row.as_dict() for row in rows if isinstance(row, HistoryEntry)]
-        listed.append({**head, "records": records, "entries": entries})
-    document = {"schema": HISTORY_SCHEMA, "devices": listed}
+        head = {"design": build.name, "actuator_sha256": build.actuator}
+        records = [row for row in rows if isinstance(row, Record)]
+        entries = [row for row in rows if isinstance(row, HistoryEntry)]
+        listed.append(DeviceEntry.read(rows[0], **head, records=records, entries=entries))
+    document = HistoryDocument.of(None, devices=listed)
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 

@@ -20,6 +20,7 @@ from pydantic import (
 )
 
 from sbafab.design.files import checked
+from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
 
 PASS = "pass"
@@ -76,6 +77,7 @@ def _several(value: object) -> object:
 
 
 LINE = AfterValidator(_one_line)
+SEVERAL = BeforeValidator(_several)
 Text = Annotated[str, Field(max_length=400), LINE]
 Day = Annotated[str, AfterValidator(_day)]
 LabNumber = Annotated[FiniteFloat, BeforeValidator(_number), Field(gt=0)]
@@ -97,8 +99,6 @@ class LabRow(BaseModel):
     """The row's name in messages, and its table in the file."""
     SIGN: ClassVar[str] = ""
     """Prefix of the number."""
-    GROUPS: ClassVar[Mapping[str, Iterable[str]]]
-    """Measured numbers, grouped in JSON."""
 
     id: int = 0
     recorded: str = ""
@@ -116,7 +116,7 @@ class LabRow(BaseModel):
     @property
     def stated(self) -> dict[str, Any]:
         """The values by column, without empty ones and those added by the file."""
-        return {name: value for name in columns(type(self)) if (value := getattr(self, name))}
+        return self.given(columns(type(self)))
 
     @property
     def cells(self) -> dict[str, Any]:
@@ -126,15 +126,9 @@ class LabRow(BaseModel):
             for name, value in self.stated.items()
         }
 
-    def group(self, name: str) -> dict[str, Any]:
-        """Return the non-empty numbers of a group."""
-        return {column: v for column in self.GROUPS[name] if (v := getattr(self, column))}
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the row for JSON; keys name the units."""
-        grouped = {column for names in self.GROUPS.values() for column in names}
-        groups = {name: self.group(name) for name in self.GROUPS}
-        return {**self.model_dump(exclude=grouped), **groups}
+    def given(self, names: Iterable[str]) -> dict[str, Any]:
+        """Return the non-empty values of these columns."""
+        return {name: value for name in names if (value := getattr(self, name))}
 
     @abstractmethod
     def conflict(self, stored: Self) -> str:
@@ -157,7 +151,6 @@ class Record(LabRow):
     """
 
     NOUN: ClassVar[str] = "record"
-    GROUPS: ClassVar[Mapping[str, Iterable[str]]] = {"numbers": NUMBERS, "errors": ERRORS}
 
     operator: Annotated[str, Field(max_length=80), LINE] = ""
     kit: Annotated[str, Field(max_length=120), LINE] = ""
@@ -168,26 +161,20 @@ class Record(LabRow):
     height_mm: Annotated[LabNumber, Field(le=10_000)] | None = None
     mass_g: Annotated[LabNumber, Field(le=100_000)] | None = None
     proof_kpa: Annotated[LabNumber, Field(le=10_000)] | None = None
-    offset_mm: Annotated[
-        tuple[Annotated[ErrorSize, Field(le=10)], ...], BeforeValidator(_several)
-    ] = ()
-    turn_deg: Annotated[
-        tuple[Annotated[ErrorSize, Field(le=45)], ...], BeforeValidator(_several)
-    ] = ()
-    cut_mm: Annotated[
-        tuple[Annotated[ErrorSize, Field(le=10)], ...], BeforeValidator(_several)
-    ] = ()
+    offset_mm: Annotated[tuple[Annotated[ErrorSize, Field(le=10)], ...], SEVERAL] = ()
+    turn_deg: Annotated[tuple[Annotated[ErrorSize, Field(le=45)], ...], SEVERAL] = ()
+    cut_mm: Annotated[tuple[Annotated[ErrorSize, Field(le=10)], ...], SEVERAL] = ()
     note: Text = ""
 
     @property
     def numbers(self) -> dict[str, float]:
         """Values measured once, by column, each in the unit of its name."""
-        return self.group("numbers")
+        return self.given(NUMBERS)
 
     @property
     def errors(self) -> dict[str, tuple[float, ...]]:
         """The measured errors, by column, each in the unit of its name."""
-        return self.group("errors")
+        return self.given(ERRORS)
 
     def _problems(self) -> Iterator[str]:
         if not self.serial:
@@ -218,7 +205,6 @@ class HistoryEntry(LabRow):
 
     NOUN: ClassVar[str] = "entry"
     SIGN: ClassVar[str] = "e"
-    GROUPS: ClassVar[Mapping[str, Iterable[str]]] = {"readings": READINGS}
 
     date: Day = ""
     step: Annotated[str, Field(max_length=40), LINE] = ""
@@ -238,7 +224,7 @@ class HistoryEntry(LabRow):
     @property
     def readings(self) -> dict[str, float]:
         """The numbers that were read, by column, each in the unit of its name."""
-        return self.group("readings")
+        return self.given(READINGS)
 
     @property
     def is_expired(self) -> bool:
@@ -246,9 +232,6 @@ class HistoryEntry(LabRow):
         given.
         """
         return bool(self.expires) and self.expires < (self.date or self.recorded[:10])
-
-    def as_dict(self) -> dict[str, Any]:
-        return {**super().as_dict(), "expired": self.is_expired}
 
     def _problems(self) -> Iterator[str]:
         if not self.serial:
@@ -281,6 +264,77 @@ class HistoryEntry(LabRow):
 
 
 Row = TypeVar("Row", bound=LabRow)
+
+
+# Rows for programs.
+
+
+class RowEntry(Document):
+    """A row of a lab's file; units are in the keys."""
+
+    id: int
+    recorded: str
+    """UTC"""
+    design_sha256: str
+    corrects: int | None
+    withdrawn: bool
+    attempt: int
+    serial: str
+    note: str
+    design: str = ""
+    actuator_sha256: str = ""
+    """equal for all designs that build this"""
+    corrected_by: int | None = None
+
+
+class RecordEntry(RowEntry):
+    """A result of an actuator."""
+
+    operator: str
+    kit: str
+    leak: str
+    numbers: dict[str, float]
+    errors: dict[str, tuple[float, ...]]
+    """sizes"""
+
+
+class HistoryRow(RowEntry):
+    """An entry of a device's history."""
+
+    date: str
+    step: str
+    item: str
+    lot: str
+    expires: str
+    decision: str
+    reason: str
+    photograph: str
+    initials: str
+    readings: dict[str, float]
+    expired: bool = attribute("is_expired")
+
+
+class RecordsDocument(Document, schema="sbafab/records@1"):
+    """What ``record --json`` prints."""
+
+    records: list[RecordEntry]
+    entries: list[HistoryRow]
+
+
+class DeviceEntry(Document):
+    """The rows of a device."""
+
+    serial: str
+    design: str
+    actuator_sha256: str
+    records: list[RecordEntry]
+    entries: list[HistoryRow]
+
+
+class HistoryDocument(Document, schema="sbafab/history@1"):
+    """What ``record --export FILE.json`` writes."""
+
+    devices: list[DeviceEntry]
 
 
 @cache

@@ -8,6 +8,7 @@ from __future__ import annotations
 import string
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any, NamedTuple
@@ -21,7 +22,8 @@ FAIL, REMEDY = "-fail", "-remedy"
 """Endings of the sentences for a failure, and for what a warning asks to do."""
 
 
-class Explanation(NamedTuple):
+@dataclass(frozen=True)
+class Explanation:
     """The condition that ``holds`` if a rule passes, ``why`` it matters, how to ``mend`` it.
 
     ``keys`` of a design file set the limit or the measured value.

@@ -30,7 +30,6 @@ from sbafab.output.checked import EVERYTHING, PICTURES, Build, RunPart, check
 from sbafab.output.folder import close_folder, write_folder
 from sbafab.output.job import Order, check_job
 from sbafab.output.manifest import as_json, identity
-from sbafab.output.schema_ids import SIMULATE_SCHEMA
 from sbafab.output.swap import JOB_SCHEMA, SCHEMA, listed_files, refuse_busy, replaced_folder
 from sbafab.pressing.schedule import Schedule
 from sbafab.process import Progress, ignore_progress
@@ -38,6 +37,7 @@ from sbafab.rules.finding import Finding, Findings
 from sbafab.simulators.simulator import (
     Name,
     Result,
+    SimulateDocument,
     SimulationRequest,
     refuse_unused,
     simulator,
@@ -265,9 +265,8 @@ class Simulated:
 
 
 def result_json(result: Result | None) -> dict[str, Any]:
-    """Return the contents of ``result.json``, the head of it where nothing has run."""
-    head = {"schema": SIMULATE_SCHEMA, "units": UNITS}
-    return {**head, **({} if result is None else result.as_dict())}
+    """Return the contents of ``result.json``, only its head if nothing has run."""
+    return SimulateDocument.of(None, units=UNITS, **({} if result is None else result.as_dict()))
 
 
 def simulate(

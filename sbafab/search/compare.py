@@ -8,16 +8,18 @@ import base64
 import csv
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
+
+from pydantic import AliasPath, Field
 
 from sbafab.actuators import load_design, records
 from sbafab.design.files import Change, override, shown
 from sbafab.design.identity import design_sha256
-from sbafab.design.records import Design, keys_of, validated
-from sbafab.documents import Document, attribute
+from sbafab.design.records import Design, validated
+from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError, OutputError
 from sbafab.models.balloons import has_balloons
 from sbafab.models.calibrated import Ends
@@ -28,14 +30,17 @@ from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import MOST_PRESSURE, stack
+from sbafab.output import advice
+from sbafab.output.advice import YieldDesign, value_of
 from sbafab.output.checked import Build, check
 from sbafab.output.swap import replace_text
 from sbafab.process import Progress, ignore_progress
 from sbafab.reports.html_templates import environment
 from sbafab.reports.inflated_picture import WHY, PictureRequest, pictures_at_one_scale
 from sbafab.reports.solid_png import solid_png
-from sbafab.search.measure import RuleMargin, margins
 from sbafab.search.sweep_report import CSV, JOURNAL
+from sbafab.search.trials import RuleMargin, margins
+from sbafab.search.vary import key_values
 from sbafab.version import GENERATOR
 
 FOLDER, PAGE = "compare", "compare.html"
@@ -59,6 +64,8 @@ DIGITS = 4
 SIZE = 640, 512
 """Width of a picture, pixels."""
 _ROW = re.compile(r"(.+\.csv):(\d+)")
+Key = TypeVar("Key")
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -132,10 +139,8 @@ class FigurePair:
     @property
     def differs(self) -> bool:
         """True if the values differ in the first DIGITS digits, or one is missing."""
-        first, second = self.figures
-        if first is None or second is None:
-            return True
-        return f"{first.value:.{DIGITS}g}" != f"{second.value:.{DIGITS}g}"
+        texts = {figure and f"{figure.value:.{DIGITS}g}" for figure in self.figures}
+        return len(texts) > 1
 
 
 @dataclass(frozen=True)
@@ -154,15 +159,14 @@ class DesignComparison:
         first, second = self.designs
         names = first.design.name, second.design.name
         files = Path(first.source).name, Path(second.source).name
-        for pair in (names, files):
-            if pair[0] != pair[1]:
-                return pair
-        return first.source, second.source
+        sources = first.source, second.source
+        return next((pair for pair in (names, files) if pair[0] != pair[1]), sources)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of ``compare --json``."""
-        rules, figures = map(_rule_entry, self.rules), map(figure_entry, self.figures)
-        return CompareDocument.of(self, rules=[*rules], figures=[*figures])
+        return CompareDocument.of(
+            self, rules=[*map(_rule_entry, self.rules)], figures=[*map(figure_entry, self.figures)]
+        )
 
 
 NumberOrNone = float | None
@@ -200,7 +204,7 @@ class FigureEntry(Document):
     differs: bool
     values: tuple[NumberOrNone, NumberOrNone]
     intervals: tuple[Ends | None, Ends | None]
-    """90 % intervals, where a calibration says so"""
+    """90 % intervals, if a calibration says so"""
     models: tuple[TextOrNone, TextOrNone]
 
 
@@ -238,10 +242,9 @@ def load_compared(source: str | Path, changes: Iterable[Change] = ()) -> Design:
     row = _ROW.fullmatch(str(source))
     if row is not None and not Path(source).exists():
         return _swept(Path(row[1]), int(row[2])).with_(*changes)
-    path = Path(source)
-    file = path / "design.toml"
+    file = Path(source) / "design.toml"
     try:
-        is_output = path.is_dir() and file.is_file()
+        is_output = file.is_file()
     except (OSError, ValueError):
         is_output = False
     return load_design(file if is_output else source, changes)
@@ -249,20 +252,23 @@ def load_compared(source: str | Path, changes: Iterable[Change] = ()) -> Design:
 
 def _swept(table: Path, number: int) -> Design:
     """Return the design of a row of a sweep by row number, from the journal beside the table."""
+    journal = table.with_name(JOURNAL)
     try:
         with table.open(encoding="utf-8", newline="") as opened:
             rows = [row for row in csv.DictReader(opened) if row.get("number") == str(number)]
-        if not rows or not rows[0].get("sha256"):
+        sha256 = rows[0].get("sha256") if rows else None
+        if not sha256:
             raise DesignError(f"{table} has no design of number {number}")
-        sha256 = rows[0]["sha256"]
-        keys = _journal_keys(table.with_name(JOURNAL), sha256)
+        with journal.open(encoding="utf-8") as opened:
+            # The last line may be incomplete.
+            lines = [line for line in opened if f'"{sha256}"' in line and line.endswith("}}\n")]
     except (OSError, UnicodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
         message = f"{shown(table)} cannot be read: {reason}; name a sweep's {CSV}"
         raise DesignError(message) from None
-    if keys is None:
-        journal = table.with_name(JOURNAL)
+    if not lines:
         raise DesignError(f"{journal} has no design of number {number}; sweep again")
+    keys = json.loads(lines[0])["row"]["keys"]
     design = validated(override({}, [keys]), records(), table.parent)
     if design_sha256(design) != sha256:
         raise DesignError(
@@ -270,21 +276,6 @@ def _swept(table: Path, number: int) -> Design:
             "measured it; compare its design file"
         )
     return design
-
-
-def _journal_keys(journal: Path, sha256: str) -> dict[str, Any] | None:
-    """Return the keys of a design in a sweep's journal; None if it is not there."""
-    with journal.open(encoding="utf-8") as opened:
-        for line in opened:
-            if sha256 not in line:
-                continue
-            try:
-                row = json.loads(line)["row"]
-                if row["sha256"] == sha256:
-                    return dict(row["keys"])
-            except (ValueError, KeyError, TypeError):
-                continue
-    return None
 
 
 def compare(
@@ -314,29 +305,27 @@ def compare(
             if not figure.other or (figure.interval and _is_main(figure.quantity, figure.at))
         )
         each.append(ComparedDesign(source, checked, margins(checked.findings), figures))
-    designs = each[0], each[1]
+    a, b = each
+    keys = _paired(key_values(a.design), key_values(b.design))
+    pairs = _paired(*({(f.quantity, f.at): f for f in one.figures} for one in each))
     return DesignComparison(
-        designs, tuple(_keys(designs)), tuple(_rules(designs)), tuple(_figures(designs)),
+        (a, b),
+        tuple(KeyDifference(k, two) for k, two in keys if k != "name" and two[0] != two[1]),
+        tuple(
+            RuleDifference(rule, two)
+            for rule, two in _paired(a.rules, b.rules)
+            if _verdict(two[0]) != _verdict(two[1])
+        ),
+        tuple(FigurePair(quantity, at, two) for (quantity, at), two in pairs),
         tuple(pressures_kpa or usual_pressures(first.form)[:1]),
-    )  # fmt: skip
+    )
 
 
-Two = tuple[ComparedDesign, ComparedDesign]
-
-
-def _keys(designs: Two) -> Iterable[KeyDifference]:
-    a, b = ({key: value for key, value, _ in keys_of(each.design)} for each in designs)
-    for key in dict.fromkeys([*a, *b]):
-        if key != "name" and a.get(key) != b.get(key):
-            yield KeyDifference(key, (a.get(key), b.get(key)))
-
-
-def _rules(designs: Two) -> Iterable[RuleDifference]:
-    a, b = (each.rules for each in designs)
-    for rule in dict.fromkeys([*a, *b]):
-        first, second = a.get(rule), b.get(rule)
-        if _verdict(first) != _verdict(second):
-            yield RuleDifference(rule, (first, second))
+def _paired(
+    a: Mapping[Key, Value], b: Mapping[Key, Value]
+) -> list[tuple[Key, tuple[Value | None, Value | None]]]:
+    """Return both values of each key, None if one has no such key."""
+    return [(key, (a.get(key), b.get(key))) for key in dict.fromkeys([*a, *b])]
 
 
 def _verdict(margin: RuleMargin | None) -> tuple[str, float | None] | None:
@@ -344,12 +333,6 @@ def _verdict(margin: RuleMargin | None) -> tuple[str, float | None] | None:
         return None
     # A yield without a limit still differs by its value.
     return margin.verdict, margin.measured if margin.margin is None else margin.margin
-
-
-def _figures(designs: Two) -> Iterable[FigurePair]:
-    a, b = ({(row.quantity, row.at): row for row in each.figures} for each in designs)
-    for quantity, at in dict.fromkeys([*a, *b]):
-        yield FigurePair(quantity, at, (a.get((quantity, at)), b.get((quantity, at))))
 
 
 def _is_main(quantity: Quantity, at: Conditions) -> bool:
@@ -389,8 +372,7 @@ def reached_text(figure: Figure | None) -> str:
 # The page.
 
 
-@dataclass(frozen=True)
-class PicturePair:
+class PicturePair(NamedTuple):
     """Pictures of both designs as data URIs, or a sentence in place of one."""
 
     title: str
@@ -470,3 +452,83 @@ def _inflated(comparison: DesignComparison) -> PicturePair:
 
 def _uri(png: bytes) -> str:
     return f"data:image/png;base64,{base64.b64encode(png).decode()}"
+
+
+# A design changed as little as a target yield needs, compared with the original.
+
+
+DESIGNS = "as given", "changed"
+
+
+@dataclass(frozen=True)
+class ReachedYield:
+    """The ``design`` for a yield, None if none reaches it; ``found`` describes the changes.
+
+    ``comparison`` holds both designs with their figures; None if nothing was changed.
+    """
+
+    found: YieldDesign
+    comparison: DesignComparison | None
+
+    @property
+    def design(self) -> Design | None:
+        """The changed design; the original if it suffices, None if no change does."""
+        return self.found.design
+
+    @property
+    def sentence(self) -> str:
+        """The changes and the share they reach, or why there are none."""
+        return self.found.sentence
+
+    @property
+    def changes(self) -> tuple[KeyDifference, ...]:
+        """Each changed key, with its old and new value."""
+        return tuple(
+            KeyDifference(key, (value_of(self.found.given, key), value))
+            for key, value in self.found.changes.items()
+        )
+
+    @property
+    def figures(self) -> list[FigureEntry]:
+        """The main figures of both designs."""
+        pairs = self.comparison.figures if self.comparison is not None else ()
+        return [figure_entry(pair) for pair in pairs if pair.is_main]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry ``yield`` of ``generate --json``."""
+        return YieldEntry.of(self)
+
+
+class ChangeEntry(Document):
+    """A key, and its values as given and as changed."""
+
+    key: str
+    given: Any = Field(validation_alias=AliasPath("values", 0), serialization_alias="from")
+    changed: Any = Field(validation_alias=AliasPath("values", 1), serialization_alias="to")
+
+
+class YieldEntry(Document):
+    """Of --target-yield; figures as given and as changed."""
+
+    target_yield: PlainNumber = attribute("found.target")
+    changes: list[ChangeEntry]
+    measured: float | None = attribute("found.share.value")
+    interval: tuple[float, float] | None = attribute("found.share.interval")
+    message: str = attribute("sentence")
+    figures: list[FigureEntry]
+
+
+def reach_yield(
+    design: Design,
+    target: float,
+    fixed: Collection[str] = (),
+    progress: Progress = ignore_progress,
+) -> ReachedYield:
+    """Return the design that reaches a yield of ``target`` by few changes, and what they cost.
+
+    Keys in ``fixed`` do not change. Raises DesignError for a share that is not between 0 and 1.
+    """
+    found = advice.reach_yield(design, target, fixed, progress)
+    if found.design is None or not found.changes:
+        return ReachedYield(found, None)
+    return ReachedYield(found, compare(design, found.design, DESIGNS, progress=progress))

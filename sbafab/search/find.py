@@ -1,8 +1,7 @@
 """Search for the design that meets all requirements and is best in one quantity.
 
-Small spaces are evaluated completely; else a coarse grid and local searches from its best points,
-or Optuna, then steps from the best candidate. Rules are checked only for a candidate that would
-become the best. The result lists the binding constraints and can be written as a design file.
+Rules are checked only for a candidate that would become the best. The result lists the binding
+constraints and can be written as a design file.
 """
 
 from __future__ import annotations
@@ -11,29 +10,31 @@ import math
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import tomli_w
 
 from sbafab.actuators import build
 from sbafab.design.files import KIT, Change, design_path, kit_names, override, read_toml, shown
 from sbafab.design.kits import kit_path
-from sbafab.design.records import Design, Free, keys_of
+from sbafab.design.records import Design, Free
+from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError, OutputError, SbafabError
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.balloons import balloons_of, has_balloons
-from sbafab.models.figures import FLAGS, Flag
+from sbafab.models.figures import FLAGS, Flag, FlagList
 from sbafab.models.intervals import uncertainty_of
-from sbafab.models.paper import Counterpart
+from sbafab.models.paper import Counterpart, CounterpartEntry
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Place
 from sbafab.search.quantities import (
     AS_DRAWN,
     AT_PRESSURE,
+    Goal,
     RequestedQuantity,
+    Requirement,
     Subject,
     group_of,
     read_quantity,
@@ -41,50 +42,22 @@ from sbafab.search.quantities import (
     shown_interval,
     shown_value,
 )
-from sbafab.search.strategies import (
-    explore,
-    neighbours,
-    refine,
-    try_every_design,
-    widen_ranges,
-    with_optuna,
-)
-from sbafab.search.sweep_report import front
-from sbafab.search.trial import (
-    Goal,
+from sbafab.search.space import (
+    FindRequest,
     GridPoint,
-    Requirement,
-    SearchProblem,
     SearchSpace,
     Trial,
-    broken_rules,
     figure_text,
-    keys_said,
     misses,
+    searched,
+    single_steps,
 )
+from sbafab.search.sweep_report import front
+from sbafab.search.vary import format_keys, key_values
 
-TRIES, LEAST_TRIES = 240, 4
+LEAST_TRIES = 4
 COUNT = "chamber.count"
 """Key of the number of chambers side by side."""
-
-
-@dataclass(frozen=True)
-class FindRequest:
-    """Requirements and goal of a search, and the design it starts from.
-
-    ``free`` are the keys it may change in place of the family's own, if any. ``optuna`` searches
-    with Optuna; ``storage`` is Optuna's database, in which a search resumes. With ``sure``, a share
-    above 0.5 and below 1, each requirement on a predicted quantity must hold with that probability.
-    """
-
-    design: Design
-    requirements: tuple[Requirement, ...]
-    goal: Goal
-    free: tuple[Free, ...] | None = None
-    tries: int = TRIES
-    optuna: bool = False
-    storage: str | None = None
-    sure: float | None = None
 
 
 @dataclass(frozen=True)
@@ -93,10 +66,12 @@ class FoundDesign:
 
     ``front``: Pareto-optimal passing designs, in the goal and every requirement, a selection of
     ``on_front`` designs. ``ends``: keys limited only by their range. ``is_cut_short``: more tries
-    might have led to a better one.
+    might have led to a better one. By quantity of the best design: ``intervals``, 90 % intervals
+    for measurements in its unit, if it has a calibration; ``flags`` and ``measured``, limits to
+    trust and the paper's values as ``predict`` gives them.
     """
 
-    problem: SearchProblem
+    request: FindRequest
     best: Trial
     binds: tuple[Binding, ...]
     ends: tuple[RangeEnd, ...]
@@ -105,6 +80,9 @@ class FoundDesign:
     tries: int
     is_cut_short: bool
     free: tuple[Free, ...]
+    intervals: dict[str, tuple[float, float]] = field(default_factory=dict)
+    flags: dict[str, tuple[Flag, ...]] = field(default_factory=dict)
+    measured: dict[str, Counterpart] = field(default_factory=dict)
 
     @property
     def holds(self) -> bool:
@@ -119,55 +97,64 @@ class FoundDesign:
     @property
     def missed(self) -> list[str]:
         """Requirements and rules that the best design breaks, one sentence each."""
-        return misses(self.problem, self.best)
+        return misses(self.request, self.best)
 
-    @property
-    def measured(self) -> dict[str, Counterpart]:
-        """Measured values of the paper, by quantity, if its model is off by over a quarter."""
-        if self.best.laminate is None:
-            return {}
-        subject = self._subject
-        return {
-            quantity.label: counterpart
-            for quantity in self.problem.quantities
-            if (counterpart := subject.counterpart(quantity)) is not None
-        }
 
-    @cached_property
-    def intervals(self) -> dict[str, tuple[float, float]]:
-        """90 % intervals for measurements of the best design, by quantity in its unit, if it has a
-        calibration.
-        """
-        if self.best.laminate is None:
-            return {}
-        intervals = {}
-        for quantity in self.problem.quantities:
-            try:
-                interval = self._subject.interval(quantity)
-            except DesignError:
-                continue
-            if interval is not None:
-                intervals[quantity.label] = interval
-        return intervals
+def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDesign:
+    """Return the best design, or the nearest miss. Raises DesignError for an impossible request."""
+    if request.tries < LEAST_TRIES:
+        raise DesignError(f"tries = {request.tries} must be at least {LEAST_TRIES}")
+    if request.storage is not None and not request.optuna:
+        raise DesignError("storage is Optuna's; search with optuna = True, or leave it out")
+    space = searched(request, free_keys(request), progress)
+    point, best = space.best()
+    if best.refused:
+        raise DesignError(_commonest_reason(space))
+    shown, count = pareto_front(space, best) if best.holds else ([], 0)
+    found = FoundDesign(
+        request,
+        best,
+        tuple(bindings(space, point, best)),
+        tuple(range_ends(space, point, best)),
+        tuple(shown),
+        count,
+        len(space.trials),
+        request.tries <= len(space.trials) < space.size,
+        space.free,
+    )
+    return found if best.laminate is None else _with_trust(found, best.laminate)
 
-    @cached_property
-    def flags(self) -> dict[str, tuple[Flag, ...]]:
-        """Limits to trust in figures of the best design, by quantity, as flagged by ``predict``."""
-        if self.best.laminate is None:
-            return {}
-        each = {q.label: self._subject.flags(q) for q in self.problem.quantities}
-        return {label: flags for label, flags in each.items() if flags}
 
-    @cached_property
-    def _subject(self) -> Subject:
-        assert self.best.laminate is not None
-        design = self.problem.design.with_(dict(self.best.values))
-        return self.problem.subject(design, self.best.laminate)
+def _with_trust(found: FoundDesign, laminate: Laminate) -> FoundDesign:
+    """Return the result with intervals, flags and measured values of its best design."""
+    request = found.request
+    subject = request.subject(request.design.with_(dict(found.best.values)), laminate)
+    intervals, flags, measured = {}, {}, {}
+    for quantity in request.quantities:
+        label = quantity.label
+        if each := subject.flags(quantity):
+            flags[label] = each
+        if (counterpart := subject.counterpart(quantity)) is not None:
+            measured[label] = counterpart
+        try:
+            interval = subject.interval(quantity)
+        except DesignError:
+            continue
+        if interval is not None:
+            intervals[label] = interval
+    return replace(found, intervals=intervals, flags=flags, measured=measured)
 
-    @property
-    def broken_rules(self) -> list[str]:
-        """The failing rules."""
-        return broken_rules(self.best)
+
+def _commonest_reason(space: SearchSpace) -> str:
+    """Return why most candidates were refused, as in the nearest one's message."""
+    refused = sorted(space.trials.values(), key=lambda trial: trial.rank)
+    counts = Counter(trial.refused_at for trial in refused)
+    nearest = max(refused, key=lambda trial: counts[trial.refused_at])
+    count = counts[nearest.refused_at]
+    return f"no design could be made: {nearest.refused} ({count} of the {len(refused)} tried)"
+
+
+# The free keys of a request, and what no search could answer.
 
 
 def free_keys(request: FindRequest) -> tuple[Free, ...]:
@@ -175,28 +162,27 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
 
     Raises DesignError, also if the design has no such quantity.
     """
-    quantities = SearchProblem(request.design, request.requirements, request.goal).quantities
-    for quantity in quantities:
-        refuse_unknown_key(quantity, request.design)
+    design = request.design
+    for quantity in request.quantities:
+        refuse_unknown_key(quantity, design)
     if request.sure is not None:
         _refuse_unsure(request, request.sure)
-    keys = {key: value for key, value, _ in keys_of(request.design)}
-    names = {quantity.name for quantity in quantities}
-    every = request.design.free if request.free is None else request.free
+    names = {quantity.name for quantity in request.quantities}
+    every = design.free if request.free is None else request.free
     free = [key for key in every if not key.asked or key.asked in names]
+    keys = [key.key for key in free]
     for requirement in request.requirements:
-        _refuse_fixed(requirement, keys, free)
-    for quantity in quantities:
-        _refuse_bend(quantity, request.design, free)
-    narrowed = [_within(key, request.requirements) for key in free]
-    if not narrowed:
+        _refuse_fixed(requirement, design, keys)
+    for quantity in request.quantities:
+        _refuse_bend(quantity, design, keys)
+    if not free:
         raise DesignError(
-            f"the search may change no key of {request.design.name}; name one with "
-            "--free KEY=LOW:HIGH:STEP"
+            f"the search may change no key of {design.name}; name one with --free KEY=LOW:HIGH:STEP"
         )
-    if not any(key.key.startswith(OF_FILMS) for key in narrowed):
-        _refuse_unknown_films(quantities, request.design)
-    return tuple(narrowed)
+    narrowed = tuple(_within(key, request.requirements) for key in free)
+    if not any(key.startswith(OF_FILMS) for key in keys):
+        _refuse_unknown_films(request)
+    return narrowed
 
 
 OF_FILMS = ("films.", "layup.")
@@ -205,24 +191,25 @@ KNOWN_BY_FILM = ("mass", "burst", "reference_stroke")
 """Quantities whose availability depends only on a design's films, and quick to evaluate."""
 
 
-def _refuse_unknown_films(quantities: Sequence[RequestedQuantity], design: Design) -> None:
+def _refuse_unknown_films(request: FindRequest) -> None:
     """Raises DesignError if a quantity is unknown for a design's films at any size: no candidate
     could be evaluated.
     """
+    design = request.design
     try:
         laminate = build(design)
     except SbafabError:
         return  # the search may start from impossible sizes
-    subject, form = Subject(design, laminate), design.form
+    subject = Subject(design, laminate)
     has_modulus = all(layer.film.elastic for layer in laminate.tpe_layers)
-    for quantity in quantities:
+    for quantity in request.quantities:
         is_moved = quantity.name in AT_PRESSURE or quantity.name == "time"
         try:
             if quantity.name in KNOWN_BY_FILM:
-                subject.value(quantity, lambda: math.nan)
+                subject.value(quantity, math.nan)
             elif quantity.share:
-                subject.value(read_quantity("reference_stroke"), lambda: math.nan)
-            if is_moved and has_balloons(form) and not has_modulus:
+                subject.value(read_quantity("reference_stroke"))
+            if is_moved and has_balloons(design.form) and not has_modulus:
                 balloons_of(design, laminate)
         except DesignError as error:
             raise DesignError(f"{quantity.label}: {error}") from None
@@ -238,8 +225,7 @@ def _refuse_unsure(request: FindRequest, sure: float) -> None:
             f"sure = {sure:g} needs a calibration, and models.calibration of {design.name} is "
             f'"{design.models.calibration}"; name one such as "paper", or leave sure out'
         )
-    for requirement in request.requirements:
-        quantity = requirement.quantity
+    for quantity in (requirement.quantity for requirement in request.requirements):
         is_exact = quantity.key is not None or quantity.name in (*AS_DRAWN, "burst")
         if not is_exact and group_of(quantity, design.form) is None:
             instead = "; ask for stroke@10kPa" if quantity.name == "reference_stroke" else ""
@@ -249,29 +235,25 @@ def _refuse_unsure(request: FindRequest, sure: float) -> None:
             )
 
 
-def _refuse_fixed(
-    requirement: Requirement, keys: Mapping[str, object], free: Sequence[Free]
-) -> None:
+def _refuse_fixed(requirement: Requirement, design: Design, free: Sequence[str]) -> None:
     """Raises DesignError if a requirement on a key contradicts its value and the key is not
     free.
     """
     key = requirement.quantity.key
-    value = keys.get(key or "")
+    value = key_values(design).get(key or "")
     if isinstance(value, str):
         raise DesignError(
             f"{key} is a word, {shown(value)}, and has no least or most; set it with --set, or let "
             f"the search choose with --free {key}={value},..."
         )
-    if key in [free_key.key for free_key in free] or not isinstance(value, int | float):
-        return
-    if not requirement.holds(value):
+    if key not in free and isinstance(value, int | float) and not requirement.holds(value):
         raise DesignError(
             f"{key} = {value:g}, not {requirement.bound}, and the search does not change it; give "
             f"it a range with --free {key}=LOW:HIGH:STEP"
         )
 
 
-def _refuse_bend(quantity: RequestedQuantity, design: Design, free: Sequence[Free]) -> None:
+def _refuse_bend(quantity: RequestedQuantity, design: Design, free: Sequence[str]) -> None:
     """Raises DesignError for a bend if the actuator does not bend, or if no chamber would stay
     empty while their number is fixed.
     """
@@ -280,12 +262,11 @@ def _refuse_bend(quantity: RequestedQuantity, design: Design, free: Sequence[Fre
     if not design.form.is_parallel:
         raise DesignError(f"{design.name} does not bend; only chambers side by side do")
     stacks = design.form.stacks
-    if quantity.chambers < stacks or COUNT in [each.key for each in free]:
-        return
-    raise DesignError(
-        f"{quantity.label}: {design.name} has {stacks} chambers, of which one must stay empty; ask "
-        f"for at most {stacks - 1}, or for more chambers with --free {COUNT}=LOW:HIGH:STEP"
-    )
+    if quantity.chambers >= stacks and COUNT not in free:
+        raise DesignError(
+            f"{quantity.label}: {design.name} has {stacks} chambers, of which one must stay empty; "
+            f"ask for at most {stacks - 1}, or for more chambers with --free {COUNT}=LOW:HIGH:STEP"
+        )
 
 
 def _within(free: Free, requirements: Sequence[Requirement]) -> Free:
@@ -293,64 +274,19 @@ def _within(free: Free, requirements: Sequence[Requirement]) -> Free:
     for requirement in requirements:
         if requirement.quantity.key != free.key:
             continue
-        is_beyond = (
-            requirement.limit > free.high if requirement.at_least else requirement.limit < free.low
-        )
-        if is_beyond and not free.widens:
+        limit, at_least = requirement.limit, requirement.at_least
+        if (limit > free.high if at_least else limit < free.low) and not free.widens:
             raise DesignError(
                 f"{free.key} must be {requirement.bound}, and its range is {free.low:g} to "
-                f"{free.high:g}; "
-                f"give it another one with --free {free.key}=LOW:HIGH:STEP"
+                f"{free.high:g}; give it another one with --free {free.key}=LOW:HIGH:STEP"
             )
-        if requirement.at_least:
-            low = max(free.low, requirement.limit)
+        if at_least:
+            low = max(free.low, limit)
             free = replace(free, low=low, high=max(free.high, low))
         else:
-            high = min(free.high, requirement.limit)
+            high = min(free.high, limit)
             free = replace(free, low=min(free.low, high), high=high)
     return free
-
-
-def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDesign:
-    """Return the best design, or the nearest miss. Raises DesignError for an impossible request."""
-    if request.tries < LEAST_TRIES:
-        raise DesignError(f"tries = {request.tries} must be at least {LEAST_TRIES}")
-    if request.storage is not None and not request.optuna:
-        raise DesignError("storage is Optuna's; search with optuna = True, or leave it out")
-    problem = SearchProblem(request.design, request.requirements, request.goal, request.sure)
-    space = SearchSpace(problem, free_keys(request), request.tries, progress)
-    if request.optuna:
-        with_optuna(space, request.storage)
-    elif space.size <= request.tries:
-        try_every_design(space)
-    else:
-        explore(space)
-    refine(space)
-    widen_ranges(space)
-    point, best = space.best()
-    if best.refused:
-        raise DesignError(_commonest_reason(space))
-    shown, count = pareto_front(space, best) if best.holds else ([], 0)
-    return FoundDesign(
-        problem,
-        best,
-        tuple(bindings(space, point, best)),
-        tuple(range_ends(space, point, best)),
-        tuple(shown),
-        count,
-        len(space.trials),
-        request.tries <= len(space.trials) < space.size,
-        space.free,
-    )
-
-
-def _commonest_reason(space: SearchSpace) -> str:
-    """Return why most candidates were refused, as in the nearest one's message."""
-    refused = sorted(space.trials.values(), key=lambda trial: trial.rank)
-    counts = Counter(trial.refused_at for trial in refused)
-    nearest = max(refused, key=lambda trial: counts[trial.refused_at])
-    count = counts[nearest.refused_at]
-    return f"no design could be made: {nearest.refused} ({count} of the {len(refused)} tried)"
 
 
 # The diagnosis of a search: binding constraints, tight rules, range ends, the Pareto front.
@@ -407,15 +343,13 @@ class RangeEnd:
 
 def without_room(best: Trial) -> list[Spare]:
     """Return the rules on lengths that pass without margin."""
-    laminate = best.laminate
+    if best.laminate is None:
+        return []
     return [
-        Spare(rule.rule, rule.measured or 0.0, rule.unit, place_text(laminate, rule.where))
+        Spare(rule.rule, rule.measured or 0.0, rule.unit, place_text(best.laminate, rule.where))
         for rule in (best.rules or {}).values()
-        if laminate is not None
-        and rule.verdict == "pass"
-        and rule.rule in TIGHT
-        and rule.share is not None
-        and abs(rule.share) < LITTLE
+        if rule.verdict == "pass" and rule.rule in TIGHT
+        if rule.share is not None and abs(rule.share) < LITTLE
     ]
 
 
@@ -425,12 +359,12 @@ def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> list[Binding]
     For the nearest miss: the steps to designs that cannot be made, or that no model covers.
     """
     constraints = []
-    for axis, neighbour in _steps(point):
-        if not space.lows[axis] <= neighbour[axis] <= space.highs[axis]:
+    for axis, neighbour in single_steps(point):
+        if not space.holds(axis, neighbour):
             continue
         trial = space.peek(neighbour)
         if _is_nearer(space, point, neighbour, trial, best):
-            broken = misses(space.problem, space.with_rules(trial))
+            broken = misses(space.request, space.with_rules(trial))
             if broken:
                 key = space.free[axis].key
                 constraints.append(Binding(key, trial.values[key], "; ".join(broken)))
@@ -452,31 +386,16 @@ def _is_nearer(
 def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> list[RangeEnd]:
     """Return the keys whose range alone prevents a better design, or a nearer miss."""
     ends = []
-    for axis, neighbour in _steps(point):
-        is_inside = space.lows[axis] <= neighbour[axis] <= space.highs[axis]
-        if is_inside or space.free[axis].choices or space.is_excluded(axis, neighbour):
+    for axis, neighbour in single_steps(point):
+        free = space.free[axis]
+        if space.holds(axis, neighbour) or free.choices or space.is_excluded(axis, neighbour):
             continue
         if space.with_rules(space.peek(neighbour)).rank < best.rank:
-            free = space.free[axis]
-            low, high = (
-                round(free.low + step * free.step, 6)
-                for step in (space.lows[axis], space.highs[axis])
-            )
-            above = neighbour[axis] > space.highs[axis]
+            steps = space.lows[axis], space.highs[axis]
+            low, high = (round(free.low + step * free.step, 6) for step in steps)
+            above = neighbour[axis] > point[axis]
             ends.append(RangeEnd(free.key, space.number(axis, point), low, high, free.step, above))
     return ends
-
-
-def _steps(point: GridPoint) -> list[tuple[int, GridPoint]]:
-    """The places one step of one key away, each with the key's number."""
-    count = len(point)
-    return [
-        (
-            next(axis for axis, by in enumerate(move) if by),
-            tuple(at + by for at, by in zip(point, move, strict=True)),
-        )
-        for move in neighbours([1] * count)[: 2 * count]
-    ]
 
 
 def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
@@ -485,38 +404,26 @@ def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
     The best is first, also if another one equals it in the goal; the rest are in the order of the
     goal. If they are many, the ends and some between are returned.
     """
-    problem = space.problem
+    request = space.request
     sides = [
         requirement
-        for requirement in problem.requirements
-        if requirement.quantity.key is None and requirement.quantity != problem.goal.quantity
+        for requirement in request.requirements
+        if requirement.quantity.key is None and requirement.quantity != request.goal.quantity
     ]
     passing = [trial for trial in space.trials.values() if trial.holds]
-    first = passing.index(best)
     more = [False, *(requirement.at_least for requirement in sides)]
     while True:
-        rows = [
-            [trial.cost, *(trial.judged(requirement) for requirement in sides)] for trial in passing
-        ]
-        numbers = sorted({first, *front(rows, more)}, key=lambda number: passing[number].rank)
-        chosen = _spread(numbers)
-        checked = {number: space.with_rules(passing[number]) for number in chosen}
-        failed = [number for number, trial in checked.items() if not trial.holds]
-        if not failed:
-            return [checked[number] for number in chosen], len(numbers)
-        first -= sum(number < first for number in failed)
-        passing = [
-            checked.get(number, trial)
-            for number, trial in enumerate(passing)
-            if number not in failed
-        ]
-
-
-def _spread(numbers: list[int]) -> list[int]:
-    """Some of them, evenly spaced, including the first and the last."""
-    if len(numbers) <= SHOWN:
-        return numbers
-    return [numbers[round(at * (len(numbers) - 1) / (SHOWN - 1))] for at in range(SHOWN)]
+        rows = [[trial.cost, *map(trial.judged, sides)] for trial in passing]
+        numbers = {next(n for n, trial in enumerate(passing) if trial is best), *front(rows, more)}
+        order = sorted(numbers, key=lambda number: passing[number].rank)
+        if len(order) > SHOWN:
+            last = len(order) - 1
+            order = [order[round(at * last / (SHOWN - 1))] for at in range(SHOWN)]
+        for number in order:
+            passing[number] = space.with_rules(passing[number])
+        if all(passing[number].holds for number in order):
+            return [passing[number] for number in order], len(numbers)
+        passing = [trial for trial in passing if trial.holds]
 
 
 # The place of a finding in an actuator, as text.
@@ -545,11 +452,91 @@ def place_text(laminate: Laminate, where: Place) -> str:
     return "at the rim"
 
 
+# The result for programs.
+
+
+class TrialEntry(Document):
+    """A design that was tried."""
+
+    keys: dict[str, Any] = attribute("values")
+    """keys of the design that were found"""
+    figures: dict[str, PlainNumber]
+    """quantities in mm, deg, N, N/mm, s, g or a share"""
+
+
+class RequirementEntry(Document):
+    """A requirement, with the figures of the best design."""
+
+    quantity: str = attribute("quantity.label")
+    unit: str = attribute("quantity.unit")
+    sense: Literal["at least", "at most"]
+    limit: PlainNumber
+    median: PlainNumber
+    """of the best; force below 0 where it rises less"""
+    bound: PlainNumber | None
+    """kept with the probability `sure`, and held against the limit"""
+    holds: bool
+
+
+class RangeEndEntry(Document):
+    """A key that only its range stops."""
+
+    key: str
+    value: Any
+    low: PlainNumber
+    high: PlainNumber
+
+
+class FindDocument(Document, schema="sbafab/find@1"):
+    """What ``find --json`` prints; by quantity where names are keys."""
+
+    holds: bool
+    file: str | None
+    """the design file; null if none holds"""
+    started_from: str
+    tries: int
+    is_cut_short: bool
+    """whether more tries might lead further"""
+    sure: PlainNumber | None = attribute("request.sure")
+    """probability with which requirements must hold"""
+    best: TrialEntry
+    intervals: dict[str, tuple[float, float]]
+    """90 % intervals of the best, if a calibration says so"""
+    flags: dict[str, FlagList]
+    """limits to trust in figures of the best"""
+    requirements: list[RequirementEntry]
+    measured: dict[str, CounterpartEntry]
+    missed: list[str]
+    binds: list[Binding]
+    range_ends: list[RangeEndEntry] = attribute("ends")
+    without_room: list[Spare]
+    front: list[TrialEntry]
+    on_front: int
+
+
+def find_document(found: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
+    """Return the content of ``find --json``; ``bound`` is null without ``sure``."""
+    best = found.best
+    rows = [
+        RequirementEntry.read(
+            row,
+            sense="at least" if row.at_least else "at most",
+            median=best.value(row),
+            bound=best.judged(row) if row.quantity.label in best.intervals else None,
+            holds=best.meets(row),
+        )
+        for row in found.request.requirements
+    ]
+    return FindDocument.of(
+        found,
+        file=str(target) if found.holds else None,
+        started_from=origin,
+        requirements=rows,
+        measured={name: row.entry() for name, row in found.measured.items()},
+    )
+
+
 # The design file of the result: the starting design's file with the new values.
-
-
-FOUND = "found.toml"
-"""The default file name in the folder of ``-o``."""
 
 
 def refuse_existing(target: Path) -> None:
@@ -562,32 +549,30 @@ def refuse_existing(target: Path) -> None:
 
 
 def found_toml(
-    source: str | Path, assignments: Sequence[str], name: str, result: FoundDesign, target: Path
+    source: str | Path, assignments: Sequence[str], name: str, found: FoundDesign, target: Path
 ) -> str:
     """Return the text of the design file ``target`` of a result, with its figures as comments."""
-    changes: list[Change] = [*assignments, dict(result.best.values), {"name": name}]
+    request, best = found.request, found.best
+    changes: list[Change] = [*assignments, dict(best.values), {"name": name}]
     data = override(read_toml(design_path(source)), changes)
-    data = override(data, [_paths_beside(target, data, result.problem.design)])
+    data = override(data, [_paths_beside(target, data, request.design)])
     first = {key: value for key, value in data.items() if not isinstance(value, dict)}
-    tables = {key: value for key, value in data.items() if isinstance(value, dict)}
-    limits = []
-    for requirement in result.problem.requirements:
-        value = figure_text(result.problem, result.best, requirement)
-        aside = _interval_text(result, requirement)
-        limits.append(f"# {requirement.quantity.label} = {value} ({requirement.bound}{aside})")
-    goal = result.problem.goal
-    value = shown_value(goal.quantity, result.best.value(goal))
-    best = f"# {goal.quantity.label} = {value} (the goal{_interval_text(result, goal)})"
-    keys = keys_said(result.best.values)
-    measured = [f"# {name}: {value.sentence()}" for name, value in result.measured.items()]
-    measured += [f"# {name}: {FLAGS[f]}" for name, flags in result.flags.items() for f in flags]
-    head = [f"# Found by sbafab find, from {Path(source).name}: {keys}.", *limits, best, *measured]
-    return "\n".join(line.rstrip() for line in head) + "\n\n" + tomli_w.dumps(first | tables)
+    head = [f"Found by sbafab find, from {Path(source).name}: {format_keys(best.values)}."]
+    for row in request.requirements:
+        value = figure_text(request, best, row)
+        head.append(f"{row.quantity.label} = {value} ({row.bound}{_interval_text(found, row)})")
+    goal = request.goal
+    value = shown_value(goal.quantity, best.value(goal))
+    head.append(f"{goal.quantity.label} = {value} (the goal{_interval_text(found, goal)})")
+    head += [f"{name}: {measured.sentence()}" for name, measured in found.measured.items()]
+    head += [f"{name}: {FLAGS[flag]}" for name, flags in found.flags.items() for flag in flags]
+    comments = "".join(f"# {line}".rstrip() + "\n" for line in head)
+    return f"{comments}\n{tomli_w.dumps(first | data)}"
 
 
-def _interval_text(result: FoundDesign, subject: Requirement | Goal) -> str:
-    interval = result.intervals.get(subject.quantity.label)
-    if interval is None or result.best.value(subject) < 0:
+def _interval_text(found: FoundDesign, subject: Requirement | Goal) -> str:
+    interval = found.intervals.get(subject.quantity.label)
+    if interval is None or found.best.value(subject) < 0:
         return ""
     return f"; 90 % interval {shown_interval(interval)}"
 

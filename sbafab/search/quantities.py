@@ -11,13 +11,14 @@ import difflib
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from itertools import permutations
+from typing import Any
 
 from sbafab.design.files import key_paths, listed, shown
-from sbafab.design.records import Design, Form, Slots, keys_of
+from sbafab.design.records import Design, Form, Slots
 from sbafab.design.units import KILOPASCALS, MILLILITRES_PER_MINUTE, millimetres
 from sbafab.errors import DesignError
 from sbafab.laminate.burst import NOT_BURST, Burst, burst
@@ -61,9 +62,11 @@ from sbafab.models.paper import FULL_KPA, HEIGHTS, WATER_FLOW, Counterpart, coun
 from sbafab.models.pneumatics import seconds
 from sbafab.models.quantity import ANYWHERE, Conditions, ModelId, Quantity
 from sbafab.models.stack import MOST_PRESSURE, Stack, stack
+from sbafab.search.vary import key_values
 
 
-class QuantityName(NamedTuple):
+@dataclass(frozen=True)
+class QuantityName:
     """A quantity as users write it, with its unit and meaning."""
 
     written: str
@@ -117,7 +120,6 @@ def quantity_lines() -> str:
 
 
 USUAL_KPA = 10.0
-_PRESSURE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*([A-Za-z]+)\s*")
 _CHAMBERS = re.compile(r"\s*([1-9]\d?)\s*chambers?\s*", re.IGNORECASE)
 AT_PRESSURE = {row.name: row.unit for row in QUANTITIES if "@" in row.written}
 """Units of the quantities that take a pressure."""
@@ -232,7 +234,7 @@ def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -
             )
         try:
             if place.endswith("%"):
-                share = _share(place)
+                share = read_share(place)
             else:
                 stroke = millimetres(place)
         except ValueError as error:
@@ -276,11 +278,10 @@ def _kilopascals(place: str) -> float | None:
 
     MPa and mPa are not the same: an ambiguous unit is rejected.
     """
-    match = _PRESSURE.fullmatch(place)
-    if match is None:
-        return None
-    units = [unit for unit in KILOPASCALS if unit.lower() == match[2].lower()]
-    if len(units) != 1 or (match[2] != units[0] and units[0] == "MPa"):
+    match = _VALUE.fullmatch(place)
+    written = match[2] if match else ""
+    units = [unit for unit in KILOPASCALS if unit.lower() == written.lower()]
+    if match is None or not units or (units == ["MPa"] and written != "MPa"):
         return None
     return float(match[1]) * KILOPASCALS[units[0]]
 
@@ -288,7 +289,7 @@ def _kilopascals(place: str) -> float | None:
 def read_limit(quantity: RequestedQuantity, text: str) -> float:
     """Return the limit of a quantity, in its unit. Raises ValueError with the end of a sentence."""
     if quantity.name == "yield":
-        return _share(text)
+        return read_share(text)
     if quantity.unit in UNITS:
         limit = _measured(quantity.unit, text)
     else:
@@ -310,14 +311,27 @@ def _measured(unit: str, text: str) -> float:
     return float(match[1]) * UNITS[unit][match[2] or unit]
 
 
-def _share(text: str) -> float:
+def read_share(text: str) -> float:
+    """Return a share from a text such as 0.95 or 95%. Raises ValueError with the end of a
+    sentence.
+    """
     match = _VALUE.fullmatch(text)
     if match is None or match[2] not in ("", "%"):
         raise ValueError("must be a share such as 0.95 or 95%")
-    limit = float(match[1]) / (100 if match[2] else 1)
-    if not 0 <= limit <= 1:
+    share = float(match[1]) / (100 if match[2] else 1)
+    if not 0 <= share <= 1:
         raise ValueError("must be a share from 0 to 1, such as 0.95 or 95%")
-    return limit
+    return share
+
+
+def read_sure(text: str) -> float:
+    """Return a probability from a text such as 0.9 or 90%. Raises ValueError with the end of a
+    sentence.
+    """
+    share = read_share(text)
+    if not 0.5 < share < 1:
+        raise ValueError("must be above 0.5 and below 1, such as 0.9 or 90%")
+    return share
 
 
 def shown_value(quantity: RequestedQuantity, value: float) -> str:
@@ -333,14 +347,107 @@ def shown_interval(interval: tuple[float, float]) -> str:
     return f"{low:.3g} to {high:.3g}"
 
 
-def read_sure(text: str) -> float:
-    """Return a probability from a text such as 0.9 or 90%. Raises ValueError with the end of a
-    sentence.
+# Requirements on quantities, and the goal.
+
+
+CLOSE = 1e-9
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A quantity with its lower or upper limit."""
+
+    quantity: RequestedQuantity
+    limit: float
+    at_least: bool
+
+    def margin(self, value: float) -> float:
+        """Return the margin of a value as a share of the limit; negative if it breaks the limit."""
+        more = value - self.limit if self.at_least else self.limit - value
+        return more / (abs(self.limit) or 1.0)
+
+    def holds(self, value: float) -> bool:
+        return self.margin(value) >= -CLOSE
+
+    @property
+    def bound(self) -> str:
+        """For example "at least 3 N"."""
+        most = "at least" if self.at_least else "at most"
+        return f"{most} {self.limit:.10g} {self.quantity.unit}".strip()
+
+    @property
+    def label(self) -> str:
+        return f"{self.quantity.label} {self.bound}"
+
+
+@dataclass(frozen=True)
+class Goal:
+    """The quantity to maximise (``more``) or minimise."""
+
+    quantity: RequestedQuantity
+    more: bool
+
+    def cost(self, value: float) -> float:
+        return -value if self.more else value
+
+    @property
+    def label(self) -> str:
+        return f"{'most' if self.more else 'least'} {self.quantity.label}"
+
+
+GOOD_IF_MORE = (
+    *("stroke", "reference_stroke", "bend", "force", "lateral_stiffness", "burst", "yield"),
+    *("lumen", *ASKED),
+)
+"""Quantities to maximise; all others are minimised."""
+
+
+def read_all(
+    least: Sequence[str], most: Sequence[str], best: str, flow_ml_min: float = WATER_FLOW
+) -> tuple[tuple[Requirement, ...], Goal]:
+    """The requirements of ``QUANTITY=VALUE`` texts, and the goal. Raises DesignError.
+
+    A quantity without its pressure takes the highest pressure named by any of them, a time without
+    a flow takes ``flow_ml_min``.
     """
-    share = _share(text)
-    if not 0.5 < share < 1:
-        raise ValueError("must be above 0.5 and below 1, such as 0.9 or 90%")
-    return share
+    pairs = [(text, True) for text in least] + [(text, False) for text in most]
+    kpa = named_pressure([text.partition("=")[0] for text, _ in pairs] + [best])
+    requirements = tuple(_read(text, at_least, kpa, flow_ml_min) for text, at_least in pairs)
+    _refuse_contradictions(requirements, [text for text, _ in pairs])
+    quantity = read_quantity(best, kpa, flow_ml_min)
+    return requirements, Goal(quantity, quantity.name in GOOD_IF_MORE)
+
+
+def _read(text: str, at_least: bool, kpa: float | None, flow_ml_min: float) -> Requirement:
+    option = "--min" if at_least else "--max"
+    name, equals, value = text.partition("=")
+    if not equals or not value.strip():
+        raise DesignError(
+            f"{option} {shown(text)} is not QUANTITY=VALUE; write for example {option} "
+            f"{'stroke@50kPa=25' if at_least else 'overall_diameter=20'}"
+        )
+    quantity = safer(read_quantity(name, kpa, flow_ml_min), at_least)
+    try:
+        limit = read_limit(quantity, value)
+    except ValueError as error:
+        raise DesignError(f"{option} {shown(text)}: the value {error}") from None
+    return Requirement(quantity, limit, at_least)
+
+
+def _refuse_contradictions(requirements: Sequence[Requirement], texts: Sequence[str]) -> None:
+    """Raises DesignError if a quantity's lower limit is above its upper limit."""
+    pairs = permutations(zip(requirements, texts, strict=True), 2)
+    for (least, least_text), (most, most_text) in pairs:
+        is_pair = least.at_least and not most.at_least and least.limit > most.limit
+        # The inflated diameter that must reach never exceeds the one that must not touch.
+        if is_pair and least.quantity == safer(most.quantity, at_least=True):
+            raise DesignError(
+                f"--min {shown(least_text)} and --max {shown(most_text)} contradict each other; no "
+                "design can meet both, so change one"
+            )
+
+
+# The values of a design.
 
 
 @dataclass(frozen=True)
@@ -361,38 +468,40 @@ class Subject:
     def _sizes(self) -> Mapping[str, float]:
         return sizes(self.design, self.laminate, self.factors)
 
-    @cached_property
-    def _keys(self) -> Mapping[str, Any]:
-        return {key: value for key, value, _ in keys_of(self.design)}
+    def value(self, quantity: RequestedQuantity, good: float | None = None) -> float:
+        """Return the value of a quantity in its unit; ``good`` is the share of good builds.
 
-    def value(self, quantity: RequestedQuantity, share_of_good: Callable[[], float]) -> float:
-        """Raises DesignError if the design has no such quantity, or no model covers it."""
-        kpa = kpa_of(quantity)
+        Raises DesignError if the design has no such quantity, or no model covers it.
+        """
+        name, kpa = quantity.name, kpa_of(quantity)
         if kpa is not None:
             refuse_beyond_burst(self.laminate, kpa)
-        if quantity.name in ASKED:
+        if name in ASKED:
             mechanism = self.design.form.mechanism
-            return mechanism_value(mechanism, self.laminate, quantity.name, kpa or USUAL_KPA)
-        if quantity.name in AT_PRESSURE:
-            return self._moved(quantity)
-        by_name: Mapping[str, Callable[[], float]] = {
-            "yield": share_of_good,
-            "mass": lambda: film_mass(self.laminate),
-            "height": lambda: self._actuator.thickness,
-            "reference_stroke": lambda: self._actuator.known_stroke,
-            "burst": lambda: self._burst.kpa,
-            "time": lambda: self._time(quantity.flow or WATER_FLOW),
-        }
-        if quantity.name in by_name:
-            return by_name[quantity.name]()
-        value: Any = self._sizes.get(quantity.name)
-        if quantity.name == "lumen":
-            value = self.design.form.lumen
-        elif "." in quantity.name:
-            value = self._keys.get(quantity.name)
+            return mechanism_value(mechanism, self.laminate, name, kpa or USUAL_KPA)
+        if name in AT_PRESSURE:
+            return self._moved(quantity, kpa or 0.0)
+        value: Any
+        match name:
+            case "yield":
+                value = good
+            case "mass":
+                value = film_mass(self.laminate)
+            case "height":
+                value = self._actuator.thickness
+            case "reference_stroke":
+                value = self._actuator.known_stroke
+            case "burst":
+                value = self._burst.kpa
+            case "time":
+                value = self._time(quantity.flow or WATER_FLOW)
+            case "lumen":
+                value = self.design.form.lumen
+            case _:
+                value = (key_values(self.design) if "." in name else self._sizes).get(name)
         if isinstance(value, int | float):
             return float(value)
-        raise DesignError(f"{self.design.name} has no {quantity.name} that is a number")
+        raise DesignError(f"{self.design.name} has no {name} that is a number")
 
     @property
     def _burst(self) -> Burst:
@@ -418,9 +527,8 @@ class Subject:
         time, _ = time_to_fill(self._stack, flow_ml_min, FULL_KPA)
         return time + self.factors.water_delay
 
-    def _moved(self, quantity: RequestedQuantity) -> float:
+    def _moved(self, quantity: RequestedQuantity, kpa: float) -> float:
         """Return a stroke, bend, lateral stiffness or force."""
-        kpa = USUAL_KPA if quantity.kpa is None else quantity.kpa
         if quantity.name == "stroke":
             return self._stroke(kpa)
         if quantity.name == "bend":
@@ -453,14 +561,11 @@ class Subject:
     @cached_property
     def _others(self) -> dict[Factors, Subject]:
         """The design at other factors."""
-        return {}
+        return {self.factors: self}
 
     def _at(self, factors: Factors) -> Subject:
-        if factors == self.factors:
-            return self
-        return self._others.setdefault(
-            factors, Subject(self.design, self.laminate, factors, self, self.most_kpa)
-        )
+        other = Subject(self.design, self.laminate, factors, self, self.most_kpa)
+        return self._others.setdefault(factors, other)
 
     def interval(
         self, quantity: RequestedQuantity, share: float = SHARE
@@ -478,10 +583,10 @@ class Subject:
         if quantity.name == "height" and not self._actuator.folded.molten:
             return None
 
-        is_force = quantity.name == "force" and self.value(quantity, lambda: math.nan) > 0
+        is_force = quantity.name == "force" and self.value(quantity) > 0
 
         def value_at(factors: Factors) -> float:
-            value = self._at(factors).value(quantity, lambda: math.nan)
+            value = self._at(factors).value(quantity)
             # Below 0 a force is only a distance from one, for the search.
             return max(value, 0.0) if is_force else value
 

@@ -17,24 +17,32 @@ from filelock import FileLock, Timeout
 from sbafab.design.files import KIT, OUTLINE, kit_names
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, plain_tables
+from sbafab.documents import Document, attribute
 from sbafab.errors import OutputError
 from sbafab.models.formulas import refuse_pressure, usual_pressures
 from sbafab.models.intervals import factors_of
 from sbafab.notebook import data_frame
 from sbafab.output.swap import MANIFEST
 from sbafab.process import Progress, ignore_progress
-from sbafab.search.measure import SweepOutcome, SweepRow, fingerprint
-from sbafab.search.pool import MeasureJob, dask_pool, local_pool, run_jobs
 from sbafab.search.sweep_report import (
     CSV,
     JOURNAL,
+    PAGE,
     Table,
     refuse_foreign,
+    replacing,
     stale_designs,
     sweep_html,
-    write_csv,
-    write_parquet,
-    write_times,
+    write_tables,
+)
+from sbafab.search.trials import (
+    MeasureJob,
+    SweepOutcome,
+    SweepRow,
+    dask_pool,
+    fingerprint,
+    local_pool,
+    run_jobs,
 )
 from sbafab.search.vary import Values, Varied, grid, latin_hypercube, refuse_unknown
 
@@ -91,14 +99,25 @@ class SweptDesigns:
     @property
     def rows(self) -> list[dict[str, Any]]:
         """One row per design, with the columns of ``sweep.csv``; units are in their names."""
-        names = [column.name for column in self.table.written]
-        return [
-            dict(zip(names, cells, strict=True)) for cells in self.table.cells(self.table.written)
-        ]
+        names = self.table.written
+        return [dict(zip(names, cells, strict=True)) for cells in self.table.cells(names)]
 
     def frame(self) -> DataFrame:
         """Return ``rows`` as a pandas DataFrame. Raises DesignError without pandas."""
         return data_frame(self.rows)
+
+
+class SweepDocument(Document, schema="sbafab/sweep@1"):
+    """What ``sweep --json`` prints."""
+
+    folder: Path
+    designs: int
+    measured_now: int = attribute("measured")
+    no_longer_asked: int
+    outcomes: dict[str, int]
+    """designs by outcome"""
+    files: list[str]
+    """files in the folder"""
 
 
 class SweepStopped(KeyboardInterrupt):
@@ -140,13 +159,9 @@ def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress
         finally:
             journal.close()
         progress("writing tables", 0, 1)
-        table = Table(
-            lambda: journal.rows(iter(keys)),
-            values,
-            request.pressures_kpa,
-            request.all_columns,
-            is_calibrated=bool(factors_of(request.design).calibration),
-        )
+        is_calibrated = bool(factors_of(request.design).calibration)
+        settings = (values, request.pressures_kpa, request.all_columns, is_calibrated)
+        table = Table(lambda: journal.rows(iter(keys)), *settings)
         gone = stale_designs(folder / CSV, table)
         files = _write(folder, request, table)
     outcomes = Counter(row["outcome"] for row in table.rows())
@@ -218,15 +233,11 @@ def _from_here(varied: Varied) -> Varied:
 
 
 def _write(folder: Path, request: SweepRequest, table: Table) -> tuple[str, ...]:
-    write_csv(table, folder / CSV)
-    write_times(table, folder / "times.csv")
-    files = [CSV, "times.csv"]
-    if write_parquet(table, folder / "sweep.parquet"):
-        files.append("sweep.parquet")
+    files = write_tables(table, folder)
     page = sweep_html(request.design, request.varied, table)
-    with table.replacing(folder / "sweep.html") as opened:
+    with replacing(folder / PAGE) as opened:
         opened.write(page)
-    return (*files, "sweep.html", JOURNAL)
+    return (*files, PAGE, JOURNAL)
 
 
 @contextmanager

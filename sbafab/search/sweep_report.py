@@ -10,11 +10,11 @@ from __future__ import annotations
 import csv
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -27,7 +27,7 @@ from sbafab.models.quantity import ANYWHERE, Conditions, FigureKey, Quantity
 from sbafab.reports.charts import ChartBars, ChartCurve, ChartSpecks, Panel, chart_svg
 from sbafab.reports.html_templates import environment
 from sbafab.rules.deck import rule_names
-from sbafab.search.measure import SweepRow
+from sbafab.search.trials import SweepRow
 from sbafab.search.vary import Values, Varied
 from sbafab.spreadsheet import write_rows
 from sbafab.version import GENERATOR
@@ -35,7 +35,8 @@ from sbafab.version import GENERATOR
 # The tables: one design per row, in the order requested.
 
 
-CSV, JOURNAL = "sweep.csv", "journal.jsonl"
+CSV, TIMES, PARQUET = "sweep.csv", "times.csv", "sweep.parquet"
+PAGE, JOURNAL = "sweep.html", "journal.jsonl"
 """Files of a sweep's folder."""
 PARTS = (("verdict", 0), ("margin", 1), ("measured", 2), ("limit", 3))
 """Columns of each rule, and their index in its list."""
@@ -61,13 +62,6 @@ BATCH = 1000
 """Most rows in memory at a time."""
 
 
-class Column(NamedTuple):
-    """A column: its name, and whether it is purely numeric."""
-
-    name: str
-    is_number: bool
-
-
 class Table:
     """Rows of a sweep, read again for each pass, so that only the disk limits their number.
 
@@ -88,35 +82,28 @@ class Table:
         self.is_whole = is_whole
         self.is_calibrated = is_calibrated
 
-    def __len__(self) -> int:
-        return len(self.values)
-
     @cached_property
-    def columns(self) -> tuple[Column, ...]:
-        """Columns of all rows: keys, the varied ones first, then rules, then figures.
-
-        A column with a text in any row is a text column.
+    def columns(self) -> dict[str, bool]:
+        """Columns of all rows, and whether they hold numbers only: keys, the varied ones first,
+        then rules, then figures.
         """
         kinds: dict[str, bool] = {}
         order: tuple[dict[str, None], ...] = ({}, {}, {}, {})
         for row in self._flat():
             for part, cells in zip(order, row, strict=True):
+                part.update(dict.fromkeys(cells))
                 for name, cell in cells.items():
-                    part[name] = None
                     if cell is not None:
-                        is_number = isinstance(cell, int | float) and not isinstance(cell, bool)
-                        kinds[name] = kinds.get(name, True) and is_number
-        names = [name for part in order for name in part]
-        return tuple(Column(name, kinds.get(name, True)) for name in names)
+                        kinds[name] = kinds.get(name, True) and _is_number(cell)
+        return {name: kinds.get(name, True) for part in order for name in part}
 
     @cached_property
-    def written(self) -> tuple[Column, ...]:
+    def written(self) -> list[str]:
         """Columns of the files: varied keys, leading figures, binding rules; or all."""
-        by_name = {column.name: column for column in self.columns}
         varied = [name for values in self.values for name in values]
         first = [*HEAD, *varied, *self._leading(), *self._binding()]
-        rest = by_name if self.is_whole else ()
-        return tuple(by_name[name] for name in dict.fromkeys([*first, *rest]) if name in by_name)
+        every = dict.fromkeys([*first, *(self.columns if self.is_whole else ())])
+        return [name for name in every if name in self.columns]
 
     @cached_property
     def figures(self) -> dict[str, FigureKey]:
@@ -159,9 +146,9 @@ class Table:
             if name in not_passing:
                 yield from (f"{name}.verdict", f"{name}.margin")
 
-    def cells(self, columns: Sequence[Column] | None = None) -> Iterator[list[Any]]:
-        """The cells of every row in these columns, or in all; None for empty cells."""
-        chosen = self.columns if columns is None else columns
+    def cells(self, names: Iterable[str]) -> Iterator[list[Any]]:
+        """The cells of every row in these columns; None for empty cells."""
+        chosen = [(name, self.columns[name]) for name in names]
         for row in self._flat():
             every = {name: cell for part in row for name, cell in part.items()}
             yield [_cell(every.get(name), is_number) for name, is_number in chosen]
@@ -170,20 +157,10 @@ class Table:
         for number, (row, values) in enumerate(zip(self.rows(), self.values, strict=True), 1):
             cells = (number, row.get("sha256", ""), row["outcome"], row["reason"])
             head = dict(zip(HEAD, cells, strict=True))
-            # Varied values are listed even if no design resulted.
             shares = dict(zip(YIELD, row.get("yield", ()), strict=False))
             by_column = {_heading(key): value for key, value in row.get("figures", {}).items()}
-            figures = {**shares, **by_column}
-            yield head, {**values, **row.get("keys", {})}, _rules(row), figures
-
-    @staticmethod
-    @contextmanager
-    def replacing(path: Path) -> Iterator[IO[str]]:
-        """A file that is swapped in once it is complete."""
-        begun = path.with_name(f".{path.name}.part")
-        with begun.open("w", encoding="utf-8", newline="") as opened:
-            yield opened
-        begun.replace(path)
+            # Varied values are listed even if no design resulted.
+            yield head, {**values, **row.get("keys", {})}, _rules(row), {**shares, **by_column}
 
 
 @lru_cache(maxsize=4096)
@@ -202,60 +179,57 @@ def _rules(row: SweepRow) -> dict[str, Any]:
     }
 
 
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def _cell(value: Any, is_number: bool) -> Any:
     if value is None or is_number or isinstance(value, str):
         return value
     return json.dumps(value, ensure_ascii=False)
 
 
-def write_csv(table: Table, path: Path) -> None:
-    """Writes every row in the table's ``written`` columns; unknown values are empty cells."""
-    with table.replacing(path) as opened:
-        names = [column.name for column in table.written]
-        write_rows(opened, chain([names], table.cells(table.written)))
+@contextmanager
+def replacing(path: Path) -> Iterator[IO[str]]:
+    """A file that is swapped in once it is complete."""
+    begun = path.with_name(f".{path.name}.part")
+    with begun.open("w", encoding="utf-8", newline="") as opened:
+        yield opened
+    begun.replace(path)
 
 
-def write_times(table: Table, path: Path) -> None:
-    """Writes the time of each design, s."""
-    with table.replacing(path) as opened:
-        rows = (
-            [number, row.get("sha256", ""), row.get("seconds")]
-            for number, row in enumerate(table.rows(), 1)
-        )
-        write_rows(opened, chain([["number", "sha256", "seconds"]], rows))
+def write_tables(table: Table, folder: Path) -> list[str]:
+    """Write every row in the table's ``written`` columns, and the time of each design, s.
+
+    Unknown values are empty cells. Returns the files' names.
+    """
+    with replacing(folder / CSV) as opened:
+        write_rows(opened, chain([table.written], table.cells(table.written)))
+    times = (
+        [n, row.get("sha256", ""), row.get("seconds")] for n, row in enumerate(table.rows(), 1)
+    )
+    with replacing(folder / TIMES) as opened:
+        write_rows(opened, chain([["number", "sha256", "seconds"]], times))
+    return [CSV, TIMES, *([PARQUET] if _write_parquet(table, folder / PARQUET) else [])]
 
 
-def write_parquet(table: Table, path: Path) -> bool:
-    """Writes the same as Parquet, numbers as doubles; False if pyarrow is not installed."""
+def _write_parquet(table: Table, path: Path) -> bool:
+    """Write the same as Parquet, numbers as doubles; False if pyarrow is not installed."""
     try:
         import pyarrow as pa
         from pyarrow import parquet
     except ImportError:
         return False
-    schema = pa.schema(
-        [(name, pa.float64() if is_number else pa.string()) for name, is_number in table.written]
-    )
+    kinds = [pa.float64() if table.columns[name] else pa.string() for name in table.written]
+    schema = pa.schema(list(zip(table.written, kinds, strict=True)))
     begun = path.with_name(f".{path.name}.part")
+    cells = table.cells(table.written)
     with parquet.ParquetWriter(begun, schema) as written:
-        for rows in _batches(table.cells(table.written)):
-            columns = [
-                pa.array(column, field.type)
-                for column, field in zip(zip(*rows, strict=True), schema, strict=True)
-            ]
-            written.write_table(pa.table(columns, schema=schema))
+        while rows := list(islice(cells, BATCH)):
+            arrays = map(pa.array, zip(*rows, strict=True), kinds)
+            written.write_table(pa.table(list(arrays), schema=schema))
     begun.replace(path)
     return True
-
-
-def _batches(rows: Iterator[list[Any]]) -> Iterator[list[list[Any]]]:
-    batch: list[list[Any]] = []
-    for row in rows:
-        batch.append(row)
-        if len(batch) == BATCH:
-            yield batch
-            batch = []
-    if batch:
-        yield batch
 
 
 # The tables of an earlier sweep in the folder.
@@ -284,10 +258,7 @@ def stale_designs(path: Path, table: Table) -> int:
     return len(before - now - {""})
 
 
-# The page: passing designs, causes of failure, trade-offs and Pareto fronts.
-
-
-# Pictures: outcomes by the varied keys, and trade-offs.
+# Pictures of the page: outcomes by the varied keys, and trade-offs.
 
 
 LOOKS = {
@@ -317,7 +288,7 @@ class Dots:
     """One value for each of some designs, with outcomes; None if a design lacks it."""
 
     outcomes: Sequence[str]
-    columns: dict[str, Sequence[Any]]
+    columns: Mapping[str, Sequence[Any]]
 
     def both(self, x: str, y: str, outcome: str) -> tuple[list[float], list[float], list[int]]:
         """Values and numbers of the designs of one outcome that have both."""
@@ -329,10 +300,6 @@ class Dots:
             if of == outcome and _is_number(a) and _is_number(b)
         ]
         return [a for a, _, _ in rows], [b for _, b, _ in rows], [number for _, _, number in rows]
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def passes_svg(dots: Dots, keys: Sequence[str]) -> str:
@@ -447,7 +414,7 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
             name=design.name,
             sha256=design_sha256(design)[:12],
             generator=GENERATOR,
-            total=len(table),
+            total=len(table.values),
             outcomes=Counter(dots.outcomes),
             keys=[(swept.key, _values_text(swept)) for swept in varied],
             passes=passes_svg(dots, keys),
@@ -489,7 +456,6 @@ def _shown_value(value: Any) -> str:
 
 def _objectives(table: Table) -> list[Objective]:
     """Size and mass, the first predicted stroke and force, and the yield."""
-    names = [column.name for column in table.columns]
     wanted = [(table.first(quantity, ANYWHERE), False) for quantity in INTRODUCTION]
     stroke = table.first(Quantity.FREE_STROKE, ANYWHERE)
     wanted.append((stroke or table.first(Quantity.REFERENCE_STROKE, ANYWHERE), True))
@@ -498,23 +464,21 @@ def _objectives(table: Table) -> list[Objective]:
         flat = flat._replace(kpa=max(table.pressures_kpa, key=abs))
     force = table.first(Quantity.BLOCKED_FORCE, flat) or table.first(Quantity.FORCE_BOUND, ANYWHERE)
     wanted.append((force, True))
-    objectives = [Objective(name, _label(name), more) for name, more in wanted if name in names]
-    return [*objectives, GOOD_BUILDS] if YIELD[0] in names else objectives
-
-
-def _label(column: str) -> str:
-    return column.replace("[", "in ").replace("]", "")
+    objectives = [
+        Objective(name, name.replace("[", "in ").replace("]", ""), more)
+        for name, more in wanted
+        if name in table.columns
+    ]
+    return [*objectives, GOOD_BUILDS] if YIELD[0] in table.columns else objectives
 
 
 def _read(table: Table, wanted_columns: Sequence[str]) -> tuple[Dots, list[_Cause]]:
     """Return the objectives' columns, and the causes of failure, the most common first."""
-    names = [column.name for column in table.columns]
-    places = {name: names.index(name) for name in (*wanted_columns, "outcome", "reason")}
-    columns: dict[str, list[Any]] = {name: [] for name in places}
+    columns: dict[str, list[Any]] = {name: [] for name in ("outcome", *wanted_columns)}
     stopped: dict[str, list[tuple[int, str]]] = {}
-    for cells in table.cells():
-        for name, place in places.items():
-            columns[name].append(cells[place])
+    for cells in table.cells(columns):
+        for column, cell in zip(columns.values(), cells, strict=True):
+            column.append(cell)
     for number, row in enumerate(table.rows(), 1):
         failed = row.get("failed", {})
         if row["outcome"] not in ("passes", "fails"):
@@ -523,7 +487,7 @@ def _read(table: Table, wanted_columns: Sequence[str]) -> tuple[Dots, list[_Caus
             stopped.setdefault(cause, []).append((number, f"{cause}: {message}"))
     causes = [_Cause(cause, len(designs), *designs[0]) for cause, designs in stopped.items()]
     causes.sort(key=lambda cause: -cause.designs)
-    return Dots(columns["outcome"], {name: columns[name] for name in wanted_columns}), causes
+    return Dots(columns["outcome"], columns), causes
 
 
 def _pairs(objectives: Sequence[Objective], dots: Dots) -> list[tuple[Objective, Objective]]:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from sbafab.design.files import as_in_a_file, key_paths, override, shown
-from sbafab.design.records import Design
+from sbafab.design.files import as_in_a_file, override, shown
+from sbafab.design.records import Design, keys_of
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
 
@@ -34,6 +34,23 @@ class Varied:
     @property
     def is_continuous(self) -> bool:
         return not self.values
+
+
+def key_values(design: Design) -> dict[str, Any]:
+    """Return the value of every key of a design."""
+    return {key: value for key, value, _ in keys_of(design)}
+
+
+def format_value(value: Any) -> str:
+    """Return the value of a key for display, a list in brackets."""
+    if isinstance(value, str):
+        return value
+    return f"[{', '.join(map(format_value, value))}]" if isinstance(value, list) else f"{value:g}"
+
+
+def format_keys(values: Values) -> str:
+    """Return keys with their values for display."""
+    return ", ".join(f"{key} = {format_value(value)}" for key, value in values.items())
 
 
 def varied_keys(vary: Mapping[str, str | Iterable[Any]] | Sequence[str]) -> tuple[Varied, ...]:
@@ -126,19 +143,13 @@ def refuse_unknown(design: Design, varied: Sequence[Varied], option: str = "--va
     """Raises DesignError for a key unknown to the design, and for one varied twice."""
     keys = [varied_key.key for varied_key in varied]
     for varied_key in varied:
-        if keys.count(varied_key.key) > 1:
-            raise DesignError(
-                f"{option} {varied_key.key} is given twice; put all its values into one"
-            )
-        if varied_key.key not in key_paths(type(design)):
-            # Suggests the likely key.
-            design.with_(
-                {varied_key.key: varied_key.values[0] if varied_key.values else varied_key.low}
-            )
+        key, values = varied_key.key, varied_key.values or (varied_key.low, varied_key.high)
+        if keys.count(key) > 1:
+            raise DesignError(f"{option} {key} is given twice; put all its values into one")
         problems = []
-        for value in varied_key.values or (varied_key.low, varied_key.high):
+        for value in values:
             try:
-                design.with_({varied_key.key: value})
+                design.with_({key: value})
             except DesignError as error:
                 problems.append(error)
             else:

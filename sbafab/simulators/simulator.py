@@ -18,6 +18,7 @@ from typing import Literal, NamedTuple, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from sbafab.documents import Document, PlainNumber
 from sbafab.errors import DesignError, OutputError, VoidError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
@@ -195,6 +196,45 @@ class Result:
             "states": states,
             "stopped": self.stopped,
         }
+
+
+class StateEntry(Document):
+    """The actuator at one time of a run."""
+
+    time: PlainNumber = 0.0
+    pressures: Mapping[str, PlainNumber] = {}
+    """over the air outside, by chamber"""
+    height: PlainNumber | None = None
+    """of the tip over the underside of the base"""
+    tip: tuple[PlainNumber, PlainNumber, PlainNumber] | None = None
+    """displacement of its middle since flat: x, y, z"""
+    tilt: PlainNumber | None = None
+    volumes: Mapping[str, PlainNumber] = {}
+    """of air, by chamber"""
+    stress: PlainNumber = 0.0
+    """calculix: von Mises, the largest"""
+    work: PlainNumber = 0.0
+    """calculix: of the air"""
+
+
+class SimulateDocument(StateEntry, schema="sbafab/simulate@2"):
+    """The contents of ``result.json``, the last state first; only its head if nothing has run."""
+
+    units: Mapping[str, str]
+    folder: str = ""
+    simulator: Name = "calculix"
+    drift: PlainNumber = 0.0
+    """sofa, mujoco: mm of the tip in the last 0.5 s"""
+    overlap: PlainNumber = 0.0
+    """sofa, mujoco: where films passed through each other"""
+    diameter: PlainNumber = 0.0
+    """sofa, round a tube: mm over the crowns"""
+    rate: PlainNumber = 0.0
+    """sofa, mujoco"""
+    states: Sequence[StateEntry] = ()
+    """in order of time"""
+    stopped: str | None = None
+    """why it ended early, if it did"""
 
 
 class Simulator(Protocol):

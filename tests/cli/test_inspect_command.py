@@ -10,20 +10,10 @@ import pytest
 from PIL import Image, ImageDraw
 
 from sbafab.cli import main
+from tests.cli.conftest import Run
 from tests.inspection.scans import Camera, render, save
 
 CAMERA = Camera(dpi=400, kerf=0.14, tilt=1)
-
-
-def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
-    capsys.readouterr()
-    try:
-        main(arguments)
-        code = 0
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return code, out, err
 
 
 @pytest.fixture(scope="module")
@@ -40,12 +30,10 @@ def coupon(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_a_scan_of_the_coupon_gives_the_kerf_twice(
-    coupon: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_scan_of_the_coupon_gives_the_kerf_twice(coupon: Path, tmp_path: Path, run: Run) -> None:
     """By all edges, and by the sizes through ``sbafab kerf``; both go to the record."""
     arguments = ["inspect", str(coupon / "coupon/coupon.dxf"), str(coupon / "scan.png")]
-    code, out, err = run([*arguments, "-o", str(tmp_path), "--json"], capsys)
+    code, out, err = run(*arguments, "-o", str(tmp_path), "--json")
     assert (code, err) == (0, "")
     result = json.loads(out)
     assert result["kerf"]["value"] == pytest.approx(0.14, abs=0.004)
@@ -54,28 +42,24 @@ def test_a_scan_of_the_coupon_gives_the_kerf_twice(
         json.loads(Path(f"{stem}.json").read_text(encoding="utf-8"))["pieces"] == result["pieces"]
     )
     assert "<svg" in Path(f"{stem}.svg").read_text(encoding="utf-8")
-    code, out, _ = run(["kerf", f"{stem}_sizes.csv", "--json"], capsys)
+    code, out, _ = run("kerf", f"{stem}_sizes.csv", "--json")
     assert code == 0
     assert json.loads(out)["all"]["kerf"]["value"] == pytest.approx(0.14, abs=0.006)
     record = ["record", "1dof-5mm", "--serial", "A1", "--lab", str(tmp_path / "lab.sqlite")]
-    code, out, err = run([*record, "--history", f"{stem}_history.json"], capsys)
+    code, out, err = run(*record, "--history", f"{stem}_history.json")
     assert (code, err) == (0, "")
     assert result["picture_sha256"] in out
 
 
-def test_a_missing_piece_ends_in_code_1(
-    coupon: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_missing_piece_ends_in_code_1(coupon: Path, tmp_path: Path, run: Run) -> None:
     arguments = ["inspect", str(coupon / "coupon/coupon.dxf"), str(coupon / "less.png")]
-    code, out, _ = run([*arguments, "-o", str(tmp_path)], capsys)
+    code, out, _ = run(*arguments, "-o", str(tmp_path))
     assert code == 1
     assert "is missing" in out
     assert out.rstrip().endswith("coupon: 3 of 4 pieces as drawn")
 
 
-def test_a_bar_tells_the_scale(
-    coupon: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_bar_tells_the_scale(coupon: Path, tmp_path: Path, run: Run) -> None:
     """The scan is 400 dpi, and the bar beside the frames is 30 mm, drawn as 400.8 dpi would."""
     pixels = render(coupon / "coupon/coupon.dxf", Camera(dpi=400, margin=12))
     image = Image.fromarray(pixels)
@@ -83,7 +67,7 @@ def test_a_bar_tells_the_scale(
     ImageDraw.Draw(image).rectangle((100, 40, 100 + round(length) - 1, 80), fill=190)
     image.save(tmp_path / "bar.png")
     arguments = ["inspect", str(coupon / "coupon/coupon.dxf"), str(tmp_path / "bar.png")]
-    code, out, _ = run([*arguments, "--bar", "30", "-o", str(tmp_path), "--json"], capsys)
+    code, out, _ = run(*arguments, "--bar", "30", "-o", str(tmp_path), "--json")
     assert code == 0
     expected = 30 / (round(length) * 25.4 / 400)
     assert json.loads(out)["scale"]["x"] == pytest.approx(expected, abs=4e-4)
@@ -110,14 +94,14 @@ def test_bad_input_is_one_sentence(
     says: str,
     coupon: Path,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    run: Run,
 ) -> None:
     save(np.full((200, 200), 9, dtype=np.uint8), coupon / "dark.png", 400)
     save(np.full((20, 20), 9, dtype=np.uint8), coupon / "tiny.png", 400)
     drawing = coupon / "coupon/coupon.dxf"
     out = tmp_path / "out"
     arguments = ["inspect", str(drawing), str(coupon / picture), *more, "-o", str(out)]
-    code, printed, err = run(arguments, capsys)
+    code, printed, err = run(*arguments)
     if says == "--paper light":
         # Read as a sheet without its pieces, the film seems larger than drawn.
         assert code == 2

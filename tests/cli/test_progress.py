@@ -29,16 +29,6 @@ def test_time_left_is_that_of_the_pace_so_far() -> None:
     assert Pace("trial 3", 0, 0, 61.0, 50.0).text == "trial 3, 1 min 01 s elapsed"
 
 
-def test_quick_work_shows_no_line_on_a_terminal() -> None:
-    assert [
-        Pace("bond-width", 0, 16, elapsed, elapsed).is_shown for elapsed in (0.0, 0.9, 1.0)
-    ] == [
-        False,
-        False,
-        True,
-    ]
-
-
 def test_a_stage_begins_where_less_is_done_or_the_total_is_another() -> None:
     clock = Clock()
     stages = Stages(clock)

@@ -7,15 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from sbafab.cli import main
-
-
-def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    out, err = capsys.readouterr()
-    return int(ended.value.code or 0), out, err
-
+from tests.cli.conftest import Run
 
 RECIPE = """
 [[laser.recipe]]
@@ -30,15 +22,15 @@ source = "material test of day one"
 
 
 def test_a_recipe_of_the_kit_is_in_the_project_of_its_film(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert run(["new", "kit", "lab.toml"], capsys)[0] == 0
+    assert run("new", "kit", "lab.toml")[0] == 0
     kit = Path("lab.toml")
     kit.write_text(kit.read_text() + RECIPE)
 
     few = ["1dof-5mm", "--set", "stack.balloons=2", "--set", "kit=lab.toml"]
-    assert run(["cut", *few, "--set", "laser.machine=K40"], capsys)[0] == 0
+    assert run("cut", *few, "--set", "laser.machine=K40")[0] == 0
     powers = {}
     for film in ("TPE", "PTFE"):
         root = ElementTree.parse(f"out/1dof-5mm/sheets/{film}_1.lbrn2").getroot()
@@ -56,24 +48,24 @@ def test_a_recipe_of_the_kit_is_in_the_project_of_its_film(
     cut = {key for key, value in powers.items() if value == ("30", "20")}
     assert cut == {("TPE", "CUT_INNER"), ("TPE", "CUT_OUTER")}
     assert {value for key, value in powers.items() if key not in cut} == {("0", None)}
-    assert run(["check", "out/1dof-5mm"], capsys)[0] == 0
+    assert run("check", "out/1dof-5mm")[0] == 0
     # Without the machine's name no recipe counts.
-    assert run(["cut", *few], capsys)[0] == 0
+    assert run("cut", *few)[0] == 0
     text = Path("out/1dof-5mm/sheets/TPE_1.lbrn2").read_text()
     assert 'maxPower Value="30"' not in text
     assert "Powers are 0" in text
 
     kit.write_text(kit.read_text() + RECIPE)
-    code, _, err = run(["check", *few], capsys)
+    code, _, err = run("check", *few)
     assert code == 2
     assert "two recipes to cut Stretchlon 200 of 0.038 mm on K40; keep one" in err
 
 
 def test_a_faulty_recipe_of_a_kit_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert run(["new", "kit", "lab.toml"], capsys)[0] == 0
+    assert run("new", "kit", "lab.toml")[0] == 0
     whole = {
         "film": '"Stretchlon 200"',
         "thickness_mm": "0.038",
@@ -93,6 +85,6 @@ def test_a_faulty_recipe_of_a_kit_is_named(
     ):
         table = "\n".join(f"{name} = {said}" for name, said in {**whole, key: value}.items())
         Path("lab.toml").write_text(f"{plain}\n[[laser.recipe]]\n{table}\n")
-        code, _, err = run(["check", "1dof-5mm", "--set", "kit=lab.toml"], capsys)
+        code, _, err = run("check", "1dof-5mm", "--set", "kit=lab.toml")
         assert code == 2, err
         assert says in err

@@ -9,23 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.cli import main
 from sbafab.models.calibrated import load_calibration
 from sbafab.reports.traveller.page import record_text
+from tests.cli.conftest import Run
 from tests.site.formats import hold
-
-
-def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    out, err = capsys.readouterr()
-    return int(ended.value.code or 0), out, err
-
-
-@pytest.fixture(autouse=True)
-def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("SBAFAB_LAB", raising=False)
 
 
 @pytest.fixture
@@ -39,18 +26,16 @@ def offline(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("offline")
-def test_from_the_first_record_to_the_report(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_from_the_first_record_to_the_report(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     told = ["--leak", "pass", "--burst", "3.5 bar", "--height", "500 um", "--operator", "Ada"]
-    code, out, err = run(["record", "1dof-5mm", "--serial", "A1", *told], capsys)
+    code, out, err = run("record", "1dof-5mm", "--serial", "A1", *told)
     assert (code, err) == (0, "")
     assert "serial A1: operator Ada, kit paper, leak pass, burst_kpa 350.0, height_mm 0.5" in out
     Path("batch.csv").write_text(
         "serial,leak,height_mm,operator\nA2,fail,0.48,Bo\nA3,pass,0.52,Bo\n"
     )
-    assert run(["record", "1dof-5mm", "--table", "batch.csv"], capsys)[0] == 0
-    code, out, _ = run(["record", "--correct", "2", "--leak", "pass", "--json"], capsys)
+    assert run("record", "1dof-5mm", "--table", "batch.csv")[0] == 0
+    code, out, _ = run("record", "--correct", "2", "--leak", "pass", "--json")
     hold("records", json.loads(out))
     [new] = json.loads(out)["records"]
     assert (code, new["corrects"], new["leak"], new["numbers"]) == (
@@ -62,7 +47,7 @@ def test_from_the_first_record_to_the_report(
 
     # The code on the traveller finds the record, and with the serial the one actuator.
     scanned = record_text("1dof-5mm", new["design_sha256"])
-    _, out, _ = run(["record", "--find", scanned, "--serial", "A2"], capsys)
+    _, out, _ = run("record", "--find", scanned, "--serial", "A2")
     assert [line.split(",")[0] for line in out.splitlines()] == [
         "record 2",
         "record 4",
@@ -71,10 +56,10 @@ def test_from_the_first_record_to_the_report(
     assert "corrected by 4" in out
     # As its last line says, to be typed by hand.
     arguments = scanned.splitlines()[-1].split()[1:]
-    assert len(run(arguments, capsys)[1].splitlines()) == 5
+    assert len(run(*arguments)[1].splitlines()) == 5
 
     monkeypatch.setenv("SBAFAB_LAB", str(Path("lab.sqlite").resolve()))
-    _, out, _ = run(["record", "--report", "--json"], capsys)
+    _, out, _ = run("record", "--report", "--json")
     said = json.loads(out)
     hold("report", said)
     assert (said["records"], said["actuators"]) == (4, 3)
@@ -91,20 +76,20 @@ def test_from_the_first_record_to_the_report(
     assert height["high"] - 0.5 == pytest.approx(4.30265 * 0.02 / 3**0.5, rel=1e-4)
     assert height["verdict"] == "differs"
     advice = "1dof-5mm: sbafab calibrate fits the models to its height_mm"
-    assert advice in run(["record", "--report"], capsys)[1]
+    assert advice in run("record", "--report")[1]
 
 
-def test_what_was_mended_is_recorded_again(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["record", "1dof-5mm", "--serial", "A1", "--leak", "fail"], capsys)[0] == 0
+def test_what_was_mended_is_recorded_again(run: Run) -> None:
+    assert run("record", "1dof-5mm", "--serial", "A1", "--leak", "fail")[0] == 0
     again = ["record", "1dof-5mm", "--serial", "A1", "--leak", "pass"]
-    code, _, err = run([*again, "--set", "order.copies=8"], capsys)
+    code, _, err = run(*again, "--set", "order.copies=8")
     assert code == 2
     assert "serial A1 has leak = fail in record 1" in err
     assert "--again" in err
-    code, out, _ = run([*again, "--again"], capsys)
+    code, out, _ = run(*again, "--again")
     assert code == 0
     assert "serial A1: kit paper, leak pass, attempt 2" in out
-    _, out, _ = run(["record", "--report"], capsys)
+    _, out, _ = run("record", "--report")
     assert "Success: leak test passed at the first attempt" in out
     [row] = (line for line in out.splitlines() if line.startswith("all"))
     assert row.split()[:4] == ["all", "all", "0", "1"]
@@ -112,100 +97,49 @@ def test_what_was_mended_is_recorded_again(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_a_folder_is_recorded_as_the_design_that_it_was_built_from(
-    capsys: pytest.CaptureFixture[str],
+    run: Run,
 ) -> None:
     arguments = ["press", "1dof-5mm", "--set", "stack.balloons=2", "--set", "name=two"]
-    assert run(arguments, capsys)[0] == 0
-    _, out, _ = run(["record", "out/two", "--serial", "1", "--leak", "pass", "--json"], capsys)
+    assert run(*arguments)[0] == 0
+    _, out, _ = run("record", "out/two", "--serial", "1", "--leak", "pass", "--json")
     [record] = json.loads(out)["records"]
     manifest = json.loads(Path("out/two/manifest.json").read_text())
     assert record["design_sha256"] == manifest["design_sha256"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        ([], "give the DESIGN that was built, --find or --report"),
-        (["1dof-5mm"], "a result needs its serial"),
-        (["1dof-5mm", "--serial", "A1"], "A1 has no result; give leak"),
-        (["1dof-5mm", "--report"], "DESIGN does not go with --report"),
-        (["--report", "--find", "A1"], "--find does not go with --report"),
-        (["--chart", "a.svg", "--serial", "A1"], "--serial does not go with --chart"),
-        (["--report", "--leak", "pass"], "--leak does not go with --report"),
-        (["1dof-5mm", "--serial", "A1", "--withdraw"], "--withdraw does not go with DESIGN"),
-        (["1dof-5mm", "--table", "x.csv", "--leak", "pass"], "--leak does not go with --table"),
-        (["1dof-5mm", "--table", "x.csv"], "x.csv cannot be read"),
-        (["--correct", "1"], "give the correct result"),
-        (["--correct", "1", "--again"], "--again does not go with --correct"),
-        (["--correct", "x1", "--leak", "pass"], "no record such as 3 and no entry such as e3"),
-        (["--correct", "e1"], "give an --entry"),
-        (["--correct", "e1", "--entry", "note=x", "--leak", "pass"], "give an --entry"),
-        (["--correct", "1", "--leak", "pass", "--entry", "note=x"], "give the correct result"),
-        (["--charts", "c"], "--charts"),
-        (["--chart", "a.svg"], "lab.sqlite is no file of records"),
-        (["1dof-5mm", "--serial", "A1", "--entry", "step"], "must be fields such as step=1"),
-        (["1dof-5mm", "--serial", "A1", "--entry", "note='x"], "a quotation mark without"),
-        (["1dof-5mm", "--entry", "note=x"], "an entry needs its serial"),
-        (["1dof-5mm", "--history", "x.doc"], "ends in none of .csv, .toml, .json"),
-        (
-            ["1dof-5mm", "--serial", "A1", "--entry", "note=x", "--leak", "pass"],
-            "--leak does not go with --entry",
-        ),
-        (["1dof-5mm", "--serial", "A1", "--leak", "pass", "--again"], "no attempt before this"),
-        (["--correct", "1", "--leak", "fail"], "lab.sqlite does not exist"),
-        (["--report"], "lab.sqlite is no file of records; record something first"),
-        (["nosuch", "--serial", "A1", "--leak", "pass"], "nosuch"),
-        (["1dof-5mm", "--serial", "A1", "--burst", "3 N"], "must be a pressure"),
-        (["1dof-5mm", "--serial", "A1", "--force", "nan"], "force_n = nan must be a finite"),
-        (
-            ["1dof-5mm", "--serial", "A1", "--leak", "pass", "--lab", "no/lab.db"],
-            "cannot be opened",
-        ),
-    ],
-)
-def test_bad_input_is_one_sentence_and_exit_2(
-    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, out, err = run(["record", *arguments], capsys)
-    assert (code, out) == (2, "")
-    assert says in err
-    assert err.count("\n") == 1
-    assert not Path("lab.sqlite").exists()
-
-
-def test_a_file_of_another_program_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_of_another_program_is_one_sentence(run: Run) -> None:
     with sqlite3.connect("lab.sqlite") as rows:
         rows.execute("CREATE TABLE photos (id)")
     rows.close()
-    code, _, err = run(["record", "--report"], capsys)
+    code, _, err = run("record", "--report")
     assert code == 2
     assert err == (
         "sbafab: lab.sqlite is a database of another program; name the lab's file with --lab\n"
     )
-    assert run(["record", "--find", "A1", "--serial", "B"], capsys)[0] == 2
+    assert run("record", "--find", "A1", "--serial", "B")[0] == 2
 
 
-def test_history_is_recorded_corrected_and_exported(capsys: pytest.CaptureFixture[str]) -> None:
+def test_history_is_recorded_corrected_and_exported(run: Run) -> None:
     lines = ["--entry", "item=TPE lot=L7 expires=2026-01-31 date=2026-05-04", "--entry"]
     arguments = ["record", "1dof-5mm", "--serial", "A1, A2", *lines, "step=1 temperature_c=134,5"]
-    code, out, err = run(arguments, capsys)
+    code, out, err = run(*arguments)
     assert (code, err) == (0, "")
     assert "warning: entry e1: TPE lot L7 expired on 2026-01-31, before 2026-05-04" in out
     assert out.endswith("4 entries added to lab.sqlite\n")
     change = ["record", "--correct", "e3", "--entry", "temperature_c=135", "--json"]
-    document = json.loads(run(change, capsys)[1])
+    document = json.loads(run(*change)[1])
     hold("records", document)
     [entry] = document["entries"]
     readings = {"temperature_c": 135.0}
     assert (entry["corrects"], entry["readings"], entry["step"]) == (3, readings, "1")
-    exported = run(["record", "--find", "A1", "--export", "a.csv"], capsys)
+    exported = run("record", "--find", "A1", "--export", "a.csv")
     assert exported[:2] == (0, "a.csv: 1 device\n")
     assert Path("a.csv").read_text().count("\n") == 4
-    _, out, err = run(["record", "--find", "Z9"], capsys)
+    _, out, err = run("record", "--find", "Z9")
     assert "no record goes with 'Z9'" in err
 
 
-def test_the_share_of_success_is_drawn(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["record", "1dof-5mm", "--serial", "A1", "--leak", "pass"], capsys)[0] == 0
-    assert run(["record", "--chart", "rate.svg"], capsys)[:2] == (0, "rate.svg\n")
+def test_the_share_of_success_is_drawn(run: Run) -> None:
+    assert run("record", "1dof-5mm", "--serial", "A1", "--leak", "pass")[0] == 0
+    assert run("record", "--chart", "rate.svg")[:2] == (0, "rate.svg\n")
     assert Path("rate.svg").read_text().startswith("<?xml")

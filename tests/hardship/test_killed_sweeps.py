@@ -38,7 +38,7 @@ def _children(folder: Path) -> list[str]:
     for process in Path("/proc").glob("[0-9]*"):
         try:
             command = (process / "cmdline").read_bytes()
-            if b"sbafab.search.measure" in command and (process / "cwd").readlink() == folder:
+            if b"sbafab.search.trials" in command and (process / "cwd").readlink() == folder:
                 found.append(process.name)
         except OSError:
             continue

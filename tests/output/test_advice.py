@@ -14,7 +14,7 @@ from sbafab.output.advice import CHECK_SEED, SEED, YieldDesign, advise, reach_yi
 from sbafab.output.checked import AdviceEntry, check
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.registration_yield import simulate
-from sbafab.search.target_yield import ReachedYield
+from sbafab.search.compare import ReachedYield
 
 SMALL = ("1dof-5mm", "stack.balloons=2", "rules.yield_builds=1000")
 

@@ -80,6 +80,6 @@ def test_a_worker_killed_half_way_loses_and_doubles_no_row(
 def test_where_no_scheduler_answers_that_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sbafab.search.pool.CONNECT", 0.2)
+    monkeypatch.setattr("sbafab.search.trials.CONNECT", 0.2)
     with pytest.raises(OutputError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
         sbafab.sweep("1dof-5mm", vary=VARY, out=tmp_path, dask="tcp://127.0.0.1:9", **QUICK)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import NormalDist
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 
 import sbafab
 from sbafab.cli import app
@@ -22,22 +22,16 @@ from sbafab.errors import DesignError
 from sbafab.models.figures import Factors
 from sbafab.models.intervals import calibration_of
 from sbafab.models.unknowns import UNKNOWNS
-from sbafab.search import trial as module
-from sbafab.search.find import FindRequest, FoundDesign, RangeEnd, find, free_keys
-from sbafab.search.quantities import QUANTITIES, read_quantity
-from sbafab.search.trial import (
-    SearchProblem,
-    Trial,
-    figure_text,
-    free_of,
-    read_all,
-    read_free,
-)
+from sbafab.search import space as module
+from sbafab.search.find import FoundDesign, RangeEnd, find, free_keys
+from sbafab.search.quantities import QUANTITIES, read_all, read_quantity
+from sbafab.search.space import FindRequest, Trial, figure_text, free_of, read_free
 
 FREE = (Free("chamber.diameter", 3.0, 12.0, 0.1), Free("stack.balloons", 2, 20, 1))
+Search = Callable[..., FoundDesign]
 
 
-def _made_up(wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+def _made_up(wanted: FindRequest, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
     """Stroke 0.4 d n, mass d^2 n and a force that falls with stroke; small pockets cannot be."""
     d, n = values["chamber.diameter"], values["stack.balloons"]
     if d < 3.4:
@@ -49,23 +43,40 @@ def _made_up(wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool 
     return Trial(values, figures, {} if with_rules else None, missed, cost)
 
 
+def _request(
+    least: Sequence[str] = (),
+    most: Sequence[str] = (),
+    best: str = "mass",
+    free: tuple[Free, ...] | None = FREE,
+    **more: Any,
+) -> FindRequest:
+    return FindRequest(sbafab.load("1dof-5mm"), *read_all(least, most, best), free, **more)
+
+
+@pytest.fixture
+def search(monkeypatch: pytest.MonkeyPatch) -> Search:
+    """A search among made-up designs."""
+    monkeypatch.setattr(module, "evaluated", _made_up)
+    return lambda *limits, **more: find(_request(*limits, **more))
+
+
+def run(*arguments: str, to: Path) -> Result:
+    return CliRunner().invoke(app, ["find", "1dof-5mm", *arguments, "--to", str(to)])
+
+
 @pytest.mark.parametrize("stroke", [10, 25, 45])
 @pytest.mark.parametrize("force", [0.5, 1.5, 3.0])
 def test_it_finds_what_trying_every_design_finds(
-    stroke: float, force: float, monkeypatch: pytest.MonkeyPatch
+    stroke: float, force: float, search: Search
 ) -> None:
-    monkeypatch.setattr(module, "evaluated", _made_up)
-    requirements, goal = read_all(
-        [f"stroke@50kPa={stroke}", f"force@5mm@50kPa={force}"], ["width=12"], "mass"
-    )
-    request = FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE)
-    wanted = SearchProblem(request.design, requirements, goal)
+    limits = [f"stroke@50kPa={stroke}", f"force@5mm@50kPa={force}"], ["width=12"]
+    request = _request(*limits)
     every = [
-        _made_up(wanted, {"chamber.diameter": 3 + step / 10, "stack.balloons": n})
+        _made_up(request, {"chamber.diameter": 3 + step / 10, "stack.balloons": n})
         for step, n in itertools.product(range(91), range(2, 21))
     ]
     best = min(every, key=lambda trial: trial.rank)
-    found = find(request)
+    found = search(*limits)
     assert found.holds == best.holds
     assert found.tries < 0.14 * len(every)
     if best.holds:
@@ -74,72 +85,150 @@ def test_it_finds_what_trying_every_design_finds(
         assert found.best.missed <= best.missed + 0.01
     # Each step that would be better is said to break something, and it does.
     for bind in found.binds:
-        values = {**found.best.values, bind.key: bind.value}
-        assert not _made_up(wanted, values).holds
+        assert not _made_up(request, {**found.best.values, bind.key: bind.value}).holds
         assert bind.breaks
     for one, other in itertools.permutations(found.front, 2):
         worse = [one.cost >= other.cost]
-        worse += [one.value(r) <= other.value(r) for r in requirements if r.at_least]
-        worse += [one.value(r) >= other.value(r) for r in requirements if not r.at_least]
+        worse += [one.value(r) <= other.value(r) for r in request.requirements if r.at_least]
+        worse += [one.value(r) >= other.value(r) for r in request.requirements if not r.at_least]
         assert not all(worse)
 
 
 def test_what_is_missed_by_a_few_designs_alone_ends_with_the_nearest() -> None:
     """Two of them: once they are tried, nothing is left to try."""
-    found = sbafab.find(
-        "1dof-5mm",
-        least={"stroke@10kPa": 1000},
-        free=(Free("stack.balloons", 3, 4, 1),),
-    )
+    free = (Free("stack.balloons", 3, 4, 1),)
+    found = sbafab.find("1dof-5mm", least={"stroke@10kPa": 1000}, free=free)
     assert not found.holds
-    assert found.tries == 2
+    assert (found.tries, found.is_cut_short) == (2, False)
     assert found.best.values == {"stack.balloons": 4}
     assert [(one.key, one.value) for one in found.ends] == [("stack.balloons", 4)]
-    assert not found.is_cut_short
 
 
-def test_a_range_of_the_family_widens_where_the_best_lies_beyond(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_range_of_the_family_widens_where_the_best_lies_beyond(search: Search) -> None:
     """With 20 balloons, 0.4 d n = 200 takes d = 25, beyond 16."""
-    monkeypatch.setattr(module, "evaluated", _made_up)
-    requirements, goal = read_all(["stroke@50kPa=200"], [], "mass")
     own = tuple(sbafab.load("1dof-5mm").free[:2])
-    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, own))
+    found = search(["stroke@50kPa=200"], free=own)
     assert found.holds
     assert found.best.values == {"chamber.diameter": 25.0, "stack.balloons": 20}
-    stays = tuple(replace(one, widens=False) for one in own)
-    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, stays))
+    found = search(["stroke@50kPa=200"], free=tuple(replace(one, widens=False) for one in own))
     assert not found.holds
-    assert {(one.key, one.value) for one in found.ends} == {
-        ("chamber.diameter", 16.0),
-        ("stack.balloons", 20),
-    }
+    ends = {(one.key, one.value) for one in found.ends}
+    assert ends == {("chamber.diameter", 16.0), ("stack.balloons", 20)}
 
 
-def test_no_more_designs_are_tried_than_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "evaluated", _made_up)
-    requirements, goal = read_all(["stroke@50kPa=25"], [], "mass")
+@pytest.mark.usefixtures("search")
+def test_no_more_designs_are_tried_than_asked_for() -> None:
     told: list[tuple[int, int]] = []
-    found = find(
-        FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE, tries=30),
-        lambda _, done, total: told.append((done, total)),
-    )
+    request = _request(["stroke@50kPa=25"], tries=30)
+    found = find(request, lambda _, done, total: told.append((done, total)))
     assert found.tries == 30
     assert found.is_cut_short
-    assert {total for _, total in told} == {30}
-    assert [done for done, _ in told] == list(range(30))
+    assert told == [(done, 30) for done in range(30)]
 
 
-def test_the_front_is_shown_from_end_to_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "evaluated", _made_up)
-    requirements, goal = read_all(["stroke@50kPa=10"], [], "mass")
-    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE))
+def test_the_front_is_shown_from_end_to_end(search: Search) -> None:
+    found = search(["stroke@50kPa=10"])
     assert len(found.front) == 8 < found.on_front
     strokes = [one.figures["stroke@50kPa"] for one in found.front]
     assert strokes == sorted(strokes)
     # The longest of all, 0.4 x 12 x 20, is on every front.
     assert strokes[-1] == pytest.approx(96)
+
+
+def test_what_stops_the_nearest_miss_is_told(search: Search) -> None:
+    """Least width of what can be made is 3.4 + 1.5; smaller pockets cannot be."""
+    found = search([], ["width=4"])
+    assert not found.holds
+    assert found.best.values["chamber.diameter"] == 3.4
+    told = [(one.key, one.value, one.breaks) for one in found.binds]
+    assert told == [("chamber.diameter", 3.3, "too small")]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "goal", "bound"),
+    [(3.3, 5.0, "mass", ["chamber.diameter"]), (3.0, 3.4, "stroke@50kPa", [])],
+)
+def test_what_cannot_be_made_binds_on_the_way_to_the_goal_alone(
+    low: float, high: float, goal: str, bound: list[str], search: Search
+) -> None:
+    """Pockets of 3.3 cannot be made: that stops the least pocket, and not one that is to grow."""
+    free = (Free("chamber.diameter", low, high, 0.1), Free("stack.balloons", 5, 5, 1))
+    found = search(best=goal, free=free)
+    assert found.best.values["chamber.diameter"] == 3.4
+    assert [one.key for one in found.binds] == bound
+
+
+def test_rules_are_asked_of_few_designs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All nine are tried, each better than the one before: only the best is asked for its rules."""
+    asked: list[int] = []
+
+    def counted(wanted: FindRequest, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+        if with_rules:
+            asked.append(values["stack.balloons"])
+        return _made_up(wanted, {"chamber.diameter": 5.0, **values}, with_rules)
+
+    monkeypatch.setattr(module, "evaluated", counted)
+    found = find(_request(best="stroke@50kPa", free=(Free("stack.balloons", 2, 10, 1),)))
+    assert found.best.figures["stroke@50kPa"] == pytest.approx(20)
+    # And a step beyond its range, which would be better.
+    assert set(asked) == {10, 11}
+
+
+def test_what_equals_the_best_is_told_by_its_mass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every design has the same width; more balloons weigh more, and give more stroke."""
+
+    def flat(wanted: FindRequest, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+        n = values["stack.balloons"]
+        figures = {"width": 5.0, "stroke@10kPa": 1.0 * n}
+        return Trial(values, figures, {} if with_rules else None, max(0.0, 4 - n), 5.0, 10.0 + n)
+
+    monkeypatch.setattr(module, "evaluated", flat)
+    found = find(
+        _request(["stroke@10kPa=4"], best="width", free=(Free("stack.balloons", 2, 9, 1),))
+    )
+    assert found.best.values == {"stack.balloons": 4}
+    assert [one.values["stack.balloons"] for one in found.front] == [4, 9]
+
+
+@pytest.mark.long
+def test_a_search_by_optuna_that_is_stopped_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The design at which it was stopped is none of those that are stored."""
+    optuna = pytest.importorskip("optuna")
+    storage = f"sqlite:///{tmp_path / 'search.db'}"
+    request = _request(["stroke@50kPa=25"], tries=20, optuna=True, storage=storage)
+    seen: list[Mapping[str, Any]] = []
+
+    def stopping(wanted: FindRequest, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+        seen.append(values)
+        if len(seen) == 8:
+            raise KeyboardInterrupt
+        return _made_up(wanted, values, with_rules)
+
+    monkeypatch.setattr(module, "evaluated", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        find(request)
+    assert "Traceback" not in capfd.readouterr().err
+    monkeypatch.setattr(module, "evaluated", _made_up)
+    find(request)
+    (study,) = optuna.get_all_study_summaries(storage)
+    kept = optuna.load_study(study_name=study.study_name, storage=storage)
+    # 0.6 of the tries are Optuna's, each told to the end.
+    assert [trial.state.name for trial in kept.trials].count("COMPLETE") == 12
+    # A design that was changed is another search, whatever its name.
+    find(replace(request, design=sbafab.load("1dof-5mm", "inlet.tab_length=6")))
+    assert len(optuna.get_all_study_summaries(storage)) == 2
+
+
+@pytest.mark.parametrize(
+    ("low", "above", "wider"), [(7, True, (7, 8)), (7, False, (6, 7)), (1, False, (0, 1))]
+)
+def test_a_wider_range_is_never_the_same(low: int, above: bool, wider: tuple[int, int]) -> None:
+    assert RangeEnd("stack.balloons", low, low, low, 1, above).wider == wider
+
+
+# Real designs.
 
 
 def test_the_same_search_finds_the_same() -> None:
@@ -153,65 +242,18 @@ def test_the_same_search_finds_the_same() -> None:
 
 def test_where_nothing_meets_all_the_nearest_miss_is_said(tmp_path: Path) -> None:
     target = tmp_path / "found.toml"
-    asked = ["find", "1dof-5mm", "--max", "outline_diameter=4", "--tries", "4", "--to", str(target)]
-    ended = CliRunner().invoke(app, asked)
+    asked = ("--max", "outline_diameter=4", "--tries", "4")
+    ended = run(*asked, to=target)
     assert ended.exit_code == 1
     assert "Nearest miss: chamber.diameter = 2.6" in ended.output
     assert "outline_diameter 4.1 mm; at most 4 mm: MISSED" in ended.output
     assert not target.exists()
     target.write_text("mine")
-    ended = CliRunner().invoke(app, asked)
-    assert ended.exit_code == 2
-    assert "exists and is not overwritten" in ended.output
-    assert target.read_text() == "mine"
-
-
-@pytest.mark.parametrize(
-    ("asked", "said"),
-    [
-        (["--min", "strok=5"], "did you mean stroke?"),
-        (["--min", "stroke=5", "--max", "stroke=4"], "contradict each other"),
-        (["--min", "inflated_diameter=5", "--max", "inflated_diameter=4"], "contradict each other"),
-        (["--max", "mass=nan"], "must be a number"),
-        (["--min", "bend=90"], "1dof-5mm does not bend"),
-        (["--max", "time=1", "--flow", "35 l"], "must be a flow"),
-        (["--sure", "0.4"], "must be above 0.5 and below 1"),
-        (["--sure", "90"], "must be a share from 0 to 1"),
-        (["--min", "reference_stroke=5", "--sure", "0.9"], "ask for stroke@10kPa"),
-        (["--set", "models.calibration=none", "--sure", "0.9"], "needs a calibration"),
-        (["--max", "mass=-1"], "must be at least 0"),
-        (["--min", "yield=95"], "a share from 0 to 1"),
-        (["--min", "stroke@50=5"], "'50' has no unit; write 50kPa"),
-        (["--min", "force@1mm@5kPa@6kPa=1"], "names two pressures"),
-        (["--min", "chamber.diamter=5"], "did you mean chamber.diameter?"),
-        (["--min", "lumen=3"], "1dof-5mm has no lumen"),
-        (["--min", "inlet.tab_length=6"], "--free inlet.tab_length=LOW:HIGH:STEP"),
-        (["--max", "deflated_diameter=3"], "only radial designs"),
-        (["--free", "chamber.diameter=6:3:1"], "--free 'chamber.diameter=6:3:1' stops below"),
-        (["--free", "registration.method=ears,glue"], "'glue' must be 'channel-pin' or 'ears'"),
-        (["--min", "registration.method=3"], "is a word, 'channel-pin', and has no least or most"),
-    ],
-)
-def test_what_cannot_be_asked_is_said_before_anything_else(
-    asked: list[str], said: str, tmp_path: Path
-) -> None:
-    """Also before the file that is there, which is another problem."""
-    target = tmp_path / "found.toml"
-    target.write_text("mine")
-    ended = CliRunner().invoke(app, ["find", "1dof-5mm", *asked, "--to", str(target)])
-    assert ended.exit_code == 2
-    assert said in " ".join(ended.output.split())
-    assert target.read_text() == "mine"
-
-
-def test_a_file_that_exists_is_refused_before_the_search(tmp_path: Path) -> None:
-    target = tmp_path / "found.toml"
-    target.write_text("mine")
-    asked = ["find", "1dof-5mm", "--min", "stroke=5", "-v", "--to", str(target)]
-    ended = CliRunner().invoke(app, asked)
+    ended = run(*asked, to=target)
     assert ended.exit_code == 2
     assert "exists and is not overwritten" in ended.output
     assert "trying designs" not in ended.output
+    assert target.read_text() == "mine"
 
 
 def test_paths_of_a_found_design_start_beside_it(
@@ -240,83 +282,50 @@ def test_paths_of_a_found_design_start_beside_it(
         assert sbafab.load(tmp_path / "moved" / name).stack.balloons == 2
 
 
-def test_a_folder_gets_found_toml(tmp_path: Path) -> None:
-    asked = ["find", "1dof-5mm", "--max", "mass=1", "--tries", "4", "-o", str(tmp_path / "new")]
-    ended = CliRunner().invoke(app, asked)
+def test_a_file_is_called_as_asked_and_its_design_loads(tmp_path: Path) -> None:
+    asked = ("--max", "mass=1", "--tries", "4", "--set", "stack.balloons=4")
+    ended = CliRunner().invoke(app, ["find", "1dof-5mm", *asked, "-o", str(tmp_path / "new")])
     assert ended.exit_code == 0, ended.output
     assert sbafab.load(tmp_path / "new" / "found.toml").name == "found"
-    assert CliRunner().invoke(app, asked).exit_code == 2
-    named = [*asked[:-2], "--to", str(tmp_path / "tip.toml")]
-    assert CliRunner().invoke(app, named).exit_code == 0
-    assert sbafab.load(tmp_path / "tip.toml").name == "tip"
-    (tmp_path / "file").write_text("mine")
-    ended = CliRunner().invoke(app, [*asked[:-1], str(tmp_path / "file")])
-    assert ended.exit_code == 2
-    assert "is a file, not a folder; choose a folder with -o" in ended.output
+    ended = run(*asked, to=tmp_path / "my file.toml")
+    assert ended.exit_code == 0, ended.output
+    assert f"sbafab generate '{tmp_path / 'my file.toml'}'" in ended.output
+    design = sbafab.load(tmp_path / "my file.toml")
+    assert design.name == "my-file"
+    # A key that is set stays.
+    assert design.stack.balloons == 4
+    assert "stack.balloons" not in ended.output.partition("from 1dof-5mm")[0]
 
 
-TAPER = ["--set", "chamber.diameter=[8, 7, 6]", "--set", "stack.balloons=3"]
+TAPER = ("--set", "chamber.diameter=[8, 7, 6]", "--set", "stack.balloons=3")
 
 
 def test_a_taper_is_scaled_as_a_whole(tmp_path: Path) -> None:
-    target = tmp_path / "found.toml"
-    asked = [
-        "find",
-        "1dof-5mm",
-        *TAPER,
-        "--min",
-        "reference_stroke=4",
-        "--tries",
-        "200",
-        "--to",
-        str(target),
-    ]
-    ended = CliRunner().invoke(app, asked)
+    asked = (*TAPER, "--min", "reference_stroke=4", "--tries", "40")
+    ended = run(*asked, "--free", "chamber.diameter=6:12:0.2", to=tmp_path / "found.toml")
     assert ended.exit_code == 0, ended.output
-    diameters: Any = sbafab.load(target).chamber.diameter  # type: ignore[attr-defined]
+    diameters: Any = sbafab.load(tmp_path / "found.toml").chamber.diameter  # type: ignore[attr-defined]
     first, second, third = diameters
     assert (second / first, third / first) == pytest.approx((7 / 8, 6 / 8), abs=0.002)
-    # Sec. 4.6: 17.5 mm of 15 balloons of d = 5; the largest diameter goes in steps of 0.1.
+    # Sec. 4.6: 17.5 mm of 15 balloons of d = 5; the largest diameter goes in steps of 0.2.
     stroke = 17.5 / 15 / 5 * sum(diameters)
-    assert 4 <= stroke < 4 * (1 + 0.1 / first) + 0.01
+    assert 4 <= stroke < 4 * (1 + 0.2 / first) + 0.01
     assert f"reference_stroke {stroke:.4g} mm; at least 4 mm" in ended.output
-    refused = CliRunner().invoke(app, [*asked[:-1], str(tmp_path / "b"), *BALLOONS])
+    refused = run(*asked, "--free", "stack.balloons=2:4:1", to=tmp_path / "b.toml")
     assert refused.exit_code == 2
     assert "a search scales that list" in refused.output
-
-
-BALLOONS = ["--free", "stack.balloons=2:4:1"]
 
 
 @pytest.mark.long
 def test_a_stroke_is_not_met_by_what_predict_says_is_less(tmp_path: Path) -> None:
     """The elastic balloon rises by 20 mm where in proportion to what was measured it is 14."""
-    target = tmp_path / "found.toml"
-    asked = ["find", "1dof-5mm", "--min", "reference_stroke=20", "--max", "outline_diameter=8"]
-    ended = CliRunner().invoke(app, [*asked, "--tries", "60", "--to", str(target)])
-    assert ended.exit_code == 0, ended.output
-    assert sbafab.predict(target).value("reference_stroke") >= 20
-    target.unlink()
-    asked[3] = "stroke@10kPa=20"
-    ended = CliRunner().invoke(app, [*asked, "--tries", "60", "--to", str(target)])
-    assert ended.exit_code == 0, repr(ended.exception) + ended.output
-    assert sbafab.predict(target).value("reference_stroke") < 20
-
-
-@pytest.mark.long
-def test_find_refuses_what_predict_leaves_out() -> None:
-    """Another film has no reference stroke, and none rises where it would be 15 % longer."""
-    film = {"product": "TPU", "thickness": 0.1, "modulus": 20, "poisson": 0.45}
-    other = sbafab.load("3dof-15mm", films={"tpe": film})
-    wide = sbafab.load("1dof-10mm")
-    for design, text, name in (
-        (other, "reference_stroke", "reference stroke and height, and what is predicted at them"),
-        (wide, "stroke@100kPa", "free stroke at 100 kPa, elastic balloon"),
-    ):
-        told = {left.name: left.reason for left in sbafab.predict(design).left_out}
-        with pytest.raises(DesignError) as refused:
-            sbafab.find(design, least={text: 1}, tries=4, free=(Free("stack.balloons", 5, 6, 1),))
-        assert told[name] in str(refused.value)
+    asked = ("--max", "outline_diameter=8", "--free", "chamber.diameter=6:6.4:0.4")
+    asked = (*asked, "--free", "stack.balloons=8:14:2")
+    for name, is_met in (("reference_stroke", True), ("stroke@10kPa", False)):
+        target = tmp_path / f"{is_met}.toml"
+        ended = run("--min", f"{name}=20", *asked, to=target)
+        assert ended.exit_code == 0, ended.output
+        assert (sbafab.predict(target).value("reference_stroke") >= 20) == is_met
 
 
 def test_the_help_lists_every_quantity_with_its_unit() -> None:
@@ -329,42 +338,14 @@ def test_the_help_lists_every_quantity_with_its_unit() -> None:
         assert read_quantity(name).unit == one.unit
 
 
-def test_a_file_with_a_space_in_its_name_names_a_design_that_loads(tmp_path: Path) -> None:
-    target = tmp_path / "my file.toml"
-    asked = ["find", "1dof-5mm", "--max", "mass=1", "--tries", "6", "--to", str(target)]
-    ended = CliRunner().invoke(app, asked)
-    assert ended.exit_code == 0, ended.output
-    assert sbafab.load(target).name == "my-file"
-    assert f"sbafab generate '{target}'" in ended.output
-
-
-def test_what_equals_the_best_is_told_by_its_mass(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every design has the same width; more balloons weigh more, and give more stroke."""
-
-    def flat(wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
-        n = values["stack.balloons"]
-        figures = {"width": 5.0, "stroke@10kPa": 1.0 * n}
-        missed = max(0.0, 4 - n)
-        return Trial(values, figures, {} if with_rules else None, missed, 5.0, 10.0 + n)
-
-    monkeypatch.setattr(module, "evaluated", flat)
-    requirements, goal = read_all(["stroke@10kPa=4"], [], "width")
-    free = (Free("stack.balloons", 2, 9, 1),)
-    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, free))
-    assert found.best.values == {"stack.balloons": 4}
-    assert [one.values["stack.balloons"] for one in found.front] == [4, 9]
-
-
-HEIGHTS = (Free("stack.balloons", 2, 20, 1),)
-
-
-@pytest.mark.parametrize("sure", [None, 0.6, 0.9])
+@pytest.mark.parametrize("sure", [None, 0.9])
 def test_a_requirement_holds_with_a_probability(sure: float | None) -> None:
     """Heights are lognormal: 2 n - 1 masks, and 2 n films times the press factor, and what that
     and the number of balloons, 15 in the evidence, leave uncertain.
     """
     design = sbafab.load("1dof-5mm")
-    found = sbafab.find(design, most={"height": 0.9}, best="stroke", free=HEIGHTS, sure=sure)
+    free = (Free("stack.balloons", 2, 20, 1),)
+    found = sbafab.find(design, most={"height": 0.9}, best="stroke", free=free, sure=sure)
     calibration = calibration_of(design)
     assert calibration is not None
     row = [unknown.field for unknown in UNKNOWNS].index("press_factor")
@@ -384,7 +365,7 @@ def test_a_requirement_holds_with_a_probability(sure: float | None) -> None:
     bounds = {n: height(n) * math.exp(quantile * deviation(n)) for n in range(2, 21)}
     most = max(n for n, bound in bounds.items() if bound <= 0.9)
     assert found.best.values == {"stack.balloons": most}
-    (requirement,) = found.problem.requirements
+    (requirement,) = found.request.requirements
     assert found.best.value(requirement) == pytest.approx(height(most))
     assert found.best.judged(requirement) == pytest.approx(bounds[most], rel=1e-6)
     low, high = found.intervals["height"]
@@ -392,63 +373,27 @@ def test_a_requirement_holds_with_a_probability(sure: float | None) -> None:
     # No film is thinner than none.
     assert low == pytest.approx(max(height(most) / factor, (2 * most - 1) * 0.025))
     assert high == pytest.approx(height(most) * factor)
-    text = figure_text(found.problem, found.best, requirement)
+    text = figure_text(found.request, found.best, requirement)
     assert ("or less with" in text) == (sure is not None)
 
 
 def test_a_bound_is_shown_beside_its_median(tmp_path: Path) -> None:
     target = tmp_path / "found.toml"
-    asked = ["find", "1dof-5mm", "--max", "height=1.5", "--free", "stack.balloons=3:6:1"]
-    asked += ["--fix", "chamber.diameter"]
-    ended = CliRunner().invoke(app, [*asked, "--sure", "90%", "--to", str(target), "--json"])
+    asked = ("--max", "height=1.5", "--free", "stack.balloons=3:6:1", "--fix", "chamber.diameter")
+    ended = run(*asked, "--sure", "90%", "--json", to=target)
     assert ended.exit_code == 0, ended.output
     said = json.loads(ended.stdout)
     (row,) = said["requirements"]
     assert said["sure"] == 0.9
     assert row["median"] == said["best"]["figures"]["height"] < row["bound"] < row["limit"]
-    assert row["bound"] < said["intervals"]["height"][1]
+    low, high = said["intervals"]["height"]
+    assert row["bound"] < high
     head = target.read_text().splitlines()[1]
     assert f"{row['median']:.4g} mm in the median, {row['bound']:.4g} mm or less with 90 %" in head
-    target.unlink()
-    ended = CliRunner().invoke(app, [*asked, "--to", str(target)])
-    low, high = said["intervals"]["height"]
+    ended = run(*asked, to=tmp_path / "other.toml")
     shown = f"{low:.3g} to {high:.3g}"
     assert f"height {row['median']:.4g} mm ({shown}); at most 1.5 mm" in ended.output
-
-
-@pytest.mark.long
-def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:
-    asked = ["find", "1dof-5mm", "--min", "force@200mm@1kPa=1", "--tries", "6"]
-    asked += ["--free", "chamber.diameter=5:5.1:0.1"]
-    ended = CliRunner().invoke(app, [*asked, "--to", str(tmp_path / "found.toml")])
-    assert ended.exit_code == 1
-    assert "force@200mm@1kPa none, it does not rise that far; at least 1 N: MISSED" in ended.output
-
-
-def test_what_stops_the_nearest_miss_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Least width of what can be made is 3.4 + 1.5; smaller pockets cannot be."""
-    monkeypatch.setattr(module, "evaluated", _made_up)
-    requirements, goal = read_all([], ["width=4"], "mass")
-    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE))
-    assert not found.holds
-    assert found.best.values["chamber.diameter"] == 3.4
-    assert [(one.key, one.value, one.breaks) for one in found.binds] == [
-        ("chamber.diameter", 3.3, "too small")
-    ]
-
-
-def test_what_cannot_be_made_binds_on_the_way_to_the_goal_alone(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Pockets of 3.3 cannot be made: that stops the least pocket, and not one that is to grow."""
-    monkeypatch.setattr(module, "evaluated", _made_up)
-    design = sbafab.load("1dof-5mm")
-    for low, high, bound in ((3.3, 5.0, ["chamber.diameter"]), (3.0, 3.4, [])):
-        free = (Free("chamber.diameter", low, high, 0.1), Free("stack.balloons", 5, 5, 1))
-        requirements, goal = read_all([], [], "mass" if bound else "stroke@50kPa")
-        found = find(FindRequest(design, requirements, goal, free))
-        assert found.best.values["chamber.diameter"] == 3.4
-        assert [one.key for one in found.binds] == bound
+    assert "meets the requirement in the median. Next" in " ".join(ended.output.split())
 
 
 @pytest.mark.parametrize(
@@ -467,63 +412,22 @@ def test_what_a_program_asks_is_checked_too(asked: dict[str, Any], said: str) ->
 
 
 def test_a_requirement_beyond_a_range_that_widens_moves_it() -> None:
-    for least in ("20 mm", np.int64(20)):
-        found = sbafab.find("1dof-5mm", least={"chamber.diameter": least}, tries=12)
-        assert found.best.values["chamber.diameter"] == 20
-    design = sbafab.load("1dof-5mm")
+    found = sbafab.find("1dof-5mm", least={"chamber.diameter": np.int64(20)}, tries=12)
+    assert found.best.values["chamber.diameter"] == 20
     for least, most, ends in (("2", "9", (2.6, 9.0)), ("3", "20", (3.0, 16.0)), ("1", "2", (2, 2))):
-        asked = [f"chamber.diameter={least}"], [f"chamber.diameter={most}"]
-        requirements, goal = read_all(*asked, "mass")
-        free = free_keys(FindRequest(design, requirements, goal))[0]
+        limits = [f"chamber.diameter={least}"], [f"chamber.diameter={most}"]
+        free = free_keys(_request(*limits, free=None))[0]
         assert (free.low, free.high) == ends
-
-
-def test_rules_are_asked_of_few_designs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All nine are tried, each better than the one before: only the best is asked for its rules."""
-    asked: list[int] = []
-
-    def counted(
-        wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool = False
-    ) -> Trial:
-        if with_rules:
-            asked.append(values["stack.balloons"])
-        return _made_up(wanted, {"chamber.diameter": 5.0, **values}, with_rules)
-
-    monkeypatch.setattr(module, "evaluated", counted)
-    requirements, goal = read_all([], [], "stroke@50kPa")
-    free = (Free("stack.balloons", 2, 10, 1),)
-    found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, free))
-    assert found.best.figures["stroke@50kPa"] == pytest.approx(20)
-    # And a step beyond its range, which would be better.
-    assert set(asked) == {10, 11}
-
-
-def test_a_key_that_is_set_stays(tmp_path: Path) -> None:
-    target = tmp_path / "found.toml"
-    asked = ["find", "1dof-5mm", "--max", "mass=1", "--tries", "6", "--to", str(target)]
-    ended = CliRunner().invoke(app, [*asked, "--set", "stack.balloons=4"])
-    assert ended.exit_code == 0, ended.output
-    assert "stack.balloons" not in ended.output.partition("from 1dof-5mm")[0]
-    assert sbafab.load(target).stack.balloons == 4
-    # What it must fit gives the chamber, unless a range for it is named.
-    design = sbafab.load("1dof-5mm", "fits.diameter=20")
-    assert "chamber.diameter" not in [
-        one.key for one in read_free(design, [], [], ["fits.diameter"])
-    ]
-    free = read_free(design, ["stack.balloons=2:5:1"], [], ["stack.balloons"])
-    assert "stack.balloons" in [one.key for one in free]
 
 
 def test_tabs_in_the_way_are_named(tmp_path: Path) -> None:
     """Two tabs of 5 mm, or three, leave nothing within 10."""
-    asked = ["find", "3dof-15mm", "--max", "overall_diameter=10", "--tries", "8"]
-    ended = CliRunner().invoke(app, [*asked, "--to", str(tmp_path / "found.toml")])
+    asked = ("--max", "overall_diameter=10", "--tries", "4")
+    ended = run(*asked, to=tmp_path / "found.toml")
     assert ended.exit_code == 1
-    first, *rest = ended.stderr.splitlines()
-    assert first.startswith("note: overall_diameter counts the inlet tabs; use outline_diameter")
-    assert "inlet tabs" not in " ".join([*rest, ended.stdout])
-    freed = ["--free", "inlet.tab_length=3:5:0.5", "--to", str(tmp_path / "found.toml")]
-    assert "inlet tabs" not in CliRunner().invoke(app, [*asked, *freed]).output
+    assert ended.stderr.startswith("note: overall_diameter counts the inlet tabs; use outline_diam")
+    freed = run(*asked, "--free", "inlet.tab_length=3:5:1", to=tmp_path / "found.toml")
+    assert "inlet tabs" not in freed.output
 
 
 def test_keys_are_freed_and_fixed_by_name() -> None:
@@ -538,153 +442,12 @@ def test_keys_are_freed_and_fixed_by_name() -> None:
     ):
         with pytest.raises(DesignError, match=said):
             read_free(design, free, fixed)
-
-
-@pytest.mark.long
-def test_a_search_by_optuna_that_is_stopped_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """The design at which it was stopped is none of those that are stored."""
-    pytest.importorskip("optuna")
-    requirements, goal = read_all(["stroke@50kPa=25"], [], "mass")
-    request = FindRequest(
-        sbafab.load("1dof-5mm"),
-        requirements,
-        goal,
-        FREE,
-        tries=20,
-        optuna=True,
-        storage=f"sqlite:///{tmp_path / 'search.db'}",
-    )
-    seen: list[Mapping[str, Any]] = []
-
-    def stopping(
-        wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool = False
-    ) -> Trial:
-        seen.append(values)
-        if len(seen) == 8:
-            raise KeyboardInterrupt
-        return _made_up(wanted, values, with_rules)
-
-    monkeypatch.setattr(module, "evaluated", stopping)
-    with pytest.raises(KeyboardInterrupt):
-        find(request)
-    assert "Traceback" not in capfd.readouterr().err
-    monkeypatch.setattr(module, "evaluated", _made_up)
-    find(request)
-    import optuna
-
-    (study,) = optuna.get_all_study_summaries(request.storage or "")
-    kept = optuna.load_study(study_name=study.study_name, storage=request.storage)
-    # 0.6 of the tries are Optuna's, each told to the end.
-    states = [trial.state.name for trial in kept.trials]
-    assert states.count("COMPLETE") == 12
-    # A design that was changed is another search, whatever its name.
-    changed = replace(request, design=sbafab.load("1dof-5mm", "inlet.tab_length=6"))
-    find(changed)
-    assert len(optuna.get_all_study_summaries(request.storage or "")) == 2
-
-
-# Keys that are words.
-
-
-YIELDING = ("stack.balloons=2", "rules.yield_builds=400")
-ROUGH = ("registration.hand_placement=0.2", "registration.hand_turn=1")
-
-
-def best_yield(*assignments: str, free: Sequence[str]) -> FoundDesign:
-    design = sbafab.load("1dof-5mm", *YIELDING, *assignments)
-    fixed = [key.key for key in design.free]
-    requirements, goal = read_all([], [], "yield")
-    return find(FindRequest(design, requirements, goal, read_free(design, free, fixed), tries=8))
-
-
-def test_the_best_yield_is_that_of_the_best_words() -> None:
-    found = best_yield(*ROUGH, free=["registration.method=channel-pin,ears"])
-    assert found.best.values == {"registration.method": "ears"}
-    by_word = {trial.values["registration.method"]: trial for trial in (found.best, *found.front)}
-    for word, trial in by_word.items():
-        changed = sbafab.load("1dof-5mm", *YIELDING, *ROUGH, f"registration.method={word}")
-        (finding,) = (row for row in sbafab.check(changed) if row.rule == "registration-yield")
-        assert trial.figures["yield"] == finding.measured
-    # Words have no end beyond which another one would be better.
-    assert found.ends == ()
-
-
-@pytest.mark.parametrize("word", ["bottom-first", "middle-first"])
-def test_of_equal_words_that_of_the_design_stays(word: str) -> None:
-    # On ears every build is good, whatever is stacked first.
-    given = ("registration.method=ears", f"registration.sequence={word}")
-    found = best_yield(*given, free=["registration.sequence=bottom-first,middle-first"])
-    assert found.best.figures["yield"] == 1
-    assert found.best.values == {"registration.sequence": word}
-
-
-def test_a_yield_frees_the_ways_of_registration() -> None:
-    design = sbafab.load("1dof-5mm")
-    requirements, goal = read_all(["yield=0.9"], [], "mass")
-    free = {key.key: key for key in free_keys(FindRequest(design, requirements, goal))}
-    assert free["registration.method"].choices == ("channel-pin", "ears")
-    assert free["registration.sequence"].choices == ("bottom-first", "middle-first")
-    requirements, goal = read_all([], [], "mass")
-    keys = [key.key for key in free_keys(FindRequest(design, requirements, goal))]
-    assert not [key for key in keys if key.startswith("registration")]
-
-
-TPU = {"product": "TPU 85A", "thickness": 0.1, "modulus": 20, "poisson": 0.45, "density": 1200}
-
-
-@pytest.mark.parametrize(
-    ("asked", "left_out", "said"),
-    [
-        ("burst", (), "burst: the burst pressure of 3dof-15mm is not known"),
-        ("reference_stroke", (), "reference_stroke: reference stroke: the paper measured it"),
-        ("force@50%@10kPa", (), "force@50%@10kPa: reference stroke: the paper measured it"),
-        ("mass", ("density",), "mass: "),
-        ("stroke@10kPa", ("modulus",), "films.tpe.modulus"),
-    ],
-)
-def test_what_no_film_of_the_design_is_known_for_is_refused_before_any_is_tried(
-    asked: str, left_out: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "evaluated", None)
-    film = {key: value for key, value in TPU.items() if key not in left_out}
-    with pytest.raises(DesignError) as refused:
-        sbafab.find("3dof-15mm", films={"tpe": film}, most={asked: 1}, best="width")
-    assert said in str(refused.value)
-    # Another film may know it.
-    requirements, goal = read_all([], [f"{asked}=1"], "width")
-    free = (Free("films.tpe.thickness", 0.038, 0.1, 0.062),)
-    request = FindRequest(sbafab.load("3dof-15mm", films={"tpe": film}), requirements, goal, free)
-    assert free_keys(request) == free
-
-
-def test_the_reason_that_holds_for_most_is_given_and_not_that_of_the_smallest() -> None:
-    """Pockets of 2.5 mm are too small for the model; the other four stretch by over 15 %."""
-    with pytest.raises(DesignError) as refused:
-        sbafab.find(
-            "1dof-5mm",
-            {"models.calibration": "none"},
-            least={"stroke@340kPa": 4},
-            free=["chamber.diameter=2.5:5.1:0.65", "stack.balloons=6:6:1"],
-            best="width",
-        )
-    assert "longer" in str(refused.value)
-    assert "(4 of the 5 tried)" in str(refused.value)
-
-
-@pytest.mark.long
-def test_a_figure_is_that_of_predict_above_the_pressure_of_usual_maps() -> None:
-    """110 kPa: up to there a map is made without being asked."""
-    design = sbafab.load("3dof-15mm", films={"tpe": TPU})
-    found = sbafab.find(
-        design,
-        least={"force@0mm@200kPa": 1},
-        free=["chamber.diameter=5:5:1", "stack.balloons=15:15:1"],
-    )
-    predicted = sbafab.predict(design, pressures_kpa=200)
-    force = predicted.value("blocked_force", "elastic-stack", kpa=200, share=0)
-    assert found.best.figures["force@0mm@200kPa"] == pytest.approx(force, rel=1e-9)
+    # What it must fit gives the chamber, unless a range for it is named.
+    fits = sbafab.load("1dof-5mm", "fits.diameter=20")
+    keys = [one.key for one in read_free(fits, [], [], ["fits.diameter"])]
+    assert "chamber.diameter" not in keys
+    named = read_free(fits, ["stack.balloons=2:5:1"], [], ["stack.balloons"])
+    assert "stack.balloons" in [one.key for one in named]
 
 
 def test_keys_from_python_are_texts_as_on_the_command_line() -> None:
@@ -699,32 +462,92 @@ def test_keys_from_python_are_texts_as_on_the_command_line() -> None:
             sbafab.find(design, free=wrong)
 
 
-@pytest.mark.parametrize("sure", [[], ["--sure", "0.6"]])
-def test_what_holds_in_the_median_is_said_to(sure: list[str], tmp_path: Path) -> None:
-    asked = ["find", "1dof-5mm", "--max", "height=3", "--free", "stack.balloons=3:3:1"]
-    asked += ["--fix", "chamber.diameter", "--to", str(tmp_path / "found.toml"), *sure]
-    ended = " ".join(CliRunner().invoke(app, asked).output.split())
-    assert ("meets the requirement in the median. Next" in ended) == (not sure)
-    assert ("meets the requirement. Next" in ended) == bool(sure)
+# Keys that are words.
 
 
-@pytest.mark.long
-def test_a_range_of_one_value_is_widened_and_more_pressure_named(tmp_path: Path) -> None:
-    asked = ["find", "1dof-5mm", "--min", "force@2mm@10kPa=9", "--free", "stack.balloons=7:7:1"]
-    asked += ["--free", "chamber.diameter=9:9:0.5", "--set", "models.calibration=none"]
-    ended = CliRunner().invoke(app, [*asked, "--to", str(tmp_path / "found.toml")])
-    assert ended.exit_code == 1
-    assert "--free stack.balloons=7:8:1" in ended.output
-    assert "--free chamber.diameter=9:9.5:0.5" in ended.output
-    assert "7:7:1" not in ended.output
-    assert "more pressure, force@2mm@50kPa" in " ".join(ended.output.split())
-    asked[3] = "stroke@10kPa=900"
-    ended = CliRunner().invoke(app, [*asked, "--to", str(tmp_path / "found.toml")])
-    assert "more pressure" not in ended.output
+YIELDING = ("stack.balloons=2", "rules.yield_builds=400")
+ROUGH = ("registration.hand_placement=0.2", "registration.hand_turn=1")
+
+
+def best_yield(*assignments: str, free: str) -> FoundDesign:
+    design = sbafab.load("1dof-5mm", *YIELDING, *assignments)
+    keys = read_free(design, [free], [key.key for key in design.free])
+    return find(FindRequest(design, *read_all([], [], "yield"), keys, tries=8))
+
+
+def test_the_best_yield_is_that_of_the_best_words() -> None:
+    found = best_yield(*ROUGH, free="registration.method=channel-pin,ears")
+    assert found.best.values == {"registration.method": "ears"}
+    by_word = {trial.values["registration.method"]: trial for trial in (found.best, *found.front)}
+    for word, trial in by_word.items():
+        changed = sbafab.load("1dof-5mm", *YIELDING, *ROUGH, f"registration.method={word}")
+        (finding,) = (row for row in sbafab.check(changed) if row.rule == "registration-yield")
+        assert trial.figures["yield"] == finding.measured
+    # Words have no end beyond which another one would be better.
+    assert found.ends == ()
+
+
+@pytest.mark.parametrize("word", ["bottom-first", "middle-first"])
+def test_of_equal_words_that_of_the_design_stays(word: str) -> None:
+    # On ears every build is good, whatever is stacked first.
+    given = ("registration.method=ears", f"registration.sequence={word}")
+    found = best_yield(*given, free="registration.sequence=bottom-first,middle-first")
+    assert found.best.figures["yield"] == 1
+    assert found.best.values == {"registration.sequence": word}
+
+
+def test_a_yield_frees_the_ways_of_registration() -> None:
+    free = {key.key: key for key in free_keys(_request(["yield=0.9"], free=None))}
+    assert free["registration.method"].choices == ("channel-pin", "ears")
+    assert free["registration.sequence"].choices == ("bottom-first", "middle-first")
+    keys = [key.key for key in free_keys(_request(free=None))]
+    assert not [key for key in keys if key.startswith("registration")]
+
+
+# Films of which something is not known.
+
+
+TPU = {"product": "TPU 85A", "thickness": 0.1, "modulus": 20, "poisson": 0.45, "density": 1200}
 
 
 @pytest.mark.parametrize(
-    ("low", "above", "wider"), [(7, True, (7, 8)), (7, False, (6, 7)), (1, False, (0, 1))]
+    ("asked", "left_out", "said"),
+    [
+        ("burst", "", "burst: the burst pressure of 3dof-15mm is not known"),
+        ("reference_stroke", "", "reference_stroke: reference stroke: the paper measured it"),
+        ("force@50%@10kPa", "", "force@50%@10kPa: reference stroke: the paper measured it"),
+        ("mass", "density", "mass: "),
+        ("stroke@10kPa", "modulus", "films.tpe.modulus"),
+    ],
 )
-def test_a_wider_range_is_never_the_same(low: int, above: bool, wider: tuple[int, int]) -> None:
-    assert RangeEnd("stack.balloons", low, low, low, 1, above).wider == wider
+def test_what_no_film_of_the_design_is_known_for_is_refused_before_any_is_tried(
+    asked: str, left_out: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "evaluated", None)
+    film = {key: value for key, value in TPU.items() if key != left_out}
+    with pytest.raises(DesignError) as refused:
+        sbafab.find("3dof-15mm", films={"tpe": film}, most={asked: 1}, best="width")
+    assert said in str(refused.value)
+    # Another film may know it.
+    free = (Free("films.tpe.thickness", 0.038, 0.1, 0.062),)
+    design = sbafab.load("3dof-15mm", films={"tpe": film})
+    assert free_keys(FindRequest(design, *read_all([], [f"{asked}=1"], "width"), free)) == free
+
+
+def test_the_reason_that_holds_for_most_is_given_and_not_that_of_the_smallest() -> None:
+    """Pockets of 2.5 mm are too small for the model; the other four stretch by over 15 %."""
+    free = ["chamber.diameter=2.5:5.1:0.65", "stack.balloons=6:6:1"]
+    drawn = {"models.calibration": "none"}
+    with pytest.raises(DesignError, match=r"longer.*\(4 of the 5 tried\)"):
+        sbafab.find("1dof-5mm", drawn, least={"stroke@340kPa": 4}, free=free, best="width")
+
+
+@pytest.mark.long
+def test_a_figure_is_that_of_predict_above_the_pressure_of_usual_maps() -> None:
+    """110 kPa: up to there a map is made without being asked."""
+    design = sbafab.load("1dof-5mm", "stack.balloons=2", films={"tpe": TPU})
+    free = ["chamber.diameter=5:5:1", "stack.balloons=2:2:1"]
+    found = sbafab.find(design, least={"force@0mm@200kPa": 1}, free=free)
+    predicted = sbafab.predict(design, pressures_kpa=200)
+    force = predicted.value("blocked_force", "elastic-stack", kpa=200, share=0)
+    assert found.best.figures["force@0mm@200kPa"] == pytest.approx(force, rel=1e-9)

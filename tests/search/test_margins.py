@@ -9,7 +9,7 @@ import pytest
 import sbafab
 from sbafab.rules.finding import Finding, Findings, Place
 from sbafab.rules.limits import TOLERANCE
-from sbafab.search.measure import margin_of, margins
+from sbafab.search.trials import margin_of, margins
 
 FAULTY = (
     {"bond.width": 0.6, "mask.overhang": 0.3, "laser.least_feature": 1.2},

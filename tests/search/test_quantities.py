@@ -9,8 +9,7 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.search.quantities import RequestedQuantity, Subject, read_limit, read_quantity
-from sbafab.search.trial import read_all
+from sbafab.search.quantities import RequestedQuantity, Subject, read_all, read_limit, read_quantity
 from tests.quick import few
 
 UNCALIBRATED = {"calibration": "none"}
@@ -19,7 +18,7 @@ UNCALIBRATED = {"calibration": "none"}
 
 def _value(text: str, name: str = "1dof-5mm", **tables: Any) -> float:
     design = sbafab.load(name, **tables)
-    return Subject(design, sbafab.build(design)).value(read_quantity(text), lambda: 0.875)
+    return Subject(design, sbafab.build(design)).value(read_quantity(text), 0.875)
 
 
 @pytest.mark.parametrize(
@@ -130,7 +129,7 @@ def test_what_must_reach_counts_the_lens_and_what_must_not_touch_the_cylinder(na
     chamber = {"width": 9.5, "length": 9.5}
     design = sbafab.load("radial-15mm", chamber=chamber, models=UNCALIBRATED)
     subject = Subject(design, sbafab.build(design))
-    reached, widest = (subject.value(one.quantity, lambda: 1.0) for one in (reach, clear))
+    reached, widest = (subject.value(one.quantity) for one in (reach, clear))
     assert widest == pytest.approx(15.328 + 4 * 8 / math.pi)
     stroke = sbafab.predict(design).value("reference_stroke")
     assert reached == pytest.approx(15.328 + 2 * stroke)
@@ -187,7 +186,7 @@ def test_each_interval_is_the_one_of_predict() -> None:
     for text, name in names.items():
         (figure,) = (one for one in said.figures if one.name == name and one.interval)
         quantity = read_quantity(text)
-        assert subject.value(quantity, lambda: 1.0) == pytest.approx(figure.value, rel=1e-9), text
+        assert subject.value(quantity) == pytest.approx(figure.value, rel=1e-9), text
         assert subject.interval(quantity) == pytest.approx(figure.interval, rel=1e-9), text
         assert (subject.counterpart(quantity) is None) == (figure.measured is None), text
     for exact in ("mass", "lumen", "reference_stroke"):
@@ -262,7 +261,7 @@ def test_a_mechanism_is_the_figure_of_predict() -> None:
             quantity = read_quantity(text)
             said = sbafab.predict(design, pressures_kpa=[quantity.kpa or 10.0])
             (figure,) = (item for item in said.figures if item.name == name)
-            assert subject.value(quantity, lambda: 1.0) == figure.value, text
+            assert subject.value(quantity) == figure.value, text
             assert quantity.unit == figure.unit
             assert subject.interval(quantity) is None
 

@@ -15,15 +15,13 @@ import pytest
 from scipy.stats import binomtest
 
 import sbafab
-from sbafab.cli.sweep import SweepDocument
 from sbafab.design.identity import design_sha256
 from sbafab.errors import OutputError
 from sbafab.models.quantity import Conditions, FigureKey, ModelId, Quantity
 from sbafab.search import sweep as module
-from sbafab.search.measure import measured
-from sbafab.search.pool import MeasureJob
-from sbafab.search.sweep import SweptDesigns
+from sbafab.search.sweep import SweepDocument, SweptDesigns
 from sbafab.search.sweep_report import Dots, Objective, Table, _objectives, passes_svg, trades_svg
+from sbafab.search.trials import MeasureJob, measured
 from tests.site.formats import hold
 
 HAS_PARQUET = find_spec("pyarrow") is not None
@@ -257,7 +255,7 @@ def test_page_and_table_lead_with_one_force(is_calibrated: bool) -> None:
     keys = [FigureKey(Quantity.BLOCKED_FORCE, at, model) for model in models for at in flat]
     row = {"outcome": "passes", "reason": "", "figures": dict.fromkeys(map(str, keys), 1.0)}
     table = Table(lambda: iter([row]), [{}], (10.0, 100.0), is_calibrated=is_calibrated)
-    leading = [column.name for column in table.written if column.name.startswith("blocked")]
+    leading = [name for name in table.written if name.startswith("blocked")]
     assert leading == [
         f"blocked force at {kpa} kPa, flat, {models[is_calibrated].words} [N]" for kpa in (10, 100)
     ]

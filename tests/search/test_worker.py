@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from sbafab.errors import OutputError
-from sbafab.search import pool as pool_module
-from sbafab.search.pool import MeasureJob, close_all, guarded, local_pool, open_all, run_jobs
+from sbafab.search import trials as pool_module
+from sbafab.search.trials import MeasureJob, close_all, guarded, local_pool, open_all, run_jobs
 
 PUPPET = """
 import json, os, signal, sys, time

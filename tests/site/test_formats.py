@@ -87,8 +87,8 @@ def test_what_is_printed_of_a_measured_coupon_is_of_its_schema(
 
 
 def test_what_is_predicted_of_an_assembly_is_of_its_schema() -> None:
-    from sbafab.output.schema_ids import ASSEMBLY_PREDICT_SCHEMA
     from sbafab.reports.assembly_prediction import (
+        SCHEMA,
         AssemblyFigure,
         AssemblyPrediction,
         BentTouch,
@@ -98,7 +98,7 @@ def test_what_is_predicted_of_an_assembly_is_of_its_schema() -> None:
     figure = AssemblyFigure("arm", "height, flat", 1.14, "mm", "elastic stack")
     touch, bent = Touch("arm", "cup", 0.1), BentTouch("arm", "cup", "chamber1", 0.1, 5.0, 80.0)
     found = AssemblyPrediction("one", 10.0, 1.2, (figure,), (touch,), ("x: why",), (bent,), ())
-    document = json.loads(json.dumps({"schema": ASSEMBLY_PREDICT_SCHEMA, **asdict(found)}))
+    document = json.loads(json.dumps({"schema": SCHEMA, **asdict(found)}))
     hold("assembly-predict", document)
 
 

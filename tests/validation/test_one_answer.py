@@ -95,7 +95,7 @@ def _near(figure: Figure) -> Any:
 def test_find_has_the_figure_of_predict(case: Case, prediction: Prediction) -> None:
     design = sbafab.load(NAME)
     subject = Subject(design, sbafab.build(design))
-    value = subject.value(read_quantity(case.quantity), lambda: 1.0)
+    value = subject.value(read_quantity(case.quantity))
     assert value == _near(_figure(prediction, case.figure))
 
 
@@ -113,7 +113,7 @@ def test_find_has_the_sizes_of_predict(name: str, quantities: set[str]) -> None:
     figures = {one.name: one.value for one in sbafab.predict(name).figures}
     for quantity in quantities:
         figure = "folded height" if quantity == "height" else quantity.replace("_", " ")
-        value = subject.value(read_quantity(quantity), lambda: 1.0)
+        value = subject.value(read_quantity(quantity))
         assert value == pytest.approx(figures[figure], rel=1e-12)
 
 
@@ -204,13 +204,13 @@ def test_one_folded_height_and_one_burst(name: str) -> None:
     )
     assert height == pytest.approx(by_hand, rel=1e-12)
     subject = Subject(design, laminate)
-    assert subject.value(read_quantity("height"), lambda: 1.0) == pytest.approx(height, rel=1e-12)
+    assert subject.value(read_quantity("height")) == pytest.approx(height, rel=1e-12)
     assert sizes(design, laminate)["folded_height"] == pytest.approx(height, rel=1e-12)
     assert f"folded height {height:.3f} mm" in size_phrases(design, laminate)[-1]
     estimate = burst(laminate)
     if estimate is not None and not design.form.works_under_vacuum:
         assert figures["burst pressure"].value == estimate.kpa
-        assert subject.value(read_quantity("burst"), lambda: 1.0) == estimate.kpa
+        assert subject.value(read_quantity("burst")) == estimate.kpa
 
 
 def test_nothing_past_the_burst_estimate() -> None:

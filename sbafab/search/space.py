@@ -1,0 +1,690 @@
+"""The designs of a search: its free keys, each candidate evaluated once, and which are tried.
+
+Small spaces are evaluated completely; else a coarse grid and local searches from its best points,
+or Optuna, then steps from the best candidate. A local search takes steps along a key, along two
+keys against each other, and with one key held fixed: if a requirement ties keys together, only a
+step of one key that the others follow makes progress.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+import traceback
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from sbafab.actuators import build
+from sbafab.design.files import shown
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import Design, Free
+from sbafab.design.units import millimetres
+from sbafab.errors import BeyondError, DesignError, GeometryError
+from sbafab.laminate.laminate import Laminate, film_mass
+from sbafab.models.stack import MOST_PRESSURE
+from sbafab.output.checked import Build, refuse_undoable
+from sbafab.process import Progress
+from sbafab.rules.deck import run_deck
+from sbafab.search.quantities import (
+    CLOSE,
+    Goal,
+    RequestedQuantity,
+    Requirement,
+    Subject,
+    kpa_of,
+    shown_value,
+)
+from sbafab.search.trials import RuleMargin, margins
+from sbafab.search.vary import key_values, read_varied, refuse_unknown
+
+TRIES = 240
+
+
+@dataclass(frozen=True)
+class FindRequest:
+    """Requirements and goal of a search, and the design it starts from.
+
+    ``free`` are the keys it may change in place of the family's own, if any. ``optuna`` searches
+    with Optuna; ``storage`` is Optuna's database, in which a search resumes. With ``sure``, a share
+    above 0.5 and below 1, each requirement on a predicted quantity must hold with that probability.
+    """
+
+    design: Design
+    requirements: tuple[Requirement, ...]
+    goal: Goal
+    free: tuple[Free, ...] | None = None
+    tries: int = TRIES
+    optuna: bool = False
+    storage: str | None = None
+    sure: float | None = None
+
+    @property
+    def quantities(self) -> list[RequestedQuantity]:
+        """The quantities to evaluate: the requirements' first, then the goal's."""
+        return [*(requirement.quantity for requirement in self.requirements), self.goal.quantity]
+
+    def subject(self, design: Design, laminate: Laminate) -> Subject:
+        """Return a candidate to evaluate, up to the highest pressure of the quantities."""
+        pressures = [kpa for each in self.quantities if (kpa := kpa_of(each)) is not None]
+        return Subject(design, laminate, most_kpa=max(MOST_PRESSURE, *pressures, 0.0))
+
+
+# One candidate: its figures against the requirements, its rules by their margins.
+
+
+YIELD = "registration-yield"
+IMPOSSIBLE = 1e6
+"""Miss of a design whose film would fail under the requirement, plus the excess: more than any
+design whose film holds. A design that cannot be made misses by twice as much."""
+GridPoint = tuple[int, ...]
+"""A design by the step of each free key."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An evaluated candidate. ``rules`` is None if they were not checked.
+
+    ``values`` are of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
+    ``missed`` is the total share by which requirements and rules are missed; 0 if none is. A lower
+    ``cost``, in the unit of the goal, is better; ``mass`` is in g. ``refused`` says why the design
+    cannot be made, ``refused_at`` is the place in the program that raised it: one per reason,
+    whatever its numbers. ``intervals``, by quantity in its unit, have ends that are compared with
+    limits, if requirements have a probability. ``words`` counts keys with words that differ from
+    the starting design's.
+    """
+
+    values: Mapping[str, Any]
+    figures: Mapping[str, float] = field(default_factory=dict)
+    rules: Mapping[str, RuleMargin] | None = None
+    missed: float = 0.0
+    cost: float = 0.0
+    mass: float = 0.0
+    refused: str = ""
+    refused_at: str = ""
+    laminate: Laminate | None = field(default=None, repr=False, compare=False)
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    words: int = 0
+
+    @property
+    def holds(self) -> bool:
+        """True if nothing is missed and the design can be made."""
+        return self.missed == 0.0 and not self.refused
+
+    @property
+    def rank(self) -> tuple[float, float, float, int]:
+        """Sort key, best first: missed share, then cost, mass and changed words."""
+        return self.missed, self.cost, self.mass, self.words
+
+    @property
+    def broken_rules(self) -> list[str]:
+        """The failing rules, one sentence each."""
+        failed = [rule for rule in (self.rules or {}).values() if rule.verdict == "fail"]
+        return [f"{rule.rule}: {rule.message}" for rule in failed]
+
+    def value(self, requirement: Requirement | Goal) -> float:
+        """The figure for a requirement or the goal, in its unit."""
+        return self.figures[requirement.quantity.label]
+
+    def judged(self, requirement: Requirement) -> float:
+        """Return the value to compare with the limit, in its unit: the end of the interval on its
+        side, if there is one.
+        """
+        interval = self.intervals.get(requirement.quantity.label)
+        return interval[not requirement.at_least] if interval else self.value(requirement)
+
+    def meets(self, requirement: Requirement) -> bool:
+        """Return True if the value, or its bound, holds the limit."""
+        return requirement.holds(self.judged(requirement))
+
+
+def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+    """Return the candidate with these values; without rules, only requirements count: quicker."""
+    try:
+        design = request.design.with_(dict(values))
+        laminate = build(design)
+        rules = None
+        if with_rules or any(quantity.name == "yield" for quantity in request.quantities):
+            findings = run_deck(laminate, design)
+            rules = margins(findings)
+            checked = Build(design, laminate, findings)
+            if not checked.failed:
+                refuse_undoable([checked])
+        subject = request.subject(design, laminate)
+        share = rules[YIELD].measured if rules and YIELD in rules else None
+        figures = {each.label: subject.value(each, share) for each in request.quantities}
+        intervals = {} if request.sure is None else _intervals(request, subject, request.sure)
+    except (DesignError, GeometryError) as error:
+        excess = error.excess if isinstance(error, BeyondError) else IMPOSSIBLE
+        *_, (frame, line) = traceback.walk_tb(error.__traceback__)
+        return Trial(
+            values,
+            missed=IMPOSSIBLE + excess,
+            refused=" ".join(str(error).split()),
+            refused_at=f"{frame.f_code.co_filename}:{line}",
+        )
+    trial = Trial(values, figures, rules, laminate=laminate, intervals=intervals)
+    margin = [row.margin(trial.judged(row)) + CLOSE for row in request.requirements]
+    return replace(
+        trial,
+        missed=sum(-min(0.0, each) for each in margin) + sum(map(_short, (rules or {}).values())),
+        cost=request.goal.cost(trial.value(request.goal)),
+        mass=_mass(laminate),
+    )
+
+
+def _mass(laminate: Laminate) -> float:
+    """The films' mass in g, the tie-breaker; 0 if a density is unknown."""
+    try:
+        return film_mass(laminate)
+    except DesignError:
+        return 0.0
+
+
+def _short(rule: RuleMargin) -> float:
+    """Return the share by which a failing rule misses its limit."""
+    return max(1e-3, -(rule.share or 0.0)) if rule.verdict == "fail" else 0.0
+
+
+def _intervals(
+    request: FindRequest, subject: Subject, sure: float
+) -> dict[str, tuple[float, float]]:
+    """Return intervals whose ends a measured value passes with a probability of ``1 - sure``."""
+    each = {
+        row.quantity: subject.interval(row.quantity, 2 * sure - 1) for row in request.requirements
+    }
+    return {quantity.label: interval for quantity, interval in each.items() if interval is not None}
+
+
+def figure_text(request: FindRequest, trial: Trial, requirement: Requirement) -> str:
+    """Return the figure of a requirement; with a probability, its median and its bound."""
+    quantity, median = requirement.quantity, trial.value(requirement)
+    value = shown_value(quantity, median)
+    if request.sure is None or quantity.label not in trial.intervals or median < 0:
+        return value
+    bound = f"{max(trial.judged(requirement), 0.0):.4g} {quantity.unit}"
+    side = "more" if requirement.at_least else "less"
+    return f"{value} in the median, {bound} or {side} with {100 * request.sure:g} % probability"
+
+
+def misses(request: FindRequest, trial: Trial) -> list[str]:
+    """Return what a candidate breaks, one sentence each: requirements, then rules."""
+    if trial.refused:
+        return [trial.refused]
+    broken = [
+        f"{row.quantity.label} {figure_text(request, trial, row)}, not {row.bound}"
+        for row in request.requirements
+        if not trial.meets(row)
+    ]
+    return [*broken, *trial.broken_rules]
+
+
+# The free keys, ``KEY=LOW:HIGH:STEP``.
+
+
+def numbers_of(value: Any) -> list[float]:
+    """The numbers of a key with a list, such as one diameter per balloon; else empty."""
+    return list(map(float, value)) if isinstance(value, list | tuple) and value else []
+
+
+def read_free(
+    design: Design, texts: Sequence[str], fixed: Sequence[str] = (), assigned: Sequence[str] = ()
+) -> tuple[Free, ...]:
+    """The family's own keys without those ``fixed``, replaced by the keys of the ``texts`` if
+    given.
+
+    Keys ``assigned`` by hand do not change, except lists, which are scaled as a whole; an envelope
+    to fit determines the chamber. Raises DesignError.
+    """
+    keys = key_values(design)
+    assigned = [key for key in assigned if not numbers_of(keys.get(key))]
+    named = [_free_of(text) for text in texts]
+    refuse_unknown(design, [read_varied(text, "--free") for text in texts], "--free")
+    for words in named:
+        for word in words.choices:
+            design.with_({words.key: word})
+    free = {key.key: key for key in design.free}
+    if any(key.startswith("fits.") for key in assigned):
+        free.pop("chamber.diameter", None)
+    for key in assigned:
+        free.pop(key, None)
+    for key in dict.fromkeys(fixed):
+        if key not in assigned and free.pop(key, None) is None:
+            raise DesignError(
+                f"--fix {shown(key)}: a search changes {', '.join(free) or 'nothing'} by default"
+            )
+    # Named keys are free whatever the requirements name.
+    free |= {key.key: key for key in named}
+    if "stack.balloons" in free and numbers_of(keys.get("chamber.diameter")):
+        raise DesignError(
+            "--free stack.balloons: chamber.diameter lists a diameter for each balloon, and a "
+            "search scales that list; leave it out, or give one diameter"
+        )
+    return tuple(free.values())
+
+
+def free_of(design: Design, free: Iterable[Free | str]) -> tuple[Free, ...]:
+    """The keys that a caller names, in place of the family's own: each a ``Free`` or a text, or one
+    text alone. Raises DesignError.
+    """
+    each = [free] if isinstance(free, str) else list(free) if isinstance(free, Iterable) else [free]
+    for key in each:
+        if not isinstance(key, Free | str):
+            raise DesignError(
+                f"free holds {shown(key)}; give texts KEY=LOW:HIGH:STEP, for example "
+                '["chamber.diameter=3:12:0.1"]'
+            )
+    texts = [key for key in each if isinstance(key, str)]
+    records = [key for key in each if isinstance(key, Free)]
+    return (*records, *read_free(design, texts, [key.key for key in design.free]))
+
+
+def _free_of(text: str) -> Free:
+    """``KEY=LOW:HIGH:STEP``, or ``KEY=word,word`` for a key with a choice of words."""
+    stepped = read_varied(text, "--free")
+    if stepped.values and all(isinstance(value, str) for value in stepped.values):
+        return Free.of_words(stepped.key, stepped.values)
+    numbers = [value for value in stepped.values if isinstance(value, int | float)]
+    parts = text.partition("=")[2].split(":")
+    if len(parts) != 3 or len(numbers) != len(stepped.values):
+        raise DesignError(
+            f"--free {shown(text)} is not KEY=LOW:HIGH:STEP; write for example "
+            "--free chamber.diameter=3:12:0.1 or --free registration.method=channel-pin,ears"
+        )
+    step = numbers[1] - numbers[0] if len(numbers) > 1 else millimetres(parts[2])
+    return replace(Free(stepped.key, numbers[0], numbers[-1], 1), step=round(step, 9))
+
+
+# The candidates by the steps of their free keys, each evaluated once.
+
+
+PROGRESS_LABEL = "trying designs"
+
+
+class SearchSpace:
+    """The candidates evaluated so far, each once, by the steps of their free keys.
+
+    ``lows`` and ``highs`` are the least and the largest step of each key. At most ``tries``
+    candidates are evaluated; the current stage ends at ``limit``.
+    """
+
+    def __init__(self, request: FindRequest, free: tuple[Free, ...], progress: Progress) -> None:
+        self.request = request
+        self.free = free
+        self.limit = request.tries
+        self.lows = [0] * len(free)
+        self.highs = [int(round((axis.high - axis.low) / axis.step, 6)) for axis in free]
+        self.trials: dict[GridPoint, Trial] = {}
+        self._tell = progress
+        self._keys = key_values(request.design)
+
+    @property
+    def is_over(self) -> bool:
+        return len(self.trials) >= min(self.limit, self.size)
+
+    @property
+    def size(self) -> int:
+        """Number of designs in the space."""
+        return math.prod(self.counts) if self.counts else 0
+
+    @property
+    def counts(self) -> list[int]:
+        """Number of values of each key."""
+        return [high - low + 1 for low, high in zip(self.lows, self.highs, strict=True)]
+
+    @property
+    def points(self) -> Iterator[GridPoint]:
+        """Every design of the space."""
+        ends = zip(self.lows, self.highs, strict=True)
+        return itertools.product(*(range(low, high + 1) for low, high in ends))
+
+    def number(self, axis: int, point: GridPoint) -> float:
+        """The value of a key at a point; for a list its largest number."""
+        return round(self.free[axis].low + point[axis] * self.free[axis].step, 6)
+
+    def values(self, point: GridPoint) -> Mapping[str, Any]:
+        """The keys' values at a point, whole numbers if low and step are.
+
+        A list, such as the diameters of a tapered stack, is scaled as a whole.
+        """
+        values: dict[str, Any] = {}
+        for axis, free in enumerate(self.free):
+            value = self.number(axis, point)
+            is_whole = free.low == int(free.low) and free.step == int(free.step)
+            listed = numbers_of(self._keys.get(free.key))
+            if free.choices:
+                # Beyond its range a word stays the last one.
+                last = len(free.choices) - 1
+                values[free.key] = free.choices[min(max(point[axis], 0), last)]
+            elif listed:
+                values[free.key] = [round(value * number / max(listed), 2) for number in listed]
+            else:
+                values[free.key] = int(value) if is_whole else value
+        return values
+
+    def nearest(self) -> GridPoint:
+        """Return the starting design's point, or the nearest to it in the space."""
+        steps = []
+        for free in self.free:
+            value: Any = self._keys.get(free.key)
+            if free.choices:
+                steps.append(free.choices.index(value) if value in free.choices else 0)
+                continue
+            listed = numbers_of(value)
+            at = max(listed) if listed else value
+            at = at if isinstance(at, int | float) else (free.low + free.high) / 2
+            steps.append(round((at - free.low) / free.step))
+        return self.inside(steps)
+
+    def inside(self, steps: Sequence[int]) -> GridPoint:
+        """Return the point, or the nearest to it within the keys' ranges."""
+        return tuple(
+            min(max(at, low), high)
+            for at, low, high in zip(steps, self.lows, self.highs, strict=True)
+        )
+
+    def holds(self, axis: int, point: GridPoint) -> bool:
+        """Return True if the range of a key holds its value at the point."""
+        return self.lows[axis] <= point[axis] <= self.highs[axis]
+
+    def is_excluded(self, axis: int, point: GridPoint) -> bool:
+        """Return True if a requirement on the key itself excludes its value at the point."""
+        key, at = self.free[axis].key, self.number(axis, point)
+        return any(
+            requirement.quantity.key == key and not requirement.holds(at)
+            for requirement in self.request.requirements
+        )
+
+    def trial(self, point: GridPoint, checks_rules: bool = True) -> Trial:
+        """Return the candidate at a point; its rules are checked if it would be the best so far.
+
+        Without ``checks_rules`` they are not: rules take most of the time.
+        """
+        if point not in self.trials:
+            self._tell(PROGRESS_LABEL, len(self.trials), self.request.tries)
+            candidate = self._evaluated(point)
+            ranks = [trial.rank for trial in self.trials.values() if trial.rules]
+            if checks_rules and all(candidate.rank < rank for rank in ranks):
+                candidate = self.with_rules(candidate)
+            self.trials[point] = candidate
+        return self.trials[point]
+
+    def peek(self, point: GridPoint) -> Trial:
+        """Return the candidate at a point, also out of range; it does not count as a try."""
+        return self.trials.get(point) or self._evaluated(point)
+
+    def _evaluated(self, point: GridPoint) -> Trial:
+        candidate = evaluated(self.request, self.values(point))
+        changes = zip(self.free, point, self.nearest(), strict=True)
+        words = sum(free.choices != () and step != start for free, step, start in changes)
+        return replace(candidate, words=words)
+
+    def with_rules(self, trial: Trial) -> Trial:
+        """Return the candidate with its rules checked, unless they are known or it was refused."""
+        if trial.rules is not None or trial.refused:
+            return trial
+        return replace(evaluated(self.request, trial.values, with_rules=True), words=trial.words)
+
+    def best(self) -> tuple[GridPoint, Trial]:
+        """Return the best candidate, rules checked; if they make it worse, the next one is
+        tried.
+        """
+        while True:
+            best = min(self.trials, key=lambda point: self.trials[point].rank)
+            trial = self.trials[best]
+            if trial.rules is not None or trial.refused:
+                return best, trial
+            self.trials[best] = self.with_rules(trial)
+
+
+def searched(request: FindRequest, free: tuple[Free, ...], progress: Progress) -> SearchSpace:
+    """Return the space of a request after all tries that lead further."""
+    space = SearchSpace(request, free, progress)
+    if request.optuna:
+        _with_optuna(space)
+    elif space.size <= request.tries:
+        for point in space.points:
+            space.trial(point, checks_rules=False)
+    else:
+        _explore(space)
+    _refine(space)
+    _widen_ranges(space)
+    return space
+
+
+# Strategies: coarse grid, local searches, wider ranges.
+
+
+GRID_SHARE = 0.25
+WALK_SHARE = 0.6
+"""Shares of all tries: for the coarse grid, and the point where walks from far places must end."""
+STARTS = 4
+"""Designs of the grid from which to continue."""
+FEW = 40
+"""Most values of a key that is held fixed in turn: balloons, not diameters."""
+FIXED_STEPS = (-1, 1, -2, 2)
+"""Steps of the key that is then held fixed."""
+WIDENINGS = 4
+"""Most times a range is widened, by its own width each time."""
+SEED = 20_240
+
+
+def _explore(space: SearchSpace) -> None:
+    """Evaluate a coarse grid, then search locally from its best points that lie far apart.
+
+    While no design passes, it restarts from random points, as long as tries are left.
+    """
+    space.limit = round(WALK_SHARE * space.request.tries)
+    _grid(space)
+    dice = random.Random(SEED)
+    starts = _starts(space)
+    while not space.is_over:
+        if starts:
+            start = starts.pop(0)
+        elif space.best()[1].holds:
+            break
+        else:
+            start = tuple(map(dice.randint, space.lows, space.highs))
+        _descend(space, start)
+
+
+def _grid(space: SearchSpace) -> None:
+    """Evaluate a coarse grid, as fine as its share of the tries allows.
+
+    Keys with words keep their starting value: the walks from the grid change them.
+    """
+    room = max(8.0, GRID_SHARE * space.request.tries)
+    numbers = sum(not free.choices for free in space.free)
+    levels = max(2, int(room ** (1 / max(1, numbers))))
+    axes = []
+    begin = space.nearest()
+    for axis, (low, count) in enumerate(zip(space.lows, space.counts, strict=True)):
+        if space.free[axis].choices:
+            axes.append([begin[axis]])
+            continue
+        few = min(levels, count)
+        steps = [low + round((count - 1) * number / max(1, few - 1)) for number in range(few)]
+        axes.append(list(dict.fromkeys(steps)))
+    for point in itertools.product(*axes):
+        if space.is_over:
+            return
+        space.trial(point, checks_rules=False)
+
+
+def _starts(space: SearchSpace) -> list[GridPoint]:
+    """Return the starting point and the best points of the grid that lie far apart."""
+
+    def is_far(a: GridPoint, b: GridPoint) -> bool:
+        return any(abs(x - y) * 3 > count for x, y, count in zip(a, b, space.counts, strict=True))
+
+    starts = [space.nearest()]
+    for point in sorted(space.trials, key=lambda point: space.trials[point].rank):
+        if len(starts) < STARTS and all(is_far(point, start) for start in starts):
+            starts.append(point)
+    return starts
+
+
+def _descend(space: SearchSpace, start: GridPoint) -> None:
+    """Search locally with steps that are halved if none is better."""
+    point, share = start, 4
+    while share <= 2 * max(space.counts) and not space.is_over:
+        point = _walk(space, point, [max(1, count // share) for count in space.counts])
+        share *= 2
+
+
+def _refine(space: SearchSpace) -> None:
+    """Search locally from the best until no neighbour and no search with a fixed key is better."""
+    space.limit = space.request.tries
+    while not space.is_over:
+        point = _walk(space, space.best()[0], [1] * len(space.free))
+        if not _has_better_walk(space, point):
+            return
+
+
+def _has_better_walk(space: SearchSpace, point: GridPoint) -> bool:
+    """Return True if a search with a key fixed a step or two away finds a better candidate."""
+    counts = space.counts
+    for axis in sorted(range(len(counts)), key=lambda axis: counts[axis]):
+        if not 1 < counts[axis] <= FEW or len(counts) == 1:
+            continue
+        for by in FIXED_STEPS:
+            start = space.inside(_moved(point, axis, by))
+            if start == point or space.is_over:
+                continue
+            for share in (32, 128, max(counts)):
+                stride = [max(1, count // share) for count in counts]
+                stride[axis] = 0
+                start = _walk(space, start, stride)
+            if start in space.trials and space.trial(start).rank < space.trial(point).rank:
+                return True
+    return False
+
+
+def _walk(space: SearchSpace, point: GridPoint, stride: Sequence[int]) -> GridPoint:
+    """Return the end of improving steps: along one key, or along two against each other.
+
+    Where two requirements meet, only a step of both keys makes progress. A move that improved is
+    repeated. A key whose stride is 0 is held fixed.
+    """
+    moves = _moves(stride)
+    stale = 0
+    while stale < len(moves) and not space.is_over:
+        to = space.inside([at + by for at, by in zip(point, moves[0], strict=True)])
+        if to != point and space.trial(to).rank < space.trial(point).rank:
+            point, stale = to, 0
+        else:
+            stale += 1
+            moves = [*moves[1:], moves[0]]
+    return point
+
+
+def _moves(stride: Sequence[int]) -> list[GridPoint]:
+    """The moves: single keys first, down and up, then pairs of keys against each other."""
+    still = (0,) * len(stride)
+    moving = [axis for axis, step in enumerate(stride) if step]
+    single = [_moved(still, axis, sign * stride[axis]) for axis in moving for sign in (-1, 1)]
+    pairs = [
+        _moved(_moved(still, a, sign * stride[a]), b, -sign * stride[b])
+        for a, b in itertools.combinations(moving, 2)
+        for sign in (-1, 1)
+    ]
+    return [*single, *pairs]
+
+
+def _moved(point: GridPoint, axis: int, by: int) -> GridPoint:
+    return (*point[:axis], point[axis] + by, *point[axis + 1 :])
+
+
+def single_steps(point: GridPoint) -> list[tuple[int, GridPoint]]:
+    """The points one step of one key away, each with the key's number."""
+    return [(axis, _moved(point, axis, by)) for axis in range(len(point)) for by in (-1, 1)]
+
+
+def _widen_ranges(space: SearchSpace) -> None:
+    """Search beyond the ends of ranges that may widen, as long as that finds better designs."""
+    for _ in range(WIDENINGS):
+        point, before = space.best()
+        ends = space.lows[:], space.highs[:]
+        _widen_ends(space, point)
+        if (space.lows, space.highs) == ends:
+            return
+        _refine(space)
+        if not space.best()[1].rank < before.rank:
+            space.lows, space.highs = ends
+            return
+
+
+def _widen_ends(space: SearchSpace, point: GridPoint) -> None:
+    """Widen the ranges at whose end the point lies."""
+    counts = space.counts
+    for axis, beyond in single_steps(point):
+        free = space.free[axis]
+        if not free.widens or space.holds(axis, beyond):
+            continue
+        if space.number(axis, beyond) <= 0 or space.is_excluded(axis, beyond):
+            continue
+        if beyond[axis] > point[axis]:
+            space.highs[axis] += counts[axis]
+        else:
+            below = int(round((free.low + space.lows[axis] * free.step) / free.step, 6)) - 1
+            space.lows[axis] -= min(counts[axis], below)
+
+
+# Search by Optuna, whose storage resumes it and shares it between machines.
+
+
+def _with_optuna(space: SearchSpace) -> None:
+    """Evaluate designs that Optuna proposes, and keep a share of the tries for the final steps.
+
+    Raises DesignError without the extra, and for a storage that cannot be used.
+    """
+    try:
+        import optuna
+    except ImportError:
+        raise DesignError('Optuna is not installed: pip install "sbafab[optuna]"') from None
+    # If a search is stopped, Optuna would report a failed trial with a traceback.
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    tries, storage = max(1, round(WALK_SHARE * space.request.tries)), space.request.storage
+    sampler = optuna.samplers.TPESampler(seed=SEED, n_startup_trials=tries // 4)
+    name = _study_name(space)
+    try:
+        study = optuna.create_study(
+            storage=storage, study_name=name, load_if_exists=True, sampler=sampler
+        )
+    except Exception as error:
+        message = " ".join(str(error).split())[:200]
+        raise DesignError(
+            f"--storage {storage} cannot be used ({message}); write for example "
+            "--storage sqlite:///search.db"
+        ) from None
+
+    def objective(trial: Any) -> float:
+        ranges = zip(space.free, space.counts, strict=True)
+        steps = (trial.suggest_int(free.key, 0, count - 1) for free, count in ranges)
+        candidate = space.trial(tuple(steps))
+        if candidate.holds:
+            return candidate.cost
+        # A miss is worse than every passing design, by the amount of the miss.
+        return IMPOSSIBLE * (1 + min(candidate.missed, IMPOSSIBLE))
+
+    # Stored trials come from an earlier run: they are looked up again, not tried again.
+    done = study.get_trials(states=[optuna.trial.TrialState.COMPLETE])
+    for old in done:
+        space.trial(tuple(old.params[free.key] for free in space.free))
+    study.optimize(objective, n_trials=max(0, tries - len(done)))
+
+
+def _study_name(space: SearchSpace) -> str:
+    """Name a study by all that its trials depend on."""
+    request = space.request
+    design = f"{request.design.name} {design_sha256(request.design)[:12]}"
+    limits = [requirement.label for requirement in request.requirements]
+    sure = [] if request.sure is None else [f"sure {request.sure:g}"]
+    keys = [
+        f"{free.key} {', '.join(free.choices)}"
+        if free.choices
+        else f"{free.key} {free.low:g} to {free.high:g} by {free.step:g}"
+        for free in space.free
+    ]
+    return "; ".join([design, *limits, request.goal.label, *sure, *keys])

@@ -1,0 +1,456 @@
+"""Run the trials of a sweep: measure designs in processes of this machine, or on a Dask cluster.
+
+A trial is a design's rules with their margins, its predicted figures, and all its keys. As a
+program this module measures designs one after the other, and may be killed at any moment.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager, suppress
+from functools import cache, lru_cache
+from itertools import islice
+from pathlib import Path
+from typing import IO, Any, Literal, NamedTuple
+
+import sbafab
+from sbafab.actuators import records
+from sbafab.design.files import checked as checked_record
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import Design
+from sbafab.errors import DesignError, OutputError, SbafabError
+from sbafab.models.figures import PredictionRequest
+from sbafab.models.intervals import factors_of
+from sbafab.models.prediction import predict
+from sbafab.output.checked import check, refuse_undoable
+from sbafab.plugins import FAMILIES, RULES, installed
+from sbafab.process import prepare, processors
+from sbafab.rules.deck import AT_MOST
+from sbafab.rules.finding import Finding, Place, Verdict
+from sbafab.search.vary import key_values
+
+SweepOutcome = Literal["passes", "fails", "refused", "crashed", "too long"]
+"""Every rule passes; a rule failed; the design cannot be made; its process died; or took too long.
+"""
+SweepRow = dict[str, Any]
+"""The measurements of one design, as JSON values. ``outcome`` and ``reason`` are always present;
+``sha256``, ``keys``, ``rules``, ``yield`` (share of good builds and the ends of its interval),
+``figures`` by their ``FigureKey`` if the design could be measured so far, and the messages of the
+rules that ``failed``."""
+
+
+def measured(
+    tables: Mapping[str, Any], folder: str, values: Mapping[str, Any], pressures: Sequence[float]
+) -> SweepRow:
+    """Return the row of the design in ``tables`` with ``values`` set; never raises a SbafabError.
+
+    Relative paths start at ``folder``; ``pressures``, kPa, are for forces and strokes.
+    """
+    row: SweepRow = {"outcome": "refused", "reason": ""}
+    try:
+        design = _base(json.dumps(tables), folder).with_(dict(values))
+        row["keys"] = key_values(design)
+        row["sha256"] = design_sha256(design)
+        _measure(design, pressures, row)
+    except SbafabError as error:
+        row["reason"] = " ".join(str(error).split())
+    return row
+
+
+@lru_cache(maxsize=4)
+def _base(tables: str, folder: str) -> Design:
+    data = json.loads(tables)
+    families = records()
+    return checked_record(families[data["family"]], data, families).placed(Path(folder))
+
+
+def _measure(design: Design, pressures: Sequence[float], row: SweepRow) -> None:
+    checked = check(design)
+    worst = margins(checked.findings)
+    row["rules"] = {
+        name: [rule.verdict, rule.margin, rule.measured, rule.limit, rule.unit]
+        for name, rule in worst.items()
+    }
+    row["yield"] = next(
+        ([each.measured, *each.interval] for each in checked.findings if each.interval), []
+    )
+    # Figures have no intervals here: with the factors given, none are computed.
+    request = PredictionRequest(tuple(pressures), calibration=factors_of(design))
+    prediction = predict(design, request, checked.laminate)
+    row["figures"] = {str(figure.key): figure.as_dict()["value"] for figure in prediction.figures}
+    if checked.failed:
+        failed = {name: rule.message for name, rule in worst.items() if rule.verdict == "fail"}
+        row["outcome"], row["failed"] = "fails", failed
+        row["reason"] = " | ".join(f"{name}: {message}" for name, message in failed.items())
+        return
+    refuse_undoable([checked])
+    row["outcome"] = "passes"
+
+
+# The margin of each rule: its findings as one verdict and one margin.
+
+
+ORDER: tuple[Verdict, ...] = ("fail", "waived", "warn", "pass")
+
+
+class RuleMargin(NamedTuple):
+    """A rule's worst verdict, and the margin of the worst value to its limit: below 0 it fails.
+
+    ``margin`` is None if nothing was measured, or if there is no limit.
+    """
+
+    rule: str
+    verdict: Verdict
+    margin: float | None
+    measured: float | None
+    limit: float | None
+    unit: str
+    where: Place
+    message: str
+
+    @property
+    def share(self) -> float | None:
+        """The margin as a share of the limit, unless that is 0."""
+        if self.margin is None:
+            return None
+        return self.margin / self.limit if self.limit else self.margin
+
+    @property
+    def severity(self) -> tuple[int, float]:
+        """Sort key: the worse, the smaller."""
+        return ORDER.index(self.verdict), self.share or 0.0
+
+
+def margin_of(finding: Finding) -> float | None:
+    """Margin of a finding to its limit, in its unit."""
+    if finding.measured is None or finding.limit is None:
+        return None
+    more = finding.measured - finding.limit
+    return round(-more if finding.rule in AT_MOST else more, 6)
+
+
+def margins(findings: Iterable[Finding]) -> dict[str, RuleMargin]:
+    """The worst of each rule, in the deck's order; findings waived by the rule itself are
+    ignored.
+    """
+    worst: dict[str, RuleMargin] = {}
+    for finding in findings:
+        if finding.verdict == "waived" and not finding.by_user:
+            continue
+        values = {name: getattr(finding, name) for name in RuleMargin._fields if name != "margin"}
+        margin = RuleMargin(**values, margin=margin_of(finding))
+        before = worst.get(finding.rule)
+        if before is None or margin.severity < before.severity:
+            worst[finding.rule] = margin
+    return worst
+
+
+# The exact version of the program: rows of different versions are never mixed.
+
+
+@cache
+def fingerprint() -> str:
+    """The version, and a hash of the package's source and of the packages that add to it."""
+    root = Path(sbafab.__file__).parent
+    total = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        total.update(path.relative_to(root).as_posix().encode())
+        total.update(path.read_bytes())
+    for entry in (*installed(FAMILIES), *installed(RULES)):
+        version = entry.dist.version if entry.dist else ""
+        total.update(f"{entry.name} {entry.value} {version}".encode())
+    return f"{sbafab.__version__}+{total.hexdigest()[:12]}"
+
+
+# The process: one job per line from standard input, one row per line to standard output. It ends
+# when its input ends, because the parent is gone, even in the middle of a job.
+
+
+def main() -> None:
+    """Measures until standard input ends."""
+    # Ctrl-C goes to all processes of a terminal; the parent ends this one.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    prepare()
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8", newline="\n")
+    # Output of libraries must not mix with the answers.
+    os.dup2(2, 1)
+    jobs: queue.SimpleQueue[str] = queue.SimpleQueue()
+    threading.Thread(target=_read, args=(sys.stdin, jobs), daemon=True).start()
+    while True:
+        job = json.loads(jobs.get())
+        answers.write(json.dumps(_answer(job)) + "\n")
+        answers.flush()
+
+
+def _read(lines: IO[str], jobs: queue.SimpleQueue[str]) -> None:
+    for line in lines:
+        jobs.put(line)
+    os._exit(0)
+
+
+def _answer(job: dict[str, Any]) -> dict[str, Any]:
+    if job.pop("program") != fingerprint():
+        return {"outcome": "unlike", "reason": fingerprint()}
+    began = time.perf_counter()
+    try:
+        row = measured(**job)
+    except Exception as error:
+        message = " ".join(str(error).split())
+        row = {"outcome": "crashed", "reason": f"{type(error).__name__}: {message}"}
+    row["seconds"] = round(time.perf_counter() - began, 4)
+    return row
+
+
+# Jobs in parallel: in threads of this machine, or on a Dask cluster.
+
+
+AHEAD = 3
+"""Jobs handed to a worker before it finishes the first."""
+POLL = 1.0
+"""Interval of progress calls while waiting, s."""
+CONNECT = 10
+"""Time for a scheduler to answer, s."""
+
+
+class Pool(NamedTuple):
+    """Runs ``guarded`` on its workers; ``size`` of them at a time."""
+
+    executor: Executor
+    size: int
+
+
+@contextmanager
+def local_pool(workers: int | None = None) -> Iterator[Pool]:
+    """One thread per worker, each with its own process; none outlives the block."""
+    size = workers or processors()
+    open_all()
+    executor = ThreadPoolExecutor(size)
+    try:
+        yield Pool(executor, size)
+    finally:
+        # Killed processes release the threads that wait for them.
+        executor.shutdown(wait=False, cancel_futures=True)
+        close_all()
+        executor.shutdown()
+
+
+@contextmanager
+def dask_pool(address: str) -> Iterator[Pool]:
+    """The workers of the cluster behind a scheduler's address, which must have sbafab installed.
+
+    Raises OutputError if there is no scheduler, DesignError without the extra.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        raise DesignError('Dask is not installed: pip install "sbafab[dask]"') from None
+    try:
+        client: Any = Client(address, timeout=CONNECT)
+    except (OSError, ValueError) as error:
+        message = " ".join(str(error).split())
+        raise OutputError(
+            f"no Dask scheduler answers at {address} ({message}); start one with `dask scheduler`, "
+            "or name its address, such as tcp://127.0.0.1:8786"
+        ) from None
+    try:
+        size = sum(client.nthreads().values())
+        yield Pool(client.get_executor(), max(1, size))
+    finally:
+        client.close()
+
+
+def run_jobs(
+    pool: Pool,
+    jobs: Iterable[tuple[str, MeasureJob]],
+    seconds: float,
+    done: Callable[[str, SweepRow], None],
+    waiting: Callable[[], None],
+) -> None:
+    """Run every job once and pass its key and row to ``done`` as soon as it ends, in any order.
+
+    Few jobs are pending at any time, so that memory does not grow with their number. ``waiting`` is
+    called in every second in which no job ends.
+    """
+    remaining = iter(jobs)
+    running: dict[Future[SweepRow], str] = {}
+    room = AHEAD * pool.size
+    try:
+        while True:
+            for key, job in islice(remaining, room - len(running)):
+                running[pool.executor.submit(guarded, job, seconds)] = key
+            if not running:
+                return
+            ended, _ = wait(running, timeout=POLL, return_when=FIRST_COMPLETED)
+            if not ended:
+                waiting()
+            for future in ended:
+                done(running.pop(future), _row(future))
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _row(future: Future[SweepRow]) -> SweepRow:
+    try:
+        row = future.result()
+    except Exception as error:
+        # A cluster gives up a job after its workers died several times.
+        message = " ".join(str(error).split())[:300]
+        row = {"outcome": "crashed", "reason": f"{type(error).__name__}: {message}", "seconds": 0.0}
+    if row["outcome"] == "unlike":
+        raise OutputError(
+            f"a worker runs sbafab {row['reason']} and this is {fingerprint()}; install the same "
+            "version there"
+        )
+    return row
+
+
+# Each thread hands its jobs to its own process, which is killed after the time limit.
+#
+# The same function runs in threads of this process and of a Dask worker.
+
+
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""One numeric thread per process: several processes already share the processors."""
+ATTEMPTS = 2
+"""A process may be killed from outside; a design that kills two in a row is to blame."""
+
+COMMAND = (sys.executable, "-m", "sbafab.search.trials")
+
+MeasureJob = dict[str, Any]
+"""The keyword arguments of ``measured``, and the ``program`` version required."""
+
+_thread = threading.local()
+
+
+class _Started:
+    """The running processes, and whether more may be started."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.children: set[Child] = set()
+        self.may_start = True
+
+
+_started = _Started()
+
+
+class Child:
+    """A running process that measures."""
+
+    def __init__(self) -> None:
+        alone = {name: os.environ.get(name, "1") for name in ONE_THREAD}
+        with _started.lock:
+            if not _started.may_start:
+                raise RuntimeError("no process is started any more")
+            self._process = subprocess.Popen(
+                COMMAND,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                encoding="utf-8",
+                env={**os.environ, **alone, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            )
+            _started.children.add(self)
+
+    def answer(self, job: MeasureJob, seconds: float) -> SweepRow:
+        """The row of a job; a row with the reason if the process dies or takes too long."""
+        late = threading.Event()
+
+        def stop() -> None:
+            late.set()
+            self._process.kill()
+
+        clock = threading.Timer(seconds, stop)
+        clock.daemon = True
+        clock.start()
+        try:
+            line = self._exchange(json.dumps(job))
+        finally:
+            clock.cancel()
+        if line.endswith("\n"):
+            row: SweepRow = json.loads(line)
+            return row
+        self.close()
+        if late.is_set():
+            reason = f"stopped after {seconds:g} s; --timeout gives it longer"
+            return {"outcome": "too long", "reason": reason, "seconds": seconds}
+        reason = _exit_reason(self._process.returncode)
+        return {"outcome": "crashed", "reason": reason, "seconds": 0.0}
+
+    def _exchange(self, job: str) -> str:
+        """The answer to a line, truncated if the process died."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        with suppress(OSError, ValueError):
+            self._process.stdin.write(job + "\n")
+            self._process.stdin.flush()
+            return self._process.stdout.readline()
+        return ""
+
+    @property
+    def is_alive(self) -> bool:
+        return self._process.poll() is None
+
+    def close(self) -> None:
+        """Kills the process and waits until it is gone."""
+        self._process.kill()
+        self._process.wait()
+        _started.children.discard(self)
+        for stream in (self._process.stdin, self._process.stdout):
+            with suppress(OSError):
+                if stream is not None:
+                    stream.close()
+
+
+def guarded(job: MeasureJob, seconds: float) -> SweepRow:
+    """The row of a job, measured in this thread's own process; dead processes are replaced."""
+    row: SweepRow = {}
+    for _ in range(ATTEMPTS):
+        child = getattr(_thread, "child", None)
+        if child is None or not child.is_alive:
+            if child is not None:
+                child.close()
+            child = _thread.child = Child()
+        row = child.answer(job, seconds)
+        # A crash that Python could still report is reported in the same way on a retry.
+        if row["outcome"] != "crashed" or child.is_alive:
+            return row
+    return row
+
+
+def open_all() -> None:
+    """Lets threads of this process start processes again."""
+    with _started.lock:
+        _started.may_start = True
+
+
+def close_all() -> None:
+    """Kills the processes started by threads of this process, and prevents new ones."""
+    with _started.lock:
+        _started.may_start = False
+        children = list(_started.children)
+    for child in children:
+        child.close()
+
+
+def _exit_reason(code: int | None) -> str:
+    if code is None or code >= 0:
+        return f"its process ended with exit code {code}"
+    with suppress(ValueError):
+        return f"its process was killed by {signal.Signals(-code).name}"
+    return f"its process was killed by signal {-code}"
+
+
+if __name__ == "__main__":
+    main()
