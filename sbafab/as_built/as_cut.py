@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
-from sbafab.as_built.expected import (
-    Expected,
-    ExpectedLaminate,
-    departure,
-    in_agreement,
-    with_circles,
-    without_specks,
-)
-from sbafab.as_built.kerf_removed import chords_for_arc, remove_kerf
 from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY, Problem
+from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.dxf_read import ReadBack, read_profile
+from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.properties import (
     CUT_INNER,
     CUT_OUTER,
@@ -42,14 +36,24 @@ from sbafab.cutting.seam_files import (
     seam_properties,
     stated_width,
 )
-from sbafab.cutting.verify import check_datum
-from sbafab.errors import OutputError
-from sbafab.geometry.region import Region
+from sbafab.cutting.verify import check_contours, check_datum
+from sbafab.design.records import Design
+from sbafab.errors import DesignError, GeometryError, OutputError
+from sbafab.geometry.contour import Contour, circle
+from sbafab.geometry.edges import Arc, Point, edge_from_bulge
+from sbafab.geometry.offset import Kerf, shrink, widths
+from sbafab.geometry.region import Region, centroid
 from sbafab.laminate.folding import halves
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.rules import registration_yield
+from sbafab.rules.deck import RULES, run_rule
+from sbafab.rules.finding import Finding
 from sbafab.rules.limits import TOLERANCE
+from sbafab.rules.measures import Measures
 
+AGREEMENT = 2 * TOLERANCE
+"""Largest distance of two contours that are each within TOLERANCE of the expected one, mm."""
 MAX_BYTES = 20_000_000
 MAX_ENTITIES = 300_000
 """Entities and points of a cut file: more would take minutes to check."""
@@ -86,6 +90,51 @@ class LayerFile(NamedTuple):
         return f"layer {self.layer.index} ({self.path})"
 
 
+# The laminate of a folder's design.
+
+
+class Expected(NamedTuple):
+    """A layer's profile and the beam's path for it."""
+
+    profile: Region
+    path: Region
+
+
+class ExpectedLaminate(NamedTuple):
+    """A design's laminate, and the beam's path for each of its patterns."""
+
+    laminate: Laminate
+    paths: Mapping[str, Region]
+
+    @property
+    def layers(self) -> list[Expected]:
+        """The expected layers, bottom to top."""
+        layers = self.laminate.layers
+        return [Expected(layer.profile, self.paths[layer.pattern]) for layer in layers]
+
+
+def expected_laminate(laminate: Laminate, settings: CutSettings) -> ExpectedLaminate:
+    """Return a laminate and its paths as drawn by the settings; with chords, the laminate that
+    these cut.
+    """
+    paths = compensated_paths(laminate, settings)
+    if settings.curves.in_chords:
+        laminate = as_cut(laminate, paths, settings)
+    return ExpectedLaminate(laminate, paths)
+
+
+def departure(path: Region, expected: Region) -> str:
+    """Return the difference of a path read back from the expected one; "" within 1 um."""
+    try:
+        check_contours(path, expected, TOLERANCE)
+    except OutputError as error:
+        return str(error).rstrip(".")
+    return ""
+
+
+# The layers as read.
+
+
 def read_layers(
     folder: Path, expected: ExpectedLaminate, settings: CutSettings, has_chords: bool
 ) -> tuple[list[LayerFile], list[Problem]]:
@@ -113,7 +162,7 @@ def read_layers(
             message = f"layer {layer.index} ({name}): {reason}"
             problems.append(Problem(INTEGRITY, message, (layer.index,)))
         files.append(LayerFile(layer, name, part))
-    return _in_agreement(files), problems + _property_problems(files, laminate, settings)
+    return _snapped(files, expected), problems + _property_problems(files, laminate, settings)
 
 
 def _property_problems(
@@ -159,16 +208,35 @@ def property_differences(actual: Mapping[str, str], expected: Mapping[str, str])
     ]
 
 
-def _in_agreement(files: Sequence[LayerFile]) -> list[LayerFile]:
-    parts = {id(file.part): file.part for file in files if file.part is not None}
-    if all(part.is_expected for part in parts.values()):
-        return list(files)
-    regions = in_agreement([part.region for part in parts.values()])
-    agreed = {
-        key: replace(part, region=region)
-        for (key, part), region in zip(parts.items(), regions, strict=True)
-    }
-    return [file._replace(part=agreed.get(id(file.part))) for file in files]
+def _snapped(files: Sequence[LayerFile], expected: ExpectedLaminate) -> list[LayerFile]:
+    """Return the files with contours that agree with the design's replaced by these.
+
+    Programs that save a file again round its coordinates, and rules would take the gap between two
+    such edges for a bond or a leak.
+    """
+    own = {contour.marks: contour for aim in expected.layers for contour in aim.profile.contours}
+
+    def snapped(contour: Contour) -> Contour:
+        return next((one for one in own.values() if _agree(contour, one)), contour)
+
+    found = []
+    for file in files:
+        part = file.part
+        if part is not None and not part.is_expected:
+            part = replace(part, region=Region(tuple(map(snapped, part.region.contours))))
+        found.append(file._replace(part=part))
+    return found
+
+
+def _agree(contour: Contour, other: Contour) -> bool:
+    bounds = zip(contour.bounds, other.bounds, strict=True)
+    if contour.is_hole != other.is_hole or any(abs(a - b) > AGREEMENT for a, b in bounds):
+        return False
+    try:
+        check_contours(Region((contour,)), Region((other,)), AGREEMENT)
+    except OutputError:
+        return False
+    return True
 
 
 def laminate_as_cut(files: Sequence[LayerFile], laminate: Laminate) -> Laminate:
@@ -288,10 +356,19 @@ def _part(
     if expected is not None and not departure(path, expected.path):
         # A path within tolerance needs no estimate of the part that the beam leaves.
         return CutPart(expected.profile, path, stated, units, is_expected=True)
-    region = remove_kerf(with_circles(path), kerf)
+    return CutPart(_without_kerf(path, kerf), path, stated, units)
+
+
+def _without_kerf(path: Region, kerf: Kerf) -> Region:
+    """Return the part that a beam along a path leaves. Raises OutputError if none is left, or if
+    the beam has two widths, which only the design tells apart.
+    """
+    if isinstance(kerf, tuple) and kerf[0] != kerf[1]:
+        raise OutputError("cut with another path than the design's by a kerf along x and y")
+    region = with_circles(_without_specks(shrink(with_circles(path), max(widths(kerf)) / 2)))
     if region.is_empty:
         raise OutputError(f"nothing is left inside a kerf of {kerf_text(kerf)} mm; regenerate it")
-    return CutPart(with_circles(without_specks(region)), path, stated, units)
+    return region
 
 
 def _check_drawn(drawing: ReadBack) -> None:
@@ -353,3 +430,188 @@ def read_seams(
             problems.append(Problem(DESIGNED, f"{message}; regenerate the folder", layers))
         seams.append(as_drawn)
     return tuple(seams), problems
+
+
+# Contours without what saving and cutting leave.
+
+
+def with_circles(region: Region) -> Region:
+    """Return the region with circles for contours that stay within TOLERANCE of one."""
+    return Region(tuple(map(_rounded, region.contours)))
+
+
+def _rounded(contour: Contour) -> Contour:
+    low_x, low_y, high_x, high_y = contour.bounds
+    if contour.circle is not None or abs(high_x - low_x - high_y + low_y) > 2 * AGREEMENT:
+        return contour
+    centre = centroid(Region((contour,)))
+    least = min(math.dist(edge.nearest(centre), centre) for edge in contour.edges)
+    most = max(edge.farthest_from(centre) for edge in contour.edges)
+    if most - least > 2 * TOLERANCE:
+        return contour
+    whole = circle(centre, (least + most) / 2)
+    return whole.reversed() if contour.is_hole else whole
+
+
+def _without_specks(region: Region) -> Region:
+    """Return the region without edges shorter than AGREEMENT, which rounded corners leave."""
+    return Region(tuple(map(_without_contour_specks, region.contours)))
+
+
+def _without_contour_specks(contour: Contour) -> Contour:
+    edges = [edge for edge in contour.edges if math.dist(edge.start, edge.end) >= AGREEMENT]
+    if len(edges) == len(contour.edges) or len(edges) < 3:
+        return contour
+    ends = [edge.start for edge in (*edges[1:], edges[0])]
+    return Contour(
+        tuple(
+            edge if edge.end == end else edge_from_bulge(edge.start, end, edge.bulge)
+            for edge, end in zip(edges, ends, strict=True)
+        )
+    )
+
+
+# Runs of chords that stand for an arc: detected where chords are not permitted, and replaced.
+
+
+ON_CIRCLE = 1e-5
+"""Largest distance of the ends of chords from their circle, mm."""
+MIN_CHORDS = 5
+MAX_STEP = math.radians(20)
+"""MIN_CHORDS or more chords on one circle, each turning less than this, replace an arc."""
+
+
+class ChordRun(NamedTuple):
+    """Consecutive chords of one circle: their ends, and the circle."""
+
+    points: tuple[Point, ...]
+    centre: Point
+    radius: float
+
+
+def chords_for_arc(region: Region) -> Point | None:
+    """Return the start of a run of chords that replaces an arc, or None."""
+    for contour in region.contours:
+        for run in _runs(_line_starts(contour)):
+            if len(run.points) > MIN_CHORDS:
+                return run.points[0]
+    return None
+
+
+def _line_starts(contour: Contour) -> list[Point]:
+    """Return the starts of the contour's lines; an arc adds a point that lies on no circle."""
+    points: list[Point] = []
+    for edge in contour.edges:
+        points.append(edge.start)
+        if isinstance(edge, Arc):
+            points.append((math.nan, math.nan))
+    return points
+
+
+def _runs(points: list[Point]) -> Iterator[ChordRun]:
+    """Yield the longest runs of at least three short chords on one circle, turning one way."""
+    count = len(points)
+    if count < 4:
+        return
+    first = next((i for i in range(count) if not _on_one_circle(points, i - 1)), None)
+    if first is None:
+        fitted = _circle(points[0], points[count // 3], points[2 * count // 3])
+        if fitted is not None:
+            yield ChordRun((*points, points[0]), *fitted)
+        return
+    # No run reaches over both ends of this ring, whose first chord comes again as its last.
+    ring = [points[(first + i) % count] for i in range(count + 2)]
+    start, last = 0, count + 1
+    while start + 2 <= last:
+        end = start + 2
+        while end + 1 <= last and _on_one_circle(ring, end - 2):
+            end += 1
+        run = tuple(ring[start : end + 1])
+        fitted = _circle(run[0], run[len(run) // 2], run[-1])
+        if fitted is None or len(run) < 4:
+            start += 1
+            continue
+        if start == 0:
+            last -= 1
+        yield ChordRun(run, *fitted)
+        start = end
+
+
+def _on_one_circle(points: list[Point], first: int) -> bool:
+    """Return True if four points from ``first`` on are ends of short chords of one circle."""
+    a, b, c, d = (points[(first + i) % len(points)] for i in range(4))
+    fitted = _circle(a, b, c)
+    if fitted is None or _angle_between(a, b, c) * _angle_between(b, c, d) <= 0:
+        return False
+    centre, radius = fitted
+    longest = max(math.dist(a, b), math.dist(b, c), math.dist(c, d))
+    return abs(math.dist(d, centre) - radius) < ON_CIRCLE and _is_short(longest, radius)
+
+
+def _is_short(length: float, radius: float) -> bool:
+    """Return True if a chord is short enough on its circle to replace an arc."""
+    return length < 2 * math.sin(MAX_STEP / 2) * radius
+
+
+def _angle_between(a: Point, b: Point, c: Point) -> float:
+    return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+
+
+def _circle(a: Point, b: Point, c: Point) -> tuple[Point, float] | None:
+    """Return centre and radius of the circle through three points; None if they lie on a line."""
+    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
+    cross = 2 * (ux * vy - uy * vx)
+    if abs(cross) < 1e-9:
+        return None
+    uu, vv = ux * ux + uy * uy, vx * vx + vy * vy
+    x, y = (vy * uu - uy * vv) / cross, (ux * vv - vx * uu) / cross
+    return (a[0] + x, a[1] + y), math.hypot(x, y)
+
+
+# Laminates cut in chords, against their limits.
+
+
+def refuse_coarse(
+    laminate: Laminate, paths: Mapping[str, Region], settings: CutSettings, design: Design
+) -> None:
+    """Raise DesignError if a passing laminate fails a rule when its ``paths`` are cut in chords."""
+    error = settings.curves.chord_error
+    try:
+        failed = _first_failure(as_cut(laminate, paths, settings), design)
+    except (OutputError, GeometryError) as failure:
+        raise DesignError(_refusal(error, f"leave no sound contours: {failure}")) from failure
+    if failed is not None:
+        raise DesignError(_refusal(error, f"break {failed.rule}: {failed.message}"))
+
+
+def _refusal(error: float, why: str) -> str:
+    return (
+        f"chords within {error:g} mm {why}; take a smaller --chord-error, or true arcs with "
+        "--dxf-profile bulges or arcs"
+    )
+
+
+def as_cut(laminate: Laminate, paths: Mapping[str, Region], settings: CutSettings) -> Laminate:
+    """Return the laminate of the parts that a beam along the paths leaves."""
+    files = []
+    for layer in laminate.layers:
+        path = paths[laminate.layer(laminate.cut_with(layer)).pattern]
+        check_clear(path.contours)
+        region = _without_kerf(path, settings.kerf_width(layer.film.material) or 0.0)
+        files.append(LayerFile(layer, "", CutPart(region, path, {})))
+    return laminate_as_cut(files, laminate)
+
+
+def _first_failure(laminate: Laminate, design: Design) -> Finding | None:
+    """Return the first failure that is not waived, without the yield, or None."""
+    measures = Measures(laminate, design)
+    return next(
+        (
+            finding
+            for rule in RULES
+            if rule.name != registration_yield.NAME
+            for finding in run_rule(rule, measures)
+            if finding.verdict == "fail"
+        ),
+        None,
+    )

@@ -19,7 +19,10 @@ from pydantic import BaseModel
 
 from sbafab.actuators import load_design
 from sbafab.as_built.as_cut import (
+    ExpectedLaminate,
     LayerFile,
+    chords_for_arc,
+    expected_laminate,
     laminate_as_cut,
     layer_departures,
     path_in_folder,
@@ -33,8 +36,6 @@ from sbafab.as_built.differences import (
     index_difference,
     unreadable,
 )
-from sbafab.as_built.expected import ExpectedLaminate, expected_laminate
-from sbafab.as_built.kerf_removed import chords_for_arc
 from sbafab.as_built.records import (
     CLAIMS,
     DESIGNED,

@@ -15,7 +15,7 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sbafab.as_built.expected import refuse_coarse
+from sbafab.as_built.as_cut import refuse_coarse
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import TRUE_ARCS, Curves
 from sbafab.design.records import Design
