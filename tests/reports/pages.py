@@ -21,6 +21,9 @@ from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.work import Work
 from sbafab.version import GENERATOR
 
+APPROVED = Path(__file__).parent / "approved"
+DOUBLE = Path(__file__).parent / "double.toml"
+"""Two pouches on each other, whose rims are welded one over the other."""
 EARS = 'registration.method="ears"'
 TPU = ("films.tpe.product=TPU", "films.tpe.thickness=0.1")
 BLOCKS = "p|li|tr|div|section|article|h1|h2|h3|ul|ol|table|figure|dt|svg|header|label|title"
@@ -68,6 +71,3 @@ def _picture(found: re.Match[str]) -> str:
     label = re.search(r'aria-label="([^"]*)"', found[0])
     words = " | ".join(re.findall(r">([^<>]+)</text>", found[0]))
     return f"<p>PICTURE {label[1]}: {words}</p>" if label else ""
-
-
-APPROVED = Path(__file__).parent / "approved"

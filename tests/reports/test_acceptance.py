@@ -51,21 +51,6 @@ def test_the_needle_holds_in_the_tubes_bore() -> None:
     assert pytest.approx(0.01, abs=0.001) == 0.02525 / 0.025 - 1
 
 
-@pytest.mark.parametrize(
-    ("template", "changes", "is_measured"),
-    [
-        ("3dof-15mm", (), True),
-        ("1dof-10mm", (), False),
-        ("3dof-15mm", TPU, False),
-        ("radial-15mm", (), False),
-    ],
-)
-def test_the_pressure_of_unfolding_is_of_the_papers_balloons_alone(
-    template: str, changes: tuple[str, ...], is_measured: bool
-) -> None:
-    assert values(work_of(template, *changes))["unfolds_as_measured"] == is_measured
-
-
 def test_chambers_of_one_net_are_filled_by_its_first_tube() -> None:
     """What comes out of the other is no leak between chambers."""
     diode, gripper = (values(work_of(name)) for name in ("diode", "gripper"))

@@ -6,7 +6,6 @@ Figures in them are held elsewhere, against the paper, closed formulas and the j
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -23,8 +22,7 @@ from sbafab.reports.traveller.bench import bench_html
 from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.work import Work
 from sbafab.rules.finding import Finding, Place
-from tests.reports.pages import APPROVED, EARS, TPU, lines_of, work_of
-from tests.reports.welded import DOUBLE
+from tests.reports.pages import APPROVED, DOUBLE, EARS, TPU, lines_of, work_of
 
 WAIVED = Finding(
     "bond-width", "waived", 0.75, 0.5, "mm", Place(), "too narrow", waived_by="the design"
@@ -44,6 +42,7 @@ DESIGNS: dict[str, tuple[str, ...]] = {
         "press.time_constant=2",
     ),
     "array": ("array",),
+    "double": (str(DOUBLE),),
     "diode": ("diode",),
     "folded": ("folded", "seam_tools.hot_tip.offset=[12, -3.5]"),
     "gripper": ("gripper",),
@@ -69,13 +68,6 @@ def test_pages_of_a_design(name: str, sheet_files: Any) -> None:
     if work.copies > 1:
         pages.append(tray_html(work))
     approve(name, "\n".join(map(lines_of, pages)))
-
-
-def test_pages_of_seams_over_each_other(tmp_path: Path) -> None:
-    """From above the tool would melt the cap, which lies over the seam of the other two films."""
-    file = tmp_path / "double.toml"
-    file.write_text(DOUBLE.replace("CAP", "pe"), encoding="utf-8")
-    approve("double", lines_of(traveller_html(work_of(str(file)))))
 
 
 @pytest.mark.parametrize("name", ["brace", "aperture"])
