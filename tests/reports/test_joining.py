@@ -32,13 +32,10 @@ def test_a_line_is_threaded_while_both_ends_can_be_reached() -> None:
     names = [one.placed.name for one in joints(brace)]
     assert names == ["tube", "grip", "vacuum", "arm", "cup"]
     assert joint(brace, "arm").lines == ["vacuum"]
-
-
-def test_a_line_in_the_root_comes_after_it() -> None:
+    # The root is there before what it carries.
     line = {"kind": "line", "on": "arm", "at": "lumen", "length": 30, "along": -5}
     names = [one.placed.name for one in joints(together("aperture", feed=line))]
-    assert names[0] == "arm"
-    assert "feed" in names[1:]
+    assert names.index("arm") == 0 < names.index("feed")
 
 
 @pytest.mark.parametrize("end", ["end", "start"])

@@ -7,16 +7,13 @@ browser writes the date of a print.
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import chain
 from string import ascii_uppercase
-from typing import Any, NamedTuple
+from typing import Any
 
-from sbafab.cutting.sheets import SheetFile
 from sbafab.design.identity import cited, cure_hours, departures, tube_name
-from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
-from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.formulas import sizes
 from sbafab.pressing.cycles import batch_times
@@ -31,13 +28,7 @@ from sbafab.reports.traveller.joints import joint_pages
 from sbafab.reports.traveller.materials import bill, cut_list, prints, release_films
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS, record_tables
 from sbafab.reports.traveller.shapes import Round, definitions, pattern_regions, rounds
-from sbafab.reports.traveller.sheet_map import (
-    is_long,
-    marked,
-    part_regions,
-    picture_note,
-    sheet_map,
-)
+from sbafab.reports.traveller.sheet_map import part_regions, sheet_rows
 from sbafab.reports.traveller.times import times
 from sbafab.reports.traveller.work import Work
 from sbafab.rules.finding import Finding
@@ -138,37 +129,6 @@ def _other_marks(work: Work) -> dict[str, str]:
     designs = {design for sheet in work.sheets for design, _, _ in sheet.counts}
     names = sorted(designs - {work.design.name})
     return {name: ascii_uppercase[i % 26] for i, name in enumerate(names, 1)}
-
-
-class SheetRow(NamedTuple):
-    """A sheet of the cut list, with the count of each pattern; ``note`` says how a long one is
-    drawn.
-    """
-
-    sheet: SheetFile
-    film: Film
-    picture: str
-    counts: list[tuple[str, int]]
-    note: str
-    is_long: bool
-
-
-def sheet_rows(
-    design: Design, sheets: Sequence[SheetFile], marks: Mapping[str, str]
-) -> list[SheetRow]:
-    """Return the film sheets of a design; patterns carry the mark or the name of their design."""
-    films = {film.material: film for film in design.films.stock.values()}
-    return [
-        SheetRow(
-            sheet,
-            films[sheet.material],
-            sheet_map(sheet, films[sheet.material], marks, f"sheet-{number}"),
-            [(marked(name, pattern, marks), count) for name, pattern, count in sheet.counts],
-            picture_note(sheet),
-            is_long(sheet),
-        )
-        for number, sheet in enumerate(sheets, 1)
-    ]
 
 
 def _lay_up(laminate: Laminate) -> list[tuple[Round, list[tuple[tuple[Layer, ...], str, str]]]]:

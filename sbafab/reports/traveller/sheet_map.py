@@ -1,4 +1,4 @@
-"""The map of a film sheet on the machine, with every part labelled by its pattern."""
+"""The maps of film sheets on the machine, with every part labelled by its pattern."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sbafab.cutting.sheets import SheetFile
+from sbafab.design.records import Design
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region, coord
 from sbafab.laminate.films import Film
@@ -40,23 +41,22 @@ class _Strip(NamedTuple):
 
     @property
     def size(self) -> Point:
-        wide, high = self.bounds[2] - self.bounds[0], self.bounds[3] - self.bounds[1]
-        return (
-            (high * self.scale, wide * self.scale)
-            if self.turned
-            else (
-                wide * self.scale,
-                high * self.scale,
-            )
-        )
+        low_x, low_y, high_x, high_y = self.bounds
+        wide, high = self.scale * (high_x - low_x), self.scale * (high_y - low_y)
+        return (high, wide) if self.turned else (wide, high)
+
+    @property
+    def window(self) -> Bounds:
+        """The place on the page."""
+        (x, y), (wide, high) = self.corner, self.size
+        return x, y, x + wide, y + high
 
     def at(self, p: Point) -> Point:
-        x, y = self.corner
-        if self.turned:
-            return x + (p[1] - self.bounds[1]) * self.scale, y + (
-                p[0] - self.bounds[0]
-            ) * self.scale
-        return x + (p[0] - self.bounds[0]) * self.scale, y + (self.bounds[3] - p[1]) * self.scale
+        (x, y), (low_x, low_y, _, high_y) = self.corner, self.bounds
+        across, down = (
+            (p[1] - low_y, p[0] - low_x) if self.turned else (p[0] - low_x, high_y - p[1])
+        )
+        return x + across * self.scale, y + down * self.scale
 
     def matrix(self, placement: Placement) -> tuple[float, ...]:
         """Return the matrix of a quarter turn and a shift in the sheet's frame, then to the
@@ -84,22 +84,41 @@ def _part_id(sheet: SheetFile, index: int) -> str:
     return f"part-{sheet.material}-{index + 1}"
 
 
-def is_long(sheet: SheetFile) -> bool:
-    """Return True if the sheet is drawn in rows across the page, each a part of its length."""
+class SheetRow(NamedTuple):
+    """A sheet of the cut list, with the count of each pattern, and its picture.
+
+    A long sheet is drawn in ``rows`` across the page, each a part of its length, and may be turned;
+    the picture of another ends above ``used`` mm.
+    """
+
+    sheet: SheetFile
+    film: Film
+    counts: list[tuple[str, int]]
+    picture: str
+    rows: int
+    is_turned: bool
+    is_long: bool
+    used: float
+
+
+def sheet_rows(
+    design: Design, sheets: Sequence[SheetFile], marks: Mapping[str, str]
+) -> list[SheetRow]:
+    """Return the film sheets of a design; patterns carry the mark or the name of their design."""
+    films = {film.material: film for film in design.films.stock.values()}
+    rows = []
+    for number, sheet in enumerate(sheets, 1):
+        film, strips, is_long = films[sheet.material], _strips(sheet), _is_long(sheet)
+        counts = [(_marked(name, pattern, marks), n) for name, pattern, n in sheet.counts]
+        picture = sheet_map(sheet, film, marks, f"sheet-{number}")
+        used = sheet.length if is_long else _used(sheet)
+        turned = strips[0].turned
+        rows.append(SheetRow(sheet, film, counts, picture, len(strips), turned, is_long, used))
+    return rows
+
+
+def _is_long(sheet: SheetFile) -> bool:
     return max(sheet.width, sheet.length) > LONG * min(sheet.width, sheet.length)
-
-
-def picture_note(sheet: SheetFile) -> str:
-    """Return what the picture of a sheet does not show directly: rows, a turn, an empty rest."""
-    if not is_long(sheet):
-        used = _used(sheet)
-        return f"the sheet above {used:.0f} mm is empty" if used < sheet.length else ""
-    strips = _strips(sheet)
-    rows = f"shown in {len(strips)} rows, one after the other" if len(strips) > 1 else ""
-    if not strips[0].turned:
-        return rows
-    turn = "turned by 90°: its lower left corner is at the upper left"
-    return f"{turn}; {rows}" if rows else turn
 
 
 def sheet_map(sheet: SheetFile, film: Film, marks: Mapping[str, str], name: str) -> str:
@@ -108,23 +127,16 @@ def sheet_map(sheet: SheetFile, film: Film, marks: Mapping[str, str], name: str)
     The label of a part is its pattern after the mark of its design, or the design's name.
     """
     strips = _strips(sheet)
-    width, height = strips[-1].size
-    low = strips[-1].corner[1] + height
-    words = f"{sheet.path}: where every part lies"
-    picture = Picture(name, width + 2 * EDGE, low + EDGE, words)
+    _, _, right, foot = strips[-1].window
+    picture = Picture(name, right + EDGE, foot + EDGE, f"{sheet.path}: where every part lies")
     for strip in strips:
-        picture.add(*_window(strip))
         _draw(picture, sheet, film, strip, marks)
-        picture.add("</svg>")
-        (x, y), (wide, high) = strip.corner, strip.size
-        frame = (x, y), (x + wide, y + high)
-        picture.add(draw.box(*frame, fill="none", stroke=draw.DARK))
     return picture.svg()
 
 
 def _strips(sheet: SheetFile) -> list[_Strip]:
     width, length = sheet.width, sheet.length
-    if not is_long(sheet):
+    if not _is_long(sheet):
         used = _used(sheet)
         scale = min(BESIDE / width, HIGHEST / used)
         return [_Strip((0.0, 0.0, width, used), (EDGE, EDGE), scale, False)]
@@ -154,36 +166,26 @@ def _used(sheet: SheetFile) -> float:
     return min(sheet.length, max(tops) + nest.stock.border)
 
 
-def _window(strip: _Strip) -> list[str]:
-    """Return the opening tags of a nested picture clipped to the strip."""
-    (x, y), (wide, high) = strip.corner, strip.size
-    place = " ".join(map(coord, (x, y, wide, high)))
-    return [
-        f'<svg x="{coord(x)}" y="{coord(y)}" width="{coord(wide)}" height="{coord(high)}" '
-        f'viewBox="{place}">',
-        draw.box(strip.corner, (x + wide, y + high), fill="#ffffff", stroke="none"),
-    ]
-
-
 def _draw(
     picture: Picture, sheet: SheetFile, film: Film, strip: _Strip, marks: Mapping[str, str]
 ) -> None:
-    """Draw parts, pins and labels of a strip."""
-    visible = [
-        (placement, sheet.nest.region(placement))
-        for placement in sheet.nest.on_sheet(sheet.number - 1)
-    ]
-    visible = [(placement, region) for placement, region in visible if _meets(region.bounds, strip)]
+    """Draw parts, pins and labels of a strip, clipped to it."""
+    left, top, right, foot = strip.window
+    x, y, wide, high = map(coord, (left, top, right - left, foot - top))
+    picture.add(
+        f'<svg x="{x}" y="{y}" width="{wide}" height="{high}" viewBox="{x} {y} {wide} {high}">',
+        draw.box((left, top), (right, foot), fill="#ffffff"),
+    )
+    placed = [(one, sheet.nest.region(one)) for one in sheet.nest.on_sheet(sheet.number - 1)]
+    visible = [(one, region) for one, region in placed if _meet(region.bounds, strip.bounds)]
     for placement, _ in visible:
         name = _part_id(sheet, placement.part)
         picture.part(name, film, strip.matrix(placement), "fresh")
-    for x, y, diameter in sheet.nest.stock.pins:
-        at = strip.at((x, y))
-        radius = coord(diameter * strip.scale / 2)
-        picture.add(
-            f'<circle cx="{coord(at[0])}" cy="{coord(at[1])}" r="{radius}" fill="#777777"/>'
-        )
+    for pin_x, pin_y, diameter in sheet.nest.stock.pins:
+        at = strip.at((pin_x, pin_y))
+        picture.add(draw.circle(at, diameter * strip.scale / 2, 'fill="#777777"'))
     _label(picture, sheet, strip, marks, visible)
+    picture.add("</svg>", draw.box((left, top), (right, foot), fill="none", stroke=draw.DARK))
 
 
 def _label(
@@ -196,11 +198,9 @@ def _label(
     """Label every part; equal parts get equal labels unless labels would collide."""
     places: dict[tuple[int, int], tuple[Point, list[PlacedLabel]]] = {}
     taken: list[Bounds] = []
-    (left, top), (wide, high) = strip.corner, strip.size
-    page = left, top, left + wide, top + high
     for placement, region in visible:
         part = sheet.nest.parts[placement.part]
-        words = marked(part.design, part.pattern, marks)
+        words = _marked(part.design, part.pattern, marks)
         x, y = strip.at(region.bounds[:2])
         key = placement.part, placement.turn
         if key not in places:
@@ -208,18 +208,13 @@ def _label(
             places[key] = (x, y), labels(words, shape)
         (first_x, first_y), found = places[key]
         for place in (one.moved(x - first_x, y - first_y) for one in found):
-            if _within(place.box, page) and not any(_meet(place.box, box) for box in taken):
+            if _within(place.box, strip.window) and not any(_meet(place.box, box) for box in taken):
                 taken.append(place.box)
                 picture.add(label(place.at, words, place.size))
                 break
 
 
-def _meets(bounds: Bounds, strip: _Strip) -> bool:
-    low_x, low_y, high_x, high_y = strip.bounds
-    return bounds[0] < high_x and bounds[2] > low_x and bounds[1] < high_y and bounds[3] > low_y
-
-
-def marked(design: str, pattern: str, marks: Mapping[str, str]) -> str:
+def _marked(design: str, pattern: str, marks: Mapping[str, str]) -> str:
     """Return a pattern after the mark of its design, or after the design's name without a mark."""
     return f"{marks.get(design, design)} {pattern}".lstrip()
 
