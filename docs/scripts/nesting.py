@@ -24,6 +24,7 @@ from typing import Any
 import shapely
 
 from sbafab.actuators import load_design
+from sbafab.build.build import make_build, stocks
 from sbafab.design.files import template_names
 from sbafab.errors import DesignError
 from sbafab.geometry.contour import run_chords
@@ -33,7 +34,6 @@ from sbafab.nesting.check import check_nest
 from sbafab.nesting.engines import bottom_left
 from sbafab.nesting.nest import materials_of, nest, of_material
 from sbafab.nesting.records import NestPart, Stock
-from sbafab.output.checked import check, stocks
 
 COPIES = (1, 4, 8, 20)
 SECONDS = 25
@@ -61,7 +61,7 @@ def rows() -> Iterator[dict[str, Any]]:
             except DesignError:
                 # An assembly, whose designs are templates themselves.
                 break
-            parts = check(design).pieces
+            parts = make_build(design).pieces
             for film in materials_of(parts):
                 stock = stocks(design)[film].model_copy(update={"most": 1000})
                 entry = {"design": name, "copies": copies, "film": film}

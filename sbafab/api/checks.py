@@ -32,9 +32,9 @@ def check(
     built. Limits are the paper's (Sec. 2) if it gives one, else ours.
     """
     # A job takes models, hence numpy; a page without numpy has the rules of a design.
-    from sbafab.output.job import check_job
+    from sbafab.build.order import make_order
 
-    return Findings(check_job(either_of(source, changes, tables), progress=progress).findings)
+    return Findings(make_order(either_of(source, changes, tables), progress=progress).findings)
 
 
 def checking(

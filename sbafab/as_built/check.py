@@ -50,6 +50,8 @@ from sbafab.as_built.records import (
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.checks import run_checks
 from sbafab.assemblies.files import DESIGN_FILE, load_assembly
+from sbafab.build.build import Build, make_build
+from sbafab.build.order import SCHEMA, Order, of_assembly
 from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import FOLDER as LAYERS
 from sbafab.cutting.properties import curves_of
@@ -62,19 +64,20 @@ from sbafab.models.figures import Factors, PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.output.artefacts import (
     ARTEFACTS,
+    EVERYTHING,
     PAGES,
+    PICTURES,
     TRAVELLER,
     DesignFolder,
+    RunPart,
     write_artefacts,
     write_nested_sheets,
     write_plates,
 )
 from sbafab.output.carry_over import MESH, PREDICTION, PRESS
-from sbafab.output.checked import EVERYTHING, PICTURES, Build, RunPart, check
 from sbafab.output.folder import write_design, write_folder
-from sbafab.output.job import Order, of_assembly
 from sbafab.output.manifest import JobManifest, Manifest, as_json, file_hashes, file_names
-from sbafab.output.swap import SCHEMA, is_among_cut_files
+from sbafab.output.swap import is_among_cut_files
 from sbafab.process import ignore_progress
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding, Place, Verdict
@@ -167,7 +170,7 @@ def read_folder(folder: Path) -> AsBuiltFolder:
         raise OutputError(f"{folder} holds no cut files; write them with sbafab cut or generate")
     design = _design(folder)
     try:
-        build = check(design, curves=curves_of(claims.curves))
+        build = make_build(design, curves=curves_of(claims.curves))
         expected = expected_laminate(build.laminate, build.settings)
     except DESIGN_ERRORS as error:
         raise DesignError(f"design.toml makes no laminate: {error}") from None

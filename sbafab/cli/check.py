@@ -13,6 +13,8 @@ import click
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.files import load
+from sbafab.build.build import Build, refuse_undoable
+from sbafab.build.order import Order, make_order
 from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.cli.options import (
     designs,
@@ -43,8 +45,7 @@ from sbafab.errors import DesignError, SbafabError
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.formulas import size_phrases, sizes
 from sbafab.output.advice import Advice, advise
-from sbafab.output.checked import Build, checks, refuse_undoable
-from sbafab.output.job import Order, check_job
+from sbafab.output.checks import checks
 from sbafab.process import Progress
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
@@ -195,7 +196,7 @@ def _check_source(
         advice = advise(load_design(name, wanted), target, progress)
         has_target = source.rules.target_yield is not None
         source = load_design(name, wanted, waivers)
-    job = check_job(source, progress=progress)
+    job = make_order(source, progress=progress)
     if not job.failed:
         refuse_undoable(job.builds)
     findings, groups = job.findings, groups_of(job.builds, job.between)

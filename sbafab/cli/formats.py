@@ -13,6 +13,7 @@ from pydantic import BaseModel, Field
 
 from sbafab import actuators
 from sbafab.assemblies.records import Assembly
+from sbafab.build.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.cli.explain import ExplainDocument, ExplainedDocument
 from sbafab.cli.kerf import KerfDocument
 from sbafab.cli.make import NestedDocument, RunDocument
@@ -27,9 +28,8 @@ from sbafab.laminate.netlist import SCHEMA as NETS
 from sbafab.models.map_files import MapDocument
 from sbafab.models.sensitivities import SensitivityRow
 from sbafab.output.artefacts import PredictDocument
-from sbafab.output.checked import Checks
+from sbafab.output.checks import Checks
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
-from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.schedule_files import PressDocument
 from sbafab.reports.assembly_prediction import SCHEMA as ASSEMBLY_PREDICTION
 from sbafab.reports.assembly_prediction import AssemblyPrediction

@@ -49,7 +49,8 @@ from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
 from sbafab.meshing.formats import CONFORMING_ENDINGS
-from sbafab.output.checked import EVERYTHING, FindingEntry, RunPart
+from sbafab.output.artefacts import EVERYTHING, RunPart
+from sbafab.output.checks import FindingEntry
 from sbafab.pressing.cycles import batch_times, design_runs
 from sbafab.runs.run import Conforming, Run, RunRequest
 from sbafab.runs.run import generate as run_design

@@ -24,7 +24,7 @@ from sbafab.cli.options import (
 )
 from sbafab.cli.printing import Group, print_failed, print_findings, print_json, print_verdict
 from sbafab.cli.progress import shown_progress
-from sbafab.output.checked import checks
+from sbafab.output.checks import checks
 from sbafab.runs.run import result_json
 from sbafab.runs.run import simulate as run
 from sbafab.simulators.simulator import CHOICES, NAMES, Name, Result, SimulationRequest

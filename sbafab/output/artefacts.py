@@ -14,6 +14,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from sbafab.build.build import Build, hole_notes
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.layer_files import write_layer_files
 from sbafab.cutting.properties import CutSettings
@@ -34,7 +35,7 @@ from sbafab.models.calibrated import NONE, load_calibration, shipped_names
 from sbafab.models.figures import Prediction, PredictionDocument
 from sbafab.nesting.nest import PLACES, as_dict
 from sbafab.nesting.records import Nest
-from sbafab.output.checked import Build, Checks, RunPart, checks, hole_notes
+from sbafab.output.checks import Checks, checks
 from sbafab.output.manifest import as_json
 from sbafab.pressing.cycles import batch_entry
 from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json
@@ -60,6 +61,13 @@ FINDINGS = "findings.html"
 PREDICT = "predict"
 """Folder of a prediction's plots."""
 PICTURES_OF_A_DESIGN = 3
+
+
+RunPart = Literal["cut", "press", "mesh", "preview", "predict"] | Name
+"""What a run writes of a design: by rules and geometry, by models, or for a simulator."""
+EVERYTHING: tuple[RunPart, ...] = ("cut", "press", "mesh", "preview")
+PICTURES: tuple[RunPart, ...] = ("preview",)
+"""What is left, beside the findings, of a design that is not to be cut."""
 
 
 @dataclass

@@ -12,6 +12,7 @@ from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
 from sbafab.assemblies.records import Cup
 from sbafab.assemblies.shapes import colours, cup_mould, linear, placed_surface
+from sbafab.build.order import SCHEMA, Order
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DefectError
 from sbafab.meshing.formats import Node, write_scene, write_stl
@@ -22,16 +23,15 @@ from sbafab.output.artefacts import (
     TRAVELLER,
     Artefact,
     DesignFolder,
+    RunPart,
     findings_page,
     work_of,
     write_artefacts,
     write_nested_sheets,
     write_text,
 )
-from sbafab.output.checked import RunPart, checks
-from sbafab.output.job import Order
+from sbafab.output.checks import checks
 from sbafab.output.manifest import AssemblyManifest, as_json, file_hashes, job_manifest, manifest
-from sbafab.output.swap import SCHEMA
 from sbafab.process import Progress
 
 SOLID = "mesh/assembled.glb"

@@ -11,21 +11,12 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path, PurePath
-from typing import Final, Literal
 
 from filelock import FileLock, Timeout
 
+from sbafab.build.order import SCHEMA, SCHEMAS
 from sbafab.errors import OutputError, SbafabError
 
-SCHEMA: Final = "sbafab/manifest@1"
-JOB_SCHEMA: Final = "sbafab/job@1"
-"""Of a folder that holds several designs cut together."""
-ASSEMBLY_SCHEMA: Final = "sbafab/assembly@1"
-"""Of a folder that holds the designs of an assembly, cut together."""
-SCHEMAS = (SCHEMA, JOB_SCHEMA, ASSEMBLY_SCHEMA)
-BatchSchema = Literal["sbafab/job@1", "sbafab/assembly@1"]
-Schema = Literal["sbafab/manifest@1"] | BatchSchema
-"""Of a folder's ``manifest.json``."""
 MANIFEST = "manifest.json"
 CUT_FOLDERS = ("layers", "sheets")
 """Where a file of somebody else would be cut together with those of the run."""

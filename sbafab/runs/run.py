@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 from sbafab.as_built.as_cut import refuse_coarse
 from sbafab.assemblies.records import Assembly
+from sbafab.build.build import Build, make_build
+from sbafab.build.order import JOB_SCHEMA, SCHEMA, Order, make_order
 from sbafab.cutting.properties import TRUE_ARCS, Curves
 from sbafab.design.records import Design
 from sbafab.errors import OccupiedError, OutputError
@@ -24,13 +26,11 @@ from sbafab.laminate.burst import burst
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import Prediction
 from sbafab.notebook import table_html
-from sbafab.output.artefacts import tops_of
+from sbafab.output.artefacts import EVERYTHING, PICTURES, RunPart, tops_of
 from sbafab.output.carry_over import carry_over, refuse_to_replace, removed_files, would_replace
-from sbafab.output.checked import EVERYTHING, PICTURES, Build, RunPart, check
 from sbafab.output.folder import close_folder, write_folder
-from sbafab.output.job import Order, check_job
 from sbafab.output.manifest import as_json, identity
-from sbafab.output.swap import JOB_SCHEMA, SCHEMA, listed_files, refuse_busy, replaced_folder
+from sbafab.output.swap import listed_files, refuse_busy, replaced_folder
 from sbafab.pressing.schedule import Schedule
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Finding, Findings
@@ -156,7 +156,7 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     old folder is then whole.
     """
     progress = progress or ignore_progress
-    order = check_job(request.source, request.name, progress, request.curves)
+    order = make_order(request.source, request.name, progress, request.curves)
     target = request.out / order.name
     beside = ""
     try:
@@ -287,7 +287,7 @@ def simulate(
     wish = under_vacuum(name, wish) if design.form.works_under_vacuum else wish
     result = None
     with tempfile.TemporaryDirectory() as temporary:
-        build = check(design, progress)
+        build = make_build(design, progress)
         if build.failed:
             return Simulated(build.findings, None)
         # Said before a run of hours, not after it.

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, TypeVar
 from pydantic import AliasPath, Field
 
 from sbafab.actuators import load_design, records
+from sbafab.build.build import Build, make_build
 from sbafab.design.files import Change, override, shown
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, validated
@@ -32,7 +33,6 @@ from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import MOST_PRESSURE, stack
 from sbafab.output import advice
 from sbafab.output.advice import YieldDesign, value_of
-from sbafab.output.checked import Build, check
 from sbafab.output.swap import replace_text
 from sbafab.process import Progress, ignore_progress
 from sbafab.reports.html_templates import environment
@@ -295,7 +295,7 @@ def compare(
     each = []
     for number, (design, source) in enumerate(zip((first, second), sources, strict=True)):
         progress(f"predicting {design.name}", number, 2)
-        checked = check(design)
+        checked = make_build(design)
         pressures = tuple(pressures_kpa or usual_pressures(design.form)[:1])
         request = PredictionRequest(pressures, flow_ml_min)
         prediction = predict(design, request, checked.laminate)

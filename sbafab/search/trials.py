@@ -25,6 +25,7 @@ from typing import IO, Any, Literal, NamedTuple
 
 import sbafab
 from sbafab.actuators import records
+from sbafab.build.build import make_build, refuse_undoable
 from sbafab.design.files import checked as checked_record
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
@@ -32,7 +33,6 @@ from sbafab.errors import DesignError, OutputError, SbafabError
 from sbafab.models.figures import PredictionRequest
 from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
-from sbafab.output.checked import check, refuse_undoable
 from sbafab.plugins import FAMILIES, RULES, installed
 from sbafab.process import prepare, processors
 from sbafab.rules.deck import AT_MOST
@@ -75,7 +75,7 @@ def _base(tables: str, folder: str) -> Design:
 
 
 def _measure(design: Design, pressures: Sequence[float], row: SweepRow) -> None:
-    checked = check(design)
+    checked = make_build(design)
     worst = margins(checked.findings)
     row["rules"] = {
         name: [rule.verdict, rule.margin, rule.measured, rule.limit, rule.unit]

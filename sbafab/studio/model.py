@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from sbafab import api
-from sbafab.output.checked import FindingEntry
+from sbafab.output.checks import FindingEntry
 
 if TYPE_CHECKING:
     from sbafab.assemblies.build import Assembled, PlacedPart

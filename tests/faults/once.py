@@ -11,7 +11,7 @@ from typing import Any
 from unittest.mock import patch
 
 from sbafab.as_built import check as as_built
-from sbafab.output import checked
+from sbafab.build import build as builds
 
 
 def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
@@ -21,8 +21,8 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     """
     remake = as_built._remake
     check = _remembered(
-        as_built.check,
-        lambda design, curves: f"{design.model_dump_json()} {curves} {id(checked.run_deck)}",
+        as_built.make_build,
+        lambda design, curves: f"{design.model_dump_json()} {curves} {id(builds.run_deck)}",
     )
     expected = _remembered(
         as_built.expected_laminate, lambda made, settings: f"{made.name} {settings}"
@@ -44,7 +44,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     @contextmanager
     def context() -> Iterator[None]:
         with (
-            patch.object(as_built, "check", check),
+            patch.object(as_built, "make_build", check),
             patch.object(as_built, "expected_laminate", expected),
             patch.object(as_built, "_remake", remake_once),
         ):

@@ -14,10 +14,10 @@ from sbafab.as_built import as_cut
 from sbafab.as_built import check as as_built
 from sbafab.as_built.as_cut import CutPart, Expected, read_part
 from sbafab.as_built.check import check_folder
+from sbafab.build import build as builds
 from sbafab.geometry.region import Region
 from sbafab.laminate import laminate
 from sbafab.laminate.laminate import Laminate, Layer, Role, interface_regions
-from sbafab.output import checked
 from sbafab.rules import registration_worst_case, registration_yield
 from sbafab.rules.deck import RULES, run_deck
 from tests.as_built.doctoring import Doctor
@@ -70,7 +70,7 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
         patch.object(as_cut, "read_part", known),
         patch.object(laminate, "interface_regions", regions),
         patch.object(as_built, "RULES", rules),
-        patch.object(checked, "run_deck", lambda *_: ()),
+        patch.object(builds, "run_deck", lambda *_: ()),
     ):
         yield
 
@@ -78,7 +78,7 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
 @contextmanager
 def unabridged() -> Iterator[None]:
     """Every rule is run."""
-    with patch.object(as_built, "RULES", RULES), patch.object(checked, "run_deck", run_deck):
+    with patch.object(as_built, "RULES", RULES), patch.object(builds, "run_deck", run_deck):
         yield
 
 

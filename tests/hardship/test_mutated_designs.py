@@ -17,10 +17,10 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import assembly_toml, load
+from sbafab.build.order import make_order
 from sbafab.design.files import template_names, templates_folder
 from sbafab.design.records import Design, design_toml
 from sbafab.errors import SbafabError
-from sbafab.output.job import check_job
 from tests.quick import few
 
 COUNT = int(os.environ.get("SBAFAB_MUTATIONS", "120"))
@@ -140,7 +140,7 @@ def at_most(seconds: int) -> Iterator[None]:
 def refused(path: Path) -> str | None:
     """What is said of a design file that is refused, None of one that is checked."""
     try:
-        check_job(load(path))
+        make_order(load(path))
     except SbafabError as error:
         return str(error)
     return None

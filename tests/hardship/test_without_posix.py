@@ -17,9 +17,10 @@ from pathlib import Path
 
 import pytest
 
+from sbafab.build.order import SCHEMA
 from sbafab.cli import main
 from sbafab.output import swap
-from sbafab.output.swap import SCHEMA, replaced_folder
+from sbafab.output.swap import replaced_folder
 from sbafab.simulators import simulator
 
 PACKAGE = Path(__file__).parents[2] / "sbafab"

@@ -16,12 +16,12 @@ from shapely.geometry import Point as ShapelyPoint
 from shapely.geometry import Polygon, box
 
 from sbafab.actuators import build, load_design
+from sbafab.build.build import make_build, stocks
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.lattice import Lattice, lattices_of
 from sbafab.nesting.nest import nest, of_material
 from sbafab.nesting.records import TURNS, Nest, NestPart, Stock, placed
-from sbafab.output.checked import check, stocks
 
 
 def best(shape: Region, spacing: float, width: float, length: float) -> Lattice:
@@ -71,7 +71,7 @@ def test_rectangles_fill_a_sheet_that_takes_two_lattices(turned: bool) -> None:
 def test_eighteen_membranes_of_a_finger_lie_on_one_sheet() -> None:
     """16 in pairs whose tabs pass each other, 117 mm wide, and two in the strip of 14.4 mm left."""
     design = load_design("finger")
-    parts = of_material(check(design).pieces, "PTFE")
+    parts = of_material(make_build(design).pieces, "PTFE")
     (result,) = nest([replace(parts[0], count=18)], {"PTFE": stocks(design)["PTFE"]})
     assert result.sheets == 1
     judged(result)
@@ -168,7 +168,7 @@ def test_only_turns_that_the_stock_allows_are_used() -> None:
 def test_five_folded_pouches_lie_on_one_sheet() -> None:
     """As sparrow packs them; two lattices hold four, as bottom-left alone does."""
     design = load_design("folded", ("order.copies=4",))
-    parts = of_material(check(design).pieces, "PE")
+    parts = of_material(make_build(design).pieces, "PE")
     stock = stocks(design)["PE"]
     low_x, low_y, high_x, high_y = stock.usable
     assert len(best(parts[0].region, stock.spacing, high_x - low_x, high_y - low_y).places) == 4

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.build.build import make_build
 from sbafab.cli import main
 from sbafab.design.records import Design
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.output.advice import CHECK_SEED, SEED, YieldDesign, advise, reach_yield
-from sbafab.output.checked import AdviceEntry, check
+from sbafab.output.checks import AdviceEntry
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.registration_yield import simulate
 from sbafab.search.compare import ReachedYield
@@ -70,7 +71,7 @@ def is_good(found: YieldDesign) -> bool:
     assert found.share is not None
     assert found.design.rules.target_yield == found.target <= found.share.interval[0]
     again = simulate(build(found.design), found.design, CHECK_SEED).whole
-    return not check(found.design).failed and again == found.share
+    return not make_build(found.design).failed and again == found.share
 
 
 def test_what_is_good_enough_stays() -> None:

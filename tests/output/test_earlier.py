@@ -14,7 +14,7 @@ from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import Curves
 from sbafab.errors import OutputError
 from sbafab.meshing.conforming.layup import MeshSettings
-from sbafab.output.checked import RunPart
+from sbafab.output.artefacts import RunPart
 from sbafab.output.manifest import file_hashes
 from sbafab.runs.run import Conforming, RunRequest, generate
 from tests.quick import few

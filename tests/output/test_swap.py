@@ -11,9 +11,10 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
+from sbafab.build.order import SCHEMA
 from sbafab.errors import OutputError
 from sbafab.output import swap
-from sbafab.output.swap import SCHEMA, replaced_folder
+from sbafab.output.swap import replaced_folder
 
 
 def write_run(folder: Path, text: str) -> None:

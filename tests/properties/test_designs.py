@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 
 from sbafab.actuators import load_design
 from sbafab.as_built.check import check_folder
+from sbafab.build.build import make_build
 from sbafab.cli import main
 from sbafab.errors import DesignError
-from sbafab.output.checked import check
 from sbafab.runs.run import RunRequest, generate
 from tests.properties.designs import Draft, lobed, one_dof, radial, valid
 from tests.properties.faults import REFUSALS, RULES
@@ -35,7 +35,7 @@ def share(few: int, parts: int) -> settings:
 
 def failures(draft: Draft) -> list[str]:
     with TemporaryDirectory() as folder:
-        findings = check(load_design(draft.write(Path(folder)))).findings
+        findings = make_build(load_design(draft.write(Path(folder)))).findings
     return [finding.message for finding in findings if finding.verdict == "fail"]
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, Literal
 
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
@@ -21,12 +21,20 @@ from sbafab.errors import DefectError, DesignError, GeometryError, OutputError
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import PLACES, from_dict, nest
 from sbafab.nesting.records import Nest, NestPart
-from sbafab.output.checked import Build, check, stocks
-from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, Schema
+from sbafab.build.build import Build, make_build, stocks
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding
 
+SCHEMA: Final = "sbafab/manifest@1"
+JOB_SCHEMA: Final = "sbafab/job@1"
+"""Of a folder that holds several designs cut together."""
+ASSEMBLY_SCHEMA: Final = "sbafab/assembly@1"
+"""Of a folder that holds the designs of an assembly, cut together."""
+SCHEMAS = (SCHEMA, JOB_SCHEMA, ASSEMBLY_SCHEMA)
+BatchSchema = Literal["sbafab/job@1", "sbafab/assembly@1"]
+Schema = Literal["sbafab/manifest@1"] | BatchSchema
+"""Of a folder's ``manifest.json``."""
 RESERVED = {
     "sheets": "the job's folder of film sheets",
     "manifest.json": "the job's index",
@@ -113,7 +121,7 @@ class Order:
         return _saved(pieces, design, old_folder / PLACES) or _nested(pieces, design)
 
 
-def check_job(
+def make_order(
     source: Design | Assembly | Sequence[Design],
     name: str = "",
     progress: Progress | None = None,
@@ -125,12 +133,12 @@ def check_job(
     not equal.
     """
     if isinstance(source, Design):
-        return Order(SCHEMA, source.name, (check(source, progress, curves),))
+        return Order(SCHEMA, source.name, (make_build(source, progress, curves),))
     if isinstance(source, Assembly):
         return _check_assembly(source, progress or ignore_progress, curves)
     _refuse_names([design.name for design in source], name)
     refuse_other_film(source)
-    return Order(JOB_SCHEMA, name, tuple(check(design, progress, curves) for design in source))
+    return Order(JOB_SCHEMA, name, tuple(make_build(design, progress, curves) for design in source))
 
 
 def _check_assembly(assembly: Assembly, progress: Progress, curves: Curves) -> Order:

@@ -33,38 +33,7 @@ from sbafab.process import Progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding, Verdict, summary
 from sbafab.rules.limits import CHECKED_AGAINST, lowered
-from sbafab.simulators.simulator import Name
 from sbafab.version import GENERATOR
-
-Micrometres = Annotated[float, AfterValidator(lambda value: round(value, 4))]
-
-
-class PlaceEntry(Document):
-    """Where a value was found."""
-
-    interface: int | None
-    """counted from 1, bottom to top"""
-    layers: list[int]
-    x: Micrometres | None
-    """mm"""
-    y: Micrometres | None
-    """mm"""
-
-
-class FindingEntry(Document):
-    """A finding."""
-
-    rule: str
-    verdict: Verdict
-    limit: PlainNumber | None
-    measured: PlainNumber | None
-    unit: str
-    where: PlaceEntry
-    message: str
-
-
-# A design and what follows from it.
-
 
 @dataclass(frozen=True, eq=False)
 class Build:
@@ -143,7 +112,7 @@ class Build:
         return replace(plain, steps=(marked, *later), remarks=tuple(remarks))
 
 
-def check(design: Design, progress: Progress | None = None, curves: Curves = TRUE_ARCS) -> Build:
+def make_build(design: Design, progress: Progress | None = None, curves: Curves = TRUE_ARCS) -> Build:
     """Build the laminate of a design and run the rule deck on it. Raises DesignError."""
     try:
         laminate = build(design)
@@ -157,65 +126,6 @@ def refuse_undoable(builds: Sequence[Build]) -> None:
     for each in builds:
         assert each.schedule
         refuse_unfit(each.pieces, stocks(each.design))
-
-
-class Summary(Document):
-    """The overall verdict, and the number of rules by verdict."""
-
-    holds: bool
-    passed: int = Field(alias="pass")
-    warn: int
-    waived: int
-    fail: int
-
-
-class AdviceEntry(Document):
-    """The least bond and overhang, mm, that reach a yield, and the share that they give."""
-
-    target_yield: PlainNumber = attribute("target")
-    bond_width: float | None = attribute("bond")
-    mask_overhang: float | None = attribute("overhang")
-    measured: float | None = attribute("share.value")
-    interval: tuple[float, float] | None = attribute("share.interval")
-    message: str = attribute("sentence")
-
-
-class Checks(Document, schema="sbafab/checks@1"):
-    """What the rules found, as ``checks.json`` holds it."""
-
-    design: str
-    """name of the design or assembly, or the folder's path"""
-    source: Literal["design", "as-built"]
-    summary: Summary
-    kits: list[dict[str, Any]]
-    findings: list[FindingEntry]
-    sizes: Mapping[str, Mapping[str, float]] = {}
-    """mm by name, of each design by its name"""
-    notes: Sequence[str] = ()
-    advice: AdviceEntry | None = None
-    """of --target-yield"""
-
-
-def checks(
-    findings: Sequence[Finding],
-    source: str,
-    name: str,
-    designs: Sequence[Design] = (),
-    **printed: object,
-) -> dict[str, Any]:
-    """Return the contents of ``checks.json`` for the design, assembly or folder called ``name``.
-
-    ``source`` is "design" or "as-built", ``designs`` are those that were checked.
-    """
-    return Checks.of(
-        None,
-        design=name,
-        source=source,
-        summary=summary(findings),
-        kits=[{"design": design.name, **citation(design)} for design in designs],
-        findings=findings,
-        **printed,
-    )
 
 
 # A design's sections as the settings that rules, cutting and pressing take.
@@ -306,13 +216,3 @@ def entries(design: Design) -> dict[Material, Entries]:
             key=key,
         )
     return found
-
-
-# The parts of a run.
-
-
-RunPart = Literal["cut", "press", "mesh", "preview", "predict"] | Name
-"""What a run writes of a design: by rules and geometry, by models, or for a simulator."""
-EVERYTHING: tuple[RunPart, ...] = ("cut", "press", "mesh", "preview")
-PICTURES: tuple[RunPart, ...] = ("preview",)
-"""What is left, beside the findings, of a design that is not to be cut."""
