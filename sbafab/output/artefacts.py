@@ -227,7 +227,7 @@ def _press_csv(folder: DesignFolder) -> str:
 
 def _underlay(folder: DesignFolder) -> bytes | None:
     # Only a folder with a traveller has an underlay.
-    from sbafab.reports.underlay import underlay_pdf
+    from sbafab.reports.prints import underlay_pdf
 
     build, platen = folder.build, folder.design.press.platen
     return underlay_pdf(build.laminate, build.sha256, build.cycles.places, platen)
@@ -235,7 +235,7 @@ def _underlay(folder: DesignFolder) -> bytes | None:
 
 def _seams(folder: DesignFolder) -> bytes | None:
     # Only a folder with a traveller has pages of seams.
-    from sbafab.reports.underlay import seams_pdf
+    from sbafab.reports.prints import seams_pdf
 
     return seams_pdf(folder.laminate, folder.build.sha256, folder.design.seam_offsets)
 
@@ -351,7 +351,7 @@ def _write_simulation(name: Name, folder: DesignFolder) -> None:
 
 def _tray_pdf(folder: DesignFolder) -> bytes | None:
     # Only a batch, or a design that asks for it, has a tray plan.
-    from sbafab.reports.tray_plan import tray_pdf
+    from sbafab.reports.prints import tray_pdf
 
     if not _has_tray(folder):
         return None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -20,6 +19,21 @@ from sbafab.reports.drawing import BOND, length
 MOST_BALLOONS = 4
 """Most balloons shown in full."""
 BEYOND_LUMEN = 3.25
+PAGE_WIDTH = 297.0
+LEFT, RIGHT = 56.0, 56.0
+HEAD, FOOT = 42.0, 36.0
+TALLEST = 120.0
+TALLEST_FILM = 8.0
+BREAK = 13.0
+ROW_STEP = 6.0
+SLIT = 0.18
+"""Share of the gap drawn open above and below a mask, to show what does not bond."""
+EXAGGERATIONS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50, 60, 80, 100)
+STEEL = "#ccd2d8"
+SEAM = 1.0
+"""Height of a bond without a gap on the page, mm."""
+PAST = 2.0
+"""Length by which a pin's axis extends past its ends, mm."""
 Spans = Sequence[Interval]
 
 
@@ -74,74 +88,92 @@ class FoldEnd(NamedTuple):
     is_ahead: bool
 
 
-@dataclass(frozen=True)
 class StackSection:
-    """The cut, in mm along the plane from the chamber's axis, positive toward its inlet.
+    """The cut, in mm along the plane from the chamber's axis, positive toward its inlet, and its
+    place on the page: ``across`` and ``up`` are page mm per mm of it.
 
-    ``hidden`` balloons are left out above the layer ``break_above`` (an index; 0 for none).
-    ``lumen`` is the position of the actuator's axis along the plane, if it has a lumen.
+    The plane runs through the first chamber's axis and its inlet; without a chamber along x through
+    the first port. ``hidden`` balloons are left out above the layer ``break_above`` (an index; 0
+    for none). ``lumen`` is the position of the actuator's axis along the plane, if it has a lumen.
     ``cropped``: the section beyond ``low`` is not shown. ``tab`` runs from the outline to its
-    mouth. ``is_bored``: the chamber's axis runs through bores.
+    mouth.
     """
 
-    chamber: str
-    slabs: Sequence[SectionSlab]
-    joints: Sequence[Joint]
-    low: float
-    high: float
-    cropped: bool
-    lumen: float | None
-    tab: Interval | None
-    hidden: int
-    break_above: int
-    rods: Sequence[Rod]
-    folds: Sequence[FoldEnd]
-    is_bored: bool
-
-
-def chamber_section(laminate: Laminate) -> StackSection:
-    """The section in the plane of the first chamber's axis and its inlet.
-
-    Without a chamber it is the section along x through the first port.
-    """
-    name, origin = _axis(laminate)
-    inlet = next((candidate for candidate in laminate.inlets if candidate.chamber == name), None)
-    direction = inlet.direction if inlet else (1.0, 0.0)
-    layers, hidden, break_above = _shown(laminate)
-    lumen = -_along(origin, (0.0, 0.0), direction) if laminate.lumen else None
-    patterns = {layer.pattern: layer.profile for layer in layers}
-    if not any(section(region, origin, direction) for region in patterns.values()):
-        # The chamber lies outside every layer: rule sealing reports it, the picture shows the
-        # films.
-        low_x, low_y, high_x, high_y = laminate.layers[0].profile.bounds
-        origin = ((low_x + high_x) / 2, (low_y + high_y) / 2)
-    cuts = {name: section(region, origin, direction) for name, region in patterns.items()}
-    ends = [end for spans in cuts.values() for span in spans for end in span]
-    low, high = min(ends), max(ends)
-    crop = low if lumen is None else max(low, lumen - (laminate.lumen or 0) / 2 - BEYOND_LUMEN)
-    shown = {layer.index for layer in layers}
-    slabs = [SectionSlab(layer, _clipped(cuts[layer.pattern], crop)) for layer in layers]
-    mouth = _along(inlet.mouth, origin, direction) if inlet else 0.0
-    return StackSection(
-        name,
-        slabs,
-        [
-            Joint(gap, _clipped(section(gap.bond, origin, direction), crop))
+    def __init__(self, laminate: Laminate) -> None:
+        self.laminate = laminate
+        self.chamber, origin = _axis(laminate)
+        inlet = next((inlet for inlet in laminate.inlets if inlet.chamber == self.chamber), None)
+        direction = inlet.direction if inlet else (1.0, 0.0)
+        layers, self.hidden, self.break_above = _shown(laminate)
+        self.lumen = -_along(origin, (0.0, 0.0), direction) if laminate.lumen else None
+        patterns = {layer.pattern: layer.profile for layer in layers}
+        if not any(section(region, origin, direction) for region in patterns.values()):
+            # The chamber lies outside every layer: rule sealing reports it, the picture shows the
+            # films.
+            low_x, low_y, high_x, high_y = laminate.layers[0].profile.bounds
+            origin = ((low_x + high_x) / 2, (low_y + high_y) / 2)
+        cuts = {name: section(region, origin, direction) for name, region in patterns.items()}
+        ends = [end for spans in cuts.values() for span in spans for end in span]
+        self.low, self.high = min(ends), max(ends)
+        beyond = (laminate.lumen or 0) / 2 + BEYOND_LUMEN
+        self.cropped = self.lumen is not None and self.lumen - beyond > self.low
+        if self.lumen is not None and self.cropped:
+            self.low = self.lumen - beyond
+        self.slabs = [SectionSlab(layer, self._clipped(cuts[layer.pattern])) for layer in layers]
+        shown = {layer.index for layer in layers}
+        self.joints = [
+            Joint(gap, self._clipped(section(gap.bond, origin, direction)))
             for gap in laminate.interfaces
             if (gap.masks or gap.seams)
             and shown.issuperset([mask.index for mask in gap.masks] or gap.layer_indices)
-        ],
-        crop,
-        high,
-        crop > low,
-        lumen,
-        (mouth - inlet.length, mouth) if inlet else None,
-        hidden,
-        break_above,
-        [rod for rod in _rods(laminate, origin, direction) if rod.span[0] > crop],
-        list(_fold_ends(laminate, slabs, origin, direction)),
-        bool(laminate.bores),
-    )
+        ]
+        mouth = _along(inlet.mouth, origin, direction) if inlet else 0.0
+        self.tab = (mouth - inlet.length, mouth) if inlet else None
+        rods = _rods(laminate, origin, direction)
+        self.rods = [rod for rod in rods if rod.span[0] > self.low]
+        self.folds = list(_fold_ends(laminate, self.slabs, origin, direction))
+        self.across = (PAGE_WIDTH - LEFT - RIGHT) / (self.high - self.low)
+        films = [layer.film.thickness for layer in layers]
+        most = min(TALLEST / sum(films), TALLEST_FILM / max(films)) / self.across
+        self.factor = max(step for step in EXAGGERATIONS if step <= max(most, 1.0))
+        self.up = self.across * self.factor
+        self.height = sum(films) * self.up + (BREAK if self.hidden else 0.0)
+
+    def _clipped(self, spans: Spans) -> Spans:
+        return tuple((max(start, self.low), end) for start, end in spans if end > self.low)
+
+    def x(self, s: float) -> float:
+        return LEFT + (s - self.low) * self.across
+
+    def y(self, z: float, index: int) -> float:
+        """Page height of ``z`` in the layer with this index."""
+        is_above = self.hidden and index > self.break_above
+        return HEAD + self.height - z * self.up + (self._drop if is_above else 0.0)
+
+    @cached_property
+    def _drop(self) -> float:
+        """Page mm by which layers above the break are lower than to scale."""
+        last, above = next(
+            (a.layer, b.layer) for a, b in pairwise(self.slabs) if b.layer.index > self.break_above
+        )
+        return (above.z - last.z - last.film.thickness) * self.up - BREAK
+
+    def bottom(self, layer: Layer, inset: float = 0.0) -> float:
+        return self.y(layer.z + inset, layer.index)
+
+    def top(self, layer: Layer, inset: float = 0.0) -> float:
+        return self.y(layer.z + layer.film.thickness - inset, layer.index)
+
+    def boxes(
+        self, spans: Spans, top: float, bottom: float, fill: str, stroke: str = "none"
+    ) -> list[str]:
+        return [
+            draw.box((self.x(start), top), (self.x(end), bottom), fill=fill, stroke=stroke)
+            for start, end in spans
+        ]
+
+    def bonds(self, kind: str) -> list[Joint]:
+        return [joint for joint in self.joints if joint.interface.kind == kind and joint.spans]
 
 
 def _along(p: Point, origin: Point, direction: Point) -> float:
@@ -170,10 +202,6 @@ def _shown(laminate: Laminate) -> tuple[Sequence[Layer], int, int]:
         if layer.balloon == count or (layer.balloon == count - 1 and layer.role == "separator-mask")
     ]
     return (*bottom, *top), count - 3, bottom[-1].index
-
-
-def _clipped(spans: Spans, low: float) -> Spans:
-    return tuple((max(start, low), end) for start, end in spans if end > low)
 
 
 def _rods(laminate: Laminate, origin: Point, direction: Point) -> Iterator[Rod]:
@@ -237,94 +265,33 @@ def opening(spans: Spans, at: float) -> Interval | None:
 # The section on its page.
 
 
-PAGE_WIDTH = 297.0
-LEFT, RIGHT = 56.0, 56.0
-HEAD, FOOT = 42.0, 36.0
-TALLEST = 120.0
-TALLEST_FILM = 8.0
-BREAK = 13.0
-ROW_STEP = 6.0
-SLIT = 0.18
-"""Share of the gap drawn open above and below a mask, to show what does not bond."""
-EXAGGERATIONS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50, 60, 80, 100)
-STEEL = "#ccd2d8"
-SEAM = 1.0
-"""Height of a bond without a gap on the page, mm."""
-PAST = 2.0
-"""Length by which a pin's axis extends past its ends, mm."""
-
-
-class StackView:
-    """The place of the section on the page: ``across`` and ``up`` are page mm per mm of it."""
-
-    def __init__(self, section: StackSection) -> None:
-        self.section = section
-        self.across = (PAGE_WIDTH - LEFT - RIGHT) / (section.high - section.low)
-        films = [slab.layer.film.thickness for slab in section.slabs]
-        most = min(TALLEST / sum(films), TALLEST_FILM / max(films)) / self.across
-        self.factor = max(step for step in EXAGGERATIONS if step <= max(most, 1.0))
-        self.up = self.across * self.factor
-        self.height = sum(films) * self.up + (BREAK if section.hidden else 0.0)
-
-    def x(self, s: float) -> float:
-        return LEFT + (s - self.section.low) * self.across
-
-    def y(self, z: float, index: int) -> float:
-        """Page height of ``z`` in the layer with this index."""
-        is_above = self.section.hidden and index > self.section.break_above
-        return HEAD + self.height - z * self.up + (self._drop if is_above else 0.0)
-
-    @cached_property
-    def _drop(self) -> float:
-        """Page mm by which layers above the break are lower than to scale."""
-        layers = [slab.layer for slab in self.section.slabs]
-        last, above = next(
-            (a, b) for a, b in pairwise(layers) if b.index > self.section.break_above
-        )
-        return (above.z - last.z - last.film.thickness) * self.up - BREAK
-
-    def bottom(self, layer: Layer, inset: float = 0.0) -> float:
-        return self.y(layer.z + inset, layer.index)
-
-    def top(self, layer: Layer, inset: float = 0.0) -> float:
-        return self.y(layer.z + layer.film.thickness - inset, layer.index)
-
-    def boxes(
-        self, spans: Spans, top: float, bottom: float, fill: str, stroke: str = "none"
-    ) -> list[str]:
-        return [
-            draw.box((self.x(start), top), (self.x(end), bottom), fill=fill, stroke=stroke)
-            for start, end in spans
-        ]
-
-
 def stack_svg(laminate: Laminate) -> str:
     """The section through the first chamber in the plane of its inlet, labelled, on A4."""
-    section = chamber_section(laminate)
-    view = StackView(section)
-    page = view.height + HEAD + FOOT
+    section = StackSection(laminate)
+    page = section.height + HEAD + FOOT
     seams = [joint for joint in section.joints if not joint.interface.masks]
     elements = [
-        *_heading(laminate, view),
-        *(part for rod in section.rods for part in _rod(rod, view)),
-        *(part for joint in section.joints if joint not in seams for part in _bond(joint, view)),
-        *(part for slab in section.slabs for part in _slab(slab, view)),
-        *(part for joint in seams for part in _bond(joint, view)),
-        *(part for fold in section.folds for part in _fold(fold, view)),
-        *_breaks(view),
-        *_dimensions_above(view),
-        *_dimensions_below(view),
-        *_labels(view),
+        *_heading(section),
+        *(part for rod in section.rods for part in _rod(rod, section)),
+        *(part for joint in section.joints if joint not in seams for part in _bond(joint, section)),
+        *(part for slab in section.slabs for part in _slab(slab, section)),
+        *(part for joint in seams for part in _bond(joint, section)),
+        *(part for fold in section.folds for part in _fold(fold, section)),
+        *_breaks(section),
+        *_dimensions_above(section),
+        *_dimensions_below(section),
+        *_labels(section),
         *_legend(section, page),
     ]
     return draw.document(PAGE_WIDTH, page, f"{laminate.name}: section", elements)
 
 
-def _heading(laminate: Laminate, view: StackView) -> list[str]:
+def _heading(section: StackSection) -> list[str]:
+    laminate = section.laminate
     along = "its inlet" if laminate.chambers else "x"
-    scale = f"Height exaggerated {view.factor}{draw.TIMES}" if view.factor > 1 else "To scale"
+    scale = f"Height exaggerated {section.factor}{draw.TIMES}" if section.factor > 1 else "To scale"
     content = (
-        f"Section through {view.section.chamber} along {along}. "
+        f"Section through {section.chamber} along {along}. "
         f"{scale}, {coord(laminate.thickness)} in all (nominal). All dimensions in mm."
     )
     return [
@@ -337,27 +304,27 @@ def _heading(laminate: Laminate, view: StackView) -> list[str]:
     ]
 
 
-def _slab(slab: SectionSlab, view: StackView) -> list[str]:
+def _slab(slab: SectionSlab, section: StackSection) -> list[str]:
     layer = slab.layer
     inset = SLIT * layer.film.thickness if layer.is_mask else 0.0
-    ends = view.top(layer, inset), view.bottom(layer, inset)
-    return view.boxes(slab.spans, *ends, draw.film_fill(layer.film), ink(layer.film).line)
+    ends = section.top(layer, inset), section.bottom(layer, inset)
+    return section.boxes(slab.spans, *ends, draw.film_fill(layer.film), ink(layer.film).line)
 
 
-def _bond(joint: Joint, view: StackView) -> list[str]:
+def _bond(joint: Joint, section: StackSection) -> list[str]:
     """The bonds in a gap; without masks, over the line on which the films lie on each other."""
     gap = joint.interface
     half = 0.0 if gap.masks else SEAM / 2
-    top, bottom = (view.y(z, joint.layer) for z in (gap.z + gap.gap * bool(gap.masks), gap.z))
-    return view.boxes(joint.spans, top - half, bottom + half, BOND)
+    top, bottom = (section.y(z, joint.layer) for z in (gap.z + gap.gap * bool(gap.masks), gap.z))
+    return section.boxes(joint.spans, top - half, bottom + half, BOND)
 
 
-def _fold(fold: FoldEnd, view: StackView) -> list[str]:
+def _fold(fold: FoldEnd, section: StackSection) -> list[str]:
     """The film that continues from one half to the other, and the line of the fold."""
     film, turn = fold.lower.film, int(not fold.is_ahead)
-    bottom, top = view.bottom(fold.lower), view.top(fold.upper)
-    thick, outer = film.thickness * view.up, (bottom - top) / 2
-    x, low, high = map(coord, (view.x(fold.s), bottom, top))
+    bottom, top = section.bottom(fold.lower), section.top(fold.upper)
+    thick, outer = film.thickness * section.up, (bottom - top) / 2
+    x, low, high = map(coord, (section.x(fold.s), bottom, top))
     data = (
         f"M{x} {low}A{coord(outer)} {coord(outer)} 0 0 {1 - turn} {x} {high}V{coord(top + thick)}"
     )
@@ -370,36 +337,35 @@ def _fold(fold: FoldEnd, view: StackView) -> list[str]:
     ]
 
 
-def _rod(rod: Rod, view: StackView) -> list[str]:
+def _rod(rod: Rod, section: StackSection) -> list[str]:
     """A dowel pin behind the films, stack by stack, and its axis; nothing across the break."""
     parts: list[str] = []
-    x = view.x(rod.middle)
+    x = section.x(rod.middle)
     for lowest, highest in rod.stacks:
-        layers = [s.layer for s in view.section.slabs if lowest <= s.layer.index <= highest]
-        below = [layer for layer in layers if layer.index <= view.section.break_above]
+        layers = [s.layer for s in section.slabs if lowest <= s.layer.index <= highest]
+        below = [layer for layer in layers if layer.index <= section.break_above]
         for run in filter(None, (below, layers[len(below) :])):
-            top, bottom = view.top(run[-1]), view.bottom(run[0])
-            parts += view.boxes([rod.span], top, bottom, STEEL, draw.GREY)
+            top, bottom = section.top(run[-1]), section.bottom(run[0])
+            parts += section.boxes([rod.span], top, bottom, STEEL, draw.GREY)
             parts.append(draw.line([(x, top - PAST), (x, bottom + PAST)], colour=draw.GREY))
     return parts
 
 
-def _breaks(view: StackView) -> list[str]:
-    section = view.section
+def _breaks(section: StackSection) -> list[str]:
     parts: list[str] = []
     if section.hidden:
         below = [s for s in section.slabs if s.layer.index <= section.break_above]
         above = section.slabs[len(below) :]
-        base = view.top(below[-1].layer)
-        x0 = view.x(section.low) - (0.0 if section.cropped else 3.0)
-        right = view.x(max(end for slab in above for _, end in slab.spans)) + 3.0
+        base = section.top(below[-1].layer)
+        x0 = section.x(section.low) - (0.0 if section.cropped else 3.0)
+        right = section.x(max(end for slab in above for _, end in slab.spans)) + 3.0
         for y in (base - 1.6, base - BREAK + 1.6):
             parts.append(_wave((x0, y), (right, y)))
         words = f"\u2026 {section.hidden} more balloon{'s' * (section.hidden > 1)} \u2026"
         middle = ((x0 + right) / 2, base - BREAK / 2 + 1.0)
         parts.append(draw.text(middle, words, anchor="middle"))
     if section.cropped:
-        x, top, bottom = view.x(section.low), HEAD - 2.0, HEAD + view.height + 2.0
+        x, top, bottom = section.x(section.low), HEAD - 2.0, HEAD + section.height + 2.0
         # White hides the straight edges beside the line.
         parts.append(draw.box((x - 1.5, top), (x, bottom), fill="#ffffff"))
         parts.append(_wave((x, top), (x, bottom)))
@@ -418,9 +384,9 @@ def _wave(start: Point, end: Point) -> str:
     return draw.line(points, colour=draw.GREY, width=0.2)
 
 
-def _dimensions_above(view: StackView) -> list[str]:
+def _dimensions_above(section: StackSection) -> list[str]:
     """Over the top balloon: chamber, the bonds beside it, the lumen, and the whole width."""
-    section, cap = view.section, view.section.slabs[-1]
+    cap = section.slabs[-1]
     chambers = [joint for joint in section.joints if joint.interface.kind == "chamber"]
     if not chambers:
         return []
@@ -433,17 +399,16 @@ def _dimensions_above(view: StackView) -> list[str]:
     through = None if section.lumen is None else opening(cap.spans, section.lumen)
     measured += [through] if through else []
     shown = [span for span in measured if span[0] > section.low or not section.cropped]
-    top = view.top(cap.layer)
-    parts, rows = _rows(view, [(span, "") for span in shown], top, (0.0, -1.0))
+    top = section.top(cap.layer)
+    parts, rows = _rows(section, [(span, "") for span in shown], top, (0.0, -1.0))
     if not section.cropped:
         whole = cap.spans[0][0], cap.spans[-1][1]
-        parts += _dimension(view, whole, "", top, (0.0, -1.0), ROW_STEP * (rows + 1) + 1.0)
+        parts += _dimension(section, whole, "", top, (0.0, -1.0), ROW_STEP * (rows + 1) + 1.0)
     return parts
 
 
-def _dimensions_below(view: StackView) -> list[str]:
+def _dimensions_below(section: StackSection) -> list[str]:
     """Under the stack: the tab, and how far the inlet strip reaches past its mouth."""
-    section = view.section
     if section.tab is None:
         return []
     mouth = section.tab[1]
@@ -453,31 +418,31 @@ def _dimensions_below(view: StackView) -> list[str]:
     if reach - mouth > 1e-3:
         tail = any(rod.middle > mouth for rod in section.rods)
         measured.append(((mouth, reach), "tail" if tail else "overhang"))
-    return _rows(view, measured, view.bottom(section.slabs[0].layer), (0.0, 1.0))[0]
+    return _rows(section, measured, section.bottom(section.slabs[0].layer), (0.0, 1.0))[0]
 
 
 def _rows(
-    view: StackView, measured: Sequence[tuple[Interval, str]], y: float, away: Point
+    section: StackSection, measured: Sequence[tuple[Interval, str]], y: float, away: Point
 ) -> tuple[list[str], int]:
     """Named dimensions in as few rows as keep their words apart, and how many rows that took."""
     rows: list[list[Interval]] = []
     parts: list[str] = []
     for span, name in measured:
-        middle = view.x((span[0] + span[1]) / 2)
+        middle = section.x((span[0] + span[1]) / 2)
         half = draw.text_width(_words(name, span)) / 2 + 0.5
         low, high = middle - half, middle + half
         free = (n for n, row in enumerate(rows) if not any(a < high and low < b for a, b in row))
         row = next(free, len(rows))
         rows[row:] = rows[row:] or [[]]
         rows[row].append((low, high))
-        parts += _dimension(view, span, name, y, away, ROW_STEP * (row + 1))
+        parts += _dimension(section, span, name, y, away, ROW_STEP * (row + 1))
     return parts, len(rows)
 
 
 def _dimension(
-    view: StackView, span: Interval, name: str, y: float, away: Point, distance: float
+    section: StackSection, span: Interval, name: str, y: float, away: Point, distance: float
 ) -> list[str]:
-    start, end = (view.x(s) for s in span)
+    start, end = (section.x(s) for s in span)
     return draw.dimension((start, y), (end, y), _words(name, span), away, distance)
 
 
@@ -525,10 +490,9 @@ class StackLabel(NamedTuple):
     colour: str = draw.DARK
 
 
-def _labels(view: StackView) -> list[str]:
+def _labels(section: StackSection) -> list[str]:
     """Layer names at the right, features at the left, each with a leader."""
-    section = view.section
-    low, high = HEAD - 4.0, HEAD + view.height + 6.0
+    low, high = HEAD - 4.0, HEAD + section.height + 6.0
     mouth = section.tab[1] if section.tab else section.high
     slabs = {slab.layer.index: slab for slab in section.slabs}
     pins: tuple[list[StackLabel], list[StackLabel]] = ([], [])
@@ -536,14 +500,16 @@ def _labels(view: StackView) -> list[str]:
         pins[rod.middle > mouth].append(_in_slab(rod.words, rod.middle, slabs[rod.stacks[-1][1]]))
     parts: list[str] = []
     for labels, x, side in (
-        ([*_layer_labels(section), *pins[1]], view.x(section.high) + 5.0, 1),
+        ([*_layer_labels(section), *pins[1]], section.x(section.high) + 5.0, 1),
         ([*_feature_labels(section), *pins[0]], LEFT - 6.0, -1),
     ):
-        placed = sorted((view.y(label.z, label.layer), label) for label in labels)
+        placed = sorted((section.y(label.z, label.layer), label) for label in labels)
         rows = draw.spread([y for y, _ in placed], 5.2, low, high)
         anchor: draw.Anchor = "start" if side > 0 else "end"
         for (y, label), row in zip(placed, rows, strict=True):
-            parts += draw.leader((view.x(label.s), y), (x - 2.2 * side, row), (x - 0.6 * side, row))
+            parts += draw.leader(
+                (section.x(label.s), y), (x - 2.2 * side, row), (x - 0.6 * side, row)
+            )
             at = x + 0.4 * side, row + 1.05
             parts.append(draw.text(at, label.words, anchor=anchor, colour=label.colour))
     return parts
@@ -564,20 +530,17 @@ def _layer_labels(section: StackSection) -> Iterator[StackLabel]:
 
 def _feature_labels(section: StackSection) -> list[StackLabel]:
     """Bond, neck ring, overhang, bore, pocket and lumen, where the section has them."""
-    cap = section.slabs[-1]
+    cap, films = section.slabs[-1], [s for s in section.slabs if not s.layer.is_mask]
+    bore = "bore ⌀" if section.laminate.bores else "opening "
     features = [
         _bond_beside(section),
         _pocket(section),
         _neck_ring(section),
         _overhang(section),
-        next(filter(None, (_bore(section, slab) for slab in section.slabs)), None),
+        next(filter(None, (_through(bore, 0.0, slab) for slab in films)), None),
         None if section.lumen is None else _through("lumen ⌀", section.lumen, cap),
     ]
     return [label for label in features if label is not None]
-
-
-def _bonds(section: StackSection, kind: str) -> list[Joint]:
-    return [joint for joint in section.joints if joint.interface.kind == kind and joint.spans]
 
 
 def _in_gap(words: str, s: float, joint: Joint) -> StackLabel:
@@ -592,7 +555,7 @@ def _in_slab(words: str, s: float, slab: SectionSlab) -> StackLabel:
 
 def _bond_beside(section: StackSection) -> StackLabel | None:
     """The bonded ring beside the bottom pocket, on the side away from the inlet."""
-    for joint in _bonds(section, "chamber"):
+    for joint in section.bonds("chamber"):
         beside = [span for span in joint.spans if span[1] < 0]
         if beside:
             return _in_gap(_words("bond", beside[-1]), sum(beside[-1]) / 2, joint)
@@ -601,7 +564,7 @@ def _bond_beside(section: StackSection) -> StackLabel | None:
 
 def _pocket(section: StackSection) -> StackLabel | None:
     """The pocket of the second balloon, or of the only one (open toward its inlet)."""
-    for joint in reversed(_bonds(section, "chamber")[:2]):
+    for joint in reversed(section.bonds("chamber")[:2]):
         pocket = opening(joint.spans, 0.0)
         if pocket is not None:
             return _in_gap(_words("chamber pocket", pocket), 0.6 * pocket[0], joint)
@@ -613,7 +576,7 @@ def _pocket(section: StackSection) -> StackLabel | None:
 
 def _neck_ring(section: StackSection) -> StackLabel | None:
     """The bond beside the bore that carries one balloon on the next, or a sheet's window."""
-    for joint in _bonds(section, "separator"):
+    for joint in section.bonds("separator"):
         for span in joint.spans:
             if span[0] < 0 < span[1]:
                 return _in_gap(_words("window, bond", span), sum(span) / 2, joint)
@@ -634,11 +597,6 @@ def _overhang(section: StackSection) -> StackLabel | None:
         if span[1] - span[0] > 1e-3:
             return _in_slab(_words("overhang", span), sum(span) / 2, mask)
     return None
-
-
-def _bore(section: StackSection, slab: SectionSlab) -> StackLabel | None:
-    name = "bore ⌀" if section.is_bored else "opening "
-    return None if slab.layer.is_mask else _through(name, 0.0, slab)
 
 
 def _through(name: str, at: float, slab: SectionSlab) -> StackLabel | None:

@@ -12,50 +12,48 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.optimize import brentq
 
 import sbafab
-from sbafab.assemblies.build import assemble
+from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.files import assembly_of
 from sbafab.cli import app
 from sbafab.models.stack import Stack
 from sbafab.reports.assembly_prediction import AssemblyPrediction, Grip, predict_assembly
 
-PAIR = """
-name = "pair"
+PLATE = """
+name = "made"
 family = "assembly"
-[parts.plate]
-kind = "base"
-width = 60
-length = 40
-thickness = 2
-material = "acrylic"
-[parts.one]
-kind = "sba"
-design = "1dof-5mm"
-set.stack.balloons = 6
-on = "plate"
-at = "top"
-offset = [-8, 0]
-turn = 180
-[parts.shelf]
-kind = "base"
-width = 10
-length = 10
-thickness = 1
-material = "acrylic"
-on = "two"
-at = "top"
-[parts.two]
-kind = "sba"
-design = "1dof-5mm"
-set.stack.balloons = 3
-on = "plate"
-at = "top"
-offset = [OFF, 0]
+[parts]
+plate = {kind = "base", width = 60, length = 40, thickness = 2, material = "acrylic"}
+"""
+PAIR = f"""{PLATE}
+one = {{kind = "sba", design = "1dof-5mm", set.stack.balloons = 6, turn = 180, on = "plate",
+at = "top", offset = [-8, 0]}}
+shelf = {{kind = "base", width = 10, length = 10, thickness = 1, material = "acrylic", on = "two",
+at = "top"}}
+two = {{kind = "sba", design = "1dof-5mm", set.stack.balloons = 3, on = "plate", at = "top",
+offset = [OFF, 0]}}
+"""
+POST = f"""{PLATE}
+arm = {{kind = "sba", design = "3dof-15mm", set.models.calibration = "none", on = "plate",
+at = "top"}}
+post = {{kind = "tube", outer_diameter = 4, inner_diameter = 2, length = LONG, material = "steel",
+on = "plate", at = "top", offset = [OFF, 0]}}
+"""
+ROD = """
+rod = {kind = "tube", outer_diameter = 2, inner_diameter = 1, length = 14, material = "steel",
+on = "arm", at = "top", offset = [4.25, 0]}
 """
 
 
-SHORT = "parts.grip.set.chamber={width = 9.5, length = 9.5}"
+def filled(text: str, off: float, long: float = 0) -> str:
+    """Return an assembly file; TOML wants each inline table on one line."""
+    return text.replace(",\n", ", ").replace("OFF", str(off)).replace("LONG", str(long))
+
+
+def assembled(text: str, off: float, long: float = 0) -> Assembled:
+    return assemble(assembly_of(tomllib.loads(filled(text, off, long)), Path("made")))
 
 
 def value(found: AssemblyPrediction, part: str, name: str) -> float:
@@ -78,14 +76,11 @@ def test_the_brace_holds_its_lumen_and_lifts_the_marble() -> None:
 
     # Virtual work: what the air gives when the wall yields by a little, from areas of two arcs.
     def held(height: float) -> float:
-        low, high = 1e-3, math.pi / 2
-        for _ in range(60):
-            b = (low + high) / 2
-            low, high = (b, high) if 10 * (1 - math.cos(b)) / b < height else (low, b)
-        r = 10 / (2 * low)
-        rise = r * (1 - math.cos(low))
+        b = brentq(lambda b: 10 * (1 - math.cos(b)) / b - height, 1e-3, math.pi / 2)
+        r = 10 / (2 * b)
+        rise = r * (1 - math.cos(b))
         caps = 2 * math.pi * rise**2 * (3 * r - rise) / 3
-        return r * r * (2 * low - math.sin(2 * low)) * 8.5 + caps
+        return float(r * r * (2 * b - math.sin(2 * b)) * 8.5 + caps)
 
     slope = (held(room + 1e-4) - held(room - 1e-4)) / 2e-4
     assert push == pytest.approx(10.0 * slope / 1000, rel=1e-3)
@@ -107,7 +102,10 @@ def test_the_brace_holds_its_lumen_and_lifts_the_marble() -> None:
 @pytest.mark.parametrize(
     ("change", "why"),
     [
-        (SHORT, "not touch the wall: 23.76 mm by the lens"),
+        (
+            "parts.grip.set.chamber={width = 9.5, length = 9.5}",
+            "not touch the wall: 23.76 mm by the lens",
+        ),
         ("deploy.lumen_diameter=15.1", "deflated it is 15.15 mm wide already, in a lumen of 15.1"),
     ],
 )
@@ -127,53 +125,11 @@ def test_parts_that_meet_only_when_inflated_are_named(
     tmp_path: Path, offset: float, meets: bool
 ) -> None:
     path = tmp_path / "pair.toml"
-    path.write_text(PAIR.replace("OFF", str(offset)), encoding="utf-8")
+    path.write_text(filled(PAIR, offset), encoding="utf-8")
     done = CliRunner().invoke(app, ["predict", str(path), "--pressure", "5", "--json"])
     assert done.exit_code == int(meets), done.output
     touches = json.loads(done.output)["touches"]
-    assert [(touch["part"], touch["other"]) for touch in touches] == (
-        [("one", "shelf")] if meets else []
-    )
-
-
-POST = """
-name = "post"
-family = "assembly"
-[parts.plate]
-kind = "base"
-width = 60
-length = 40
-thickness = 2
-material = "acrylic"
-[parts.arm]
-kind = "sba"
-design = "3dof-15mm"
-set.models.calibration = "none"
-on = "plate"
-at = "top"
-[parts.post]
-kind = "tube"
-outer_diameter = 4
-inner_diameter = 2
-length = 30
-material = "steel"
-on = "plate"
-at = "top"
-offset = [OFF, 0]
-"""
-
-
-ROD = """
-[parts.rod]
-kind = "tube"
-outer_diameter = 2
-inner_diameter = 1
-length = 14
-material = "steel"
-on = "arm"
-at = "top"
-offset = [4.25, 0]
-"""
+    assert [(touch["part"], touch["other"]) for touch in touches] == [("one", "shelf")] * meets
 
 
 @cache
@@ -201,7 +157,7 @@ def reach(pressure: float) -> float:
 )
 def test_a_bent_arm_is_held_against_what_stands_beside_it(room: float, meets: bool) -> None:
     """The first chamber lies at x > 0 and bends the arm towards x < 0, where a post stands."""
-    made = assemble(assembly_of(tomllib.loads(POST.replace("OFF", f"{-room - 2}")), Path("post")))
+    made = assembled(POST, off=-room - 2, long=30)
     found = predict_assembly(made, 5.0)
     assert found.touches == ()  # 0.5 mm and more beside the straight arm
     assert 8.0 < reach(5.0) < 10.5
@@ -221,8 +177,7 @@ def test_a_bent_arm_is_held_against_what_stands_beside_it(room: float, meets: bo
 @pytest.mark.parametrize(("height", "meets"), [(5, False), (9, True)])
 def test_what_stands_on_a_bent_arm_goes_along_with_its_tip(height: int, meets: bool) -> None:
     """A rod on the arm's top sweeps over a low post that the arm alone stays clear of."""
-    rod = POST.replace("length = 30", f"length = {height}").replace("OFF", "-20")
-    made = assemble(assembly_of(tomllib.loads(rod + ROD), Path("post")))
+    made = assembled(POST + ROD, off=-20, long=height)
     pose = drawn_arm().pose((5, 0, 0))
     x, z = pose.frames[1][-1][:, 0], pose.frames[1][-1][:, 2]
     rod_axis = pose.tip + 4.25 * x + np.linspace(0, 14, 200)[:, None] * z

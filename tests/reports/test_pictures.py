@@ -250,24 +250,28 @@ def test_moving_pictures_and_scenes_are_read_by_others(
         write_picture(laminate, stack, SMALL, tmp_path / "a.jpg")
 
 
+def run(*arguments: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, ["picture", *arguments])
+    return done.exit_code, " ".join(done.output.split())
+
+
 def test_the_command_says_what_it_drew_and_refuses_in_a_sentence(tmp_path: Path) -> None:
-    run = CliRunner().invoke
-    asked = ["picture", "1dof-5mm", "--set", "stack.balloons=2", "--width", "120"]
-    done = run(app, [*asked, "--pressure", "5", "--to", str(tmp_path / "a.png")])
-    assert done.exit_code == 0, done.output
-    assert "5 kPa" in done.output
+    asked = ["1dof-5mm", "--set", "stack.balloons=2", "--width", "120"]
+    code, said = run(*asked, "--pressure", "5", "--to", str(tmp_path / "a.png"))
+    assert code == 0
+    assert "5 kPa" in said
     with Image.open(tmp_path / "a.png") as image:
         assert image.size == (120, 96)
-    for extra, said in (
+    for extra, sentence in (
         (["--pressure", "arm=5"], "chamber arm is not there; the chambers are chamber1"),
         (["--pressure", "5", "--volume", "5"], "give --pressure or --volume, not both"),
         (["--pressure", "400", "--to", str(tmp_path / "b.png")], "burst pressure"),
         (["--to", str(tmp_path / "no" / "a.png")], "cannot be written"),
         (["--motion", "circle", "--to", "a.png"], "--motion is for an animation"),
     ):
-        refused = run(app, [*asked, *extra])
-        assert refused.exit_code != 0
-        assert said in " ".join(refused.output.split())
+        code, said = run(*asked, *extra)
+        assert code != 0
+        assert sentence in said
 
 
 @pytest.mark.parametrize("name", ["oval", "radial-15mm"])
@@ -275,31 +279,23 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     design = str(GALLERY / f"{name}.toml") if name == "oval" else name
-    arguments = ["picture", design, "--set", "stack.balloons=1", "--to"]
-    for ending, wide in ((".png", ["--width", "160"]), (".glb", [])):
-        path = tmp_path / f"shown{ending}"
-        result = CliRunner().invoke(app, [*arguments, str(path), *wide])
-        assert result.exit_code == 0, result.output
-        assert f"{name} drawn flat, since no model inflates pockets" in result.output
-    with Image.open(tmp_path / "shown.png") as image:
-        assert image.size == (160, 128)
+    flat = [design, "--set", "stack.balloons=1"]
+    monkeypatch.chdir(tmp_path)
     # Unnamed, it is named as what it is.
-    (tmp_path / "here").mkdir()
-    monkeypatch.chdir(tmp_path / "here")
-    assert CliRunner().invoke(app, [*arguments[:-1], "--width", "160"]).exit_code == 0
-    assert [file.name for file in Path().iterdir()] == [f"{name}-flat.png"]
-    mesh = trimesh.load(tmp_path / "shown.glb", force="mesh")
-    laminate = sbafab.build(design, "stack.balloons=1")
+    for more in (["--width", "160"], ["--to", "shown.glb"]):
+        code, said = run(*flat, *more)
+        assert code == 0
+        assert f"{name} drawn flat, since no model inflates pockets" in said
+    with Image.open(f"{name}-flat.png") as image:
+        assert image.size == (160, 128)
+    mesh = trimesh.load("shown.glb", force="mesh")
     assert isinstance(mesh, trimesh.Trimesh)
     # Metres, and y is up.
-    assert mesh.extents[1] == pytest.approx(laminate.thickness / 1000, rel=1e-5)
-    glb = [*arguments, str(tmp_path / "other.glb")]
+    thickness = sbafab.build(design, "stack.balloons=1").thickness
+    assert mesh.extents[1] == pytest.approx(thickness / 1000, rel=1e-5)
     for extra in (["--width", "160"], ["--azimuth", "3"], ["--pressure", "5"], ["--volume", "5"]):
-        refused = CliRunner().invoke(app, [*glb, *extra])
-        assert refused.exit_code == 2
-        assert f"{extra[0]} is for " in refused.output
-    assert not (tmp_path / "other.glb").exists()
-    moving = CliRunner().invoke(app, [*arguments, str(tmp_path / "shown.webp")])
-    assert moving.exit_code == 2
-    assert "a .png or .glb shows it flat" in moving.output
-    assert not (tmp_path / "shown.webp").exists()
+        code, said = run(*flat, "--to", "other.glb", *extra)
+        assert (code, f"{extra[0]} is for " in said) == (2, True)
+    code, said = run(*flat, "--to", "other.webp")
+    assert (code, "a .png or .glb shows it flat" in said) == (2, True)
+    assert not list(Path().glob("other.*"))

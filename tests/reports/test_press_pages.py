@@ -14,13 +14,13 @@ import shapely
 
 from sbafab.laminate.assembly import assembly
 from sbafab.reports.drawing import text_width
+from sbafab.reports.prints import seams_pdf
 from sbafab.reports.traveller.acceptance import straight_run
 from sbafab.reports.traveller.bench import film_classes, pressure_range
 from sbafab.reports.traveller.joints import FoldPage, SeamPage, joint_pages
 from sbafab.reports.traveller.shapes import beds
 from sbafab.reports.traveller.step_pictures import plan
 from sbafab.reports.traveller.steps import PressPage, step_pages
-from sbafab.reports.underlay import seams_pdf
 from tests.reports.pages import DOUBLE, EARS, bench, built, page, words_of, work_of
 
 TPE, PTFE, BOND, OVERHANG = 0.038, 0.025, 0.75, 0.5

@@ -14,11 +14,10 @@ from sbafab.pressing.build_up import BASE_PLATE, PAD, RELEASE, UNDERLAY, pad_she
 from sbafab.pressing.dowels import pin_holes
 from sbafab.pressing.schedule import Step, joined_words
 from sbafab.reports.drawing import layer_numbers
+from sbafab.reports.prints import PAPER, leaves, tray_sheets
 from sbafab.reports.traveller.formatting import BLANK, count, millimetres, size
 from sbafab.reports.traveller.shapes import thumbnail
 from sbafab.reports.traveller.work import Work
-from sbafab.reports.tray_plan import tray_sheets
-from sbafab.reports.underlay import PAPER, leaves
 from sbafab.spreadsheet import csv_text
 
 TAPE = "polyimide tape (silicone adhesive, rated 260 °C)"

@@ -20,6 +20,7 @@ from sbafab.pressing.cycles import cycle_name
 from sbafab.pressing.dowels import PinSetting
 from sbafab.pressing.plate_heating import PATIENCE
 from sbafab.pressing.schedule import FoldStep, SeamStep, Step
+from sbafab.reports.prints import guides
 from sbafab.reports.traveller.bench import punch
 from sbafab.reports.traveller.lay_up import (
     Alignment,
@@ -33,7 +34,6 @@ from sbafab.reports.traveller.materials import TAPE, has_underlay, turns_over
 from sbafab.reports.traveller.shapes import Bed, Round, beds, inlets_in, rounds
 from sbafab.reports.traveller.step_pictures import build_up_svg, equal_pins, exploded, plan
 from sbafab.reports.traveller.work import Work
-from sbafab.reports.underlay import guides
 
 MOST_LINES = 12
 """Up to this many single layers each has its own line, and cycles their own box."""

@@ -14,8 +14,8 @@ from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.cycles import Runs, design_runs
 from sbafab.pressing.schedule import Schedule
-from sbafab.reports.underlay import NAME as UNDERLAY
-from sbafab.reports.underlay import guides
+from sbafab.reports.prints import NAME as UNDERLAY
+from sbafab.reports.prints import guides
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import lowered
 

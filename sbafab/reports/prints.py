@@ -1,10 +1,11 @@
 """Pages to print at 1:1: underlay.pdf to lay up on, below the release film; seams.pdf: the paths
-of seams on their films.
+of seams on their films; tray.pdf: a place for every part in the order of laying.
 
 The underlay shows the edges of every layer without pins at its place in the stack, seen from above,
 with the actuator's axis at the cross. If a cycle of many laminates does not fit one page, it is
 spread over several, with whole laminates on each: their dotted frames are cut out and laid edge to
-edge. Ours; its effect on placement by hand was not measured.
+edge. On the tray plan, whose pages all cycles reuse, parts lie on their outlines, upper side up, so
+that a wrong or missing part is noticed. Ours; the effect on placement by hand was not measured.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ from sbafab.cutting.fixture import whole_plate
 from sbafab.cutting.seam_files import shift_words
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point, box_round
-from sbafab.geometry.region import Region, coord, disc, union
+from sbafab.geometry.region import Region, coord, disc, rectangle, union
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers, laying
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.pressing.cycles import Runs, serial
 from sbafab.pressing.schedule import joined_words, layers_in_words
 from sbafab.reports.traveller.shapes import Bed, beds
 
@@ -171,7 +173,7 @@ LEFT = 14.0
 SMALL, WORDS, TITLE, ROW = 2.2, 3.0, 5.0, 4.5
 
 
-def head(page: PdfPage, at: Point, title: str, lines: Sequence[str], size: float = TITLE) -> None:
+def _head(page: PdfPage, at: Point, title: str, lines: Sequence[str], size: float = TITLE) -> None:
     page.text(at, title, size, bold=True)
     _lines(page, (at[0], at[1] - 1 - ROW), lines)
 
@@ -181,7 +183,7 @@ def _lines(page: PdfPage, at: Point, lines: Iterable[str]) -> None:
         page.text((at[0], at[1] - ROW * number), line, WORDS)
 
 
-def bars(page: PdfPage, across: Point, up: Point) -> None:
+def _bars(page: PdfPage, across: Point, up: Point) -> None:
     """A bar along each direction of the page, from a point."""
     page.stroke(BLACK)
     (x0, y), (x, y0) = across, up
@@ -192,14 +194,14 @@ def bars(page: PdfPage, across: Point, up: Point) -> None:
 
 def _work_head(page: PdfPage, title: str, use: Sequence[str]) -> None:
     """Title, use and bars of a page to work on."""
-    head(page, (LEFT, page.height - 16), title, use)
+    _head(page, (LEFT, page.height - 16), title, use)
     across, up = ((page.width - BAR) / 2, page.height - HEAD + 8), (LEFT, page.height - HEAD - BAR)
-    bars(page, across, up)
+    _bars(page, across, up)
     page.text((across[0] + BAR / 2 - 8, across[1] + 1.5), f"{BAR:g} mm", WORDS)
     page.text((up[0] - 4, up[1] - 6), f"{BAR:g} mm", WORDS)
 
 
-def look(page: PdfPage, is_mask: bool, width: float = THIN) -> None:
+def _look(page: PdfPage, is_mask: bool, width: float = THIN) -> None:
     """Set the look of a film's edges, or of a mask's."""
     page.stroke(MASK if is_mask else FILM, width, DASHED if is_mask else ())
 
@@ -233,13 +235,13 @@ TRIM = (
 class Leaf:
     """One page: its size in mm, and its places of a cycle, counted from 1.
 
-    ``trim`` is the frame to cut out, in the frame of the places. ``is_plate``: it is the base
+    ``trim`` is the line to cut along, in the frame of the places. ``is_plate``: it is the base
     plate's own edge, with its cut corner.
     """
 
     size: tuple[float, float]
     places: tuple[int, ...]
-    trim: Bounds
+    trim: Contour
     is_plate: bool = False
 
 
@@ -275,17 +277,16 @@ def underlay_pdf(
     """
     outlines = guides(laminate)
     spread = leaves(laminate, places, platen)
-    plate = whole_plate(laminate, platen, places).outers[0]
     pages = []
     for number, leaf in enumerate(spread, 1):
         page = PdfPage(*leaf.size)
-        _draw(page, laminate, outlines, places, leaf, plate)
+        _draw(page, laminate, outlines, places, leaf)
         which = f", page {number} of {len(spread)}" if len(spread) > 1 else ""
         title = f"{laminate.name}: alignment underlay{which}, seen from above, 1:1"
         _work_head(page, title, USE)
         y = _foot(outlines) - 8
         for guide in outlines:
-            look(page, guide.is_mask)
+            _look(page, guide.is_mask)
             page.lines(((LEFT, y + 1), (LEFT + 10, y + 1)))
             page.text((LEFT + 13, y), guide.words, WORDS)
             y -= ROW
@@ -309,7 +310,8 @@ def leaves(
     if not outlines:
         return ()
     box = box_round([guide.region.bounds for guide in outlines])
-    plate = whole_plate(laminate, platen, places).bounds
+    edge = whole_plate(laminate, platen, places).outers[0]
+    plate = edge.bounds
     margins = 2 * SIDE, HEAD + _foot(outlines)
     columns, rows = (
         _tiles({place[axis] for place in places}, box, plate, PAPER[axis] - margins[axis], axis)
@@ -324,9 +326,9 @@ def leaves(
                 n for n, (x, y) in enumerate(places, 1) if x in column.steps and y in row.steps
             )
             size = max(PAPER[0], column.length + margins[0]), max(PAPER[1], row.length + margins[1])
-            trim = plate if is_plate else (column.low, row.low, column.high, row.high)
+            frame = rectangle((column.low, row.low), (column.high, row.high)).outers[0]
             if numbers:
-                spread.append(Leaf(size, numbers, trim, is_plate))
+                spread.append(Leaf(size, numbers, edge if is_plate else frame, is_plate))
     return tuple(spread)
 
 
@@ -376,12 +378,11 @@ def _draw(
     outlines: Sequence[Guide],
     places: Sequence[Point],
     leaf: Leaf,
-    plate: Contour,
 ) -> None:
     """The laminates of a page, numbered if there are several, with its trim frame in the middle."""
     box = box_round([guide.region.bounds for guide in outlines])
     foot = _foot(outlines)
-    x0, low, right, top = leaf.trim
+    x0, low, right, top = leaf.trim.bounds
     x = page.width / 2 - (x0 + right) / 2
     y = foot + (page.height - HEAD - foot) / 2 - (low + top) / 2
     for number in leaf.places:
@@ -391,12 +392,7 @@ def _draw(
         if len(places) > 1:
             page.text((at[0] + box[0], at[1] + box[1] - 2.3), f"{number}", SMALL)
     page.stroke(BLACK, dashes=(0.2, 0.8))
-    if leaf.is_plate:
-        page.contours([plate], (x, y))
-        return
-    ring = [(x0, low), (right, low), (right, top), (x0, top), (x0, low)]
-    corners = [(u + x, v + y) for u, v in ring]
-    page.lines(*zip(corners, corners[1:], strict=False))
+    page.contours([leaf.trim], (x, y))
 
 
 def _laminate(page: PdfPage, laminate: Laminate, outlines: Sequence[Guide], at: Point) -> None:
@@ -411,7 +407,7 @@ def _laminate(page: PdfPage, laminate: Laminate, outlines: Sequence[Guide], at: 
     for pin in laminate.pins:
         page.contours(disc(pin.centre, pin.diameter / 2).contours, at)
     for guide in outlines:
-        look(page, guide.is_mask)
+        _look(page, guide.is_mask)
         page.contours(guide.region.contours, at)
 
 
@@ -507,10 +503,10 @@ def _seam_page(
     height = max(PAPER[1], high_y - low_y + HEAD + foot)
     page = PdfPage(width, height)
     at = (width - low_x - high_x) / 2, foot + (height - HEAD - foot - low_y - high_y) / 2
-    look(page, is_mask=False)
+    _look(page, is_mask=False)
     page.contours(films.contours, at)
     for step, seam in seams:
-        look(page, is_mask=True)
+        _look(page, is_mask=True)
         page.contours(seam.region.contours, at)
         page.stroke(BLACK)
         page.chains(seam.path, at)
@@ -520,4 +516,151 @@ def _seam_page(
     _work_head(page, f"{laminate.name}: paths of seams, from above, 1:1", SEAM_USE)
     _lines(page, (LEFT, foot - 8), words)
     page.text((width - 46, foot - 8 - ROW * len(words)), f"design {sha256[:12]}", WORDS)
+    return page
+
+
+# The tray plan: places for parts in rows, a new row for each step, over as many pages as needed.
+
+
+TRAY_SIDE, TRAY_HEAD, TRAY_FOOT = 12.0, 34.0, 12.0
+"""Margins of the page: left and right, above and below, mm."""
+GAP, LABEL, HEADING = 2.5, 2.6, 3.4
+"""mm between two places, and the sizes of labels and of a step's heading."""
+BELOW = 3.6
+"""Height of a place's label below its part, mm."""
+LETTER = 0.58
+"""Mean width of a label's letters, in font sizes: slightly above Helvetica's digits."""
+MOST_NAMED = 8
+"""Up to this many serials of a place are in its heading; otherwise the first and the last."""
+TRAY_USE = (
+    f"Print at 100 %: both bars must be {BAR:g} mm, {CLOSE:g} more or less. Lay each part, "
+    "upper side up, on its outline; its",
+    "layer and pattern stand below it. Take the parts up in this order, from left to right, "
+    "row by row.",
+)
+
+
+class TrayPart(NamedTuple):
+    """A part as it is cut, by its lowest layer."""
+
+    layer: Layer
+    region: Region
+
+    @property
+    def label(self) -> str:
+        return f"{self.layer.index} {self.layer.pattern}"
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height of its place, with its label, mm."""
+        low_x, low_y, high_x, high_y = self.region.bounds
+        return max(high_x - low_x, LETTER * LABEL * len(self.label)), high_y - low_y + BELOW
+
+
+class TraySheet(NamedTuple):
+    """One page of a laminate: its size in mm, and its parts and the headings of its steps, each
+    with its place: where a part's frame has its origin, or where words begin.
+    """
+
+    size: tuple[float, float]
+    parts: list[tuple[Point, TrayPart]]
+    headings: list[tuple[Point, str]]
+
+
+def tray_pdf(laminate: Laminate, runs: Runs, design_sha256: str, batch: str | None = None) -> bytes:
+    """Return the pages of all places of a cycle."""
+    sheets = [_tray_page(sheet) for sheet in tray_sheets(laminate)]
+    pages = []
+    for place in range(1, runs.together + 1):
+        for number, under in enumerate(sheets, 1):
+            page = PdfPage(under.width, under.height, under)
+            which = f", page {number} of {len(sheets)}" if len(sheets) > 1 else ""
+            title = f"{laminate.name}: tray{_place_words(runs, place, batch)}{which}"
+            _head(page, (TRAY_SIDE, page.height - 12), title, TRAY_USE, 4.4)
+            across = TRAY_SIDE, page.height - 29
+            _bars(page, across, (page.width - 6, page.height - TRAY_HEAD - BAR))
+            page.text((across[0] + BAR + 2, across[1] - 1), f"{BAR:g} mm", LABEL)
+            page.text((TRAY_SIDE, 6), f"design {design_sha256[:12]}", LABEL)
+            pages.append(page)
+    return pdf(pages, f"{laminate.name}: tray plan")
+
+
+def tray_sheets(laminate: Laminate) -> list[TraySheet]:
+    """Return the pages of one laminate; a part wider than the paper gets a wider page."""
+    steps = [*_laid(laminate)]
+    boxes = [part.region.bounds for _, parts in steps for part in parts]
+    wide = max(box[2] - box[0] for box in boxes) + 2 * TRAY_SIDE
+    high = max(box[3] - box[1] for box in boxes) + BELOW + HEADING + 3 + TRAY_HEAD + TRAY_FOOT
+    size = max(PAPER[0], wide), max(PAPER[1], high)
+    sheets = [TraySheet(size, [], [])]
+    top = size[1] - TRAY_HEAD
+    for heading, parts in steps:
+        words = heading
+        for row in _in_rows(parts, size[0] - 2 * TRAY_SIDE):
+            high = max(part.size[1] for part in row)
+            if sheets[-1].parts and top - (HEADING + 3 if words else 0) - high < TRAY_FOOT:
+                sheets.append(TraySheet(size, [], []))
+                top = size[1] - TRAY_HEAD
+                words = words or f"{heading} (continued)"
+            if words:
+                sheets[-1].headings.append(((TRAY_SIDE, top - HEADING), words))
+                top -= HEADING + 3
+                words = ""
+            x = TRAY_SIDE
+            for part in row:
+                low_x, low_y = part.region.bounds[:2]
+                sheets[-1].parts.append(((x - low_x, top - high + BELOW - low_y), part))
+                x += part.size[0] + GAP
+            top -= high + GAP
+    return sheets
+
+
+def _laid(laminate: Laminate) -> Iterator[tuple[str, list[TrayPart]]]:
+    """Yield the heading of each step that lays parts, and the parts in their order.
+
+    Folded halves are one part, with the half that is laid first.
+    """
+    taken: set[int] = set()
+    for step in laying(laminate):
+        cut_with = [laminate.cut_with(laminate.layer(index)) for index in step.adds]
+        roots = [laminate.layer(i) for i in dict.fromkeys(cut_with) if i not in taken]
+        taken.update(cut_with)
+        if roots:
+            parts = [TrayPart(root, laminate.as_cut(root)) for root in roots]
+            yield f"Step {step.number}: {layers_in_words(step.adds)}", parts
+
+
+def _in_rows(parts: Sequence[TrayPart], width: float) -> Iterator[list[TrayPart]]:
+    row: list[TrayPart] = []
+    x = 0.0
+    for part in parts:
+        if row and x + part.size[0] > width:
+            yield row
+            row, x = [], 0.0
+        row.append(part)
+        x += part.size[0] + GAP
+    yield row
+
+
+def _place_words(runs: Runs, place: int, batch: str | None) -> str:
+    """Return the laminates that use a page, as text; empty for a single one."""
+    if runs.copies == 1:
+        return ""
+    last = runs.copies + 1
+    names = [serial(runs, copy, batch) for copy in range(place, last, runs.together)]
+    if len(names) > MOST_NAMED:
+        names = [names[0], "...", names[-1]]
+    return f", place {place} ({', '.join(names)})"
+
+
+def _tray_page(sheet: TraySheet) -> PdfPage:
+    """Return the content common to all laminates of a cycle: the places with their labels."""
+    page = PdfPage(*sheet.size)
+    for at, words in sheet.headings:
+        page.text(at, words, HEADING, bold=True)
+    for at, part in sheet.parts:
+        _look(page, part.layer.is_mask, 0.15)
+        page.contours(part.region.contours, at)
+        low_x, low_y = part.region.bounds[:2]
+        page.text((at[0] + low_x, at[1] + low_y - BELOW + 0.6), part.label, LABEL)
     return page
