@@ -7,7 +7,7 @@ full bonds: a flash bond on the pins comes first, then the full bond without pin
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -76,7 +76,7 @@ def _laying(laminate: Laminate) -> tuple[AssemblyStep, ...]:
         adds = tuple(body[0] for body in joining.bodies if len(body) == 1)
         plans = [_Plan("flash_middle", "flash", joining.bodies, adds)]
         if is_pressed and adds == joining.layers:
-            plans = [*_plans(laminate, joining.layers)]
+            plans = _plans(laminate, joining.layers)
         elif is_pressed:
             plans = [_Plan("bond_all", "full", joining.bodies, adds)]
         for plan in plans:
@@ -88,13 +88,9 @@ def _laying(laminate: Laminate) -> tuple[AssemblyStep, ...]:
 
 def _steps(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     if not is_only_pressed(laminate):
-        return tuple(
-            step
-            for step in laying(laminate)
-            if step.joining is not None and step.joining.process == PRESS
-        )
-    indices = tuple(layer.index for layer in laminate.layers)
-    plans = [*_plans(laminate, indices)]
+        steps = laying(laminate)
+        return tuple(step for step in steps if step.joining and step.joining.process == PRESS)
+    plans = _plans(laminate, tuple(layer.index for layer in laminate.layers))
     if laminate.registration == "ears" and not laminate.pins_in_full_bonds:
         plans = [step for plan in plans for step in _tacked(plan)]
     return tuple(_step(number, plan, laminate) for number, plan in enumerate(plans, 1))
@@ -109,41 +105,34 @@ class _Plan(NamedTuple):
     adds: tuple[int, ...]
 
 
-def _plans(laminate: Laminate, indices: Sequence[int]) -> Iterator[_Plan]:
-    """Yield the press steps of these layers that add any."""
-    return (plan for plan in _all_plans(laminate, tuple(indices)) if plan.adds)
-
-
-def _all_plans(laminate: Laminate, indices: tuple[int, ...]) -> tuple[_Plan, ...]:
+def _plans(laminate: Laminate, indices: tuple[int, ...]) -> list[_Plan]:
+    """Return the press steps of these layers that add any."""
     films = [layer for layer in map(laminate.layer, indices) if not layer.is_mask]
     base = next((layer for layer in films if layer.role == "base"), films[0]).index
     wall = next((layer.index for layer in films if layer.index > base), base)
     upper = tuple(index for index in indices if base < index <= wall)
-    bottom = (base, *upper)
     under = tuple(index for index in indices if index < base)
-    between = tuple(index for index in indices if index > base)
-    if laminate.middle_first and len(between) > 2:
-        between, cap = between[:-1], between[-1:]
-        return (
+    *core, last = (index for index in indices if index >= base)
+    between = tuple(core[1:])
+    if laminate.middle_first and len(between) > 1:
+        return [
             _Plan("flash_middle", "flash", (between,), between),
-            _Plan("bond_all", "full", (under, (base,), between, cap), (*under, base, *cap)),
-        )
-    over = tuple(index for index in indices if index > wall)
-    middle, cap = over[:-1], over[-1:]
-    if len(upper) < 2:
-        first = [_Plan("bond_bottom", "full", (bottom,), bottom)]
-    else:
-        first = [
-            _Plan("flash_bottom", "flash", (upper,), upper),
-            _Plan("bond_bottom", "full", ((base,), upper), (base,)),
+            _Plan("bond_all", "full", (under, (base,), between, (last,)), (*under, base, last)),
         ]
-    if len(middle) < 2:
-        middle, cap = (), over
-    return (
-        *first,
+    bottom = (base, *upper)
+    over = tuple(index for index in indices if index > wall)
+    middle, cap = (over[:-1], over[-1:]) if len(over) > 2 else ((), over)
+    plans = [
+        _Plan("flash_bottom", "flash", (upper,), upper),
+        _Plan("bond_bottom", "full", ((base,), upper), (base,)),
+    ]
+    if len(upper) < 2:
+        plans = [_Plan("bond_bottom", "full", (bottom,), bottom)]
+    plans += [
         _Plan("flash_middle", "flash", (middle,), middle),
         _Plan("bond_all", "full", (under, bottom, middle, cap), under + cap),
-    )
+    ]
+    return [plan for plan in plans if plan.adds]
 
 
 def _tacked(plan: _Plan) -> tuple[_Plan, ...]:
@@ -152,18 +141,13 @@ def _tacked(plan: _Plan) -> tuple[_Plan, ...]:
         return (plan,)
     tack: StepName = "tack_bottom" if plan.name == "bond_bottom" else "tack_all"
     whole = tuple(index for stack in plan.stacks for index in stack)
-    return (
-        plan._replace(name=tack, bond="flash"),
-        plan._replace(stacks=(whole,), adds=()),
-    )
+    return plan._replace(name=tack, bond="flash"), plan._replace(stacks=(whole,), adds=())
 
 
 def _step(number: int, plan: _Plan, laminate: Laminate) -> AssemblyStep:
     layers = [index for stack in plan.stacks for index in stack]
-    pinned = plan.bond == "flash" or (
-        laminate.registration == "ears" and laminate.pins_in_full_bonds
-    )
-    pins = _pins_in(laminate, layers) if pinned else ()
+    is_eared = laminate.registration == "ears" and laminate.pins_in_full_bonds
+    pins = _pins_in(laminate, layers) if plan.bond == "flash" or is_eared else ()
     stacks = tuple(stack for stack in plan.stacks if stack)
     return AssemblyStep(number, plan.name, plan.bond, stacks, plan.adds, pins)
 

@@ -115,7 +115,8 @@ def _first_conflict(laminate: Laminate, tasks: Sequence[_Task]) -> str:
     while True:
         conflicts = [_conflict(laminate, task, waiting, done) for task in waiting]
         if None not in conflicts:
-            return next(filter(None, conflicts)).sentence
+            conflict = next(filter(None, conflicts))
+            return f"{conflict.words}; {conflict.remedy}"
         done.append(waiting.pop(conflicts.index(None)))
 
 
@@ -181,54 +182,43 @@ def _in_hand(laminate: Laminate, task: _Task, done: Sequence[_Task]) -> tuple[in
     return first, last
 
 
-def _conflict(
-    laminate: Laminate, task: _Task, waiting: Sequence[_Task], done: Sequence[_Task]
-) -> _Conflict | None:
-    """Return why a task is not possible yet, or None if it is."""
-    bond = _bond(laminate, task)
-    if bond is not None and bond.after is not None:
-        others = [other for other in waiting if other is not task]
-        if any(_is_of(laminate, other, bond.after) for other in others):
-            return _Conflict(
-                _what(task),
-                f"comes after bond {bond.after} by face_bonds.{bond.name}.after, and that cannot "
-                "be made before",
-                "",
-                "change the order of the two",
-            )
-    first, last = _in_hand(laminate, task, done)
-    gaps = laminate.interfaces[first - 1 : last]
-    if task.seam is None:
-        return _pressed_by_mistake(laminate, task, gaps)
-    return _welded_by_mistake(laminate, task.seam, task, gaps) or _is_covered(task.seam, task, gaps)
-
-
-def _is_of(laminate: Laminate, task: _Task, name: str) -> bool:
-    bond = _bond(laminate, task)
-    return bond is not None and bond.name == name
-
-
-def _what(task: _Task) -> str:
-    return "the press" if task.seam is None else f"seam {task.seam.name}"
-
-
 class _Conflict(NamedTuple):
-    """Reasons why films cannot be joined yet: the fault, its place, and a remedy."""
+    """Why films cannot be joined yet: the fault of a task, its place, and a remedy."""
 
     subject: str
     harm: str
-    where: str
     remedy: str
+    where: str = ""
 
     @property
     def words(self) -> str:
         """The fault and its place."""
         return f"{self.subject} {self.harm}{self.where}"
 
-    @property
-    def sentence(self) -> str:
-        """The whole sentence."""
-        return f"{self.words}; {self.remedy}"
+
+def _conflict(
+    laminate: Laminate, task: _Task, waiting: Sequence[_Task], done: Sequence[_Task]
+) -> _Conflict | None:
+    """Return why a task is not possible yet, or None if it is."""
+    bond = _bond(laminate, task)
+    if bond is not None and bond.after is not None:
+        others = [_bond(laminate, other) for other in waiting if other is not task]
+        if any(other is not None and other.name == bond.after for other in others):
+            harm = (
+                f"comes after bond {bond.after} by face_bonds.{bond.name}.after, and that cannot "
+                "be made before"
+            )
+            subject = "the press" if task.seam is None else f"seam {task.seam.name}"
+            return _Conflict(subject, harm, "change the order of the two")
+    first, last = _in_hand(laminate, task, done)
+    return _harm(laminate, task, laminate.interfaces[first - 1 : last])
+
+
+def _harm(laminate: Laminate, task: _Task, gaps: Sequence[Interface]) -> _Conflict | None:
+    """Return what a task would do to the films of the interfaces, or None if it does no harm."""
+    if task.seam is None:
+        return _pressed_by_mistake(laminate, task, gaps)
+    return _welded_by_mistake(laminate, task.seam, task, gaps) or _is_covered(task.seam, task, gaps)
 
 
 def _named(seam: Seam) -> str:
@@ -238,22 +228,18 @@ def _named(seam: Seam) -> str:
 def _pressed_by_mistake(
     laminate: Laminate, task: _Task, gaps: Sequence[Interface]
 ) -> _Conflict | None:
-    if laminate.bonds:
-        # Faces that do not bond in the press are safe in it; its temperature is checked later.
-        return None
-    for gap in gaps:
-        if task.first <= gap.index <= task.last:
-            continue
-        weld = _open(laminate, gap)
+    # Faces that do not bond in the press are safe in it; its temperature is checked later.
+    for gap in gaps if not laminate.bonds else ():
+        weld = _open(laminate, gap) if not task.first <= gap.index <= task.last else Region()
         if weld.area > LEAST_WELD:
             x, y = _somewhere(weld)
             return _Conflict(
                 f"the press of layers {gaps[0].below.index} to {gaps[-1].above.index}",
                 f"would weld layers {gap.below.index} and {gap.above.index} all over, which are "
                 "bonded by seams",
-                f" (x {x:.3f}, y {y:.3f})",
                 "lay a mask between them, or say in [face_bonds] that these faces do not bond in "
                 "the press",
+                f" (x {x:.3f}, y {y:.3f})",
             )
     return None
 
@@ -291,7 +277,6 @@ def _welded_by_mistake(
                 _named(seam),
                 f"would weld layers {gap.below.index} and {gap.above.index} too, over "
                 f"{weld.area:.3f} mm2 at x {x:.3f}, y {y:.3f}",
-                "",
                 "lay a mask between these, move the seam, or take films whose faces do not bond "
                 "there",
             )
@@ -320,7 +305,6 @@ def _is_covered(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> _Conflict
     return _Conflict(
         _named(seam),
         f"would have to be made through layer {over} or layer {under}, which melt under the tool",
-        "",
         "make it before these are joined to them, or open them there",
     )
 
@@ -385,13 +369,7 @@ def _bodies(
     laminate: Laminate, layers: Sequence[int], done: Sequence[_Task], folded: Sequence[Fold]
 ) -> Iterator[tuple[int, ...]]:
     """Yield earlier joined bodies and single layers, lowest first."""
-    joined = {index for past in done for index in range(past.first, past.last + 1)}
-    inside = {
-        index
-        for gap in laminate.interfaces
-        if gap.index in joined
-        for index in range(gap.below.index, gap.above.index)
-    }
+    inside = {index for past in done for index in _layers(laminate, past)[:-1]}
     inside |= {index for fold in folded for index in range(fold.lower, fold.upper)}
     body: list[int] = []
     for index in layers:
@@ -423,13 +401,7 @@ def _reason(laminate: Laminate, task: _Task, before: Sequence[_Conflict | None])
 def _later(laminate: Laminate, task: _Task) -> str | None:
     """Return why a task is not possible after all others, or None if it is."""
     gaps = laminate.interfaces
-    if len(gaps) == task.last - task.first + 1:
-        return None
-    if task.seam is None:
-        conflict = _pressed_by_mistake(laminate, task, gaps)
-    else:
-        conflict = _welded_by_mistake(laminate, task.seam, task, gaps)
-        conflict = conflict or _is_covered(task.seam, task, gaps)
+    conflict = _harm(laminate, task, gaps) if len(gaps) > task.last - task.first + 1 else None
     if conflict is None:
         return None
     return f"{conflict.subject if task.seam is None else 'it'} {conflict.harm}"

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Edge, Point
@@ -87,14 +87,6 @@ class Fold:
     lower: int
     upper: int
     line: tuple[Point, Point]
-
-
-class GapJoints(NamedTuple):
-    """Joints between two films other than masks: seams, whether they are pressed, and folds."""
-
-    seams: tuple[Seam, ...] = ()
-    pressed: bool = True
-    folds: tuple[Fold, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, get_args
 
 from sbafab.errors import DesignError
@@ -17,7 +18,7 @@ from sbafab.geometry.edges import Bounds, Point, box_round
 from sbafab.geometry.region import Region, coord, path_data, union
 from sbafab.laminate.films import Film, density_of, in_order, ink
 from sbafab.laminate.folding import flat_part, fold_roots, unfolded
-from sbafab.laminate.joints import PRESS, FaceBond, Fold, GapJoints, Net, Port, Seam, chamber_gaps
+from sbafab.laminate.joints import PRESS, FaceBond, Fold, Net, Port, Seam, chamber_gaps
 from sbafab.markup import escape
 from sbafab.notebook import table_html
 
@@ -25,7 +26,6 @@ Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
 ROLES: tuple[Role, ...] = get_args(Role)
 
 NOTHING = Region()
-PLAINLY_PRESSED = GapJoints()
 LOOSE = 0.2
 """Tolerance on place and diameter for a hole to belong to a pin, mm."""
 IN_MOUTH = 0.1
@@ -73,7 +73,7 @@ class Layer:
         return (lower, upper) if self.turned else (upper, lower)
 
     def _repr_html_(self) -> str:
-        return layer_html(self)
+        return _plan(f"{self.name} ({self.pattern})", (self,), 1.0)
 
 
 @dataclass(frozen=True)
@@ -195,33 +195,30 @@ class Laminate:
     @cached_attribute
     def interfaces(self) -> tuple[Interface, ...]:
         """One between every two consecutive TPE layers, bottom to top."""
-        regions: dict[tuple[object, ...], tuple[Region, Region, Region, Region]] = {}
+        regions: dict[tuple[object, ...], Regions] = {}
         interfaces: list[Interface] = []
-        below: Layer | None = None
-        masks: list[Layer] = []
-        for layer in self.layers:
-            if layer.is_mask:
-                masks.append(layer)
-                continue
-            if below is not None:
-                joints = self._joints_between(below, layer)
+        films = [place for place, layer in enumerate(self.layers) if not layer.is_mask]
+        for low, high in pairwise(films):
+            below, *masks, above = self.layers[low : high + 1]
+            seams, pressed = self.seams_between(below, above), self.presses(below, above)
+            key = *(layer.pattern for layer in (below, *masks, above)), pressed, seams
+            if key not in regions:
                 profiles = [mask.profile for mask in masks]
-                patterns = below.pattern, layer.pattern, tuple(mask.pattern for mask in masks)
-                key = *patterns, joints.pressed, joints.seams
-                if key not in regions:
-                    pressed = interface_regions(below.profile, layer.profile, profiles)
-                    regions[key] = joined_regions(pressed, joints)
-                number = len(interfaces) + 1
-                interfaces.append(
-                    Interface.between(number, below, layer, masks, regions[key], joints)
-                )
-            below, masks = layer, []
+                found = interface_regions(below.profile, above.profile, profiles)
+                regions[key] = found if pressed else _seamed(found, seams)
+            roles = [layer.role for layer in (below, *masks, above)]
+            kind: InterfaceKind = "bond"
+            if masks or not pressed:
+                (chamber,) = chamber_gaps(roles, [(1, len(roles))] if seams else ()).values()
+                kind = "chamber" if chamber else "separator"
+            pair = below.index, above.index
+            folds = tuple(fold for fold in self.folds if (fold.lower, fold.upper) == pair)
+            joints = seams, pressed, folds
+            number = len(interfaces) + 1
+            interfaces.append(
+                Interface(number, kind, below, above, tuple(masks), *regions[key], *joints)
+            )
         return tuple(interfaces)
-
-    def _joints_between(self, below: Layer, above: Layer) -> GapJoints:
-        pair = below.index, above.index
-        folds = tuple(fold for fold in self.folds if (fold.lower, fold.upper) == pair)
-        return GapJoints(self.seams_between(below, above), self.presses(below, above), folds)
 
     def seams_between(self, below: Layer, above: Layer) -> tuple[Seam, ...]:
         """The seams that bond two structural layers, in order of making."""
@@ -348,7 +345,14 @@ class Laminate:
         )
 
     def _repr_html_(self) -> str:
-        return laminate_html(self)
+        title = f"{self.name}: {len(self.layers)} layers, {coord(self.thickness)} mm"
+        groups = self.patterns.values()
+        rows = [(layers[0], _numbers(layers)) for layers in groups]
+        table = table_html(
+            ("pattern", "film", "role", "layers, bottom to top"),
+            [(one.pattern, one.film.material, one.role, numbers) for one, numbers in rows],
+        )
+        return _plan(title, [layers[0] for layers in groups], 0.45) + table
 
 
 # Interfaces between consecutive TPE layers: bonded and open areas.
@@ -379,23 +383,6 @@ class Interface:
     seams: tuple[Seam, ...] = ()
     pressed: bool = True
     folds: tuple[Fold, ...] = ()
-
-    @staticmethod
-    def between(
-        index: int,
-        below: Layer,
-        above: Layer,
-        masks: Sequence[Layer],
-        regions: tuple[Region, Region, Region, Region],
-        joints: GapJoints = PLAINLY_PRESSED,
-    ) -> Interface:
-        roles = [below.role, *(mask.role for mask in masks), above.role]
-        kind: InterfaceKind = "bond"
-        if not joints.pressed or masks:
-            seams = [(1, len(roles))] if joints.seams else ()
-            (is_chamber,) = chamber_gaps(roles, seams).values()
-            kind = "chamber" if is_chamber else "separator"
-        return Interface(index, kind, below, above, tuple(masks), *regions, *joints)
 
     @property
     def fold_lines(self) -> tuple[tuple[Point, Point], ...]:
@@ -444,28 +431,21 @@ class Interface:
         )
 
 
-def interface_regions(
-    below: Region, above: Region, masks: Sequence[Region]
-) -> tuple[Region, Region, Region, Region]:
-    """Mask, contact, bond and unbonded region of two TPE profiles with masks between."""
+Regions = tuple[Region, Region, Region, Region]
+"""Mask, contact, bond and unbonded region of an interface."""
+
+
+def interface_regions(below: Region, above: Region, masks: Sequence[Region]) -> Regions:
+    """Return mask, contact, bond and unbonded region of two TPE profiles with masks between."""
     mask = union(masks)
     contact = below if below.contours == above.contours else below & above
     return mask, contact, contact - mask, contact & mask
 
 
-def joined_regions(
-    regions: tuple[Region, Region, Region, Region], joints: GapJoints
-) -> tuple[Region, Region, Region, Region]:
-    """The regions of an interface; bonded only by seams if it is not pressed.
-
-    No seam bonds through a mask.
-    """
-    if joints.pressed:
-        return regions
+def _seamed(regions: Regions, seams: Sequence[Seam]) -> Regions:
+    """The regions of an interface that seams alone bond; none bonds through a mask."""
     mask, contact, bare, _ = regions
-    if not joints.seams:
-        return mask, contact, NOTHING, contact
-    bond = bare & union([seam.region for seam in joints.seams])
+    bond = bare & union([seam.region for seam in seams]) if seams else NOTHING
     return mask, contact, bond, contact - bond
 
 
@@ -518,76 +498,35 @@ SHOWN_MM = 80.0
 BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
 
-def laminate_html(laminate: Laminate) -> str:
-    """Return the laminate in plan, with a legend, a scale and its layers in order."""
-    rows = [
-        (f"{layers[0].pattern}", layers[0].film.material, layers[0].role, _numbers(layers))
-        for layers in laminate.patterns.values()
-    ]
-    table = table_html(("pattern", "film", "role", "layers, bottom to top"), rows)
-    return laminate_svg(laminate) + _legend(laminate.bounds, laminate.layers) + table
-
-
-def layer_html(layer: Layer) -> str:
-    """Return the layer in plan, with a legend and a scale."""
-    return layer_svg(layer) + _legend(layer.profile.bounds, (layer,))
+def _plan(title: str, layers: Sequence[Layer], opacity: float) -> str:
+    """Return exact profiles in plan, enlarged to fit a notebook cell, a scale bar and a legend."""
+    low_x, low_y, high_x, high_y = box_round([layer.profile.bounds for layer in layers])
+    longer = max(high_x - low_x, high_y - low_y)
+    margin, scale = 0.03 * longer, SHOWN_MM / (1.06 * longer)
+    width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
+    box = " ".join(map(coord, (low_x - margin, -high_y - margin, width, height)))
+    shapes = "".join(
+        f'<path d="{path_data(layer.profile)}" fill="{ink(layer.film).fill}" '
+        f'stroke="{ink(layer.film).line}" fill-opacity="{coord(opacity)}"/>'
+        for layer in layers
+    )
+    bar = max((step for step in BARS if step < 1.06 * longer / 3), default=BARS[0])
+    swatches = "".join(
+        f'<span style="background:{ink(film).fill};border:1px solid {ink(film).line}">&emsp;</span>'
+        f" {film.material}, {escape(film.product)}, {coord(film.thickness)} mm &ensp; "
+        for film in dict.fromkeys(layer.film for layer in layers)
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{coord(width * scale)}mm" '
+        f'height="{coord(height * scale)}mm" viewBox="{box}"><title>{escape(title)}</title>'
+        f'<g transform="scale(1 -1)" fill-rule="evenodd" stroke-width="{coord(0.3 / scale)}">'
+        f"{shapes}</g></svg>"
+        f'<div><span style="display:inline-block;width:{coord(bar * scale)}mm;border-top:2px '
+        f'solid">{bar:g} mm</span> &ensp; {swatches}</div>'
+    )
 
 
 def _numbers(layers: Sequence[Layer]) -> str:
     """Layer indices as text; many of them as first, second ... last."""
     indices = [str(layer.index) for layer in layers]
     return ", ".join(indices if len(indices) < 6 else [*indices[:2], "...", indices[-1]])
-
-
-def _legend(bounds: Bounds, layers: Iterable[Layer]) -> str:
-    """A scale bar in HTML, and a swatch for each film."""
-    low_x, low_y, high_x, high_y = bounds
-    longer = 1.06 * max(high_x - low_x, high_y - low_y)
-    bar = max((step for step in BARS if step < longer / 3), default=BARS[0])
-    films = dict.fromkeys(layer.film for layer in layers)
-    swatches = "".join(
-        f'<span style="background:{ink(film).fill};border:1px solid '
-        f'{ink(film).line}">&emsp;</span> {film.material}, {escape(film.product)}, '
-        f"{coord(film.thickness)} mm &ensp; "
-        for film in films
-    )
-    width = coord(bar * SHOWN_MM / longer)
-    return (
-        f'<div><span style="display:inline-block;width:{width}mm;border-top:2px solid">'
-        f"{bar:g} mm</span> &ensp; {swatches}</div>"
-    )
-
-
-def layer_svg(layer: Layer) -> str:
-    """The layer's exact profile in plan, enlarged to fit a notebook cell."""
-    title = f"{layer.name} ({layer.pattern})"
-    return _document(title, layer.profile.bounds, [_profile(layer, 1.0)])
-
-
-def laminate_svg(laminate: Laminate) -> str:
-    """Every distinct profile in plan, bottom to top, see-through."""
-    title = f"{laminate.name}: {len(laminate.layers)} layers, {coord(laminate.thickness)} mm"
-    shapes = [_profile(layers[0], 0.45) for layers in laminate.patterns.values()]
-    return _document(title, laminate.bounds, shapes)
-
-
-def _profile(layer: Layer, opacity: float) -> str:
-    colours = ink(layer.film)
-    return (
-        f'<path d="{path_data(layer.profile)}" fill="{colours.fill}" stroke="{colours.line}" '
-        f'fill-opacity="{coord(opacity)}"/>'
-    )
-
-
-def _document(title: str, bounds: Bounds, shapes: list[str]) -> str:
-    low_x, low_y, high_x, high_y = bounds
-    margin = 0.03 * max(high_x - low_x, high_y - low_y)
-    width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
-    scale = SHOWN_MM / max(width, height)
-    box = " ".join(map(coord, (low_x - margin, -high_y - margin, width, height)))
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{coord(width * scale)}mm" '
-        f'height="{coord(height * scale)}mm" viewBox="{box}"><title>{escape(title)}</title>'
-        f'<g transform="scale(1 -1)" fill-rule="evenodd" stroke-width="{coord(0.3 / scale)}">'
-        f"{''.join(shapes)}</g></svg>"
-    )

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 from sbafab.errors import DesignError
 from sbafab.laminate.joints import Port, PortKind
@@ -33,8 +33,7 @@ class Netlist:
     ports: tuple[Port, ...] = ()
 
 
-@dataclass(frozen=True)
-class NetlistComparison:
+class NetlistComparison(NamedTuple):
     """Nets that match, nets that are open, pairs of nets that are shorted, names that are missing.
 
     A net with a missing name is neither open nor matched.
@@ -45,11 +44,6 @@ class NetlistComparison:
     shorted: tuple[tuple[str, str], ...]
     missing: tuple[str, ...]
 
-    @property
-    def is_equal(self) -> bool:
-        """True if every net matches."""
-        return not (self.open or self.shorted or self.missing)
-
 
 def compare(
     groups: Iterable[frozenset[str]], nets: Mapping[str, Sequence[str]]
@@ -59,34 +53,26 @@ def compare(
     Ports not named by any net count as a net of one port, by its name. A port that lies in two
     groups, as the inlet and the pocket of a chamber may, makes its net open.
     """
-    parts = [*groups]
-    home: dict[str, set[int]] = {}
-    for number, part in enumerate(parts):
+    home: dict[str, list[int]] = {}
+    for number, part in enumerate(groups):
         for port in part:
-            home.setdefault(port, set()).add(number)
-    named = {port for ports in nets.values() for port in ports}
-    missing = tuple(dict.fromkeys(p for ports in nets.values() for p in ports if p not in home))
-    broken = tuple(
-        name
-        for name, ports in nets.items()
-        if len({part for port in ports for part in home.get(port, ())}) > 1
-    )
-    alone = {port: (port,) for port in sorted(home) if port not in named}
-    owners: dict[int, dict[str, None]] = {}
-    for name, ports in {**nets, **alone}.items():
-        for port in ports:
-            for place in sorted(home.get(port, ())):
-                owners.setdefault(place, {})[name] = None
-    shorted = dict.fromkeys(
-        (first, other) for first, *others in owners.values() for other in others
-    )
+            home.setdefault(port, []).append(number)
+    named = dict.fromkeys(port for ports in nets.values() for port in ports)
+    missing = tuple(port for port in named if port not in home)
+    parts = {name: {n for port in ports for n in home.get(port, ())} for name, ports in nets.items()}
+    broken = tuple(name for name in nets if len(parts[name]) > 1)
+    alone = {port: set(home[port]) for port in sorted(home) if port not in named}
+    owners: dict[int, list[str]] = {}
+    for name, numbers in {**parts, **alone}.items():
+        for number in numbers:
+            owners.setdefault(number, []).append(name)
+    pairs = ((first, other) for first, *others in owners.values() for other in others)
+    shorted = tuple(dict.fromkeys(pairs))
     faulty = {*broken, *(name for pair in shorted for name in pair)}
     matched = tuple(
-        name
-        for name, ports in nets.items()
-        if name not in faulty and not any(port in missing for port in ports)
+        name for name, ports in nets.items() if name not in faulty and not {*ports} & {*missing}
     )
-    return NetlistComparison(matched, broken, tuple(shorted), missing)
+    return NetlistComparison(matched, broken, shorted, missing)
 
 
 # Files.

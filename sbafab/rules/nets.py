@@ -658,7 +658,7 @@ def _openings(
         interface = laminate.interfaces[worst.interface - 1]
         facts = {
             "net": worst.net,
-            "drawn": worst.width.value,
+            "as_drawn": worst.width.value,
             "interface": worst.interface,
             "left": worst.left,
             "pressure": pressure,
@@ -670,7 +670,7 @@ def _openings(
         yield judged(NAME, good, limit, measured, "kPa", place, sentence, **facts)
     if len(known) < len(narrow):
         unknown = next(place for place in narrow if place.pressure is None)
-        facts = {"drawn": unknown.width.value, "left": unknown.left}
+        facts = {"as_drawn": unknown.width.value, "left": unknown.left}
         where = Place(unknown.interface, (), *unknown.width.middle)
         facts["interface"] = unknown.interface
         yield judged(NAME, "warn", limit, None, "kPa", where, "unknown", **facts)

@@ -61,7 +61,7 @@ def check(measures: Measures) -> list[Finding]:
     facts = {
         "stretch": say(f"pin-fit.{stretch}", spare=worst.least - worst.most),
         "percent": 100 * limit,
-        "drawn": worst.drawn,
+        "as_drawn": worst.drawn,
         "layer": layer_name(layer),
         "least": max(worst.least, 0.0),
         "pin": pin.name,

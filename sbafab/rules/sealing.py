@@ -216,7 +216,7 @@ def _closing(
         for place, left in edges.narrow_places(region) if edges.seams else ():
             if left.value > 0 or not _parts(region, place, held):
                 continue
-            facts = {"whose": [*names], "drawn": place.value, "edges": edges.causes()}
+            facts = {"whose": [*names], "as_drawn": place.value, "edges": edges.causes()}
             yield _Offence("closing", void.level, place.middle, facts)
             break
 

@@ -90,7 +90,7 @@ def _of_inlets(fits: Sequence[_Fit], design: Design) -> Finding:
     facts = {
         "feature": say("tube-fit.strip" if worst.feature == "strip" else "tube-fit.mouth"),
         "chamber": worst.inlet.chamber,
-        "drawn": worst.drawn,
+        "as_drawn": worst.drawn,
         "how": say("tube-fit.cut" if is_cut else "tube-fit.welded"),
         "edges": edges.causes(),
         "tube": worst.inlet.tube_diameter,
@@ -154,7 +154,7 @@ def _on_hole(port: Port, laminate: Laminate, design: Design) -> Iterator[_HoleFi
         is_known = design.kerf_widths.get(layer.film.material) is not None
         kerf = 0.0 if is_known else design.laser.unknown_kerf
         cut = 2 * (reach + design.registration.cutting_error) + kerf
-        drawn = {"drawn": 2 * reach}
+        drawn = {"as_drawn": 2 * reach}
         yield _HoleFit(layer, port, port.tube_diameter, cut, "covered", drawn)
     others = Region(tuple(other for other in layer.profile.contours if other is not hole))
     film = others.distance_to_edge(port.at) - reach

@@ -275,4 +275,3 @@ def test_comparing_names_just_the_pairs_that_differ(seed: int) -> None:
     assert {n for pair in found.shorted for n in pair} == {n for pair in shorts for n in pair}
     assert set(found.matched) == set(nets) - opens - {n for pair in shorts for n in pair}
     assert found.missing == ()
-    assert found.is_equal == (not opens and not shorts)
