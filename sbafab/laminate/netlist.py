@@ -59,12 +59,14 @@ def compare(
             home.setdefault(port, []).append(number)
     named = dict.fromkeys(port for ports in nets.values() for port in ports)
     missing = tuple(port for port in named if port not in home)
-    parts = {name: {n for port in ports for n in home.get(port, ())} for name, ports in nets.items()}
+    parts = {
+        name: {n for port in ports for n in home.get(port, ())} for name, ports in nets.items()
+    }
     broken = tuple(name for name in nets if len(parts[name]) > 1)
     alone = {port: set(home[port]) for port in sorted(home) if port not in named}
     owners: dict[int, list[str]] = {}
     for name, numbers in {**parts, **alone}.items():
-        for number in numbers:
+        for number in sorted(numbers):
             owners.setdefault(number, []).append(name)
     pairs = ((first, other) for first, *others in owners.values() for other in others)
     shorted = tuple(dict.fromkeys(pairs))
