@@ -21,7 +21,7 @@ GROUPS = {
         "new": "Write a commented design file to start from, or list the templates.",
         "import": "Write a design of drawn layers from other files.",
         "studio": "Edit a design in the browser.",
-        "schema": "Print a JSON schema, by default that of design files.",
+        "schema": "Print a JSON schema, by default of design files.",
     },
     "Check": {
         "check": "Run the rules on a design or on an output folder.",
@@ -109,7 +109,7 @@ EXTRAS = {
     "studio": ("starlette", "sbafab studio"),
     "yaml": ("yaml", "import of YAML, as foldable_robotics writes it"),
 }
-"""By extra: a module that it installs, and the feature that needs it."""
+"""Extra -> a module that it installs, and the feature that needs it."""
 
 
 class CommandGroup(click.Group):
@@ -143,7 +143,7 @@ class CommandGroup(click.Group):
                 formatter.write("".join(f"  {line}\n" for line in missing))
 
     def invoke(self, ctx: click.Context) -> Any:
-        # Click hands a command what is left of the line here; it is read before a command is.
+        # Click hands over the rest of the line, the command first.
         with exit_plainly("--json" in ctx.args):
             return super().invoke(ctx)
 
@@ -192,7 +192,7 @@ def app() -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; bad input ends in one sentence and exit code 2."""
     if arguments is None:
-        # The command is all that the process does, however it was started.
+        # The process runs only this command, however it was started.
         prepare()
     prepared_streams()
     if any("\0" in argument for argument in arguments or ()):

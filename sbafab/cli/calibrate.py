@@ -40,7 +40,7 @@ def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) ->
     .csv), or build records (.sqlite); several are fitted together. By default it is the paper's.
     The fit gives modulus ratio, pocket loss, press factor and delays with their uncertainty, and
     what the models miss beyond that. Each test is then predicted from a fit without it. A design
-    uses the file that is written with models.calibration = "NAME.toml"; a kit likewise.
+    or kit uses the file that is written with models.calibration = "NAME.toml".
     """
     _check_name(name)
     sources = [load_source(source) for source in evidence or ("paper",)]

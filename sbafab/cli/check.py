@@ -25,7 +25,7 @@ from sbafab.cli.options import (
 )
 from sbafab.cli.printing import (
     FILES,
-    Group,
+    FindingGroup,
     groups_of,
     notes_of,
     print_failed,
@@ -64,7 +64,7 @@ class CheckOutcome(NamedTuple):
 
     name: str
     findings: Sequence[Finding]
-    groups: Sequence[Group]
+    groups: Sequence[FindingGroup]
     job: Order | None = None
     advice: Advice | None = None
     has_target: bool = False
@@ -204,7 +204,7 @@ def _check_source(
         (checked,) = job.builds
         more = netlist_findings(checked.laminate, checked.design, read_netlist(nets), nets.name)
         findings = (*findings, *more)
-        groups = (Group(job.name, findings),)
+        groups = (FindingGroup(job.name, findings),)
     return CheckOutcome(job.name, findings, groups, job, advice, has_target)
 
 
@@ -212,13 +212,13 @@ def _check_folder(folder: Path, nets: Path | None) -> CheckOutcome:
     """Check the files of an output folder."""
     import logging
 
-    # Reading a folder back takes as long to load as all that checks a design.
+    # Modules that read a folder back take as long to load as those that check a design.
     from sbafab.as_built.check import check_folder
 
     # A broken file becomes a finding; the log of ezdxf would repeat it on the screen.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
     findings = check_folder(folder, nets)
-    return CheckOutcome(str(folder), findings, [Group(str(folder), findings)])
+    return CheckOutcome(str(folder), findings, [FindingGroup(str(folder), findings)])
 
 
 # Checking again after every change of a file, until Ctrl-C.

@@ -22,7 +22,7 @@ from sbafab.search.quantities import QUANTITIES, QuantityName
 
 MEASURED = "a text with its unit"
 NAMED = "NAME"
-"""In a key, a name that the design file chooses, as that of a film or a shape."""
+"""In a key, a name that the design file chooses, as of a film or a shape."""
 
 
 TERMS: Mapping[str, str] = {
@@ -74,7 +74,7 @@ def _completed(ctx: click.Context, param: click.Parameter, typed: str) -> list[C
 
 
 class ExplainDocument(Document, schema="sbafab/explain@1"):
-    """What ``explain NAME --json`` prints: of a rule, of keys, of quantities or of a term."""
+    """Output of ``explain NAME --json``: a rule, keys, quantities or a term."""
 
     rule: str = ""
     holds: str = ""
@@ -87,7 +87,7 @@ class ExplainDocument(Document, schema="sbafab/explain@1"):
 
 
 class ExplainedDocument(Document, schema="sbafab/explained@1"):
-    """What ``explain --json`` prints of all rules."""
+    """Output of ``explain --json``: all rules."""
 
     rules: dict[str, Explanation]
 
@@ -142,7 +142,7 @@ def _explained(name: str) -> dict[str, Any]:
         return {"keys": chosen}
     near = difflib.get_close_matches(name, explainable_names(), 1)
     hint = f"did you mean {near[0]}?" if near else "sbafab explain lists all rules"
-    raise click.BadParameter(f"{name!r} is no rule, key or quantity; {hint}", param_hint="NAME")
+    raise click.BadParameter(f"{name!r} is not a rule, key or quantity; {hint}", param_hint="NAME")
 
 
 def _print_listed(meanings: Mapping[str, str]) -> None:
@@ -188,7 +188,7 @@ def _keys(prefix: str, record: Mapping[str, Any], schema: Mapping[str, Any]) -> 
 
 
 def _tables(value: Any, schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the tables that a key may hold, each with what stands between the key and theirs."""
+    """Yield the tables that a key may hold, each with the part of its keys that follows the key."""
     for choice in (value, *value.get("anyOf", ())):
         found = _resolved(choice, schema)
         more = found.get("additionalProperties")

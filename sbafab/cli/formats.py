@@ -52,7 +52,7 @@ class YieldRunDocument(RunDocument, schema=RunDocument.SCHEMA):
 
 
 class PrintedPrediction(PredictDocument, schema=PredictDocument.SCHEMA):
-    """The contents of ``predict.json``, and what is printed besides."""
+    """The contents of ``predict.json`` and further printed figures."""
 
     failed: tuple[str, ...] = ()
     folder: str = ""
@@ -77,7 +77,7 @@ class NetsDocument(Document, schema=NETS):
     """A netlist."""
 
     nets: dict[str, list[str | NamedPort]] = Field(min_length=1)
-    """by name: ports and chambers of the design, or ports with their place"""
+    """name -> ports and chambers of the design, or ports with their place"""
 
 
 class ErrorEntry(Document):
@@ -89,7 +89,7 @@ class ErrorEntry(Document):
 
 
 class ErrorDocument(Document, schema=ERROR_SCHEMA):
-    """What a command prints when it ends in an error."""
+    """An error that ends a command."""
 
     error: ErrorEntry
 
@@ -192,7 +192,7 @@ def schema_of(name: str) -> dict[str, Any]:
 @click.command()
 @click.argument("name", type=click.Choice(FORMATS), default="design", required=False)
 def schema(name: str) -> None:
-    """Print a JSON schema, by default that of design files.
+    """Print a JSON schema, by default of design files.
 
     Editors use it to complete and check design files; the other schemas describe JSON output.
     """

@@ -23,7 +23,7 @@ from sbafab.errors import DesignError
 
 
 class KerfEstimate(Document):
-    """Of ``count`` sizes: kerf in mm and scale as a ratio, with 95 % half widths."""
+    """Fit of ``count`` sizes: kerf in mm and scale as a ratio, with 95 % half widths."""
 
     kerf: Value
     scale: Value | None
@@ -34,7 +34,7 @@ class KerfEstimate(Document):
 
 
 class KerfDocument(Document, schema="sbafab/kerf@1"):
-    """What ``kerf --json`` prints."""
+    """Output of ``kerf --json``."""
 
     all: KerfEstimate = attribute("overall")
     x: KerfEstimate | None

@@ -252,14 +252,14 @@ def _generate_for_yield(
 
 
 class RunDocument(Document, schema="sbafab/run@1"):
-    """What commands print of a folder that they write."""
+    """Output of a command that writes a folder."""
 
     folder: Path
     failed: bool
     findings: list[FindingEntry]
     notes: list[str]
     files: list[str]
-    """what lies in the folder"""
+    """contents of the folder"""
 
 
 def _run_json(run: Run) -> dict[str, Any]:
@@ -277,13 +277,13 @@ class NestedDesign(Document):
 
 
 class NestedDocument(Document, schema="sbafab/nested@1"):
-    """What ``nest --json`` prints."""
+    """Output of ``nest --json``."""
 
     folder: Path
     failed: bool
     designs: list[NestedDesign]
     files: list[str]
-    """what lies in the folder"""
+    """contents of the folder"""
 
 
 def _job_json(job: Run) -> dict[str, Any]:
@@ -296,7 +296,7 @@ def _job_json(job: Run) -> dict[str, Any]:
 
 UNCHANGED = (
     "is unchanged: it holds an earlier design or version. To see the findings and pictures of this "
-    "one, give it a folder of its own with --set name=NAME"
+    "one, give it another folder with --set name=NAME"
 )
 DECKS = ("calculix/actuator.inp", "sofa/actuator.scn", "mujoco/actuator.xml")
 """The file of each deck that its simulator opens."""
@@ -463,12 +463,12 @@ def _stale_facts(dropped: Sequence[str]) -> Facts:
     if dropped:
         names = ", ".join(dict.fromkeys(path.partition("/")[0] for path in dropped))
         count = several(len(dropped), "stale file")
-        own = "--set name=NAME gives a design a folder of its own"
+        own = "--set name=NAME gives a design another folder"
         yield "replaced", f"removed {count} ({names}); {own}"
 
 
 def _film_text(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copies: int) -> str:
-    """Return the use of a film in words: sheets, size, density, waste and cutting time."""
+    """Return the use of a film as text: sheets, size, density, waste and cutting time."""
     film_sheets = [sheet for sheet in sheets if sheet["material"] == film["material"]]
     sizes = dict.fromkeys(f"{sheet['width']:g} x {sheet['length']:g}" for sheet in film_sheets)
     minutes = sum(sheet["estimated_minutes"] for sheet in film_sheets)

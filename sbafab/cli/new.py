@@ -57,7 +57,7 @@ def new(template: str | None, file: Path | None, as_json: bool) -> None:
 
 
 def _list(as_json: bool) -> None:
-    """Print the designs that ship, and in words the other files."""
+    """Print the designs that ship, and a line on the other files."""
     designs = template_summaries()
     if as_json:
         print_json([{"name": name, "summary": summary} for name, summary in designs.items()])

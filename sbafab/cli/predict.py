@@ -221,7 +221,7 @@ def _predict_assembly(
         click.get_current_context().exit(RULE_FAILED)
 
 
-# Printing: the main figures of a design, or with -v all and their models; those of an assembly.
+# Printing: main figures of a design, or with -v all and their models; figures of an assembly.
 
 
 NAME_WIDTH, VALUE_WIDTH = 56, 10
@@ -252,7 +252,7 @@ def print_prediction(prediction: Prediction, verbose: bool = False) -> None:
 
 
 def _print_figures(prediction: Prediction) -> None:
-    """Print all figures, those of alternative models last, and the validity of the models."""
+    """Print all figures, alternative models last, and the validity of the models."""
     width = console().width
     main = [figure for figure in prediction.figures if not figure.other]
     alternatives = [figure for figure in prediction.figures if figure.other]

@@ -138,14 +138,14 @@ def notes_of(checked: Iterable[Build]) -> list[str]:
     ]
 
 
-# Findings, a line a rule; what to do about them; the verdict in the last line.
+# Findings, one line per rule; remedies; the verdict in the last line.
 
 
 SHARE_OF = {"pin-fit": "stretch", "registration-yield": "hold"}
 """Words after the per cent sign, by rule: a film stretches over its pin, builds hold."""
 
 
-class Group(NamedTuple):
+class FindingGroup(NamedTuple):
     """Findings of one design, or between the parts of an assembly."""
 
     name: str
@@ -154,13 +154,13 @@ class Group(NamedTuple):
 
 def groups_of(
     checked: Iterable[Build], between: Sequence[Finding] | None = None
-) -> tuple[Group, ...]:
+) -> tuple[FindingGroup, ...]:
     """Return a group of findings for each design, and one for the checks between parts."""
-    groups = tuple(Group(design.design.name, design.findings) for design in checked)
-    return groups if between is None else (*groups, Group("between the parts", between))
+    groups = tuple(FindingGroup(design.design.name, design.findings) for design in checked)
+    return groups if between is None else (*groups, FindingGroup("between the parts", between))
 
 
-def print_findings(groups: Sequence[Group], verbose: bool = False) -> None:
+def print_findings(groups: Sequence[FindingGroup], verbose: bool = False) -> None:
     """Print a line for every rule (of several groups only if ``verbose``), and the remedies."""
     for group in groups:
         if len(groups) > 1:
@@ -206,7 +206,7 @@ def print_open(findings: Sequence[Finding]) -> None:
 
 
 def print_verdict(sentence: str, written: Path | None = None) -> None:
-    """Print the last line of a command that is done; with -q what was ``written`` alone."""
+    """Print the last line of a command that is done; with -q only the ``written`` path."""
     print_line(sentence, "bold")
     print_written(written)
 
@@ -232,7 +232,7 @@ def print_note(text: str) -> None:
 
 
 def print_passed(
-    name: str, groups: Sequence[Group], details: str = "", written: Path | None = None
+    name: str, groups: Sequence[FindingGroup], details: str = "", written: Path | None = None
 ) -> None:
     """Print the verdict of a design or assembly that passed; ``details``: the command for more."""
     more = f" Details: {details}" if details else ""

@@ -20,7 +20,7 @@ from sbafab.process import Progress, ignore_progress
 
 QUIET, VERBOSE = "sbafab.quiet", "sbafab.verbose"
 RESULTS = "sbafab.results"
-"""Where results go while -q discards the rest."""
+"""The stream for results while -q discards the rest."""
 FIRST_LINE_SECONDS = 5.0
 """Before the first plain line, so that quick commands leave no lines in a log."""
 LINE_SECONDS = 10.0
@@ -29,7 +29,7 @@ VERBOSE_LINE_SECONDS = 1.0
 SHOWN_AFTER_SECONDS = 1.0
 """Before the line appears on a terminal."""
 RATE_AFTER_SECONDS = 1.0
-"""Of a stage, before its rate is used."""
+"""Duration of a stage before its rate is used."""
 
 
 def add_verbosity(command: click.Command) -> None:
@@ -109,7 +109,7 @@ class Pace(NamedTuple):
 
     @property
     def remaining(self) -> float | None:
-        """Seconds left at the present rate, None while there is no rate."""
+        """Seconds left at the present rate, None before a rate is known."""
         if not 0 < self.done <= self.total or self.stage_elapsed < RATE_AFTER_SECONDS:
             return None
         return self.stage_elapsed * (self.total - self.done) / self.done

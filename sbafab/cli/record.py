@@ -64,7 +64,7 @@ def _row_key(
         return None
     match = re.fullmatch(r"(e?)(\d{1,9})", value)
     if match is None:
-        raise click.BadParameter(f"{value!r} is no record such as 3 and no entry such as e3")
+        raise click.BadParameter(f"{value!r} is neither a record such as 3 nor an entry such as e3")
     return HistoryEntry if match[1] else Record, int(match[2])
 
 
@@ -180,7 +180,7 @@ GOES_WITH: Mapping[str, tuple[str, ...]] = {
     "entry": ("design", "again", "serial"),
     "design": ("again", "serial", *RESULTS),
 }
-"""What a call does, by the first of these that it names, and the options that go with it."""
+"""Actions: a call does the first that it names; and the options that go with each."""
 
 
 def _task(values: Mapping[str, Any]) -> str:
@@ -242,7 +242,7 @@ def _correct(store: Lab, values: Mapping[str, Any]) -> LabRow:
     change = _pairs(" ".join(values.get("entry", ()))) if is_entry else _result(values)
     is_other = values.keys() & ({"serial", *RESULTS} if is_entry else {"entry"})
     if is_other or not (change or "withdraw" in values):
-        wanted = "an --entry with what is right" if is_entry else "the correct result"
+        wanted = "an --entry with the correct text" if is_entry else "the correct result"
         raise click.UsageError(f"give {wanted}, or --withdraw")
     row: LabRow = store.correct(kind, number, {**change, "withdrawn": "withdraw" in values})
     return row

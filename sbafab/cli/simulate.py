@@ -22,7 +22,13 @@ from sbafab.cli.options import (
     by_chamber,
     run_options,
 )
-from sbafab.cli.printing import Group, print_failed, print_findings, print_json, print_verdict
+from sbafab.cli.printing import (
+    FindingGroup,
+    print_failed,
+    print_findings,
+    print_json,
+    print_verdict,
+)
 from sbafab.cli.progress import shown_progress
 from sbafab.output.checks import checks
 from sbafab.runs.run import result_json
@@ -109,7 +115,7 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
         if request.as_json:
             print_json(checks(simulation.findings, "design", design.name))
         else:
-            print_findings([Group(design.name, simulation.findings)])
+            print_findings([FindingGroup(design.name, simulation.findings)])
             print_failed(design.name, simulation.findings, "It was not simulated", "design")
         click.get_current_context().exit(RULE_FAILED)
     result = simulation.result

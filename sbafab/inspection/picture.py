@@ -52,7 +52,7 @@ def read_picture(path: Path) -> ScanPicture:
 
     try:
         if not path.is_file():
-            raise DesignError(f"{path} is no file; give the picture of the cut sheet")
+            raise DesignError(f"{path} is not a file; give the picture of the cut sheet")
         if path.stat().st_size > MOST_BYTES:
             raise DesignError(f"{path} is larger than {MOST_BYTES:,} bytes; scan in grey")
         data = path.read_bytes()

@@ -189,7 +189,7 @@ class Record(LabRow):
             if is_once and (before[name] != value or name not in ("operator", "kit")):
                 return (
                     f"serial {self.serial} has {name} = {before[name]} in record {stored.id}; "
-                    f"correct that with --correct {stored.id}, record what was mended and tested "
+                    f"correct that with --correct {stored.id}, record the mended and tested device "
                     "again with --again, or choose another serial"
                 )
         return ""
@@ -315,7 +315,7 @@ class HistoryRow(RowEntry):
 
 
 class RecordsDocument(Document, schema="sbafab/records@1"):
-    """What ``record --json`` prints."""
+    """Output of ``record --json``."""
 
     records: list[RecordEntry]
     entries: list[HistoryRow]
@@ -332,7 +332,7 @@ class DeviceEntry(Document):
 
 
 class HistoryDocument(Document, schema="sbafab/history@1"):
-    """What ``record --export FILE.json`` writes."""
+    """Contents of ``record --export FILE.json``."""
 
     devices: list[DeviceEntry]
 

@@ -115,7 +115,7 @@ class SuccessDocument(Document):
     low: float = attribute("share.interval.0")
     high: float = attribute("share.interval.1")
     promised: float | None
-    """by registration-yield; null of several designs"""
+    """from registration-yield; null for several designs"""
     passed_later: int
 
 

@@ -76,7 +76,7 @@ class Lab:
         """Return all rows; a read-only file suffices."""
         if not self.path.is_file():
             raise OutputError(
-                f"{self.path} is no file of records; record something first, or name the lab's "
+                f"{self.path} is not a file of records; record something first, or name the lab's "
                 "file with --lab"
             )
         with self._sqlite_errors(), closing(self._open("?mode=ro")) as file:
@@ -92,7 +92,7 @@ class Lab:
         Photographs are copied into the folder beside the lab's file first.
         """
         if is_again and not self.path.exists():
-            raise OutputError(f"{self.path} does not exist, so there is no attempt before this one")
+            raise OutputError(f"{self.path} does not exist, so no attempt came before this one")
         rows = [with_photograph(self.path, row) for row in rows]
         with self._writing() as file:
             if build is not None:
@@ -196,7 +196,7 @@ class Lab:
         except sqlite3.Error as error:
             raise OutputError(f"{self.path} {_reason(error)}") from error
         except (ValidationError, UnicodeDecodeError) as error:
-            # SQLite's own message may quote bytes that are no longer text.
+            # SQLite's own message may quote bytes that cannot be read as text.
             raise OutputError(f"{self.path} {_REASONS['CORRUPT']}") from error
 
 
@@ -207,7 +207,7 @@ _REASONS = {
     "PERM": "may not be opened; ask for the right to it",
     "AUTH": "may not be opened; ask for the right to it",
     "CANTOPEN": "cannot be opened; see that its folder exists and may be written",
-    "NOTADB": "is no file of records; name the lab's file with --lab",
+    "NOTADB": "is not a file of records; name the lab's file with --lab",
     "FULL": "cannot grow, the disk is full; nothing was recorded, make room there",
     "CORRUPT": "is damaged; put a sound copy in its place",
     "IOERR": "cannot be read or written, the disk reports an error; nothing was recorded",
@@ -255,7 +255,7 @@ class _Devices:
         attempts = [row.attempt for row in self.of(sha256, serial)]
         if is_again and not attempts:
             raise DesignError(
-                f"serial {serial} has no record yet, so there is no attempt before this one; leave "
+                f"serial {serial} has no record yet, so no attempt came before this one; leave "
                 "out --again, or see: sbafab record --find"
             )
         return max(attempts, default=1) + is_again
@@ -292,8 +292,8 @@ def store_photograph(lab: Path, content: bytes, where: str) -> str:
     kind = _PICTURE.match(content)
     if kind is None or len(content) > MOST_PHOTOGRAPH:
         raise DesignError(
-            f"{where} is no JPEG, PNG or WebP of at most {MOST_PHOTOGRAPH // 1_000_000} MB; save "
-            "it as one"
+            f"{where} is not a JPEG, PNG or WebP of at most {MOST_PHOTOGRAPH // 1_000_000} MB; "
+            "save it as one"
         )
     folder = lab.with_name(f"{lab.stem}-photographs")
     path = folder / f"{hashlib.sha256(content).hexdigest()}.{kind.lastgroup}"

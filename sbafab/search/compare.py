@@ -190,7 +190,7 @@ class RuleEntry(Document):
     unit: str
     verdicts: tuple[TextOrNone, TextOrNone]
     margins: tuple[NumberOrNone, NumberOrNone]
-    """what is left to the limit"""
+    """distance to the limit"""
     measured: tuple[NumberOrNone, NumberOrNone]
 
 
@@ -200,7 +200,7 @@ class FigureEntry(Document):
     name: str
     unit: str
     main: bool = attribute("is_main")
-    """whether the command prints it"""
+    """true if the command prints it"""
     differs: bool
     values: tuple[NumberOrNone, NumberOrNone]
     intervals: tuple[Ends | None, Ends | None]
@@ -229,7 +229,7 @@ def _rule_entry(row: RuleDifference) -> RuleEntry:
 
 
 def figure_entry(pair: FigurePair) -> FigureEntry:
-    """Return a figure of both designs as a document has it."""
+    """Return a figure of both designs as an entry of a document."""
     each = [figure.as_dict() if figure is not None else None for figure in pair.figures]
     columns = ("value", "interval", "model")
     return FigureEntry.read(pair, **{f"{c}s": [row and row[c] for row in each] for c in columns})
@@ -353,7 +353,7 @@ def value_text(value: object) -> str:
 
 
 def margin_text(margin: RuleMargin | None) -> str:
-    """Return verdict and margin of a rule; the measured value if there is no limit."""
+    """Return verdict and margin of a rule; the measured value if the rule has no limit."""
     if margin is None:
         return NOTHING
     if margin.margin is None:
@@ -508,7 +508,7 @@ class ChangeEntry(Document):
 
 
 class YieldEntry(Document):
-    """Of --target-yield; figures as given and as changed."""
+    """Result of --target-yield; figures as given and as changed."""
 
     target_yield: PlainNumber = attribute("found.target")
     changes: list[ChangeEntry]

@@ -264,7 +264,7 @@ def _refuse_bend(quantity: RequestedQuantity, design: Design, free: Sequence[str
     stacks = design.form.stacks
     if quantity.chambers >= stacks and COUNT not in free:
         raise DesignError(
-            f"{quantity.label}: {design.name} has {stacks} chambers, of which one must stay empty; "
+            f"{quantity.label}: {design.name} has {stacks} chambers and one must stay empty; "
             f"ask for at most {stacks - 1}, or for more chambers with --free {COUNT}=LOW:HIGH:STEP"
         )
 
@@ -472,7 +472,7 @@ class RequirementEntry(Document):
     sense: Literal["at least", "at most"]
     limit: PlainNumber
     median: PlainNumber
-    """of the best; force below 0 where it rises less"""
+    """best; its force is below 0 if it rises less"""
     bound: PlainNumber | None
     """kept with the probability `sure`, and held against the limit"""
     holds: bool
@@ -488,7 +488,7 @@ class RangeEndEntry(Document):
 
 
 class FindDocument(Document, schema="sbafab/find@1"):
-    """What ``find --json`` prints; by quantity where names are keys."""
+    """Output of ``find --json``; names that are keys are quantities."""
 
     holds: bool
     file: str | None
@@ -496,7 +496,7 @@ class FindDocument(Document, schema="sbafab/find@1"):
     started_from: str
     tries: int
     is_cut_short: bool
-    """whether more tries might lead further"""
+    """true if more tries might lead further"""
     sure: PlainNumber | None = attribute("request.sure")
     """probability with which requirements must hold"""
     best: TrialEntry

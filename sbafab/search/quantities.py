@@ -80,12 +80,12 @@ class QuantityName:
 
 
 QUANTITIES = (
-    QuantityName("overall_diameter", "mm", "all that is cut, inlet tabs included"),
+    QuantityName("overall_diameter", "mm", "the whole outline, inlet tabs included"),
     QuantityName("outline_diameter", "mm", "the films without tabs and ears"),
     QuantityName("deflated_diameter", "mm", "flat, round a tube"),
     QuantityName("inflated_diameter", "mm", "round a tube; safer of two models"),
     QuantityName("reached_diameter", "mm", "the lower one of these two"),
-    QuantityName("width", "mm", "of the flat laminate, likewise length"),
+    QuantityName("width", "mm", "of the flat laminate, as length"),
     QuantityName("length", "mm", ""),
     QuantityName("height", "mm", "folded: what the press leaves of the films"),
     QuantityName("lumen", "mm", "diameter of the lumen"),
@@ -539,7 +539,7 @@ class Subject:
 
     def _stroke_of(self, quantity: RequestedQuantity) -> float:
         """Return the stroke in mm at which a force is blocked; a share is relative to the reference
-        stroke, as in ``predict``. Raises DesignError for a share if there is no reference stroke.
+        stroke, as in ``predict``. Raises DesignError for a share without a reference stroke.
         """
         if not quantity.share:
             return quantity.stroke or 0.0
@@ -678,7 +678,7 @@ class Subject:
 
 
 def kpa_of(quantity: RequestedQuantity) -> float | None:
-    """Return the gauge pressure in kPa of a quantity; None if it has none."""
+    """Return the gauge pressure in kPa of a quantity; None without one."""
     if quantity.name == "time":
         return FULL_KPA
     return quantity.kpa if quantity.name in AT_PRESSURE else None

@@ -676,7 +676,7 @@ def _with_optuna(space: SearchSpace) -> None:
 
 
 def _study_name(space: SearchSpace) -> str:
-    """Name a study by all that its trials depend on."""
+    """Name a study by everything that its trials depend on."""
     request = space.request
     design = f"{request.design.name} {design_sha256(request.design)[:12]}"
     limits = [requirement.label for requirement in request.requirements]

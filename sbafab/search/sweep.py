@@ -108,7 +108,7 @@ class SweptDesigns:
 
 
 class SweepDocument(Document, schema="sbafab/sweep@1"):
-    """What ``sweep --json`` prints."""
+    """Output of ``sweep --json``."""
 
     folder: Path
     designs: int

@@ -106,7 +106,7 @@ ORDER: tuple[Verdict, ...] = ("fail", "waived", "warn", "pass")
 class RuleMargin(NamedTuple):
     """A rule's worst verdict, and the margin of the worst value to its limit: below 0 it fails.
 
-    ``margin`` is None if nothing was measured, or if there is no limit.
+    ``margin`` is None if nothing was measured, or without a limit.
     """
 
     rule: str
@@ -248,7 +248,7 @@ def local_pool(workers: int | None = None) -> Iterator[Pool]:
 def dask_pool(address: str) -> Iterator[Pool]:
     """The workers of the cluster behind a scheduler's address, which must have sbafab installed.
 
-    Raises OutputError if there is no scheduler, DesignError without the extra.
+    Raises OutputError without a scheduler, DesignError without the extra.
     """
     try:
         from distributed import Client

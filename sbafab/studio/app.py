@@ -19,8 +19,9 @@ import shutil
 import socket
 import tempfile
 import zlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import parse_qs
@@ -40,7 +41,8 @@ from sbafab.studio import forms, places, record_form
 from sbafab.studio.places import RunFolder, zipped
 from sbafab.studio.workers import BusyError, WaitingJob, WorkerPool
 
-HERE = ("127.0.0.1", "localhost", "[::1]")
+ADDRESS = "127.0.0.1"
+HERE = (ADDRESS, "localhost", "[::1]")
 TOKEN_HEADER = b"x-sbafab-token"
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
@@ -58,9 +60,9 @@ MADE_POLICY = (
 class Guard:
     """Refuses requests of other sites, and tells the browser what a page may load."""
 
-    def __init__(self, app: ASGIApp, token: str, address: str = HERE[0]) -> None:
+    def __init__(self, app: ASGIApp, token: str, address: str = ADDRESS) -> None:
         self.app, self.token = app, token.encode()
-        self.hosts = HERE if address == HERE[0] else (*HERE, address)
+        self.hosts = HERE if address == ADDRESS else (*HERE, address)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         refused = self.refusal(scope) if scope["type"] == "http" else None
@@ -78,7 +80,7 @@ class Guard:
         headers: dict[bytes, bytes] = dict(scope["headers"])
         host = headers.get(b"host", b"").decode("latin-1")
         if host.rpartition(":")[0] not in self.hosts and host not in self.hosts:
-            return 403, f"the studio answers to {HERE[0]} only; open the link that it printed"
+            return 403, f"the studio answers to {ADDRESS} only; open the link that it printed"
         origin = headers.get(b"origin")
         if origin is not None and origin.decode("latin-1").partition("://")[2] != host:
             return 403, "this request comes from another site"
@@ -139,6 +141,7 @@ def packed(text: str) -> str:
 
 
 STATIC = Path(__file__).parent / "static"
+JOBS = ("live", "elastic", "motion")
 LIVE_SECONDS, MAKE_SECONDS = 60.0, 900.0
 LOOK_EVERY = 0.4
 """Polling interval for the file on disk, s."""
@@ -146,17 +149,25 @@ MOST_MADE = 6
 """Number of run folders kept; the oldest is deleted first."""
 
 
+class OpenedDesign(NamedTuple):
+    """The design that the page opens: a file of the folder, the text in a link, or a template."""
+
+    opened: str | None = None
+    text: str | None = None
+    template: str | None = None
+
+
+NO_DESIGN = OpenedDesign()
+
+
 @dataclass
 class Studio:
-    """State that the routes share: the chosen folder, the workers and the folders of runs."""
+    """State that the routes share: folder, initial design, workers and folders of runs."""
 
     folder: Path
     token: str
-    opened: str | None = None
-    text: str | None = None
-    """A design from a link instead of a file."""
-    template: str | None = None
-    address: str = HERE[0]
+    opened: OpenedDesign = NO_DESIGN
+    address: str = ADDRESS
     """Address to listen on; at another than this a phone gets only the record page."""
     live: WorkerPool = field(default_factory=lambda: WorkerPool(LIVE_SECONDS, _processes()))
     mover: WorkerPool = field(
@@ -171,7 +182,7 @@ class Studio:
 
     @contextlib.asynccontextmanager
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        if self.address == HERE[0]:
+        if self.address == ADDRESS:
             self.live.start()
         try:
             yield
@@ -194,17 +205,19 @@ def app(studio: Studio) -> Starlette:
         Route("/api/file/{name}", opened_file),
         Route("/api/save", save, methods=["POST"]),
         Route("/api/watch/{name}", watch),
-        Route("/api/live", live, methods=["POST"]),
-        Route("/api/elastic", elastic, methods=["POST"]),
-        Route("/api/motion", motion, methods=["POST"]),
         Route("/api/generate", generate, methods=["POST"]),
+        *(Route(f"/api/{do}", partial(answered, do), methods=["POST"]) for do in JOBS),
         Route("/made/{key}.zip", made_zip),
         Route("/made/{key}/{path:path}", made_file),
     ]
     application = Starlette(
         routes=[
-            *(editing if studio.address == HERE[0] else ()),
-            *record_routes(),
+            *(editing if studio.address == ADDRESS else ()),
+            # The record page, the only routes for a phone.
+            Route("/record", record_page),
+            Route("/api/record", record_choices),
+            Route("/api/record", partial(recorded, record_form.stored), methods=["POST"]),
+            Route("/api/record/sheet", partial(recorded, record_form.sheet), methods=["POST"]),
             Mount("/", StaticFiles(directory=STATIC, html=True)),
         ],
         middleware=[Middleware(Guard, token=studio.token, address=studio.address)],
@@ -213,16 +226,6 @@ def app(studio: Studio) -> Starlette:
     )
     application.state.studio = studio
     return application
-
-
-def record_routes() -> list[Route]:
-    """Routes of the record page, the only ones for a phone."""
-    return [
-        Route("/record", record_page),
-        Route("/api/record", record_choices),
-        Route("/api/record", record_lines, methods=["POST"]),
-        Route("/api/record/sheet", record_sheet, methods=["POST"]),
-    ]
 
 
 def _studio(request: Request) -> Studio:
@@ -242,7 +245,7 @@ async def _busy(_: Request, __: Exception) -> Response:
 
 async def start(request: Request) -> Response:
     studio = _studio(request)
-    return JSONResponse(forms.started(studio.folder, studio.opened, studio.text, studio.template))
+    return JSONResponse(forms.started(studio.folder) | studio.opened._asdict())
 
 
 async def template(request: Request) -> Response:
@@ -278,16 +281,13 @@ async def watch(request: Request) -> Response:
     return _Lines(changes())
 
 
-async def live(request: Request) -> Response:
-    return await _answered(request, _studio(request).live, "live")
-
-
-async def elastic(request: Request) -> Response:
-    return await _answered(request, _studio(request).mover, "elastic")
-
-
-async def motion(request: Request) -> Response:
-    return await _answered(request, _studio(request).mover, "motion")
+async def answered(do: str, request: Request) -> Response:
+    """Runs a job of the page."""
+    studio = _studio(request)
+    pool = studio.live if do == "live" else studio.mover
+    job = {**forms.job(studio.folder, await _request_table(request)), "do": do}
+    waiting = pool.ask((job["tab"], do), job)
+    return _Lines(waiting.lines(), waiting)
 
 
 async def generate(request: Request) -> Response:
@@ -303,11 +303,10 @@ async def generate(request: Request) -> Response:
             answer = json.loads(line)
             if answer["kind"] == "made":
                 _remember(studio, key, RunFolder(out / answer["name"], answer["name"]))
-                yield json.dumps({**answer, "key": key}).encode() + b"\n"
-            else:
-                yield line + b"\n"
+                answer["key"] = key
+            yield json.dumps(answer).encode() + b"\n"
 
-    return _Lines(lines(), studio.maker, waiting)
+    return _Lines(lines(), waiting)
 
 
 def _remember(studio: Studio, key: str, run: RunFolder) -> None:
@@ -327,16 +326,11 @@ async def record_choices(request: Request) -> Response:
     return JSONResponse(record_form.choices(_studio(request).folder))
 
 
-async def record_sheet(request: Request) -> Response:
+async def recorded(
+    answer: Callable[[Path, Mapping[str, Any]], dict[str, Any]], request: Request
+) -> Response:
     table = await _request_table(request)
-    folder = _studio(request).folder
-    return JSONResponse(await asyncio.to_thread(record_form.sheet, folder, table))
-
-
-async def record_lines(request: Request) -> Response:
-    table = await _request_table(request)
-    folder = _studio(request).folder
-    return JSONResponse(await asyncio.to_thread(record_form.stored, folder, table))
+    return JSONResponse(await asyncio.to_thread(answer, _studio(request).folder, table))
 
 
 async def made_file(request: Request) -> Response:
@@ -354,39 +348,22 @@ async def made_zip(request: Request) -> Response:
     return Response(content, media_type="application/zip", headers=headers)
 
 
-async def _answered(request: Request, pool: WorkerPool, do: str) -> Response:
-    studio, table = _studio(request), await _request_table(request)
-    job = {**forms.job(studio.folder, table), "do": do}
-    waiting = pool.ask((job["tab"], do), job)
-
-    async def lines() -> AsyncIterator[bytes]:
-        async for answer in waiting.lines():
-            yield answer + b"\n"
-
-    return _Lines(lines(), pool, waiting)
-
-
 class _Lines(StreamingResponse):
     """A job's answers, each as a line of JSON; the job is cancelled if the reader disconnects."""
 
     media_type = "application/x-ndjson"
 
-    def __init__(
-        self,
-        content: AsyncIterator[bytes],
-        pool: WorkerPool | None = None,
-        job: WaitingJob | None = None,
-    ) -> None:
+    def __init__(self, content: AsyncIterator[bytes], job: WaitingJob | None = None) -> None:
         super().__init__(content)
-        self.pool, self.job = pool, job
+        self.job = job
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         try:
             await super().__call__(scope, receive, send)
         finally:
             # Also if the reader left before the first line was requested.
-            if self.pool is not None and self.job is not None:
-                self.pool.forget(self.job)
+            if self.job is not None:
+                self.job.pool.forget(self.job)
 
 
 async def _request_table(request: Request) -> dict[str, Any]:
@@ -396,44 +373,32 @@ async def _request_table(request: Request) -> dict[str, Any]:
 # Start of the studio: design, port and link.
 
 
-ADDRESS = "127.0.0.1"
 PORT = 8417
 """Tried first, so that a saved link finds the studio again."""
 
 
-class StudioStart(NamedTuple):
-    """The studio's folder, and its initial design, if one was named."""
-
-    folder: Path
-    file: str | None = None
-    """A design file of the folder."""
-    text: str | None = None
-    """A design from a link."""
-    template: str | None = None
-
-
-def opened(source: str | None) -> StudioStart:
-    """Return the folder and design that the studio opens.
+def opened(source: str | None) -> tuple[Path, OpenedDesign]:
+    """Return the folder and the design that the studio opens.
 
     ``source`` is a file, a folder, a template's name, a link that holds a design, or None for the
     current folder. Raises DesignError.
     """
     if source is None:
-        return StudioStart(Path.cwd())
+        return Path.cwd(), NO_DESIGN
     if source.startswith(("http://", "https://")):
-        return StudioStart(Path.cwd(), text=design_in(source))
+        return Path.cwd(), OpenedDesign(text=design_in(source))
     if source in api.templates():
-        return StudioStart(Path.cwd(), template=source)
+        return Path.cwd(), OpenedDesign(template=source)
     path = Path(source)
     if path.is_dir():
-        return StudioStart(path.resolve())
+        return path.resolve(), NO_DESIGN
     if not path.is_file():
         raise DesignError(
             f"{source} is not a design file, folder, template or link; the templates are "
             f"{', '.join(api.templates())}"
         )
     folder = path.resolve().parent
-    return StudioStart(folder, places.design_file(folder, path.name).name)
+    return folder, OpenedDesign(places.design_file(folder, path.name).name)
 
 
 def listening(port: int | None, address: str = ADDRESS) -> socket.socket:
@@ -477,8 +442,8 @@ def serve(
         raise DesignError(
             f'{error.name} is not installed; add it with pip install "sbafab[studio]"'
         ) from None
-    folder, name, text, template = opened(source)
-    studio = Studio(folder, secrets.token_urlsafe(24), name, text, template, address)
+    folder, design = opened(source)
+    studio = Studio(folder, secrets.token_urlsafe(24), design, address)
     sock = listening(port, address)
     page = "" if address == ADDRESS else "record"
     announce(f"http://{address}:{sock.getsockname()[1]}/{page}#token={studio.token}")

@@ -76,7 +76,7 @@ def _value(key: str, text: str) -> Any:
     try:
         return tomlkit.value(text)
     except (TOMLKitError, ValueError, RecursionError, IndexError):
-        raise DesignError(f"{key} = {text[:60]} is no value; write a number or a text") from None
+        raise DesignError(f"{key} = {text[:60]} is not a value; write a number or a text") from None
 
 
 def _put(
@@ -98,7 +98,7 @@ def _put(
             raise DesignError(f"{'.'.join(parts)}: {part} {missing}; change it in the text")
         table = inner
     if not isinstance(table, MutableMapping):
-        raise DesignError(f"{'.'.join(parts)} is no key of a table; change it in the text")
+        raise DesignError(f"{'.'.join(parts)} is not a key of a table; change it in the text")
     old = table.get(last)
     if old is not None and hasattr(old, "trivia") and hasattr(value, "trivia"):
         _comment_like(old, value)

@@ -8,6 +8,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel, Field, ValidationError
+
 from sbafab import __version__, api
 from sbafab.errors import SbafabError
 from sbafab.studio import places
@@ -15,7 +17,7 @@ from sbafab.studio import places
 PLACING = ("on", "at", "angle", "turn", "along", "offset", "glue", "note")
 """Keys of a part's position; its form ends with them."""
 JsonSchema = Mapping[str, Any]
-Field = dict[str, Any]
+FormField = dict[str, Any]
 # key: least, most, step of its slider; values beyond it are typed.
 SLIDERS: dict[str, tuple[float, float, float]] = {
     "stack.balloons": (1, 24, 1),
@@ -47,7 +49,7 @@ UNITS = (
 )
 
 
-def families(schema: JsonSchema) -> dict[str, list[Field]]:
+def families(schema: JsonSchema) -> dict[str, list[FormField]]:
     """The fields of every family of single designs."""
     return {
         name: sorted(_fields(table, schema, ""), key=_rank)
@@ -110,16 +112,16 @@ def keys(schema: JsonSchema) -> set[str]:
     return {field["key"] for field in [*fields, *assembly(schema)["fields"]]}
 
 
-def _rank(field: Field) -> int:
+def _rank(field: FormField) -> int:
     section = field["key"].partition(".")[0] if "." in field["key"] else ""
     if not section:
         return -1
     return FIRST.index(section) if section in FIRST else len(FIRST)
 
 
-def _fields(table: JsonSchema, schema: JsonSchema, prefix: str) -> Iterator[Field]:
+def _fields(table: JsonSchema, schema: JsonSchema, prefix: str) -> Iterator[FormField]:
     for name, rule in table["properties"].items():
-        reference = rule.get("$ref") or _single(rule) or _optional(rule)
+        reference = _reference(rule)
         if reference is not None:
             inner = _named(reference, schema)
             if "properties" in inner:
@@ -132,13 +134,13 @@ def _fields(table: JsonSchema, schema: JsonSchema, prefix: str) -> Iterator[Fiel
             yield _field(key, rule)
 
 
-def _field(key: str, rule: JsonSchema) -> Field:
+def _field(key: str, rule: JsonSchema) -> FormField:
     ways = rule.get("anyOf", [rule])
     kinds = [way.get("type") for way in ways]
     number = next((way for way in ways if way.get("type") in {"number", "integer"}), None)
     is_length = number is not None and any("mm" in way.get("pattern", "") for way in ways)
     choices = next((way["enum"] for way in ways if "enum" in way), None)
-    field: Field = {
+    field: FormField = {
         "key": key,
         "meaning": " ".join(rule.get("description", "").split()),
         "default": rule.get("default"),
@@ -175,16 +177,11 @@ def _unit(key: str) -> str:
     return next((unit for pattern, unit in UNITS if pattern.search(key)), "")
 
 
-def _single(rule: JsonSchema) -> str | None:
-    """The reference of a key that is a single table, whatever else is allowed."""
-    ways = rule.get("allOf") or []
-    return ways[0].get("$ref") if len(ways) == 1 else None
-
-
-def _optional(rule: JsonSchema) -> str | None:
-    """The reference of a table that may be omitted as a whole."""
-    ways = [way for way in rule.get("anyOf") or [] if way.get("type") != "null"]
-    return ways[0].get("$ref") if len(ways) == 1 else None
+def _reference(rule: JsonSchema) -> str | None:
+    """The reference of a key that is a single table, also of one that may be omitted."""
+    ways = rule.get("allOf") or rule.get("anyOf") or [rule]
+    tables = [way for way in ways if way.get("type") != "null"]
+    return tables[0].get("$ref") if len(tables) == 1 else None
 
 
 def _named(reference: str, schema: JsonSchema) -> JsonSchema:
@@ -195,23 +192,12 @@ def _named(reference: str, schema: JsonSchema) -> JsonSchema:
 # Requests of the page.
 
 
-def started(
-    folder: Path,
-    opened: str | None = None,
-    text: str | None = None,
-    template: str | None = None,
-) -> Any:
-    """Return the first answer to the page.
-
-    ``opened`` names a file of the folder, ``text`` is a link's design, ``template`` a template.
-    """
+def started(folder: Path) -> dict[str, Any]:
+    """Return the first answer to the page, without the design that it opens."""
     schema = api.schema()
     return {
         "version": __version__,
         "folder": str(folder),
-        "opened": opened,
-        "text": text,
-        "template": template,
         "files": places.listed(folder),
         "templates": api.templates(),
         "summaries": summaries(),
@@ -232,33 +218,31 @@ def table(body: bytes) -> dict[str, Any]:
     return parsed
 
 
+class PageRequest(BaseModel):
+    """What a page sends with a job: its ``tab``, text and edits of the design, the name of its
+    file, keys of the shapes that it has, and the pose that it asks for.
+    """
+
+    tab: str = Field("", max_length=40)
+    text: str
+    edits: list[tuple[str, str | None]] = []
+    name: str = ""
+    has: list[str] = []
+    pose: dict[str, Any] = {}
+
+
 def job(folder: Path, request: dict[str, Any]) -> dict[str, Any]:
     """Return the job of a request: design text, edits, and paths that the page cannot choose.
 
     Raises SbafabError.
     """
-    edits = request.get("edits") or []
-    good = isinstance(edits, list) and all(
-        isinstance(edit, list)
-        and len(edit) == 2
-        and isinstance(edit[0], str)
-        and (edit[1] is None or isinstance(edit[1], str))
-        for edit in edits
-    )
-    if not good or not isinstance(request.get("text"), str):
-        raise SbafabError("a request holds a text, and edits as [key, value]")
-    pose = request.get("pose") or {}
-    if not isinstance(pose, dict):
-        raise SbafabError("the pose of a request is a table")
-    name = request.get("name")
-    path = name if isinstance(name, str) and name.endswith(".toml") and "/" not in name else None
-    has = request.get("has") or []
-    return {
-        "tab": str(request.get("tab", ""))[:40],
-        "text": request["text"],
-        "edits": [(key, value) for key, value in edits],
-        "has": [key for key in has if isinstance(key, str)] if isinstance(has, list) else [],
-        "folder": str(folder),
-        "path": path or "design.toml",
-        "pose": pose,
-    }
+    try:
+        stated = {key: value for key, value in request.items() if value is not None}
+        read = PageRequest.model_validate(stated)
+    except ValidationError:
+        raise SbafabError(
+            "a request holds a text, edits as [key, value], and a pose as a table"
+        ) from None
+    is_file = read.name.endswith(".toml") and "/" not in read.name
+    path = read.name if is_file else "design.toml"
+    return {**read.model_dump(exclude={"name"}), "folder": str(folder), "path": path}

@@ -1,6 +1,6 @@
 """The jobs of the page: each yields its answers.
 
-A job is a table with ``do`` and the text of a design; ``pause`` raises if the answer is no longer
+A job is a table with ``do`` and the text of a design; ``pause`` raises once the answer is not
 needed. Files are only searched in ``folder``.
 """
 

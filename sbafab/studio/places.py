@@ -36,7 +36,7 @@ def design_file(folder: Path, name: str) -> Path:
     size = len(os.fsencode(name))
     if size > MOST_NAME:
         raise DesignError(
-            f"the name {name[:20]}... has {size} bytes, that of a design file at most {MOST_NAME}; "
+            f"the name {name[:20]}... has {size} bytes, of a design file at most {MOST_NAME}; "
             "shorten it"
         )
     path = folder / name
@@ -83,7 +83,7 @@ def content_of(path: Path, most: int | None = None) -> bytes:
 
 
 def state(path: Path) -> str:
-    """Hash of the file on disk; empty if there is no readable file."""
+    """Hash of the file on disk; empty without a readable file."""
     try:
         return _hash(content_of(path))
     except (OSError, DesignError):

@@ -43,6 +43,7 @@ class BusyError(Exception):
 class WaitingJob:
     """A job with a waiting client, and its answers as they come."""
 
+    pool: WorkerPool
     key: Key
     job: dict[str, Any]
     answers: asyncio.Queue[bytes] = field(default_factory=asyncio.Queue)
@@ -55,7 +56,7 @@ class WaitingJob:
     async def lines(self) -> AsyncIterator[bytes]:
         """Each answer as a line of JSON; they end early if a newer job replaces this one."""
         while (answer := await self.answers.get()) != END:
-            yield answer
+            yield answer + b"\n"
 
 
 class WorkerPool:
@@ -93,7 +94,7 @@ class WorkerPool:
         self._give_up(key)
         if len(self.waiting) >= MOST_WAITING:
             raise BusyError
-        waiting = self.waiting[key] = WaitingJob(key, job)
+        waiting = self.waiting[key] = WaitingJob(self, key, job)
         self.assign()
         return waiting
 

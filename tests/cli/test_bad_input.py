@@ -145,16 +145,16 @@ record 1dof-5mm --table x.csv --leak pass | --leak does not go with --table
 record 1dof-5mm --table x.csv | x.csv cannot be read
 record --correct 1 | give the correct result
 record --correct 1 --again | --again does not go with --correct
-record --correct x1 --leak pass | no record such as 3 and no entry such as e3
+record --correct x1 --leak pass | neither a record such as 3 nor an entry such as e3
 record --correct e1 | give an --entry
 record --correct e1 --entry note=x --leak pass | give an --entry
 record --correct 1 --leak pass --entry note=x | give the correct result
-record --chart a.svg | lab.sqlite is no file of records
+record --chart a.svg | lab.sqlite is not a file of records
 record 1dof-5mm --serial A1 --entry step | must be fields such as step=1
 record 1dof-5mm --serial A1 --entry "note='x" | a quotation mark without
 record 1dof-5mm --entry note=x | an entry needs its serial
 record 1dof-5mm --history x.doc | ends in none of .csv, .toml, .json
-record 1dof-5mm --serial A1 --leak pass --again | no attempt before this
+record 1dof-5mm --serial A1 --leak pass --again | no attempt came before this
 record --correct 1 --leak fail | lab.sqlite does not exist
 record nosuch --serial A1 --leak pass | nosuch
 record 1dof-5mm --serial A1 --burst "3 N" | must be a pressure

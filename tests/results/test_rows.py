@@ -158,7 +158,7 @@ def test_photographs_lie_beside_the_file_by_their_hash(lab: Lab, tmp_path: Path)
     again = lab.add(SHA, None, [HistoryEntry(serial="A2", photograph=str(path))])
     assert again[0].photograph == entry.photograph
     path.write_text("no picture")
-    for name, says in ((path, "is no JPEG, PNG or WebP"), ("x.jpg", "x.jpg cannot be read")):
+    for name, says in ((path, "is not a JPEG, PNG or WebP"), ("x.jpg", "x.jpg cannot be read")):
         with pytest.raises(DesignError, match=says):
             lab.add(SHA, None, [HistoryEntry(serial="A3", photograph=str(name))])
 

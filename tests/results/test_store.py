@@ -159,7 +159,7 @@ DAMAGE = {
 }
 FOREIGN = {
     "a database": (changed("CREATE TABLE photos (id)"), "is a database of another program"),
-    "a table": (lambda path: path.write_text("serial\nA1\n" * 99), "is no file of records"),
+    "a table": (lambda path: path.write_text("serial\nA1\n" * 99), "is not a file of records"),
     "a folder": (lambda path: path.mkdir(), "cannot be opened"),
 }
 

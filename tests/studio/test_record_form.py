@@ -103,7 +103,7 @@ def test_lines_are_stored_with_their_photograph(client: Client, folder: Path) ->
         ),
         (
             {"design": "two.toml", "entries": [{"serial": "A1", "photograph": "YWJj"}]},
-            "is no JPEG, PNG or WebP",
+            "is not a JPEG, PNG or WebP",
         ),
     ],
 )
