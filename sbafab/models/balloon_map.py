@@ -107,6 +107,13 @@ WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
 PIECES_IN_ALL = HEIGHT_SPANS + 2
 """Pieces of a spline by height, with an extrapolation at either end."""
 CURVES = np.stack([SLOPES[:, k] * k for k in range(1, DEGREE)], -1)
+BY_PRESSURE = np.zeros((3, DEGREE + 1, DEGREE + 1))
+BY_PRESSURE[0], BY_PRESSURE[1, :, :-1], BY_PRESSURE[2, :, :-2] = PIECES, SLOPES, CURVES
+"""Weights of a piece's coefficients by powers: of values, first and second derivatives."""
+COUNTS = np.arange(DEGREE + 1)[:, None]
+RATES = np.diag(np.arange(1.0, DEGREE + 1), 1)
+WITH_RATES = np.stack([np.eye(DEGREE + 1), RATES, RATES @ RATES], axis=1).reshape(-1, DEGREE + 1)
+"""Matrix from the powers of a polynomial to those of its value and first two derivatives."""
 
 
 def _near_pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
@@ -177,57 +184,44 @@ class BalloonMap:
         return HEIGHT_SPANS / self.most_height
 
     @cached_property
-    def _polynomials(self) -> Array:
-        """Polynomials by both: (pieces by pressure, powers, pieces by height x powers)."""
-        by_height = pieces(self.coefficients).reshape(len(self.coefficients), -1)
-        rows = by_height[np.arange(PRESSURE_SPANS)[:, None] + np.arange(DEGREE + 1)]
-        return np.asarray(PIECES.T @ rows)
+    def _by_pressure(self) -> Array:
+        """Polynomials by height of each coefficient: (powers x pieces, coefficients)."""
+        rows = pieces(self.coefficients).transpose(2, 1, 0)
+        return np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]))
 
-    def pressed(self, pressure: ArrayLike, sucked: bool = False) -> Array:
-        """Polynomials by height, of W and of -dW/dp (the volume), at pressures: (..., 2, pieces,
-        powers).
+    def splines(self, pressure: ArrayLike, orders: int = 2, sucked: bool = False) -> Array:
+        """Return the polynomials by height of W, of -dW/dp (the volume) and of the volume's rate by
+        pressure, the first ``orders`` of these, at pressures: (powers, pieces, orders, ...).
 
         With ``sucked`` pressures may be below 0, as in a shut chamber that is pulled open: slack
-        films cave in, their volume falls by exp(p / CAVES_IN). Raises DesignError for a pressure
-        outside the map.
+        films cave in, their volume falls by exp(p / COLLAPSE_SUCTION). Raises DesignError for a
+        pressure outside the map.
         """
         below = np.asarray(pressure, dtype=float)
         p = np.maximum(below, 0.0) if sucked else below
         refuse_outside(p, self.most_pressure)
-        x, rate = self.scaled(p)
+        x, rate = (part.ravel() for part in self.scaled(p))
         first = x.astype(np.int_)
-        powers = np.empty((*p.shape, 2, DEGREE + 1))
-        powers[..., 0, :] = (x - first)[..., None] ** POWERS
-        powers[..., 1, 0] = 0.0
-        powers[..., 1, 1:] = powers[..., 0, :-1] * POWERS[1:] * -rate[..., None]
-        polynomials = powers @ self._polynomials[first]
-        polynomials = polynomials.reshape(*p.shape, 2, PIECES_IN_ALL, DEGREE + 1)
+        each = BY_PRESSURE[:orders] @ (x - first) ** POWERS[:, None]
+        if orders > 2:
+            each[2] *= rate * rate
+            flat = p.ravel()
+            each[2] -= each[1] * (rate * flat / (flat * flat + self.scale_pressure**2))
+        if orders > 1:
+            each[1:] *= -1.0
+            each[1] *= rate
+        weights = np.zeros((len(self.coefficients), orders, p.size))
+        states = np.arange(p.size)
+        weights[first + COUNTS, :, states] = each.transpose(1, 2, 0)
         if sucked:
-            fall = np.exp((below - p) / COLLAPSE_SUCTION)[..., None, None]
-            polynomials[..., 0, :, :] -= COLLAPSE_SUCTION * (fall - 1) * polynomials[..., 1, :, :]
-            polynomials[..., 1, :, :] *= fall
-        return polynomials
-
-    def volume_slopes(self, pressure: ArrayLike, sucked: bool = False) -> Array:
-        """Polynomials by height of dV/dp = -d2W/dp2 at pressures: (..., pieces, powers).
-
-        ``sucked`` as for ``pressed``. Raises DesignError for a pressure outside the map.
-        """
-        below = np.asarray(pressure, dtype=float)
-        if below.min() < 0:
-            volumes = self.pressed(below, sucked)[..., 1, :, :]
-            rest = self.volume_slopes(np.maximum(below, 0.0))
-            return np.where((below < 0)[..., None, None], volumes / COLLAPSE_SUCTION, rest)
-        p = below
-        x, rate = self.scaled(p)
-        first = x.astype(np.int_)
-        powers = (x - first)[..., None] ** POWERS
-        weights = np.zeros_like(powers)
-        bend = rate * p / (p * p + self.scale_pressure**2)
-        weights[..., 1:] = powers[..., :-1] * POWERS[1:] * bend[..., None]
-        weights[..., 2:] -= powers[..., :-2] * POWERS[2:] * POWERS[1:-1] * (rate * rate)[..., None]
-        slopes = weights[..., None, :] @ self._polynomials[first]
-        return np.asarray(slopes.reshape(*p.shape, PIECES_IN_ALL, DEGREE + 1))
+            fall = np.exp((below - p) / COLLAPSE_SUCTION).ravel()
+            weights[:, 0] -= COLLAPSE_SUCTION * (fall - 1) * weights[:, 1]
+            weights[:, 1] *= fall
+            if orders > 2:
+                is_slack = below.ravel() < 0
+                weights[:, 2] = np.where(is_slack, weights[:, 1] / COLLAPSE_SUCTION, weights[:, 2])
+        found = self._by_pressure @ weights.reshape(len(weights), -1)
+        return np.asarray(found.reshape(DEGREE + 1, PIECES_IN_ALL, orders, *p.shape))
 
     def scaled(self, p: Array) -> tuple[Array, Array]:
         """Return the coordinate in pieces of the spline at pressures, and its rate by pressure."""
@@ -249,12 +243,9 @@ class BalloonMap:
 
     def _along(self, which: int, pressure: ArrayLike, height: ArrayLike) -> Along:
         p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
-        polynomials = self.pressed(p)[..., which, :, :].reshape(-1, DEGREE + 1)
-        return along(
-            derivatives(polynomials),
-            PIECES_IN_ALL * np.arange(p.size).reshape(p.shape),
-            h * self.spans,
-        )
+        table = self.splines(p)[:, :, which].reshape(DEGREE + 1, -1)
+        begins = np.arange(p.size).reshape(p.shape)
+        return Along(*horner(table, begins, h * self.spans, p.size, with_rates=True))
 
     def free_height(self, pressure: ArrayLike) -> Array:
         """Return the height in mm of the unloaded balloon."""
@@ -327,33 +318,23 @@ def pieces(coefficients: Array) -> Array:
     return polynomials
 
 
-def derivatives(polynomials: Array) -> Array:
-    """Polynomials (rows, powers) with their first two derivatives: (powers, 3, rows)."""
-    table = np.zeros((DEGREE + 1, 3, len(polynomials)))
-    powers = np.arange(1.0, DEGREE + 1)[:, None]
-    table[:, 0] = polynomials.T
-    np.multiply(table[1:, 0], powers, out=table[:-1, 1])
-    np.multiply(table[1:-1, 1], powers[:-1], out=table[:-2, 2])
-    return table
+def horner(
+    table: Array, which: NDArray[np.int_], y: Array, stride: int = 1, with_rates: bool = False
+) -> Array:
+    """Return splines (powers, rows) at heights ``y``, in pieces: their values (...), or these and
+    the first and second derivatives (3, ...) ``with_rates``.
 
-
-def along(table: Array, which: NDArray[np.int_], y: Array) -> Along:
-    """Return splines with derivatives at heights ``y``, in pieces.
-
-    ``table`` are the ``derivatives`` of the pieces of all splines; ``which`` is the row at which
-    each one begins.
+    ``which`` is the row of each spline's first piece; its next one is ``stride`` rows on.
     """
-    values = horner(table, which, y)
-    return Along(*values)
-
-
-def horner(table: Array, which: NDArray[np.int_], y: Array) -> Array:
-    """Return polynomials (powers, ..., rows) of splines at heights ``y``, in pieces."""
     # Pieces are counted from the one below the spline.
     after = y + 1.0
     piece = np.minimum(np.maximum(after, 0.0), PIECES_IN_ALL - 1).astype(np.int_)
     u = after - piece
+    if stride != 1:
+        piece *= stride
     powers = table.take(which + piece, axis=-1)
+    if with_rates:
+        powers = (WITH_RATES @ powers.reshape(DEGREE + 1, -1)).reshape(-1, 3, *powers.shape[1:])
     values = powers[DEGREE] * u
     for power in powers[DEGREE - 1 : 0 : -1]:
         values += power

@@ -14,10 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon_map import DEGREE, horner
 from sbafab.models.stack_loads import (
     CROSS,
-    RING_POINTS,
     SMALL,
     WALL_POINTS,
     crossing,
@@ -29,7 +27,7 @@ from sbafab.models.stack_loads import (
 
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
-    from sbafab.models.stack_loads import Chain, Load, LoadedEnergy, Springs
+    from sbafab.models.stack_loads import Load, LoadedEnergy
     from sbafab.models.stack_poses import Pose, PosedStack
 
 RIGID = 1e-9
@@ -163,9 +161,10 @@ def linearised(
     stack: PosedStack, pose: Pose, load: Load | None = None, sucked: bool = False
 ) -> Linearised:
     """Return a stack linearised about a pose under the load that it was found with."""
-    springs = stack.springs(pose.pressures, sucked)
+    each = stack.springs(pose.pressures, sucked, by_level=True, orders=3)
     push, hardness = np.zeros_like(pose.freedoms), 0.0
     if load is None:
+        springs = stack.springs(pose.pressures, sucked)
         kinds = pose.freedoms[stack.first_levels]
         for _ in range(CORRECTIONS):
             _, gradient, blocks = springs.energy(kinds)
@@ -176,30 +175,28 @@ def linearised(
         freedoms = kinds[stack.levels]
         plates = plate_chain(freedoms, stack.pitch)
         motions = level_motions(plates)
-        each = stack.each(springs)
     else:
-        each = stack.each(springs)
         freedoms = pose.freedoms
         for _ in range(CORRECTIONS):
             now = loaded_energy(each, stack.pitch, load, freedoms)
-            matrix = hessian(now, freedoms, stack.pitch)
+            matrix = hessian(now, now.rest(), freedoms, stack.pitch)
             if np.abs(now.gradient).max() < RESIDUAL * (1 + 1e-3 * now.push):
                 break
             freedoms = freedoms - _solved(matrix, now.gradient).reshape(-1, 3)
         matrices = matrix[None]
         plates, motions = now.plates, now.motions
         if now.touch is not None:
-            touch = now.touch
-            stiff = (touch.stiff * (touch.deep > touch.least))[:WALL_POINTS]
-            push = (stiff @ now.deeper(touch)[:WALL_POINTS]).reshape(-1, 3)
+            stiff = (now.touch.stiff * now.touch.touches)[:WALL_POINTS]
+            push = (stiff @ now.deeper(now.touch)[:WALL_POINTS]).reshape(-1, 3)
             hardness = float(stiff.sum())
-    films, filling = each.slopes(freedoms)
+    films, _ = each.slopes(freedoms)
+    _, filling, swelling = each.volumes(freedoms)
     return Linearised(
         freedoms,
         matrices,
-        tip_motion(plates, motions),
+        plates.tip_motion(motions).transpose(2, 0, 1),
         filling.transpose(1, 0, 2),
-        _swelling(stack, pose, springs, freedoms, sucked),
+        swelling.sum(0),
         films,
         push,
         hardness,
@@ -215,38 +212,21 @@ def _solved(matrices: Array, right: Array) -> Array:
         ) from None
 
 
-def tip_motion(plates: Chain, motions: Array) -> Array:
-    """Return the motion of the middle of the top, then its turn, by freedoms: (6, levels, 3)."""
-    turns = motions[..., :3]
-    moves = motions[..., 3:] - turns @ crossing(plates.places[-1])
-    return np.concatenate([moves, turns], axis=-1).transpose(2, 0, 1)
-
-
-def _swelling(
-    stack: PosedStack, pose: Pose, springs: Springs, freedoms: Array, sucked: bool
-) -> Array:
-    """Return ul of each chamber by its own pressure with all plates held: (chambers,)."""
-    slopes = np.stack([kind.volume_slopes(pose.pressures, sucked) for kind in stack.maps])
-    table = slopes.reshape(-1, DEGREE + 1).T / RING_POINTS
-    places = stack.each(springs).places
-    gaps = (places.ring @ freedoms[..., None])[..., 0]
-    values = horner(table, places.begins, gaps)
-    return np.asarray(values.reshape(len(freedoms), -1, RING_POINTS).sum((0, 2)))
-
-
 # Second derivatives of the energy under a load.
 
 
-def hessian(now: LoadedEnergy, freedoms: Array, pitch: float) -> Array:
-    """Return the second derivatives (freedoms, freedoms) of the energy of a stack under a load."""
+def hessian(now: LoadedEnergy, rest: Array, freedoms: Array, pitch: float) -> Array:
+    """Return the second derivatives (..., freedoms, freedoms) of the energy of a stack under a
+    load; ``rest`` are those of all but the springs.
+    """
     blocks = now.blocks.copy()
-    blocks[:, 1:, 1:] -= _tilt_works(now, freedoms, pitch)
-    return with_diagonal_blocks(now.rest(), blocks)
+    blocks[..., 1:, 1:] -= _tilt_works(now, freedoms, pitch)
+    return with_diagonal_blocks(rest, blocks)
 
 
 def _tilt_works(now: LoadedEnergy, freedoms: Array, pitch: float) -> Array:
     """Return the work of the forces by the two tilts of one level that ``LoadedEnergy.turned``
-    omits: (levels, 2, 2).
+    omits: (..., levels, 2, 2).
 
     A point y from the level's middle moves by a x y with the turn a of a tilt. The second tilt,
     with the turn b, changes that to second order by da/db x y + a x (b x y - c x s / 2);
@@ -254,7 +234,7 @@ def _tilt_works(now: LoadedEnergy, freedoms: Array, pitch: float) -> Array:
     the turn of the level's first half, so that the middle shifts by c x s / 2.
     """
     plates, acting = now.plates, now.acting
-    half = freedoms[:, 1:] / 2
+    half = freedoms[..., 1:] / 2
     safe = np.maximum((half * half).sum(-1), SMALL)
     angle = np.sqrt(safe)
     # A tilt's turn, in the frame of the level's middle, is (sine I + mean v v) times its rate, and
@@ -263,19 +243,19 @@ def _tilt_works(now: LoadedEnergy, freedoms: Array, pitch: float) -> Array:
     mean = (1 - sine) / safe
     sine_rate = (np.cos(angle) - sine) / safe
     mean_rate = -(sine_rate + 2 * mean) / safe
-    skew = half @ QUARTER_TURN * ((1 - np.cos(angle)) / safe)[:, None]
+    skew = half @ QUARTER_TURN * ((1 - np.cos(angle)) / safe)[..., None]
     # Moments about the level's middle, along the turns, v, the plane's axes, and across the rise.
-    arms = acting.arms - plates.middles[:, :, None] * acting.forces[:, None, :]
-    moment = (arms.reshape(-1, 9) @ CROSS.T)[:, None]
-    works = now.works[:, 1:, 3]
+    arms = acting.arms - plates.middles[..., None] * acting.forces[..., None, :]
+    moment = (arms.reshape(*arms.shape[:-2], 9) @ CROSS.T)[..., None, :]
+    works = now.works[..., 1:, 3]
     along = (half * works).sum(-1)
-    axes = (works - (mean * along)[:, None] * half) / sine[:, None]
-    across = ((moment @ crossing(plates.rises))[:, 0, None] @ -plates.turns.swapaxes(1, 2))[:, 0]
-    mixed = (sine_rate + mean)[:, None] * half
-    pairs = mixed[:, :, None] * axes[:, None] - skew[:, :, None] * across[:, None]
-    lift = now.works[:, 0, 3] * (freedoms[:, 0] + pitch)
-    second = pairs + pairs.swapaxes(1, 2)
-    second += (2 * mean_rate * along)[:, None, None] * (half[:, :, None] * half[:, None])
-    second += (2 * mean * along)[:, None, None] * UNIT
-    second += lift[:, None, None] * (plates.turns @ plates.turns.swapaxes(1, 2))
+    axes = (works - (mean * along)[..., None] * half) / sine[..., None]
+    across = ((moment @ crossing(plates.rises)) @ -plates.turns.swapaxes(-1, -2))[..., 0, :]
+    mixed = (sine_rate + mean)[..., None] * half
+    pairs = mixed[..., :, None] * axes[..., None, :] - skew[..., :, None] * across[..., None, :]
+    lift = now.works[..., 0, 3] * (freedoms[..., 0] + pitch)
+    second = pairs + pairs.swapaxes(-1, -2)
+    second += (2 * mean_rate * along)[..., None, None] * (half[..., :, None] * half[..., None, :])
+    second += (2 * mean * along)[..., None, None] * UNIT
+    second += lift[..., None, None] * (plates.turns @ plates.turns.swapaxes(-1, -2))
     return np.asarray(second / 4)

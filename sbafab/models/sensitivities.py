@@ -22,7 +22,7 @@ from sbafab.models.derivatives import Linearised, Rates, linearised
 from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
 from sbafab.models.intervals import factors_of
-from sbafab.models.stack import MOST_PRESSURE, NO_LOAD, Pose, Stack, stack
+from sbafab.models.stack import MOST_PRESSURE, Pose, Stack, stack
 from sbafab.models.stack_loads import WALL_POINTS, Load, loaded_energy
 
 KEYS = (
@@ -124,7 +124,7 @@ def sensitivities(
 
     whole = made()
     pose = whole.pose(pressures, **load)
-    at = linearised(whole, pose, _acting(whole, load), load.get("sucked", False))
+    at = linearised(whole, pose, whole.acting(load), load.get("sucked", False))
     rows = []
     for key in keys:
         value = _value(design, key)
@@ -157,10 +157,6 @@ def sensitivity_table(design: Design, pressure: float) -> list[SensitivityRow]:
         SensitivityRow(row.key, row.value, row.stroke, bend)
         for row, bend in zip(free, bends, strict=True)
     ]
-
-
-def _acting(whole: Stack, load: dict[str, Any]) -> Load | None:
-    return whole.load(*(load.get(name, value) for name, value in NO_LOAD.items()))
 
 
 def _value(design: Design, key: str) -> int | float:
@@ -223,9 +219,9 @@ def _by_key(
     whole, *ends = stacks
     if any((each.levels != whole.levels).any() for each in ends):
         raise DesignError(f"{key} changes which balloons are equal; ask for another key")
-    acting = _acting(whole, load) or Load(np.zeros(3), None, None)
+    acting = whole.acting(load) or Load(np.zeros(3), None, None)
     now = loaded_energy(
-        whole.each(whole.springs(pose.pressures, load.get("sucked", False))),
+        whole.springs(pose.pressures, load.get("sucked", False), by_level=True),
         whole.pitch,
         acting,
         at.freedoms,
@@ -239,7 +235,7 @@ def _by_key(
     pulls, force = -slope, 0.0
     if touch is not None:
         # A stiff plate keeps its contacts.
-        harder = touch.stiff * (touch.deep > touch.least) * deep
+        harder = touch.stiff * touch.touches * deep
         pulls = pulls - (harder @ now.deeper(touch)).reshape(-1, 3)
         force = float(harder[:WALL_POINTS].sum())
     motion = np.concatenate([tip, np.zeros(3)])[:, None]
@@ -250,10 +246,10 @@ def _by_key(
 def _held(
     other: Stack, freedoms: Array, pose: Pose, load: dict[str, Any], forces: Array | None
 ) -> _Held:
-    springs = other.each(other.springs(pose.pressures, load.get("sucked", False)))
-    acting = _acting(other, load) or Load(np.zeros(3), None, None)
+    springs = other.springs(pose.pressures, load.get("sucked", False), by_level=True)
+    acting = other.acting(load) or Load(np.zeros(3), None, None)
     now = loaded_energy(springs, other.pitch, acting, freedoms, forces)
     deep = np.zeros(0) if now.touch is None else now.touch.deep
     volumes = springs.contents(freedoms)[0].sum(0)
     slope = now.gradient.reshape(-1, 3)
-    return _Held(slope, volumes, now.plates.places[-1], deep, other.flat_height)
+    return _Held(slope, volumes, now.plates.tip, deep, other.flat_height)

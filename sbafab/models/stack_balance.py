@@ -1,23 +1,16 @@
-"""Equilibrium of a stack by Newton's method: levels alone, all together under a load, and against
-an outer plate.
+"""Equilibrium of a stack by Newton's method: levels alone and all together under a load, of many
+states at once, and against an outer plate, of one.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sbafab.errors import DesignError
 from sbafab.models.film_elements import Array
-from sbafab.models.least_energy import (
-    LARGEST_MOVE,
-    SMALLEST_STEP,
-    is_last_step,
-    is_positive_definite,
-    newton_step,
-    step_limit,
-)
 from sbafab.models.stack_loads import (
     Load,
     LoadedEnergy,
@@ -28,9 +21,14 @@ from sbafab.models.stack_loads import (
     with_diagonal_blocks,
 )
 
+LARGEST_MOVE = np.array([0.4, 0.15, 0.15])
+LEAST_LIMIT = float(LARGEST_MOVE.min())
+"""Largest rise (mm) and tilts (rad) in one step, and the least of these."""
+SMALLEST_STEP = 1e-6
+"""Step (mm, rad) below which an equilibrium counts as converged."""
 SOFT_PLATES = ((1e3, 1e5), (1e3, 1e4, 1e5), (1e4, 1e5))
 """Stiffness in mN/mm of an outer plate in the first solutions, for paths tried in turn."""
-MOST_STEPS = 300
+MOST_STEPS, HALVINGS = 300, 14
 RESIDUAL = 1e-7
 """Tolerance of the residual, mN or mN mm."""
 SMALLEST_SUM_STEP = 5e-8
@@ -73,92 +71,145 @@ PUSH_RATIO = 2.0
 """Largest initial force on a plate over the largest push of a level."""
 
 
-def free_equilibrium(springs: Springs, start: Array) -> Array:
-    """Return rise and tilt of each row without external load: (rows, 3). Raises DesignError."""
-    at, before = start, SMALLEST_STEP
-    value, gradient, matrix = springs.energy(at)
+class Balance(NamedTuple):
+    """Equilibria of n states: ``freedoms`` (n, rows, 3), ``pushes`` (n) in mN on an outer plate,
+    and which are stable and which have been found (n).
+    """
+
+    freedoms: Array
+    pushes: Array
+    is_stable: NDArray[np.bool_]
+    is_found: NDArray[np.bool_]
+
+    @classmethod
+    def none(cls, start: Array) -> Balance:
+        """Return as many that are not found."""
+        count = len(start)
+        false = np.zeros(count, dtype=bool)
+        return cls(start.copy(), np.zeros(count), false, false.copy())
+
+    @classmethod
+    def stable(cls, freedoms: Array, pushes: Array | None = None) -> Balance:
+        """Return stable equilibria."""
+        true = np.ones(len(freedoms), dtype=bool)
+        return cls(
+            freedoms, np.zeros(len(freedoms)) if pushes is None else pushes, true, true.copy()
+        )
+
+    def keep(self, which: Any, freedoms: Array, pushes: Any, is_stable: Any) -> None:
+        """Note states that are found."""
+        self.freedoms[which], self.pushes[which] = freedoms, pushes
+        self.is_stable[which], self.is_found[which] = is_stable, True
+
+
+def put(record: Any, which: Any, other: Any) -> None:
+    """Replace some of the states of a record of arrays by another's."""
+    for mine, its in zip(record, other, strict=True):
+        if isinstance(mine, np.ndarray):
+            mine[which] = its
+        elif mine is not None:
+            put(mine, which, its)
+
+
+def free_equilibrium(springs: Springs, start: Array) -> Balance:
+    """Return the equilibria without external load of n states, (n, rows, 3), whose rows do not act
+    on each other: the energy of a level alone is convex.
+    """
+    found, live, at = Balance.none(start), np.arange(len(start)), start
+    before = np.full(len(start), SMALLEST_STEP)
+    now = springs.energy(at)
     for _ in range(MOST_STEPS):
-        if np.abs(gradient).max() < RESIDUAL:
-            return at
-        move, is_firm = newton_step(gradient, matrix)
-        largest = float(np.abs(move).max())
-        if is_firm and is_last_step(largest, before, SMALLEST_SUM_STEP):
-            return at + move
-        share = step_limit(move)
-        slope = (move * gradient).sum(-1)
-        for _ in range(12):
-            step = share[:, None] * move
-            tried = springs.energy(at + step)
-            good = tried[0] <= value + 1e-4 * share * slope + 1e-11 * (1 + np.abs(value))
-            if good.all():
+        value, gradient, matrix = now
+        move = newton_step(gradient, matrix)
+        largest = np.abs(move).max((1, 2))
+        is_over = is_last_step(largest, before, SMALLEST_SUM_STEP)
+        is_over |= np.abs(gradient).max((1, 2)) < RESIDUAL
+        if is_over.any():
+            found.keep(live[is_over], (at + move)[is_over], 0.0, True)
+            if is_over.all():
                 break
-            share = np.where(good, share, share / 2)
-        before = largest if (share == 1.0).all() else 0.0
-        at = at + step
-        value, gradient, matrix = tried
-    raise DesignError("no equilibrium of the stack found at these pressures; try others")
+            rest = ~is_over
+            live, at, move, largest = live[rest], at[rest], move[rest], largest[rest]
+            value, springs = value[rest], springs.at(rest)
+        share = step_limit(move, largest)
+        now = springs.energy(at + share[..., None] * move)
+        for _ in range(HALVINGS):
+            is_far = _rises(now[0], value)
+            if not is_far.any():
+                break
+            share = np.where(is_far, share / 2, share)
+            far = np.flatnonzero(is_far.any(1))
+            put(now, far, springs.at(far).energy((at + share[..., None] * move)[far]))
+        before = largest * (share == 1).all(1)
+        at = at + share[..., None] * move
+    return found
+
+
+def _rises(after: Array, before: Array) -> NDArray[np.bool_]:
+    """Return which energies rise by more than rounding."""
+    return np.asarray(~(after <= before + 1e-11 * (1 + np.abs(before))))
 
 
 def loaded_equilibrium(
     springs: Springs, pitch: float, load: Load, start: Array, is_near: bool
-) -> tuple[Array, float, bool]:
-    """Return rise and tilt of each level (levels, 3) under a load, the force in mN on the plate,
-    and True for a stable equilibrium.
+) -> Balance:
+    """Return the equilibria under a load of n states, (n, levels, 3); of one state against an outer
+    plate.
 
     An outer plate that is not met soon is stiffened gradually, since steps without contact would
-    run far into it; ``is_near`` marks a start that may be in contact. Raises DesignError if no
-    equilibrium is found.
+    run far into it; ``is_near`` marks a start that may be in contact.
     """
     wall = load.wall
-    if wall is None:
-        fine = SMALLEST_STEP if is_near else SMALLEST_SUM_STEP
-        balance = _energy_descent(springs, pitch, load, start, FEW_STEPS, quick=fine)
-        if balance is None:
-            balance = _energy_descent(springs, pitch, load, start, MOST_STEPS)
-    else:
-        at = start if is_near else start_below(springs, start, pitch, wall, load.stiffness)
-        balance = _contact_descent(springs, pitch, load, wall, at)
-        if balance is None:
-            balance = _energy_descent(
-                springs, pitch, load, at, MOST_STEPS if is_near else FEW_STEPS
-            )
-        if balance is None:
-            balance = _by_softer_plates(springs, pitch, load, wall, at)
+    if wall is not None:
+        return _plate_equilibrium(springs.at(0), pitch, load, wall, start[0], is_near)
+    fine = SMALLEST_STEP if is_near else SMALLEST_SUM_STEP
+    found = _energy_descent(springs, pitch, load, start, FEW_STEPS, quick=fine)
+    rest = np.flatnonzero(~found.is_found)
+    if rest.size:
+        put(found, rest, _energy_descent(springs.at(rest), pitch, load, start[rest], MOST_STEPS))
+    return found
+
+
+def _plate_equilibrium(
+    springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array, is_near: bool
+) -> Balance:
+    """Return the equilibrium of one state against an outer plate, from freedoms (levels, 3)."""
+    at = start if is_near else start_below(springs, start, pitch, wall, load.stiffness)
+    balance = _contact_descent(springs, pitch, load, wall, at)
     if balance is None:
-        raise DesignError("no equilibrium of the stack found under this load; try a smaller one")
-    return balance
+        most = MOST_STEPS if is_near else FEW_STEPS
+        balance = _one_descent(springs, pitch, load, at, most)
+    return balance or _by_softer_plates(springs, pitch, load, wall, at) or Balance.none(at[None])
+
+
+def _one_descent(
+    springs: Springs, pitch: float, load: Load, start: Array, most: int, enough: float = 0.0
+) -> Balance | None:
+    """Return the ``_energy_descent`` of one state from freedoms (levels, 3), None if it fails."""
+    found = _energy_descent(springs.at(None), pitch, load, start[None], most, enough)
+    return found if found.is_found[0] else None
 
 
 def _by_softer_plates(
     springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
-) -> tuple[Array, float, bool] | None:
+) -> Balance | None:
     """Return the loaded equilibrium against a plate by continuation in plate stiffness; None if it
     fails.
     """
     for way in SOFT_PLATES:
-        at = _below_soft_plates(springs, pitch, load, start, way)
-        if at is not None:
+        at = start
+        for stiffness in way:
+            softer = load._replace(stiffness=stiffness)
+            soft = _one_descent(springs, pitch, softer, at, MOST_STEPS, ROUGH_STEP)
+            if soft is None:
+                break
+            at = soft.freedoms[0]
+        else:
             balance = _contact_descent(springs, pitch, load, wall, at)
-            balance = balance or _energy_descent(springs, pitch, load, at, MOST_STEPS)
+            balance = balance or _one_descent(springs, pitch, load, at, MOST_STEPS)
             if balance is not None:
                 return balance
     return None
-
-
-def _below_soft_plates(
-    springs: Springs, pitch: float, load: Load, start: Array, way: tuple[float, ...]
-) -> Array | None:
-    """Return freedoms near equilibrium against the last of increasingly stiff plates; None if one
-    has no equilibrium.
-    """
-    at = start
-    for stiffness in way:
-        softer = load._replace(stiffness=stiffness)
-        soft = _energy_descent(springs, pitch, softer, at, MOST_STEPS, ROUGH_STEP)
-        if soft is None:
-            return None
-        at, _, _ = soft
-    return at
 
 
 def _energy_descent(
@@ -169,115 +220,170 @@ def _energy_descent(
     most: int,
     enough: float = 0.0,
     quick: float = 0.0,
-) -> tuple[Array, float, bool] | None:
-    """Return the loaded equilibrium, or None if ``most`` steps do not reach it.
+) -> Balance:
+    """Return the loaded equilibria of n states that at most ``most`` steps reach.
 
     A step no larger than ``enough`` ends it. ``quick`` makes fewer and larger steps, until the
     error is below it.
     """
-    fine = quick or SMALLEST_STEP
-    at, before, last = start, fine, None
-    now = loaded_energy(springs, pitch, load, at)
+    found, live, at = Balance.none(start), np.arange(len(start)), start
+    before, now = np.full(len(at), quick or SMALLEST_STEP), loaded_energy(springs, pitch, load, at)
+    last: tuple[Array, Array] | None = None
     for _ in range(most):
-        if np.abs(now.gradient).max() < RESIDUAL * (1 + 1e-3 * now.push):
-            return at, now.push, is_positive_definite(with_diagonal_blocks(now.rest(), now.blocks))
-        if last is not None:
-            # The matrix of such a small step is good enough for the last one.
-            matrix, blocks = last
-            flat = -np.linalg.solve(matrix, now.gradient)
-            if np.abs(flat).max() * before < REUSED_PRODUCT and _are_close(blocks, now.blocks):
-                return at + flat.reshape(-1, 3), now.push, True
+        if quick and last is not None and 0 < before.min() <= before.max() < REUSED_STEP:
+            flat, is_last = _last_step(now, *last, before)
+            if is_last:
+                found.keep(live, at + flat.reshape(at.shape), 0.0, True)
+                break
         rest = now.rest()
         matrix = with_diagonal_blocks(rest, now.blocks)
-        flat, is_firm = (_plain_step if quick else _safeguarded_step)(now.gradient, matrix)
+        flat = newton_step(now.gradient, matrix, None if quick else is_positive_definite(matrix))
         flat = _rim_limited(springs, at, flat, now.gradient, rest, now.blocks)
-        if quick and np.abs(flat).max() > STRAIGHT:
+        if quick:
             flat = _refined(springs, at, flat, now, rest)
-        move = flat.reshape(-1, 3)
-        largest = float(np.abs(move).max())
-        slope = float(flat @ now.gradient)
-        fits = load.wall is None or (largest < PLATE_LAST_STEP and slope > -PLATE_LAST_GAIN)
-        is_last = largest <= enough or (fits and is_last_step(largest, before, fine))
-        if is_last and (is_positive_definite(matrix) if is_firm is None else is_firm):
-            at = at + move
-            if load.wall is None:
-                return at, 0.0, True
-            return at, loaded_energy(springs, pitch, load, at).push, True
-        share = float(step_limit(move).min()) if largest > LARGEST_MOVE.min() else 1.0
-        for _ in range(14):
-            tried = loaded_energy(springs, pitch, load, at + share * move)
-            if tried.value <= now.value + 1e-4 * share * slope + 1e-11 * (1 + abs(now.value)):
+        largest, move, value = np.abs(flat).max(-1), flat.reshape(at.shape), now.value
+        last = (matrix, now.blocks)
+        is_still = np.zeros(len(at), dtype=bool) if quick else _is_still(now, flat)
+        is_over = (
+            is_still | (largest <= enough) | is_last_step(largest, before, quick or SMALLEST_STEP)
+        )
+        if load.wall is not None:
+            gain = -(flat * now.gradient).sum(-1)
+            is_over &= (
+                is_still
+                | (largest <= enough)
+                | (largest < PLATE_LAST_STEP) & (gain < PLATE_LAST_GAIN)
+            )
+        if is_over.any():
+            is_stable = is_over.copy()
+            is_stable[is_over] = is_positive_definite(matrix[is_over])
+            is_over &= is_still | is_stable
+            end, pushes = at + np.where(is_stable[:, None, None], move, 0.0), now.push
+            if load.wall is not None:
+                pushes = loaded_energy(springs, pitch, load, end).push
+            found.keep(live[is_over], end[is_over], pushes[is_over], is_stable[is_over])
+            if is_over.all():
                 break
-            share /= 2
-        before = largest if share == 1.0 else 0.0
-        may_last = load.wall is None and 0 < before < REUSED_STEP and is_positive_definite(matrix)
-        last = (matrix, now.blocks) if may_last else None
-        at = at + share * move
-        now = tried
-        if abs(slope) < 1e-11 * (1 + abs(now.value)):
-            return at, now.push, is_positive_definite(with_diagonal_blocks(now.rest(), now.blocks))
-    return None
+            if is_over.any():
+                goes = ~is_over
+                live, at, move, largest, value = (
+                    part[goes] for part in (live, at, move, largest, value)
+                )
+                springs, last = springs.at(goes), (last[0][goes], last[1][goes])
+        now, share = _searched(springs, pitch, load, at, move, largest, value)
+        before = largest * (share == 1)
+        at = at + share[:, None, None] * move
+    return found
 
 
-def _safeguarded_step(gradient: Array, matrix: Array) -> tuple[Array, bool]:
-    """Return Newton's step of all levels, and True for a positive definite tangent stiffness."""
-    step, is_firm = newton_step(gradient[None], matrix[None])
-    return step[0], is_firm
+def _is_still(now: LoadedEnergy, flat: Array) -> NDArray[np.bool_]:
+    """Return which states (n) a step (n, freedoms) hardly changes."""
+    is_still = np.abs(now.gradient).max(-1) < RESIDUAL * (1 + 1e-3 * now.push)
+    slope = (flat * now.gradient).sum(-1)
+    return np.asarray(is_still | (slope > -1e-12 * (1 + np.abs(now.value))))
 
 
-def _plain_step(gradient: Array, matrix: Array) -> tuple[Array, bool | None]:
-    """Return Newton's step, its tangent stiffness unchecked (None) where it leads downhill."""
-    flat = -np.linalg.solve(matrix, gradient)
-    return (np.asarray(flat), None) if flat @ gradient < 0 else _safeguarded_step(gradient, matrix)
+def _last_step(
+    now: LoadedEnergy, matrix: Array, blocks: Array, before: Array
+) -> tuple[Array, bool]:
+    """Return the steps (n, freedoms) by the tangent stiffness and springs' ``blocks`` of the last
+    ones, of size ``before`` (n), and True if that is good enough: not where rims meet or part.
+    """
+    flat = np.asarray(-np.linalg.solve(matrix, now.gradient[..., None])[..., 0])
+    is_small = (np.abs(flat).max(-1) * before).max() < REUSED_PRODUCT
+    change = np.abs(now.blocks - blocks).max((1, 2, 3)) - SPRING_CHANGE * np.abs(blocks).max(
+        (1, 2, 3)
+    )
+    return flat, bool(is_small and change.max() < 0 and is_positive_definite(matrix).all())
 
 
-def _are_close(first: Array, second: Array) -> bool:
-    """Return True if the springs of two places are nearly equal: not where rims meet or part."""
-    return float(np.abs(first - second).max()) < SPRING_CHANGE * float(np.abs(first).max())
+def _searched(
+    springs: Springs, pitch: float, load: Load, at: Array, move: Array, largest: Array, value: Array
+) -> tuple[LoadedEnergy, Array]:
+    """Return the energy at the end of a share of each step (n, levels, 3) that does not raise it
+    above ``value`` (n), and this share (n).
+    """
+    share = step_limit(move, largest).min(-1)
+    now = loaded_energy(springs, pitch, load, at + share[:, None, None] * move)
+    for _ in range(HALVINGS):
+        is_far = _rises(now.value, value)
+        if not is_far.any():
+            break
+        share, (far,) = np.where(is_far, share / 2, share), is_far.nonzero()
+        ahead = (at + share[:, None, None] * move)[far]
+        again = loaded_energy(springs.at(far), pitch, load, ahead)
+        if len(far) == len(share):
+            now = again
+        else:
+            put(now, far, again)
+    return now, share
 
 
 def _rim_limited(
     springs: Springs, at: Array, flat: Array, gradient: Array, rest: Array, blocks: Array
 ) -> Array:
-    """Return the step to where rims just touch that it would drive into each other.
+    """Return the steps (n, freedoms) to where rims just touch that they would drive into each
+    other.
 
     A step without their contact would run far past them (a primal-dual active set).
     """
     for _ in range(RIM_ROUNDS):
-        met = springs.meeting(at, flat.reshape(-1, 3))
+        met = springs.meeting(at, flat.reshape(at.shape))
         if met is None:
             break
         push, stiffer = met
-        matrix = with_diagonal_blocks(rest, blocks + stiffer)
-        tried, _ = newton_step((gradient + push.ravel())[None], matrix[None])
-        if float((tried @ gradient)[0]) >= 0:
-            break  # it would lead uphill
-        flat = tried[0]
+        some = np.flatnonzero(stiffer.any((1, 2, 3)))
+        matrix = with_diagonal_blocks(rest[some], (blocks + stiffer)[some])
+        gradients = gradient[some]
+        pushes = gradients + push[some].reshape(gradients.shape)
+        tried = newton_step(pushes, matrix, is_positive_definite(matrix))
+        goes = (tried * gradients).sum(-1) < 0  # others would lead uphill
+        if not goes.any():
+            break
+        flat = flat.copy()
+        flat[some[goes]] = tried[goes]
     return flat
 
 
 def _refined(springs: Springs, at: Array, flat: Array, now: LoadedEnergy, rest: Array) -> Array:
-    """Return the step at whose end springs are in equilibrium, with all else linear.
+    """Return the steps (n, freedoms), of the long ones those at whose end springs are in
+    equilibrium, with all else linear.
 
     Films, and rims that meet on the way, are most of the nonlinearity.
     """
-    outside = now.gradient - now.spring_gradient.ravel()
-    best, least = flat, math.inf
+    (live,) = (np.abs(flat).max(-1) > STRAIGHT).nonzero()
+    if not live.size:
+        return flat
+    found, outside = flat.copy(), now.gradient - now.spring_gradient.reshape(flat.shape)
+    if len(live) < len(flat):
+        at, rest, outside, springs = at[live], rest[live], outside[live], springs.at(live)
+        flat = flat[live]
+    best, least = flat, np.full(len(live), math.inf)
     for _ in range(CORRECTIONS):
-        value, spring_gradient, blocks = springs.energy(at + flat.reshape(-1, 3))
-        follows = outside + rest @ flat
-        total = float(value.sum() + (outside + follows) @ flat / 2)
-        if total > least:
-            flat = (best + flat) / 2
-            continue
-        best, least = flat, total
-        gradient = follows + spring_gradient.ravel()
-        more = np.asarray(-np.linalg.solve(with_diagonal_blocks(rest, blocks), gradient))
-        more = _rim_limited(springs, at + best.reshape(-1, 3), more, gradient, rest, blocks)
+        value, spring_gradient, blocks = springs.energy(at + flat.reshape(at.shape))
+        follows = outside + (rest @ flat[..., None])[..., 0]
+        total = value.sum(-1) + ((outside + follows) * flat).sum(-1) / 2
+        is_worse, halfway = total > least, (best + flat) / 2
+        if is_worse.any():
+            flat = np.where(is_worse[:, None], best, flat)
+        best, least = flat, np.minimum(total, least)
+        gradient = follows + spring_gradient.reshape(flat.shape)
+        matrix = with_diagonal_blocks(rest, blocks)
+        more = np.asarray(-np.linalg.solve(matrix, gradient[..., None])[..., 0])
+        more = _rim_limited(springs, at + best.reshape(at.shape), more, gradient, rest, blocks)
         flat = best + more
-        if np.abs(more).max() < SMALL_CORRECTION * np.abs(best).max():
-            return flat
-    return best
+        is_over = np.abs(more).max(-1) < SMALL_CORRECTION * np.abs(best).max(-1)
+        if is_worse.any():
+            flat, is_over = np.where(is_worse[:, None], halfway, flat), is_over & ~is_worse
+        if is_over.any():
+            found[live[is_over]] = flat[is_over]
+            if is_over.all():
+                return found
+            goes = ~is_over
+            live, at, flat, best, least = live[goes], at[goes], flat[goes], best[goes], least[goes]
+            outside, rest, springs = outside[goes], rest[goes], springs.at(goes)
+    found[live] = best
+    return found
 
 
 # Against an outer plate, with its contact forces as unknowns beside the freedoms.
@@ -305,9 +411,9 @@ def start_below(
 
 def _contact_descent(
     springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
-) -> tuple[Array, float, bool] | None:
-    """Return rise and tilt of each level (levels, 3), the force in mN on the plate, and True for a
-    stable equilibrium; None if the steps pass an unstable place, or are too many.
+) -> Balance | None:
+    """Return the equilibrium of one state from freedoms (levels, 3); None if the steps pass an
+    unstable place, or are too many.
 
     A mixed method: a plate is stiff, so the contact forces are unknowns beside the freedoms, found
     with each step and handed to the next. The set of points in contact is found within a step, with
@@ -331,11 +437,11 @@ def _contact_descent(
         largest = float(np.abs(move).max())
         if is_last_step(largest, before, PLATE_SMALLEST_STEP):
             if is_found:
-                return at + move, touch.push, True
+                return Balance.stable((at + move)[None], touch.push[None])
             # A rim or a point that just touches is met in one round and parts in the next.
             end = loaded_energy(springs, pitch, load, at + move)
             if np.abs(end.gradient).max() < PLATE_RESIDUAL * (1 + end.push):
-                return at + move, end.push, True
+                return Balance.stable((at + move)[None], end.push[None])
         share = float(step_limit(move).min())
         if share < 1.0 and not wall.sticks:
             return None
@@ -410,16 +516,62 @@ def _active_set_step(
         if met is not None:
             against = with_diagonal_blocks(against, met[1])
             pushes = pushes + met[0].ravel()
-        step, is_firm = newton_step(pushes[None], (matrix + against)[None])
-        if not is_firm:
+        if not is_positive_definite(matrix + against):
             return None
-        ahead = deep + lines @ step[0] > touch.least
+        step = np.asarray(-np.linalg.solve(matrix + against, pushes))
+        ahead = deep + lines @ step > touch.least
         if (ahead == touches).all():
-            met = springs.meeting(at, step[0].reshape(-1, 3))
+            met = springs.meeting(at, step.reshape(-1, 3))
             if met is None or held_off == CONTACT_RIM_ROUNDS:
-                return step[0], met is None
+                return step, met is None
             held_off += 1
         touches = ahead
-        tried.append(step[0])
+        tried.append(step)
     # Otherwise take the best place on the paths there; the first one leads downhill.
     return min((share * trial for trial in tried for share in STEP_SHARES), key=energy), False
+
+
+# Safeguarded Newton steps.
+
+
+def is_last_step(largest: Any, before: Any, fine: float = SMALLEST_STEP) -> Any:
+    """Return True if the step after this one would be below ``fine``, by quadratic convergence from
+    ``before``, the largest move of the full step before it.
+    """
+    return largest * largest < fine * before
+
+
+def newton_step(gradient: Array, matrix: Array, is_firm: NDArray[np.bool_] | None = None) -> Array:
+    """Return Newton's step of each row (..., size), a descent direction even where the tangent
+    stiffness (..., size, size) is not positive definite, ``is_firm``; without it, where the plain
+    step leads uphill.
+    """
+    step = np.asarray(-np.linalg.solve(matrix, gradient[..., None])[..., 0])
+    uphill = (step * gradient).sum(-1) >= 0 if is_firm is None else ~is_firm
+    if uphill.any():
+        values, vectors = np.linalg.eigh(matrix[uphill])
+        least = 1e-6 * np.abs(values).max(-1, keepdims=True) + 1e-9
+        values = np.maximum(np.abs(values), least)
+        within = (vectors.swapaxes(-1, -2) @ gradient[uphill][..., None])[..., 0]
+        step[uphill] = -(vectors @ (within / values)[..., None])[..., 0]
+    return step
+
+
+def step_limit(move: Array, largest: Array | None = None) -> Array:
+    """Return the share of each row's step (..., 3) that stays within ``LARGEST_MOVE``; ``largest``
+    are the largest components of the steps, if they are known.
+    """
+    if largest is not None and largest.max() <= LEAST_LIMIT:
+        return np.ones(move.shape[:-1])
+    return np.asarray(np.minimum(1.0, (LARGEST_MOVE / np.maximum(np.abs(move), 1e-12)).min(-1)))
+
+
+def is_positive_definite(matrix: Array) -> NDArray[np.bool_]:
+    """Return which matrices (..., size, size) are positive definite: (...)."""
+    try:
+        np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        if matrix.ndim == 2:
+            return np.zeros((), dtype=bool)
+        return np.array([is_positive_definite(each) for each in matrix])
+    return np.ones(matrix.shape[:-2], dtype=bool)

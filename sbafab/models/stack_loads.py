@@ -3,22 +3,22 @@ external forces.
 
 A level has three freedoms: its rise (mm) and the tilt of its upper plate, a rotation vector in the
 lower plate's plane (rad). Half of the tilt comes before the rise and half after, as with constant
-curvature within a level. Arrays have one row per level.
+curvature within a level. Arrays have one row per level, and any leading axes: those of many states.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon_map import DEGREE, PIECES_IN_ALL, BalloonMap, derivatives, horner
+from sbafab.models.balloon_map import DEGREE, BalloonMap, horner
 from sbafab.models.film_elements import Array
 
 SMALL = 1e-8
@@ -64,11 +64,11 @@ ROTATION = _rotation_matrix()
 
 
 class Chain(NamedTuple):
-    """Plates of a chain, the base first: places (n + 1, 3) in mm and axes (n + 1, 3, 3), whose
-    columns are the plates' x, y and z; ``rises`` (n, 3) are the levels' directions.
+    """Plates of a chain, the base first: places (..., n + 1, 3) in mm and axes (..., n + 1, 3, 3),
+    whose columns are the plates' x, y and z; ``rises`` (..., n, 3) are the levels' directions.
 
-    A level's tilt turns all beyond it about its middle: ``middles`` (n, 3) in mm; ``turns``
-    (n, 2, 3) are the rotations by a unit of either tilt.
+    A level's tilt turns all beyond it about its middle: ``middles`` (..., n, 3) in mm; ``turns``
+    (..., n, 2, 3) are the rotations by a unit of either tilt.
     """
 
     places: Array
@@ -77,27 +77,40 @@ class Chain(NamedTuple):
     middles: Array
     turns: Array
 
+    @property
+    def tip(self) -> Array:
+        """Middle of the top plate in mm: (..., 3)."""
+        return np.asarray(self.places[..., -1, :])
+
+    def tip_motion(self, motions: Array) -> Array:
+        """Return the motion of the tip, then the turn of the top, by freedoms, from the
+        ``level_motions``: (..., levels, 3, 6).
+        """
+        turns = motions[..., :3]
+        moves = motions[..., 3:] - turns @ crossing(self.tip)[..., None, :, :]
+        return np.concatenate([moves, turns], axis=-1)
+
 
 def plate_chain(freedoms: Array, pitch: float) -> Chain:
-    """Return the plates of levels with freedoms (n, 3), each ``pitch`` mm high when flat."""
-    count = len(freedoms)
-    turned, rates = rotations(freedoms[:, 1:] / 2)
-    axes = np.empty((count + 1, 3, 3))
-    axes[0] = BASE
-    np.matmul(turned, turned, out=axes[1:])
+    """Return the plates of levels with freedoms (..., n, 3), each ``pitch`` mm high when flat."""
+    *lead, count, _ = freedoms.shape
+    turned, rates = rotations(freedoms[..., 1:] / 2)
+    axes = np.empty((*lead, count + 1, 3, 3))
+    axes[..., 0, :, :] = BASE
+    np.matmul(turned, turned, out=axes[..., 1:, :, :])
     reach = 1
     while reach < count:
         # Each is already the product of ``reach`` levels up to its own.
-        axes[reach + 1 :] = axes[1:-reach] @ axes[reach + 1 :]
+        axes[..., reach + 1 :, :, :] = axes[..., 1:-reach, :, :] @ axes[..., reach + 1 :, :, :]
         reach *= 2
-    middle = axes[:-1] @ turned
-    rises = middle[:, :, 2]
-    steps = rises * (freedoms[:, :1] + pitch)
+    middle = axes[..., :-1, :, :] @ turned
+    rises = middle[..., 2]
+    steps = rises * (freedoms[..., :1] + pitch)
     places = _sums(count) @ steps
     # What the first half of a tilt turns by and what the second does differ along the plates
     # between them alone, across which the level rises: together they turn about its middle.
-    turns = rates @ middle[:, :, :2].transpose(0, 2, 1)
-    return Chain(places, axes, rises, places[1:] - steps / 2, turns)
+    turns = rates @ middle[..., :2].swapaxes(-1, -2)
+    return Chain(places, axes, rises, places[..., 1:, :] - steps / 2, turns)
 
 
 @lru_cache(maxsize=16)
@@ -107,13 +120,13 @@ def _sums(count: int) -> Array:
 
 
 def rotations(vectors: Array) -> tuple[Array, Array]:
-    """Return rotations (n, 3, 3) by vectors (n, 2) in the xy plane, and the rotation by a unit of
-    each component, half before and half after, in the xy plane between (n, 2, 2): Rodrigues'
+    """Return rotations (..., 3, 3) by vectors (..., 2) in the xy plane, and the rotation by a unit
+    of each component, half before and half after, in the xy plane between (..., 2, 2): Rodrigues'
     formula, and the mean of the left and the right Jacobian.
     """
-    count = len(vectors)
-    # One column per level: numpy is faster with a longer last axis.
-    each = vectors.T
+    # One column per vector: numpy is faster with a longer last axis.
+    each = vectors.reshape(-1, 2).T
+    count = each.shape[1]
     pairs = (each[:, None] * each).reshape(4, count)
     safe = np.maximum(pairs[0] + pairs[3], SMALL)
     angle = np.sqrt(safe)
@@ -124,8 +137,9 @@ def rotations(vectors: Array) -> tuple[Array, Array]:
     np.multiply((1 - np.cos(angle)) / safe, pairs, out=parts[3:7])
     parts[7] = sine
     np.multiply((1 - sine) / safe, pairs, out=parts[8:])
-    rows = parts.T @ ROTATION
-    return rows[:, :9].reshape(count, 3, 3), rows[:, 9:].reshape(count, 2, 2)
+    rows = (parts.T @ ROTATION).reshape(*vectors.shape[:-1], 13)
+    turned = rows[..., :9].reshape(*vectors.shape[:-1], 3, 3)
+    return turned, rows[..., 9:].reshape(*vectors.shape[:-1], 2, 2)
 
 
 def crossing(vectors: Array) -> Array:
@@ -134,25 +148,26 @@ def crossing(vectors: Array) -> Array:
 
 
 def force_motions(arms: Array, forces: Array) -> Array:
-    """Return moments and work of forces f at points x under motions as of ``level_motions``: (n, 6,
-    4).
+    """Return moments and work of forces f at points x under motions as of ``level_motions``: (...,
+    6, 4).
 
-    From the sum of x f (n, 3, 3) and of f (n, 3) over the points. The first three of the last axis
-    are the sum of (motion of x) x f, the fourth is the sum of (motion of x) . f.
+    From the sum of x f (..., 3, 3) and of f (..., 3) over the points. The first three of the last
+    axis are the sum of (motion of x) x f, the fourth is the sum of (motion of x) . f.
     """
-    both = np.concatenate([arms.reshape(-1, 9), forces], axis=1)
-    return np.asarray((both @ FORCE_MOTION).reshape(-1, 6, 4))
+    both = np.concatenate([arms.reshape(*forces.shape[:-1], 9), forces], axis=-1)
+    return np.asarray((both @ FORCE_MOTION).reshape(*forces.shape[:-1], 6, 4))
 
 
 def level_motions(at: Chain) -> Array:
-    """Return the motion of all plates beyond a level by a unit of each of its freedoms: (n, 3, 6).
+    """Return the motion of all plates beyond a level by a unit of each of its freedoms: (..., n, 3,
+    6).
 
     The first three turn, the others move: a point x of these plates moves by turn x x + move.
     """
-    motions = np.zeros((len(at.rises), 3, 6))
-    motions[:, 0, 3:] = at.rises
-    motions[:, 1:, :3] = at.turns
-    np.matmul(at.turns, crossing(at.middles), out=motions[:, 1:, 3:])
+    motions = np.zeros((*at.rises.shape, 6))
+    motions[..., 0, 3:] = at.rises
+    motions[..., 1:, :3] = at.turns
+    np.matmul(at.turns, crossing(at.middles), out=motions[..., 1:, 3:])
     return motions
 
 
@@ -167,27 +182,38 @@ RIM_STIFFNESS = 2e4
 """Contact stiffness in mN/mm of a flat balloon, and of rims: films barely yield."""
 
 
+def by_row(vectors: Array, matrices: Array) -> Array:
+    """Return the products of vectors (..., rows, k) with matrices (rows, k, m), or with a single
+    one for all rows.
+    """
+    if len(matrices) == 1:
+        return np.asarray(vectors @ matrices[0])
+    return np.asarray((vectors[..., None, :] @ matrices)[..., 0, :])
+
+
 class GapPlaces(NamedTuple):
     """Points at which the gaps of levels are evaluated, at any pressure.
 
-    ``begins`` (rows, chambers x points) is the first row of each point's potential in the table of
-    springs. ``ring`` (rows, chambers x points, 3) are the gaps there, in pieces of the spline, by
-    rise and tilt, ``squares`` (rows, chambers x points, 9) their products. ``meet`` (rows, 3,
-    points) are all gaps that may close: the rings' gaps, then the rims' in mm; ``shut`` (rows,
-    points, 9) their products times the contact stiffness.
+    ``kinds`` (rows, 1) are the rows' kinds of balloon; ``chambers`` and ``shares`` (ring points)
+    the chamber of each point of the rings and its share of its balloon. ``meet`` (rows, 3, points)
+    are all gaps that may close, by rise and tilt: the rings' gaps, in pieces of the spline, then
+    the rims' in mm. ``ring`` (rows, ring points, 3) are the former, ``squares`` (rows, ring points,
+    9) their products, both as a point's share of its balloon; ``shut`` (rows, points, 9) are the
+    products of all gaps times the contact stiffness.
     """
 
-    begins: NDArray[np.int_]
+    kinds: NDArray[np.int_]
+    chambers: NDArray[np.int_]
+    shares: Array
+    meet: Array
     ring: Array
     squares: Array
-    meet: Array
     shut: Array
 
     @classmethod
     def of(cls, maps: Sequence[BalloonMap], gaps: Array, rims: Array) -> GapPlaces:
         """Return one row per kind of balloon, with gaps at its ring and round its rim, in mm."""
         count = gaps.shape[1]
-        begins = np.arange(len(maps) * count // RING_POINTS).reshape(len(maps), -1) * PIECES_IN_ALL
         spans = np.array([[kind.spans] for kind in maps])
         ring = gaps * spans[..., None]
         stiff = np.full((len(maps), count + rims.shape[1]), RIM_STIFFNESS / RING_POINTS)
@@ -195,29 +221,42 @@ class GapPlaces(NamedTuple):
         meet = np.concatenate([ring, rims], axis=1)
         squares = (meet[..., :, None] * meet[..., None, :]).reshape(*meet.shape[:2], 9)
         return cls(
-            np.repeat(begins, RING_POINTS, axis=1),
-            ring,
-            squares[:, :count],
+            np.arange(len(maps))[:, None],
+            np.repeat(np.arange(count // RING_POINTS), RING_POINTS),
+            np.full(count, 1 / RING_POINTS),
             np.ascontiguousarray(meet.transpose(0, 2, 1)),
+            ring / RING_POINTS,
+            squares[:, :count] / RING_POINTS,
             squares * stiff[..., None],
         )
 
     def at(self, levels: NDArray[np.int_]) -> GapPlaces:
         """Return a row for each level; a single row if all are equal."""
-        if len(self.begins) == 1:
+        if len(self.kinds) == 1:
             return self
-        begins, ring, squares, meet, shut = self
-        return GapPlaces(begins[levels], ring[levels], squares[levels], meet[levels], shut[levels])
+        kinds, chambers, shares, *parts = self
+        return GapPlaces(kinds[levels], chambers, shares, *(part[levels] for part in parts))
+
+    def closed(self, freedoms: Array) -> NDArray[np.bool_]:
+        """Return which contacts of balloons and rims are closed: (..., rows, points)."""
+        return np.asarray(by_row(freedoms, self.meet) < 0)
 
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """Elastic response of levels at given pressures, evaluated in ``places``.
+    """Elastic response of rows of levels at given pressures, of any number of states, evaluated in
+    ``places``.
 
-    ``table`` holds the ``derivatives`` of the potentials of all splines, then of their volumes.
+    ``table`` (powers, rows) are the pieces of the splines of all potentials, of their volumes and,
+    if asked for, of the volumes' rates by pressure; ``begins`` (..., rows, ring points) is the row
+    of each point's first piece, ``stride`` leads from a piece to the next and ``step`` from a
+    potential to its volume.
     """
 
     table: Array
+    begins: NDArray[np.int_]
+    stride: int
+    step: int
     places: GapPlaces
 
     @classmethod
@@ -227,41 +266,60 @@ class Springs:
         pressures: Array,
         places: GapPlaces,
         sucked: bool = False,
+        orders: int = 2,
     ) -> Springs:
-        """Return the springs of maps at pressures, one a chamber, below 0 only where ``sucked``."""
-        polynomials = np.stack([kind.pressed(pressures, sucked) for kind in maps])
-        # Each point has its share of its balloon.
-        rows = polynomials.transpose(2, 0, 1, 3, 4).reshape(-1, DEGREE + 1) / RING_POINTS
-        return cls(derivatives(rows), places)
+        """Return the springs of maps at pressures (..., chambers), below 0 only where ``sucked``;
+        rates of volumes by pressure need three ``orders``.
+        """
+        parts = [kind.splines(pressures, orders, sucked)[:, :, None] for kind in maps]
+        table = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2)
+        *lead, chambers = pressures.shape
+        states = np.arange(0, pressures.size, chambers).reshape(*lead, 1, 1)
+        begins = states + (orders * pressures.size * places.kinds + places.chambers)
+        return cls(
+            table.reshape(DEGREE + 1, -1),
+            begins,
+            len(maps) * orders * pressures.size,
+            pressures.size,
+            places,
+        )
+
+    def at(self, where: Any) -> Springs:
+        """Return the springs of some of the states."""
+        return replace(self, begins=self.begins[where])
 
     def meeting(self, freedoms: Array, move: Array) -> tuple[Array, Array] | None:
-        """Return gradient (rows, 3) and second derivatives (rows, 3, 3) of the contact of the rims
-        that a move closes, as if shut from the start; None if it closes none.
+        """Return gradient (..., rows, 3) and second derivatives (..., rows, 3, 3) of the contact of
+        the rims that a move closes, as if shut from the start; None if it closes none.
         """
-        first = self.places.begins.shape[1]
-        rims = self.places.meet[:, :, first:]
-        ends = ((freedoms + move)[:, None] @ rims)[:, 0]
+        first = len(self.places.chambers)
+        rims = self.places.meet[..., first:]
+        ends = by_row(freedoms + move, rims)
         if ends.min() >= 0:
             return None
-        met = (ends < 0) & ((freedoms[:, None] @ rims)[:, 0] >= 0)
+        met = (ends < 0) & (by_row(freedoms, rims) >= 0)
         if not met.any():
             return None
         stiffer = self._shut(met, first)
         return (stiffer @ freedoms[..., None])[..., 0], stiffer
 
     def _shut(self, met: NDArray[np.bool_], first: int = 0) -> Array:
-        """Return the contact stiffness (rows, 3, 3) of the points ``met`` (rows, points)."""
-        each = met.astype(float)[:, None] @ self.places.shut[:, first:]
-        return np.asarray(each.reshape(-1, 3, 3))
+        """Return the contact stiffness (..., rows, 3, 3) of the points ``met`` (..., rows,
+        points).
+        """
+        each = by_row(met.astype(float), self.places.shut[:, first:])
+        return each.reshape(*met.shape[:-1], 3, 3)
 
     def energy(self, freedoms: Array) -> tuple[Array, Array, Array]:
-        """Return energy (rows) in uJ, gradient (rows, 3), second derivatives (rows, 3, 3)."""
-        begins, ring, squares, meet, _ = self.places
-        gaps = (freedoms[:, None] @ meet)[:, 0]
-        value, first, second = horner(self.table, begins, gaps[:, : begins.shape[1]])
-        value = value @ np.ones(value.shape[-1])
-        gradient = (first[:, None] @ ring)[:, 0]
-        matrix = (second[:, None] @ squares).reshape(-1, 3, 3)
+        """Return energy (..., rows) in uJ, gradient (..., rows, 3), second derivatives (..., rows,
+        3, 3).
+        """
+        count = len(self.places.chambers)
+        gaps = by_row(freedoms, self.places.meet)
+        value, first, second = horner(self.table, self.begins, gaps[..., :count], self.stride, True)
+        value = value @ self.places.shares
+        gradient = by_row(first, self.places.ring)
+        matrix = by_row(second, self.places.squares).reshape(*gradient.shape, 3)
         if gaps.min() < 0:
             stiffer = self._shut(gaps < 0)
             push = (stiffer @ freedoms[..., None])[..., 0]
@@ -270,24 +328,45 @@ class Springs:
             matrix += stiffer
         return value, gradient, matrix
 
+    def _orders(self, freedoms: Array, orders: Sequence[int], with_rates: bool = False) -> Array:
+        """Return potentials (order 0), volumes (1) and their rates by pressure (2), without
+        contacts, at each point of the rings: (orders, ..., rows, points), with their derivatives by
+        height before these.
+        """
+        gaps = by_row(freedoms, self.places.meet)[..., : len(self.places.chambers)]
+        begins = np.stack([self.begins + order * self.step for order in orders])
+        return horner(self.table, begins, gaps, self.stride, with_rates)
+
+    def _by_freedoms(self, rates: Array) -> Array:
+        """Return rates (..., rows, points) by height as those of each balloon by its level's
+        freedoms: (..., rows, chambers, 3).
+        """
+        by_point = rates[..., None] * self.places.ring
+        return np.asarray(by_point.reshape(*rates.shape[:-1], -1, RING_POINTS, 3).sum(-2))
+
     def slopes(self, freedoms: Array) -> tuple[Array, Array]:
         """Return by each freedom the potential of each balloon in mN (or mN mm), without contacts,
-        and its volume in ul: (rows, chambers, 3) each.
+        and its volume in ul: (..., rows, chambers, 3) each.
         """
-        begins, ring = self.places.begins, self.places.ring
-        gaps = (ring @ freedoms[..., None])[..., 0]
-        both = begins + np.array([[[0]], [[self.table.shape[2] // 2]]])
-        rates = horner(self.table[:, 1], both, gaps)[..., None] * ring
-        rates = rates.reshape(*rates.shape[:2], -1, RING_POINTS, 3).sum(-2)
-        return rates[0], rates[1]
+        films, filling = self._by_freedoms(self._orders(freedoms, (0, 1), with_rates=True)[1])
+        return films, filling
 
     def contents(self, freedoms: Array) -> tuple[Array, Array]:
-        """Return ul in each balloon (rows, chambers), and the potential of each row."""
-        begins, ring = self.places.begins, self.places.ring
-        gaps = (ring @ freedoms[..., None])[..., 0]
-        both = begins + np.array([[[0]], [[self.table.shape[2] // 2]]])
-        stored, volumes = horner(self.table[:, 0], both, gaps)
-        return volumes.reshape(len(volumes), -1, RING_POINTS).sum(-1), stored.sum(-1)
+        """Return ul in each balloon (..., rows, chambers), and the potential of each row."""
+        stored, volumes = self._orders(freedoms, (0, 1))
+        return _by_chamber(volumes), stored @ self.places.shares
+
+    def volumes(self, freedoms: Array) -> tuple[Array, Array, Array]:
+        """Return ul in each balloon (..., rows, chambers), its rates by freedoms (..., rows,
+        chambers, 3), and by pressure with all plates held (..., rows, chambers).
+        """
+        (values, swelling), (first, _), _ = self._orders(freedoms, (1, 2), with_rates=True)
+        return _by_chamber(values), self._by_freedoms(first), _by_chamber(swelling)
+
+
+def _by_chamber(values: Array) -> Array:
+    """Return the mean over the points of each balloon's ring: (..., chambers)."""
+    return np.asarray(values.reshape(*values.shape[:-1], -1, RING_POINTS).mean(-1))
 
 
 # External loads, and the energy of a stack under them.
@@ -379,10 +458,12 @@ class Load(NamedTuple):
 
 
 class PlateContact(NamedTuple):
-    """Contact of the top with an outer plate: depth in mm of its points (``deep``), and their
-    increase by a unit of each turn and move of ``level_motions``, ``lines`` (points, 6).
+    """Contact of the top with an outer plate: depth in mm of its points, ``deep`` (..., points),
+    and their increase by a unit of each turn and move of ``level_motions``, ``lines`` (..., points,
+    6).
 
-    ``stiff`` and ``least`` (points) are their stiffness and least depth; ``forces`` (points) in mN.
+    ``stiff`` and ``least`` (points) are their stiffness and least depth; ``forces`` (..., points)
+    in mN.
     """
 
     deep: Array
@@ -392,40 +473,46 @@ class PlateContact(NamedTuple):
     forces: Array
 
     @property
-    def push(self) -> float:
-        """Force in mN on the plate."""
-        return float(self.forces[:WALL_POINTS].sum())
+    def push(self) -> Array:
+        """Force in mN on the plate: (...)."""
+        return np.asarray(self.forces[..., :WALL_POINTS].sum(-1))
+
+    @property
+    def touches(self) -> NDArray[np.bool_]:
+        """Which points are in contact: (..., points)."""
+        return np.asarray(self.deep > self.least)
 
     def resists(self, deep: Array) -> Array:
         """Return the forces in mN at depths in mm."""
-        return self.stiff * np.maximum(deep, self.least)
+        return np.asarray(self.stiff * np.maximum(deep, self.least))
 
 
 class ExternalForces(NamedTuple):
-    """External forces on the plates: the sum of the forces f beyond each level (n, 3), the sum of
-    x f over their points x (n, 3, 3), and their energy; n is 1 if all levels carry the same.
+    """External forces on the plates: the sum of the forces f beyond each level (..., n, 3), the sum
+    of x f over their points x (..., n, 3, 3), and their energy (...); n is 1 if all levels carry
+    the same.
     """
 
     forces: Array
     arms: Array
-    energy: float
+    energy: Array
     touch: PlateContact | None = None
 
 
 def external_forces(plates: Chain, load: Load, forces: Array | None) -> ExternalForces:
-    tip = plates.places[-1]
+    tip = plates.tip[..., None, :]
     acting = ExternalForces(
-        load.tip[None], np.multiply.outer(tip, load.tip)[None], -float(load.tip @ tip)
+        np.zeros(tip.shape) + load.tip, tip[..., None] * load.tip, -(tip @ load.tip)[..., 0]
     )
     if load.wall is not None:
         acting = _with_contact(acting, plates, load.wall, load.stiffness, forces)
     if load.weight is not None:
-        beyond, number = plates_beyond(len(plates.rises))
+        beyond, number = plates_beyond(plates.rises.shape[-2])
         above = beyond @ plates.places
         acting = ExternalForces(
             acting.forces + number * load.weight,
-            acting.arms + above[:, :, None] * load.weight,
-            acting.energy - float(above[0] @ load.weight),
+            acting.arms + above[..., None] * load.weight,
+            acting.energy - above[..., 0, :] @ load.weight,
             acting.touch,
         )
     return acting
@@ -435,18 +522,20 @@ def _with_contact(
     acting: ExternalForces, plates: Chain, wall: OuterPlate, stiffness: float, forces: Array | None
 ) -> ExternalForces:
     """Return the forces, including the outer plate's: ``forces``, or by its stiffness."""
-    points = plates.places[-1] + wall.local @ plates.axes[-1].T
+    points = plates.tip[..., None, :] + wall.local @ plates.axes[..., -1, :, :].swapaxes(-1, -2)
     deep = ((points - wall.point) * wall.ways).sum(-1)
-    lines = np.concatenate([(points[:, None] @ wall.crosses)[:, 0], wall.ways], axis=1)
-    stiff = np.full(len(deep), stiffness)
+    lines = np.empty((*points.shape[:-1], 6))
+    lines[..., :3] = (points[..., None, :] @ wall.crosses)[..., 0, :]
+    lines[..., 3:] = wall.ways
+    stiff = np.full(len(wall.local), stiffness)
     stiff[:WALL_POINTS] /= WALL_POINTS
     resists = stiff * np.maximum(deep, wall.least)
     acts = resists if forces is None else forces
-    each = acts[:, None] * wall.ways
+    each = acts[..., None] * wall.ways
     return ExternalForces(
-        acting.forces - acts @ wall.ways,
-        acting.arms - points.T @ each,
-        acting.energy + float(resists @ deep) / 2,
+        acting.forces - (acts @ wall.ways)[..., None, :],
+        acting.arms - (points.swapaxes(-1, -2) @ each)[..., None, :, :],
+        acting.energy + (resists * deep).sum(-1) / 2,
         PlateContact(deep, lines, stiff, wall.least, acts),
     )
 
@@ -459,14 +548,14 @@ def plates_beyond(count: int) -> tuple[Array, Array]:
 
 
 class LoadedEnergy(NamedTuple):
-    """Energy of a stack under a load with its gradient (freedoms).
+    """Energy (...) of a stack under a load with its gradient (..., freedoms).
 
-    ``spring_gradient`` (levels, 3) and ``blocks`` (levels, 3, 3) are first and second derivatives
-    of the springs; ``motions`` (levels, 3, 6) of the ``plates`` beyond each level by its freedoms,
-    ``works`` (levels, 3, 6, 4) those with the forces ``acting`` on them.
+    ``spring_gradient`` (..., levels, 3) and ``blocks`` (..., levels, 3, 3) are first and second
+    derivatives of the springs; ``motions`` (..., levels, 3, 6) of the ``plates`` beyond each level
+    by its freedoms, ``works`` (..., levels, 3, 6, 4) those with the forces ``acting`` on them.
     """
 
-    value: float
+    value: Array
     gradient: Array
     spring_gradient: Array
     blocks: Array
@@ -481,41 +570,47 @@ class LoadedEnergy(NamedTuple):
         return self.acting.touch
 
     @property
-    def push(self) -> float:
-        """Force in mN on the outer plate."""
-        return 0.0 if self.touch is None else self.touch.push
+    def push(self) -> Array:
+        """Force in mN on the outer plate: (...)."""
+        return np.zeros(self.value.shape) if self.touch is None else self.touch.push
+
+    @property
+    def flat_motions(self) -> Array:
+        """The motions by all freedoms: (..., freedoms, 6)."""
+        return self.motions.reshape(*self.gradient.shape, 6)
 
     def turned(self) -> Array:
-        """Return the geometric stiffness (freedoms, freedoms), by the forces alone.
+        """Return the geometric stiffness (..., freedoms, freedoms), by the forces alone.
 
         A level nearer the base turns all motions beyond it. The mutual effect of the two tilts of
         one level is taken at its mean: enough for a descent.
         """
-        size = self.gradient.size
-        half = self.motions.reshape(size, 6)[:, :3] @ self.works[..., :3].reshape(size, 3).T
-        half *= base_side(size // 3)
-        return -(half + half.T)
+        moments = self.works[..., :3].reshape(*self.gradient.shape, 3)
+        half = self.flat_motions[..., :3] @ moments.swapaxes(-1, -2)
+        half *= base_side(half.shape[-1] // 3)
+        return -(half + half.swapaxes(-1, -2))
 
     def deeper(self, touch: PlateContact) -> Array:
-        """Return a contact's depths in mm by a unit of each freedom: (points, freedoms)."""
-        return np.asarray(touch.lines @ self.motions.reshape(-1, 6).T)
+        """Return a contact's depths in mm by a unit of each freedom: (..., points, freedoms)."""
+        return np.asarray(touch.lines @ self.flat_motions.swapaxes(-1, -2))
 
     def rest(self) -> Array:
-        """Return the tangent stiffness (freedoms, freedoms) without the springs."""
+        """Return the tangent stiffness (..., freedoms, freedoms) without the springs."""
         stiffness = self.turned()
         if self.touch is not None:
             lines = self.deeper(self.touch)
-            stiffness += (
-                lines.T * (self.touch.stiff * (self.touch.deep > self.touch.least))
-            ) @ lines
+            stiff = (self.touch.stiff * self.touch.touches)[..., None, :]
+            stiffness += (lines.swapaxes(-1, -2) * stiff) @ lines
         return stiffness
 
 
 def with_diagonal_blocks(rest: Array, blocks: Array) -> Array:
-    """Return a matrix (freedoms, freedoms) with blocks (levels, 3, 3) added on its diagonal."""
+    """Return a matrix (..., freedoms, freedoms) with blocks (..., levels, 3, 3) added on its
+    diagonal.
+    """
     whole = rest.copy()
-    count = len(blocks)
-    diagonal = np.einsum("iaib->iab", whole.reshape(count, 3, count, 3))
+    count = blocks.shape[-3]
+    diagonal = np.einsum("...iaib->...iab", whole.reshape(*rest.shape[:-2], count, 3, count, 3))
     diagonal += blocks
     return whole
 
@@ -523,17 +618,19 @@ def with_diagonal_blocks(rest: Array, blocks: Array) -> Array:
 def loaded_energy(
     springs: Springs, pitch: float, load: Load, at: Array, forces: Array | None = None
 ) -> LoadedEnergy:
-    """Return the energy of a stack under a load, with contact ``forces`` (mN) of an outer plate if
-    given: the gradient is then the residual against these.
+    """Return the energy of a stack under a load at freedoms (..., levels, 3), with contact
+    ``forces`` (..., points) in mN of an outer plate if given: the gradient is then the residual
+    against these.
     """
     value, spring_gradient, blocks = springs.energy(at)
     plates = plate_chain(at, pitch)
     acting = external_forces(plates, load, forces)
     motions = level_motions(plates)
     works = motions @ force_motions(acting.arms, acting.forces)
-    gradient = (spring_gradient - works[..., 3]).ravel()
-    energy = float(value.sum()) + acting.energy
-    return LoadedEnergy(energy, gradient, spring_gradient, blocks, motions, works, plates, acting)
+    gradient = spring_gradient - works[..., 3]
+    energy = value.sum(-1) + acting.energy
+    flat = gradient.reshape(*at.shape[:-2], -1)
+    return LoadedEnergy(energy, flat, spring_gradient, blocks, motions, works, plates, acting)
 
 
 @lru_cache(maxsize=16)

@@ -6,9 +6,9 @@ balloon is taken to push at six points of a ring, each as hard as the axisymmetr
 the gap there; between rigid plates that touch the film in a disc the ring's radius would be the
 disc's, and it is taken midway between neck and pocket. Flat balloons, and rims of leaning levels,
 do not sink into each other: contact by a stiff penalty, without friction.
-The equilibrium is the minimum of one energy, found by Newton's method. Levels of equal balloons
-without a load are equal and solved once. Lengths mm, pressures kPa, volumes ul; forces mN inside,
-N outside.
+The equilibrium is the minimum of one energy, found by Newton's method, for many states at once.
+Levels of equal balloons without a load are equal and solved once. Lengths mm, pressures kPa,
+volumes ul; forces mN inside, N outside.
 """
 
 from __future__ import annotations
@@ -17,17 +17,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from itertools import groupby
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon_map import BalloonMap
 from sbafab.models.film_elements import Array
 from sbafab.models.map_range import holds_at
 from sbafab.models.paper import counterparts_of_pose
-from sbafab.models.stack_balance import free_equilibrium, loaded_equilibrium
+from sbafab.models.stack_balance import Balance, free_equilibrium, loaded_equilibrium
 from sbafab.models.stack_loads import (
     RING_POINTS,
     Chain,
@@ -44,6 +45,11 @@ RIM_POINTS = 24
 """Least number of points round a level's outline where its rims may meet the next level's."""
 NO_LOAD: dict[str, Any] = {"tip_load": (0.0, 0.0, 0.0), "gravity": False, "plate": None}
 """Defaults of the arguments of ``Stack.load``."""
+NOT_FOUND = (
+    "no equilibrium of the stack found at these pressures, under this load; try a smaller one"
+)
+CHUNK, LOADED_CHUNK = 256, 64
+"""States solved together, without and with a load: more bring no speed, and cost memory."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +121,54 @@ class Pose:
         """Degrees round the base, from x, towards which it bends; 0 where it stands straight."""
         x, y = self.freedoms[:, 1:].sum(0)
         return math.degrees(math.atan2(-x, y)) if math.hypot(x, y) > 1e-9 else 0.0
+
+
+class Equilibria(NamedTuple):
+    """States of a stack: ``pressures`` (n, chambers) in kPa and ``freedoms`` (n, rows, 3), a row
+    per kind of balloon without a load and per level under one; ``volumes`` (n, chambers) ul,
+    ``energies`` (n) uJ in the films, ``pushes`` (n) mN on an outer plate, which are stable and
+    which have been found (n); ``excess`` (n) mm by which a balloon rises above its map.
+    """
+
+    pressures: Array
+    freedoms: Array
+    volumes: Array
+    energies: Array
+    pushes: Array
+    is_stable: NDArray[np.bool_]
+    is_found: NDArray[np.bool_]
+    excess: Array
+
+    @property
+    def is_met(self) -> NDArray[np.bool_]:
+        """Which have been found, with all balloons on their maps: (n)."""
+        return np.asarray(self.is_found & (self.excess <= 0))
+
+
+@dataclass(frozen=True, eq=False)
+class BatchPoses:
+    """N poses of a stack at ``pressures`` (N, chambers) in kPa.
+
+    ``freedoms`` (N, levels, 3) are rise in mm and tilt in rad of each level; ``volumes``
+    (N, chambers) ul; ``tips`` (N, 3) the middles of the top plates in mm; ``forces`` (N,) N on an
+    outer plate.
+    """
+
+    pressures: Array
+    freedoms: Array
+    volumes: Array
+    tips: Array
+    forces: Array
+
+    @property
+    def heights(self) -> Array:
+        """Heights of the middles of the top plates above the base in mm: (N,)."""
+        return np.asarray(self.tips[:, 2])
+
+    @cached_property
+    def bends(self) -> Array:
+        """Degrees from base to top, along the stack: (N,)."""
+        return np.asarray(np.degrees(np.hypot(*self.freedoms[:, :, 1:].sum(1).T)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,26 +259,17 @@ class PosedStack:
         """Gaps of each level."""
         return self.places.at(self.levels)
 
-    def springs(self, pressures: Sequence[float], sucked: bool = False) -> Springs:
-        """Return the springs of each kind of balloon at pressures, one a chamber. Raises
-        DesignError.
+    def springs(
+        self, pressures: ArrayLike, sucked: bool = False, by_level: bool = False, orders: int = 2
+    ) -> Springs:
+        """Return the springs of each kind of balloon, or of each level, at pressures (...,
+        chambers). Raises DesignError.
 
-        With ``sucked`` a chamber that is shut may stand below 0 kPa.
+        With ``sucked`` a chamber that is shut may stand below 0 kPa; three ``orders`` as of
+        ``Springs.pressed``.
         """
-        try:
-            values = np.array(pressures, dtype=float)
-        except (TypeError, ValueError):
-            raise DesignError("pressures must be numbers in kPa, one a chamber") from None
-        if values.shape != (self.chambers,):
-            raise DesignError(
-                f"{values.size} pressures are given for {self.chambers} chambers; give one a "
-                "chamber"
-            )
-        return Springs.pressed(self.maps, values, self.places, sucked)
-
-    def each(self, springs: Springs) -> Springs:
-        """Return the springs of each level."""
-        return Springs(springs.table, self.level_places)
+        places = self.level_places if by_level else self.places
+        return Springs.pressed(self.maps, np.asarray(pressures, float), places, sucked, orders)
 
     def pose(
         self,
@@ -243,31 +288,150 @@ class PosedStack:
         only where chambers may be ``sucked``: shut, with a fluid that keeps its volume. Raises
         DesignError for pressures outside the maps, and where Newton's method finds no equilibrium.
         """
-        springs = self.springs(pressures, sucked)
+        try:
+            values = np.array(pressures, dtype=float)
+        except (TypeError, ValueError):
+            raise DesignError("pressures must be numbers in kPa, one a chamber") from None
+        if values.shape != (self.chambers,):
+            raise DesignError(
+                f"{values.size} pressures are given for {self.chambers} chambers; give one a "
+                "chamber"
+            )
         load = self.load(tip_load, gravity, plate)
-        if load is None:
-            if near is None:
-                start = self.start_freedoms(pressures)
-            else:
-                start = near.freedoms[self.first_levels]
-            kinds = free_equilibrium(springs, start)
-            return self.pose_at(pressures, springs, kinds[self.levels], kinds)
-        if near is not None:
-            start = near.freedoms
-        else:
-            start = self.start_freedoms(pressures)
-            if load.wall is not None and not (load.wall.is_level and load.wall.sticks):
-                start = free_equilibrium(springs, start)
-            start = start[self.levels]
-        freedoms, push, stable = loaded_equilibrium(
-            self.each(springs), self.pitch, load, start, near is not None
-        )
-        return self.pose_at(pressures, springs, freedoms, None, push / 1000, stable)
+        start = None if near is None else near.freedoms[None]
+        return self.pose_of(self.equilibria(values[None], load, start, sucked))
 
-    def pose_like(self, freedoms: Array, pressures: Sequence[float] = ()) -> Pose:
-        """Return a pose with freedoms (levels, 3) to start from: not in equilibrium."""
-        none = np.zeros(0)
-        return Pose(tuple(pressures), freedoms, none, none, 0.0, 0.0, True, self.pitch)
+    def equilibria(
+        self,
+        pressures: Array,
+        load: Load | None,
+        start: Array | None = None,
+        sucked: bool = False,
+    ) -> Equilibria:
+        """Return the equilibria of n states at pressures (n, chambers) in kPa, from freedoms (n,
+        levels, 3) if given. Raises DesignError for pressures outside the maps.
+        """
+        if not len(pressures):
+            return self.no_states(load, 0)
+        size = CHUNK if load is None else LOADED_CHUNK if load.wall is None else 1
+        if len(pressures) <= size:
+            return self._solved(pressures, load, start, sucked)
+        parts = [slice(begin, begin + size) for begin in range(0, len(pressures), size)]
+        each = [
+            self._solved(pressures[part], load, None if start is None else start[part], sucked)
+            for part in parts
+        ]
+        return Equilibria(*(np.concatenate(part) for part in zip(*each, strict=True)))
+
+    def _solved(
+        self, pressures: Array, load: Load | None, start: Array | None, sucked: bool
+    ) -> Equilibria:
+        springs = self.springs(pressures, sucked, by_level=load is not None)
+        begin = self.start_freedoms(pressures) if start is None else start
+        if load is None:
+            begin = begin if start is None else begin[:, self.first_levels]
+            return self.settled(pressures, free_equilibrium(springs, begin), load, sucked, springs)
+        if start is None:
+            if load.wall is not None and not (load.wall.is_level and load.wall.sticks):
+                begin = free_equilibrium(self.springs(pressures, sucked), begin).freedoms
+            begin = begin[:, self.levels]
+        found = loaded_equilibrium(springs, self.pitch, load, begin, start is not None)
+        return self.settled(pressures, found, load, sucked, springs)
+
+    def settled(
+        self,
+        pressures: Array,
+        found: Balance,
+        load: Load | None,
+        sucked: bool = False,
+        springs: Springs | None = None,
+    ) -> Equilibria:
+        """Return the states of a balance at pressures (n, chambers) in kPa."""
+        if springs is None:
+            springs = self.springs(pressures, sucked, by_level=load is not None)
+        counts, tops = self.row_counts[load is None], self.row_tops[load is None]
+        each, stored = springs.contents(found.freedoms)
+        volumes = counts @ each
+        energies = stored @ counts + (pressures * volumes).sum(-1)
+        excess = (found.freedoms @ self.centres - tops).max((1, 2))
+        return Equilibria(pressures, found.freedoms, volumes, energies, *found[1:], excess)
+
+    def pose_of(self, states: Equilibria, number: int = 0) -> Pose:
+        """Return one of the states as a pose. Raises DesignError if it has none."""
+        if not states.is_found[number]:
+            raise DesignError(NOT_FOUND)
+        excess, top = states.excess[number], self.row_tops[1].min()
+        if excess > 0:
+            raise DesignError(
+                "a balloon would rise higher than its films can be stretched "
+                f"({excess:.2g} mm above {top:.3g} mm); give less pressure or load"
+            )
+        freedoms = self.by_level(states.freedoms[number])
+        return Pose(
+            tuple(states.pressures[number].tolist()),
+            freedoms,
+            freedoms @ self.centres,
+            states.volumes[number],
+            float(states.pushes[number]) / 1000,
+            float(states.energies[number]),
+            bool(states.is_stable[number]),
+            self.pitch,
+        )
+
+    def poses_of(self, states: Equilibria) -> BatchPoses:
+        """Return the states as poses. Raises DesignError as for the first that has none."""
+        for number in np.flatnonzero(~states.is_met)[:1]:
+            self.pose_of(states, int(number))
+        return BatchPoses(
+            states.pressures,
+            self.by_level(states.freedoms),
+            states.volumes,
+            self.tips(states.freedoms),
+            states.pushes / 1000,
+        )
+
+    def no_states(self, load: Load | None, count: int) -> Equilibria:
+        """Return ``count`` states under a load that are not found."""
+        none, each = np.zeros(count), np.zeros((count, self.chambers))
+        freedoms = np.zeros((count, len(self.row_counts[load is None]), 3))
+        balance = Balance.none(freedoms)
+        return Equilibria(each, freedoms, each.copy(), none, *balance[1:], none.copy())
+
+    def states_of(self, pose: Pose, load: Load | None) -> Equilibria:
+        """Return a pose under a load as one state."""
+        rows = pose.freedoms if load is not None else pose.freedoms[self.first_levels]
+        true, stable = np.ones(1, dtype=bool), np.array([pose.stable])
+        return Equilibria(
+            np.array([pose.pressures]),
+            rows[None],
+            pose.volumes[None],
+            np.array([pose.energy]),
+            np.array([1000 * pose.force]),
+            stable,
+            true,
+            -np.ones(1),
+        )
+
+    def by_level(self, freedoms: Array) -> Array:
+        """Return freedoms (..., kinds, 3), or (..., levels, 3) themselves, of each level."""
+        is_level = freedoms.shape[-2] == len(self.levels)
+        return freedoms if is_level else freedoms[..., self.levels, :]
+
+    def tips(self, freedoms: Array) -> Array:
+        """Return the middles of the top plates in mm, by freedoms (n, rows, 3) as of
+        ``Equilibria``: (n, 3).
+        """
+        if freedoms.shape[-2] == len(self.levels):
+            return plate_chain(freedoms, self.pitch).tip
+        # Equal levels move all beyond them alike.
+        alone = plate_chain(freedoms[..., None, :], self.pitch)
+        moves = np.zeros((*freedoms.shape[:-1], 4, 4))
+        moves[..., :3, :3], moves[..., :3, 3] = alone.axes[..., 1, :, :], alone.tip
+        moves[..., 3, 3] = 1.0
+        whole: Array = np.eye(4)
+        for kind, levels in groupby(self.levels.tolist()):
+            whole = whole @ np.linalg.matrix_power(moves[..., kind, :, :], sum(1 for _ in levels))
+        return np.asarray(whole[..., :3, 3])
 
     def within(self, pose: Pose) -> bool:
         """Return True if the maps hold for all balloons of a pose: within 3 % of balloons between
@@ -293,11 +457,12 @@ class PosedStack:
             return [self.within(pose) for pose in poses] if len(poses) > 1 else [False]
         return holds.tolist()
 
-    def start_freedoms(self, pressures: Sequence[float]) -> Array:
-        """Return rise and tilt to start from, one row per kind of balloon: the plane nearest to the
-        free heights of the balloons.
+    def start_freedoms(self, pressures: ArrayLike) -> Array:
+        """Return rise and tilt to start from at pressures (..., chambers), one row per kind of
+        balloon (..., kinds, 3): the plane nearest to the free heights of the balloons.
         """
-        return np.stack([kind.rises(pressures) for kind in self.maps]) @ self.planes
+        rises = [kind.rises(pressures)[..., None, :] for kind in self.maps]
+        return np.concatenate(rises, axis=-2) @ self.planes
 
     @cached_property
     def most_pressure(self) -> float:
@@ -305,9 +470,16 @@ class PosedStack:
         return round(min(kind.most_pressure for kind in self.maps), 9)
 
     @cached_property
-    def _top(self) -> Array:
-        """Largest height of each level's map in mm: (levels, 1)."""
-        return np.array([self.maps[kind].most_height for kind in self.levels])[:, None]
+    def row_tops(self) -> tuple[Array, Array]:
+        """Largest height in mm of the map of each level, and of each kind: (rows, 1)."""
+        kinds = np.array([[kind.most_height] for kind in self.maps])
+        return kinds[self.levels], kinds
+
+    @cached_property
+    def row_counts(self) -> tuple[Array, Array]:
+        """How many levels each level, and each kind of balloon, stands for: (rows,)."""
+        kinds = np.bincount(self.levels, minlength=len(self.maps))
+        return np.ones(len(self.levels)), kinds.astype(float)
 
     @cached_property
     def first_levels(self) -> NDArray[np.int_]:
@@ -322,6 +494,29 @@ class PosedStack:
                 "gravity needs the density of every film; add films.<name>.density, in kg/m3"
             )
         return self.weight
+
+    def acting(self, arguments: dict[str, Any]) -> Load | None:
+        """Return the load that arguments of ``pose`` beside pressures are. Raises DesignError."""
+        unknown = sorted(set(arguments) - {*NO_LOAD, "sucked"})
+        if unknown:
+            raise DesignError(
+                f"a load has no {unknown[0]}; give tip_load, gravity or plate, as of Stack.pose"
+            )
+        return self.load(*(arguments.get(name, value) for name, value in NO_LOAD.items()))
+
+    def table(self, pressures: ArrayLike, rows: int | None = None) -> Array:
+        """Return pressures (rows, chambers) in kPa. Raises DesignError if they are invalid."""
+        try:
+            table = np.asarray(pressures, dtype=float)
+        except (TypeError, ValueError):
+            table = np.zeros(0)
+        shape = (len(table) if rows is None and table.ndim else rows, self.chambers)
+        if table.shape != shape or not np.isfinite(table).all():
+            states = "a row a state" if rows is None else f"{rows} rows"
+            raise DesignError(
+                f"pressures in kPa must be finite numbers, {states} of {self.chambers}"
+            )
+        return table
 
     def load(
         self,
@@ -351,38 +546,3 @@ class PosedStack:
                 f"{self.flat_height:.4g} mm"
             )
         return Load(force, weight, wall)
-
-    def pose_at(
-        self,
-        pressures: Sequence[float],
-        springs: Springs,
-        freedoms: Array,
-        kinds: Array | None = None,
-        force: float = 0.0,
-        stable: bool = True,
-    ) -> Pose:
-        """Return a pose; ``kinds`` are its freedoms by kind of balloon where levels are equal."""
-        gaps = freedoms @ self.centres
-        highest = float((gaps - self._top).max())
-        if highest > 0:
-            raise DesignError(
-                "a balloon would rise higher than its films can be stretched "
-                f"({highest:.2g} mm above {self._top.min():.3g} mm); give less pressure or load"
-            )
-        if kinds is None:
-            volumes, energies = self.each(springs).contents(freedoms)
-        else:
-            each, stored = springs.contents(kinds)
-            volumes, energies = each[self.levels], stored[self.levels]
-        volumes, energy = volumes.sum(0), float(energies.sum())
-        p = np.asarray(pressures, dtype=float)
-        return Pose(
-            tuple(p.tolist()),
-            freedoms,
-            gaps,
-            volumes,
-            force,
-            energy + float(p @ volumes),
-            stable,
-            self.pitch,
-        )

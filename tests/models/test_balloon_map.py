@@ -16,11 +16,9 @@ from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import (
     DEGREE,
     HEIGHT_SPANS,
-    PIECES_IN_ALL,
     PRESSURE_SPANS,
     BalloonMap,
     balloon_map,
-    derivatives,
     horner,
 )
 from sbafab.models.elastic import OUTSIDE
@@ -118,10 +116,10 @@ def never_falls(made: BalloonMap) -> None:
     p = np.minimum(scale * np.sinh(x * math.asinh(made.most_pressure / scale)), made.most_pressure)
     y = np.linspace(0, HEIGHT_SPANS, 16 * HEIGHT_SPANS + 1)
     y = np.broadcast_to(y, (len(p), len(y)))
-    rows = PIECES_IN_ALL * np.arange(len(p))[:, None]
-    potential, slopes = made.pressed(p)[:, 0], made.volume_slopes(p)
-    stiffness = horner(derivatives(potential.reshape(-1, DEGREE + 1)), rows, y)[2]
-    growth = horner(derivatives(slopes.reshape(-1, DEGREE + 1)), rows, y)[0]
+    potential, _, slopes = made.splines(p, 3).transpose(2, 0, 1, 3)
+    rows, flat = np.arange(len(p))[:, None], (DEGREE + 1, -1)
+    stiffness = horner(potential.reshape(flat), rows, y, len(p), with_rates=True)[2]
+    growth = horner(slopes.reshape(flat), rows, y, len(p))
     assert (stiffness > 0).all()
     assert (growth > 0).all()
 

@@ -15,6 +15,7 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.models.derivatives import hessian
 from sbafab.models.stack import NO_LOAD, Plate, Pose, Stack
+from sbafab.models.stack_balance import Balance
 from sbafab.models.stack_loads import (
     Load,
     loaded_energy,
@@ -51,18 +52,21 @@ def acting(stack: Stack, loads: dict[str, Any]) -> Load:
 
 def settled(stack: Stack, pressures: Array, load: Load, start: Array) -> Pose:
     """Return the pose in equilibrium to rounding."""
-    springs, at = stack.springs(pressures.tolist()), start
+    springs, at = stack.springs(pressures, by_level=True), start
     for _ in range(40):
-        now = loaded_energy(stack.each(springs), stack.pitch, load, at)
-        move = np.linalg.solve(hessian(now, at, stack.pitch), now.gradient).reshape(-1, 3)
-        after = loaded_energy(stack.each(springs), stack.pitch, load, at - move)
+        now = loaded_energy(springs, stack.pitch, load, at)
+        move = np.linalg.solve(hessian(now, now.rest(), at, stack.pitch), now.gradient).reshape(
+            -1, 3
+        )
+        after = loaded_energy(springs, stack.pitch, load, at - move)
         while np.abs(move).max() > 1e-6 and after.value > now.value:
             move = move / 2
-            after = loaded_energy(stack.each(springs), stack.pitch, load, at - move)
+            after = loaded_energy(springs, stack.pitch, load, at - move)
         at = at - move
         if np.abs(move).max() < 1e-13:
             break
-    return stack.pose_at(pressures.tolist(), springs, at, None, now.push / 1000)
+    balance = Balance.stable(at[None], now.push[None])
+    return stack.pose_of(stack.settled(pressures[None], balance, load))
 
 
 def figures(pose: Pose) -> Array:
@@ -79,12 +83,11 @@ def turn_rate(low: Pose, high: Pose, step: float) -> Array:
 
 def closed(stack: Stack, pose: Pose, load: Load) -> bytes:
     """Return which contacts are closed: derivatives jump where they change."""
-    places = stack.level_places.meet
-    gaps = (pose.freedoms[:, None] @ places)[:, 0]
-    springs = stack.each(stack.springs(pose.pressures))
+    shut = stack.level_places.closed(pose.freedoms)
+    springs = stack.springs(pose.pressures, by_level=True)
     touch = loaded_energy(springs, stack.pitch, load, pose.freedoms).touch
     deep = np.zeros(0) if touch is None else touch.deep
-    return bytes((gaps < 0).ravel()) + bytes(deep > 0)
+    return bytes(shut.ravel()) + bytes(deep > 0)
 
 
 class Case(NamedTuple):
@@ -203,12 +206,13 @@ def test_derivatives_are_central_differences_of_many_poses(name: str) -> None:
 def test_second_derivatives_are_those_of_the_energy(plate: Plate | None) -> None:
     """Far from equilibrium too, where forces turn all levels."""
     stack = stack_of("three chambers")
-    springs = stack.each(stack.springs((8, 5, 2)))
+    springs = stack.springs((8, 5, 2), by_level=True)
     load = stack.load((0.1, 0.2, -0.3), (0.0, 0.3, -1.0), plate)
     assert load is not None
     at = np.random.default_rng(1).uniform(-0.2, 0.2, (15, 3))
     at[:, 0] += 0.8
-    matrix = hessian(loaded_energy(springs, stack.pitch, load, at), at, stack.pitch)
+    now = loaded_energy(springs, stack.pitch, load, at)
+    matrix = hessian(now, now.rest(), at, stack.pitch)
     step = 1e-6
     for number in (0, 1, 2, 22, 23, 43, 44):
         ahead = step * np.eye(45)[number].reshape(15, 3)
@@ -246,7 +250,7 @@ def test_a_straight_column_is_as_stiff_as_its_balloons_in_series() -> None:
 def test_volumes_of_a_map_grow_as_their_slopes_say() -> None:
     balloon = stack_of("three chambers").maps[0]
     pressures, step = np.array([-0.05, 0.03, 1.0, 40.0]), 1e-5
-    low, high = (balloon.pressed(pressures + side * step, sucked=True) for side in (-1, 1))
-    difference = (high - low)[:, 1] / (2 * step)
-    slopes = balloon.volume_slopes(pressures, sucked=True)
+    low, high = (balloon.splines(pressures + side * step, 2, sucked=True) for side in (-1, 1))
+    difference = (high - low)[:, :, 1] / (2 * step)
+    slopes = balloon.splines(pressures, 3, sucked=True)[:, :, 2]
     assert slopes == pytest.approx(difference, rel=1e-5, abs=1e-5 * np.abs(difference).max())

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 import sbafab
+from sbafab.models.motion import LEAST_CONTENT, SUCTION, TOLERANCE, Motion
 from sbafab.models.pneumatics import AIR, WATER, Line
-from sbafab.models.stack import LEAST_CONTENT, SUCTION, TOLERANCE, Motion, Stack
+from sbafab.models.stack import Stack
 
 COUNT = int(os.environ.get("SBAFAB_HISTORIES", "3"))
 STEPS = 15

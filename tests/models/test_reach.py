@@ -10,6 +10,7 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError, UnreachableError
+from sbafab.models.reach import _Alone
 from sbafab.models.stack import Plate, Stack
 from sbafab.models.stack_batch import StackBatch
 
@@ -75,8 +76,8 @@ def test_few_of_many_targets_are_left_to_be_met_alone(
     three: Stack, load: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tips, alone = np.array(list(targets(three, 8, LOADS[load]))), []
-    monkeypatch.setattr("sbafab.models.batch_reach.FEW", 0)
-    monkeypatch.setattr(Stack, "reach", lambda _, tip, *__, **___: alone.append(tip))
+    reached = _Alone.reached
+    monkeypatch.setattr(_Alone, "reached", lambda *each: alone.append(1) or reached(*each))
     StackBatch(three).reach(tips, MOST, **LOADS[load])
     assert len(alone) <= 1
 

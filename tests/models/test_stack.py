@@ -179,7 +179,7 @@ def test_without_a_load_all_levels_are_alike_in_the_full_solve_too(three: Stack)
 
 
 def test_gradients_of_a_loaded_stack_are_those_of_its_energy(three: Stack) -> None:
-    springs = three.each(three.springs((20, 8, 3)))
+    springs = three.springs((20, 8, 3), by_level=True)
     plate = Plate((0.3, 0.0, 9.0), (0.1, 0.0, 1.0))
     load = three.load((0.1, 0.2, -0.3), (0.0, 0.3, -1.0), plate)
     assert load is not None
@@ -314,7 +314,7 @@ def test_a_stack_that_slips_far_under_a_plate_has_a_pose(pressures: Any) -> None
     assert pose.stable
     load = stack.load((0.0, 0.0, 0.0), False, plate)
     assert load is not None
-    springs = stack.each(stack.springs(pressures))
+    springs = stack.springs(pressures, by_level=True)
     now = loaded_energy(springs, stack.pitch, load, pose.freedoms)
     assert np.abs(now.gradient).max() < 1e-3 * now.push
 
@@ -361,15 +361,17 @@ def test_any_start_ends_in_the_same_balance(three: Stack, load: str) -> None:
     for pressures in ((4.26, 0.56, 8.7), (0.21, 0.18, 1.46), (0.5, 8.0, 0.2), (6.0, 3.0, 1.0)):
         pose = three.pose(pressures, **loads)
         assert acting is not None
-        springs = three.springs(pressures)
-        start = free_equilibrium(springs, three.start_freedoms(pressures))[three.levels]
-        each, wall = three.each(springs), acting.wall
+        each, wall = three.springs([pressures], by_level=True), acting.wall
+        begin = three.start_freedoms([pressures])
+        start = free_equilibrium(three.springs([pressures]), begin).freedoms[:, three.levels]
         if wall is None:
             slow = _energy_descent(each, three.pitch, acting, start, MOST_STEPS)
         else:
-            slow = _by_softer_plates(each, three.pitch, acting, wall, start)
-        assert slow is not None
-        places = plate_chain(slow[0], three.pitch).places
+            found = _by_softer_plates(each.at(0), three.pitch, acting, wall, start[0])
+            assert found is not None
+            slow = found
+        assert slow.is_found.all()
+        places = plate_chain(slow.freedoms[0], three.pitch).places
         assert pose.frames[0] == pytest.approx(places, abs=1e-5)
         assert pose.stable
 

@@ -10,8 +10,7 @@ from tests.packaging.sources import sources
 ROOT = Path(sbafab.__file__).parent
 STATES = {
     "as_built/expected.py": {"_ContourGroup"},
-    "models/stack.py": {"Motion"},
-    "models/stack_batch.py": {"BatchMotion"},
+    "models/motion.py": {"Motion", "BatchMotion"},
     "output/artefacts.py": {"DesignFolder"},
     "rules/voids.py": {"VoidGraph"},
     "studio/app.py": {"Studio"},

@@ -188,7 +188,7 @@ class PressedChain:
         """
         tilt_x, tilt_y, rise, tilt_y_upper, tilt_x_upper = data.qpos[self.places].T
         at = np.stack([rise, tilt_x + tilt_x_upper, tilt_y + tilt_y_upper], axis=-1)
-        _, gradient, matrices = self.stack.each(self.stack.springs(pressures)).energy(at)
+        _, gradient, matrices = self.stack.springs(pressures, by_level=True).energy(at)
         # Both halves of a tilt carry its full moment, and each moves by half.
         data.qfrc_applied[self.dofs] = -gradient[:, BY_JOINT]
         stiff = np.einsum("lii->li", matrices)[:, BY_JOINT] * HALVES
