@@ -14,9 +14,9 @@ DESIGN = "3dof-15mm"
 def rules_and_cut_files(balloons: int, turn: int) -> float:
     """Seconds from the design to its findings and cut files, without the copies' share."""
     from sbafab.actuators import build, load_design
-    from sbafab.build.build import cut_settings
     from sbafab.cutting.kerf import compensated_paths
     from sbafab.cutting.layer_files import write_layer_files
+    from sbafab.orders.build import cut_settings
     from sbafab.rules.deck import run_deck
 
     another = f"chamber.diameter={5 + turn / 1000}"

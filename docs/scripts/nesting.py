@@ -24,7 +24,6 @@ from typing import Any
 import shapely
 
 from sbafab.actuators import load_design
-from sbafab.build.build import make_build, stocks
 from sbafab.design.files import template_names
 from sbafab.errors import DesignError
 from sbafab.geometry.contour import run_chords
@@ -34,6 +33,7 @@ from sbafab.nesting.check import check_nest
 from sbafab.nesting.engines import bottom_left
 from sbafab.nesting.nest import materials_of, nest, of_material
 from sbafab.nesting.records import NestPart, Stock
+from sbafab.orders.build import make_build, stocks
 
 COPIES = (1, 4, 8, 20)
 SECONDS = 25

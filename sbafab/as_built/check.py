@@ -50,8 +50,6 @@ from sbafab.as_built.records import (
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.checks import run_checks
 from sbafab.assemblies.files import DESIGN_FILE, load_assembly
-from sbafab.build.build import Build, make_build
-from sbafab.build.order import SCHEMA, Order, of_assembly
 from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import FOLDER as LAYERS
 from sbafab.cutting.properties import curves_of
@@ -62,6 +60,8 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.figures import Factors, PredictionRequest
 from sbafab.models.prediction import predict
+from sbafab.orders.build import Build, make_build
+from sbafab.orders.order import SCHEMA, Order, of_assembly
 from sbafab.output.artefacts import (
     ARTEFACTS,
     EVERYTHING,

@@ -9,8 +9,8 @@ from typing import TypeVar
 
 from pydantic import ValidationError
 
-from sbafab.build.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.errors import OutputError
+from sbafab.orders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import read_manifest
 from sbafab.rules.finding import Finding, Place, Verdict

@@ -13,8 +13,6 @@ import click
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.files import load
-from sbafab.build.build import Build, refuse_undoable
-from sbafab.build.order import Order, make_order
 from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.cli.options import (
     designs,
@@ -44,6 +42,8 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError, SbafabError
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.formulas import size_phrases, sizes
+from sbafab.orders.build import Build, refuse_undoable
+from sbafab.orders.order import Order, make_order
 from sbafab.output.advice import Advice, advise
 from sbafab.output.checks import checks
 from sbafab.process import Progress

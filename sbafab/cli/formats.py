@@ -13,7 +13,6 @@ from pydantic import BaseModel, Field
 
 from sbafab import actuators
 from sbafab.assemblies.records import Assembly
-from sbafab.build.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.cli.explain import ExplainDocument, ExplainedDocument
 from sbafab.cli.kerf import KerfDocument
 from sbafab.cli.make import NestedDocument, RunDocument
@@ -27,6 +26,7 @@ from sbafab.laminate.joints import PortKind
 from sbafab.laminate.netlist import SCHEMA as NETS
 from sbafab.models.map_files import MapDocument
 from sbafab.models.sensitivities import SensitivityRow
+from sbafab.orders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.output.artefacts import PredictDocument
 from sbafab.output.checks import Checks
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest

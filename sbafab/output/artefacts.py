@@ -14,7 +14,6 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from sbafab.build.build import Build, hole_notes
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.layer_files import write_layer_files
 from sbafab.cutting.properties import CutSettings
@@ -35,6 +34,7 @@ from sbafab.models.calibrated import NONE, load_calibration, shipped_names
 from sbafab.models.figures import Prediction, PredictionDocument
 from sbafab.nesting.nest import PLACES, as_dict
 from sbafab.nesting.records import Nest
+from sbafab.orders.build import Build, hole_notes
 from sbafab.output.checks import Checks, checks
 from sbafab.output.manifest import as_json
 from sbafab.pressing.cycles import batch_entry

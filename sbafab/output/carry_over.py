@@ -8,10 +8,10 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.build.build import Build
 from sbafab.design.files import shown
 from sbafab.design.records import Design, dotted, resolved
 from sbafab.errors import OccupiedError, OutputError
+from sbafab.orders.build import Build
 from sbafab.output.artefacts import ARTEFACTS, tops_of
 from sbafab.output.manifest import carried_over, file_hash, file_names, identity
 from sbafab.output.swap import listed_files, read_manifest

@@ -12,11 +12,11 @@ from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
 from sbafab.assemblies.records import Cup
 from sbafab.assemblies.shapes import colours, cup_mould, linear, placed_surface
-from sbafab.build.order import SCHEMA, Order
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DefectError
 from sbafab.meshing.formats import Node, write_scene, write_stl
 from sbafab.nesting.records import Nest
+from sbafab.orders.order import SCHEMA, Order
 from sbafab.output.artefacts import (
     BENCH,
     FINDINGS,

@@ -14,8 +14,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from sbafab.build.build import Build, warnings
-from sbafab.build.order import SCHEMA, BatchSchema
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.properties import CutSettings, layer_path, said_of
 from sbafab.cutting.seam_files import seam_path
@@ -29,6 +27,8 @@ from sbafab.laminate.joints import SeamKind, SeamTool
 from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, Role
 from sbafab.meshing.mesh_files import MeshFile
 from sbafab.models.formulas import sizes
+from sbafab.orders.build import Build, warnings
+from sbafab.orders.order import SCHEMA, BatchSchema
 from sbafab.pressing.cycles import Runs
 from sbafab.version import GENERATOR
 

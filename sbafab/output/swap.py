@@ -14,8 +14,8 @@ from pathlib import Path, PurePath
 
 from filelock import FileLock, Timeout
 
-from sbafab.build.order import SCHEMA, SCHEMAS
 from sbafab.errors import OutputError, SbafabError
+from sbafab.orders.order import SCHEMA, SCHEMAS
 
 MANIFEST = "manifest.json"
 CUT_FOLDERS = ("layers", "sheets")

@@ -109,7 +109,7 @@ class Places(NamedTuple):
         return x, y
 
 
-class Group(NamedTuple):
+class MarginGroup(NamedTuple):
     """Interfaces of equal profiles and equal freedoms, and the narrow places of the first."""
 
     interfaces: tuple[Interface, ...]
@@ -277,7 +277,7 @@ def narrow_places(
     pins: tuple[Pin, ...],
     design: Design,
     moves: Freedoms,
-) -> list[Group]:
+) -> list[MarginGroup]:
     """Return all margins that could become the least under the tolerances, or fall short of a
     limit, of the first of each group of interfaces: its bond's least width, the masks' reaches
     past film edges, and the overlaps of its seams.
@@ -308,7 +308,7 @@ def narrow_places(
         )
         if free and not first.contact.is_empty:
             places["overhang"] = overhang_places(first.mask, free, loss, films)
-        found.append(Group(groups[number], places))
+        found.append(MarginGroup(groups[number], places))
     return found
 
 
@@ -453,7 +453,7 @@ class Margins(NamedTuple):
     per radian of a turn, 0 for a shift.
     """
 
-    group: Group
+    group: MarginGroup
     quantity: MarginKind
     owners: Owners
     numbers: Indices
@@ -483,7 +483,7 @@ class Margins(NamedTuple):
         return sum([freedom.most for freedom, _ in self.moves if not freedom.by_hand], 0.0)
 
 
-def margins_of(groups: Sequence[Group], moves: Freedoms) -> list[Margins]:
+def margins_of(groups: Sequence[MarginGroup], moves: Freedoms) -> list[Margins]:
     """Return the margins of all groups, bonds before overhangs, by the owners of their edges."""
     return [
         _between(group, quantity, number, moves)
@@ -494,7 +494,7 @@ def margins_of(groups: Sequence[Group], moves: Freedoms) -> list[Margins]:
     ]
 
 
-def _between(group: Group, quantity: MarginKind, number: int, moves: Freedoms) -> Margins:
+def _between(group: MarginGroup, quantity: MarginKind, number: int, moves: Freedoms) -> Margins:
     places, layers = group.places[quantity], seated(group.first)
     (numbers,) = (places.between == number).nonzero()
     own, owners = places.at(numbers), places.owners[number]

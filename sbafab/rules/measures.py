@@ -19,7 +19,7 @@ from sbafab.rules.finding import Place
 from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
 from sbafab.rules.margins import (
     SHARP,
-    Group,
+    MarginGroup,
     Margins,
     group_interfaces,
     margins_of,
@@ -99,7 +99,7 @@ class Measures:
         return seam_ends(self.laminate, first, self.design.registration.error_of_seam)
 
     @cached_property
-    def groups(self) -> list[Group]:
+    def groups(self) -> list[MarginGroup]:
         """Equal interfaces, with their narrow places."""
         interfaces = self._equal_interfaces
         return narrow_places(

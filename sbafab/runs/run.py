@@ -17,8 +17,6 @@ from typing import TYPE_CHECKING, Any
 
 from sbafab.as_built.as_cut import refuse_coarse
 from sbafab.assemblies.records import Assembly
-from sbafab.build.build import Build, make_build
-from sbafab.build.order import JOB_SCHEMA, SCHEMA, Order, make_order
 from sbafab.cutting.properties import TRUE_ARCS, Curves
 from sbafab.design.records import Design
 from sbafab.errors import OccupiedError, OutputError
@@ -26,6 +24,8 @@ from sbafab.laminate.burst import burst
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import Prediction
 from sbafab.notebook import table_html
+from sbafab.orders.build import Build, make_build
+from sbafab.orders.order import JOB_SCHEMA, SCHEMA, Order, make_order
 from sbafab.output.artefacts import EVERYTHING, PICTURES, RunPart, tops_of
 from sbafab.output.carry_over import carry_over, refuse_to_replace, removed_files, would_replace
 from sbafab.output.folder import close_folder, write_folder

@@ -16,7 +16,6 @@ from typing import Any, NamedTuple, TypeVar
 from pydantic import AliasPath, Field
 
 from sbafab.actuators import load_design, records
-from sbafab.build.build import Build, make_build
 from sbafab.design.files import Change, override, shown
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, validated
@@ -31,6 +30,7 @@ from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import MOST_PRESSURE, stack
+from sbafab.orders.build import Build, make_build
 from sbafab.output import advice
 from sbafab.output.advice import YieldDesign, value_of
 from sbafab.output.swap import replace_text

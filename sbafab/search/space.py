@@ -17,7 +17,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sbafab.actuators import build
-from sbafab.build.build import Build, refuse_undoable
 from sbafab.design.files import shown
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, Free
@@ -25,6 +24,7 @@ from sbafab.design.units import millimetres
 from sbafab.errors import BeyondError, DesignError, GeometryError
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.stack import MOST_PRESSURE
+from sbafab.orders.build import Build, refuse_undoable
 from sbafab.process import Progress
 from sbafab.rules.deck import run_deck
 from sbafab.search.quantities import (

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.build.build import make_build
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, disc
 from sbafab.laminate.assembly import assembly
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.orders.build import make_build
 from sbafab.pressing.schedule import schedule
 
 DESIGNS = [

@@ -11,7 +11,7 @@ from typing import Any
 from unittest.mock import patch
 
 from sbafab.as_built import check as as_built
-from sbafab.build import build as builds
+from sbafab.orders import build as builds
 
 
 def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:

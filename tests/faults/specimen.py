@@ -14,10 +14,10 @@ from sbafab.as_built import as_cut
 from sbafab.as_built import check as as_built
 from sbafab.as_built.as_cut import CutPart, Expected, read_part
 from sbafab.as_built.check import check_folder
-from sbafab.build import build as builds
 from sbafab.geometry.region import Region
 from sbafab.laminate import laminate
 from sbafab.laminate.laminate import Laminate, Layer, Role, interface_regions
+from sbafab.orders import build as builds
 from sbafab.rules import registration_worst_case, registration_yield
 from sbafab.rules.deck import RULES, run_deck
 from tests.as_built.doctoring import Doctor

@@ -17,10 +17,10 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import assembly_toml, load
-from sbafab.build.order import make_order
 from sbafab.design.files import template_names, templates_folder
 from sbafab.design.records import Design, design_toml
 from sbafab.errors import SbafabError
+from sbafab.orders.order import make_order
 from tests.quick import few
 
 COUNT = int(os.environ.get("SBAFAB_MUTATIONS", "120"))

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.build.order import SCHEMA
 from sbafab.cli import main
+from sbafab.orders.order import SCHEMA
 from sbafab.output import swap
 from sbafab.output.swap import replaced_folder
 from sbafab.simulators import simulator

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.build.build import make_build
 from sbafab.cli import main
 from sbafab.design.records import Design
 from sbafab.laminate.base_plate import for_a_cnc_mill
+from sbafab.orders.build import make_build
 from sbafab.output.advice import CHECK_SEED, SEED, YieldDesign, advise, reach_yield
 from sbafab.output.checks import AdviceEntry
 from sbafab.rules.deck import has_failed, run_deck

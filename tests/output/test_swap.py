@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
-from sbafab.build.order import SCHEMA
 from sbafab.errors import OutputError
+from sbafab.orders.order import SCHEMA
 from sbafab.output import swap
 from sbafab.output.swap import replaced_folder
 

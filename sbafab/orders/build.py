@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Any, Literal
-
-from pydantic import AfterValidator, Field
 
 from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
@@ -15,10 +12,9 @@ from sbafab.cutting.entries import Entries
 from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings, Recipes
 from sbafab.design.films import Sheet, material
-from sbafab.design.identity import citation, design_sha256
+from sbafab.design.identity import design_sha256
 from sbafab.design.recipes import recipes_for
 from sbafab.design.records import Design
-from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.offset import widths
 from sbafab.geometry.region import Region
@@ -31,9 +27,10 @@ from sbafab.pressing.cycles import Runs, design_runs
 from sbafab.pressing.schedule import Schedule, plate_holes, schedule
 from sbafab.process import Progress
 from sbafab.rules.deck import has_failed, run_deck
-from sbafab.rules.finding import Finding, Verdict, summary
+from sbafab.rules.finding import Finding
 from sbafab.rules.limits import CHECKED_AGAINST, lowered
 from sbafab.version import GENERATOR
+
 
 @dataclass(frozen=True, eq=False)
 class Build:
@@ -112,7 +109,9 @@ class Build:
         return replace(plain, steps=(marked, *later), remarks=tuple(remarks))
 
 
-def make_build(design: Design, progress: Progress | None = None, curves: Curves = TRUE_ARCS) -> Build:
+def make_build(
+    design: Design, progress: Progress | None = None, curves: Curves = TRUE_ARCS
+) -> Build:
     """Build the laminate of a design and run the rule deck on it. Raises DesignError."""
     try:
         laminate = build(design)

@@ -21,7 +21,7 @@ from sbafab.errors import DefectError, DesignError, GeometryError, OutputError
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import PLACES, from_dict, nest
 from sbafab.nesting.records import Nest, NestPart
-from sbafab.build.build import Build, make_build, stocks
+from sbafab.orders.build import Build, make_build, stocks
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding
