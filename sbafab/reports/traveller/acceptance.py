@@ -78,7 +78,9 @@ def _boxes(names: list[str]) -> list[str]:
 
 def _shared(laminate: Laminate) -> dict[str, list[str]]:
     """Return the chambers with an inlet and the tubes on holes of each net that joins several."""
-    tubes = {port.name for port in laminate.tube_holes} | {one.chamber for one in laminate.inlets}
+    tubes = {port.name for port in laminate.tube_holes} | {
+        inlet.chamber for inlet in laminate.inlets
+    }
     nets = {net.name: [name for name in net.ports if name in tubes] for net in laminate.nets}
     return {net: names for net, names in nets.items() if len(names) > 1}
 
@@ -112,17 +114,17 @@ def straight_run(laminate: Laminate, inlet: Inlet) -> float:
     """
     (x, y), (u, v) = inlet.mouth, inlet.direction
 
-    def at(depth: float, left: float) -> Point:
-        return x - depth * u - left * v, y - depth * v + left * u
+    def at(depth: float, aside: float) -> Point:
+        return x - depth * u - aside * v, y - depth * v + aside * u
 
-    half, aside = inlet.width / 2 - STATION / 2, inlet.width / 2 + STATION / 2
+    within, beyond = inlet.width / 2 - STATION / 2, inlet.width / 2 + STATION / 2
     gap = laminate.mouth_gap(inlet)
     void = None if gap is None else gap.unbonded
     depth = 0.0
     while void is not None:
         here = depth + STATION
-        inside = all(void.contains(at(here, left)) for left in (-half, half))
-        if not inside or any(void.contains(at(here, left)) for left in (-aside, aside)):
+        inside = all(void.contains(at(here, wall)) for wall in (-within, within))
+        if not inside or any(void.contains(at(here, wall)) for wall in (-beyond, beyond)):
             break
         depth = here
     return depth

@@ -33,7 +33,7 @@ _NAMES = re.compile(r'(\b(?:id|aria-labelledby)="|\bhref="#|url\(#)')
 
 @dataclass(frozen=True)
 class AssemblyWork:
-    """What an assembly's traveller is made from; ``findings`` are from checks between parts.
+    """The input of an assembly's traveller; ``findings`` are from checks between parts.
 
     ``waived`` are checks, ``lowered`` limits below the defaults, for the checks between parts and
     for all designs; ``picture`` are the bytes of the assembly's picture.
@@ -56,33 +56,33 @@ class AssemblyWork:
         return {name: ascii_uppercase[i % 26] if several else "" for i, name in enumerate(names)}
 
 
-def assembly_html(made: AssemblyWork) -> str:
+def assembly_html(assembly: AssemblyWork) -> str:
     """Return the whole page, each pattern prefixed with the mark of its design."""
-    made = _with_marks(made)
-    assembled, works, marks = made.assembled, made.works, made.marks
+    assembly = _with_marks(assembly)
+    assembled, works, marks = assembly.assembled, assembly.works, assembly.marks
     name = assembled.assembly.name
-    text = record_text(name, made.sha256)
-    findings = [*made.findings, *(finding for work in works for finding in work.findings)]
+    text = record_text(name, assembly.sha256)
+    findings = [*assembly.findings, *(finding for work in works for finding in work.findings)]
     cups = [placed.name for placed in assembled.parts if isinstance(placed.part, Cup)]
     return render(
         "assembly.html.j2",
-        **frame(name, made.sha256),
+        **frame(name, assembly.sha256),
         **preparations(works, findings) | {"cups": cups},
         **cutting(works),
-        assembly=made,
+        assembly=assembly,
         order=assembled.assembly.order,
         works=works,
         design=works[0].design,
-        shapes=definitions(part_regions(made.sheets)),
+        shapes=definitions(part_regions(assembly.sheets)),
         code=code_svg(text),
         code_text=text,
-        picture=b64encode(made.picture).decode("ascii"),
+        picture=b64encode(assembly.picture).decode("ascii"),
         colours={part: f"#{bytes(rgb).hex()}" for part, rgb in colours(assembled).items()},
         tested=[name for build in assembled.designs for name in build.parts],
-        bill=_bill(made),
-        sheet_rows=sheet_rows(works[0].design, made.sheets, dict.fromkeys(marks, "")),
+        bill=_bill(assembly),
+        sheet_rows=sheet_rows(works[0].design, assembly.sheets, dict.fromkeys(marks, "")),
         marks=marks,
-        chapters=[_chapter(made, number) for number in range(1, len(works) + 1)],
+        chapters=[_chapter(assembly, number) for number in range(1, len(works) + 1)],
         step_rows=[(work, step_rows(work)) for work in works],
         joints=joints(assembled),
         joint_count=sum(placed.part.on is not None for placed in assembled.parts),
@@ -91,24 +91,24 @@ def assembly_html(made: AssemblyWork) -> str:
     )
 
 
-def _chapter(made: AssemblyWork, number: int) -> str:
+def _chapter(assembly: AssemblyWork, number: int) -> str:
     """Return the chapter on one design, with ids unique on the page."""
-    work = made.works[number - 1]
+    work = assembly.works[number - 1]
     page: dict[str, Any] = context(work)
     page["shapes"] = definitions(pattern_regions(work.laminate))
-    page |= {"in_chapter": True, "again": number > 1, "mark": made.marks[work.design.name]}
+    page |= {"in_chapter": True, "again": number > 1, "mark": assembly.marks[work.design.name]}
     return _NAMES.sub(rf"\g<1>d{number}-", render("chapter.html.j2", **page))
 
 
-def _with_marks(made: AssemblyWork) -> AssemblyWork:
+def _with_marks(assembly: AssemblyWork) -> AssemblyWork:
     """Return the work with "A P03" for P03 of its first design, on sheets and in laminates; a
     single design's patterns need no mark.
     """
-    marks = made.marks
+    marks = assembly.marks
     if len(marks) == 1:
-        return made
+        return assembly
     sheets = []
-    for sheet in made.sheets:
+    for sheet in assembly.sheets:
         parts = tuple(
             replace(part, pattern=f"{marks[part.design]} {part.pattern}")
             for part in sheet.nest.parts
@@ -116,13 +116,13 @@ def _with_marks(made: AssemblyWork) -> AssemblyWork:
         counts = tuple((name, f"{marks[name]} {pattern}", n) for name, pattern, n in sheet.counts)
         sheets.append(replace(sheet, counts=counts, nest=replace(sheet.nest, parts=parts)))
     works = []
-    for work in made.works:
+    for work in assembly.works:
         mark = marks[work.design.name]
         layers = tuple(
             replace(layer, pattern=f"{mark} {layer.pattern}") for layer in work.laminate.layers
         )
         works.append(replace(work, laminate=replace(work.laminate, layers=layers), sheets=sheets))
-    return replace(made, works=works, sheets=sheets)
+    return replace(assembly, works=works, sheets=sheets)
 
 
 # The bill of materials.
@@ -132,17 +132,17 @@ POUR = 10.0
 """Smallest amount of silicone that can be weighed and mixed well, ml: ours."""
 
 
-def _bill(made: AssemblyWork) -> list[Item]:
+def _bill(assembly: AssemblyWork) -> list[Item]:
     """Return the films of all designs together, each design's other items, and bought items."""
-    items = [*film_items(made.works)]
-    for work in made.works:
+    items = [*film_items(assembly.works)]
+    for work in assembly.works:
         for item in items_of_part(work):
             items.append(Item(f"{item.name} ({work.design.name})", item.what, item.quantity))
-    return list(dict.fromkeys([*items, *_bought(made.assembled)]))
+    return list(dict.fromkeys([*items, *_bought(assembly.assembled)]))
 
 
 def _bought(assembled: Assembled) -> Iterator[Item]:
-    """Yield what is not cut from film: parts, for a cup its silicone and mould, and adhesives."""
+    """Yield bought items: parts, for a cup its silicone and mould, and adhesives."""
     copies = assembled.assembly.order.copies
     for placed in assembled.parts:
         part = placed.part
@@ -225,7 +225,7 @@ class PartJoint:
 
     @property
     def heading(self) -> float:
-        """Degrees anti-clockwise from the mark of its carrier to that of the part, looking at the
+        """Degrees anti-clockwise from the mark of its carrier to the part's mark, looking at the
         face that it is fixed on: an actuator bends by its tabs.
         """
         assert self.carrier is not None

@@ -27,7 +27,7 @@ from sbafab.reports.traveller.work import Work
 from sbafab.rules.pin_fit import NAME as PIN_FIT
 from sbafab.rules.pin_fit import most_on_a_pin
 
-# Cutting: how films are held, and what is done with the parts.
+# Cutting: how films are held, and how parts are taken off the sheet.
 
 
 class HeldFilm(NamedTuple):
@@ -102,7 +102,7 @@ def _loose(works: Sequence[Work]) -> tuple[int, int]:
 
 
 def cutting(works: Sequence[Work]) -> dict[str, Any]:
-    """Return what the section on cutting says of designs on common sheets."""
+    """Return the facts of the section on cutting, for designs on common sheets."""
     loose, spare = _loose(works)
     return {
         "laser": laser(works[0]),
@@ -116,7 +116,7 @@ def cutting(works: Sequence[Work]) -> dict[str, Any]:
 
 
 def kerf_notes(works: Sequence[Work]) -> dict[str, list[str]]:
-    """Return the materials by what is said of the kerf of their cut files."""
+    """Return the materials by the note on the kerf of their cut files."""
     notes: dict[str, list[str]] = {}
     widths = works[0].design.kerf_widths
     for film in dict.fromkeys(film for work in works for film in work.films):
@@ -215,7 +215,7 @@ def bench_html(
 
 
 def _trials(works: Sequence[Work]) -> dict[str, object]:
-    """Return the films whose bond and adhesive need a trial: all that bond, except the paper's."""
+    """Return the films whose bond and adhesive need a trial: all but the paper's and masks."""
     papers = [(PAPER_PRODUCT, PAPER_THICKNESS)]
     bonded = [film for work in works for film in films_without_minutes(work.laminate, papers)]
     films = [film for work in works for film in work.laminate.glued_films]
@@ -228,7 +228,7 @@ def _trials(works: Sequence[Work]) -> dict[str, object]:
 
 
 def _tools(works: Sequence[Work], films: Iterable[Film]) -> dict[str, object]:
-    """Return what decides which tools are needed, without consumables."""
+    """Return the facts that decide on the tools, without consumables."""
     laminates = [work.laminate for work in works]
     steps = [step for work in works for step in work.schedule.steps]
     seams: dict[SeamTool, set[float]] = {}

@@ -48,11 +48,11 @@ class PiecePlace:
 
 
 class Alignment(NamedTuple):
-    """The edge of a layer beside that of its neighbour in a step, or of the stack above it.
+    """The edge of a layer and of its neighbour in a step, or of the stack above the layer.
 
-    It lies ``outside`` the ``neighbour``, mm; None if each piece has its place in the table. It is
-    that of ``layer`` in a stack, 0 for a layer by itself, and may lie ``on`` the edge of a film of
-    the same stack too. Neighbours are named, and numbered by ``numbers``.
+    It lies ``outside`` the ``neighbour``, mm; None if each piece has its place in the table.
+    ``layer`` is the one in a stack, 0 for a layer by itself. The edge may also lie ``on`` the edge
+    of a film of the same stack. Neighbours are named, and numbered by ``numbers``.
     """
 
     layer: int

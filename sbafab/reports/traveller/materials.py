@@ -1,4 +1,4 @@
-"""What a job needs: films, tubes and press supplies with their counts, and the parts to cut."""
+"""Materials of an order: films, tubes and press supplies, and the parts to cut."""
 
 from __future__ import annotations
 
@@ -60,14 +60,14 @@ def bill(work: Work) -> list[Item]:
 
 
 def items_of_part(work: Work) -> list[Item]:
-    """Return what a design in an assembly needs beside films; its wrap is the assembly's part."""
+    """Return the needs of a design in an assembly beside films; its wrap is the assembly's part."""
     return [*_tubes(work), *supplies(work)]
 
 
 def film_items(works: Sequence[Work]) -> Iterator[Item]:
     """Yield each film of designs on common sheets."""
     for film in dict.fromkeys(film for work in works for film in work.films):
-        layers = [(w, one) for w in works for one in w.laminate.layers if one.film == film]
+        layers = [(w, layer) for w in works for layer in w.laminate.layers if layer.film == film]
         area = sum(work.copies * layer.profile.area for work, layer in layers) / 100
         sheets = [sheet for sheet in works[0].sheets if sheet.material == film.material]
         sizes = Counter(size(sheet.width, sheet.length) for sheet in sheets)
@@ -268,7 +268,7 @@ def cut_list(work: Work) -> list[Cut]:
 def _cut(work: Work, same: Sequence[Layer]) -> Cut:
     """Return the row of layers of the same pattern; halves of a folded film are one part."""
     laminate, first = work.laminate, same[0]
-    halves = [one for one in laminate.layers if laminate.cut_with(one) == first.index]
+    halves = [half for half in laminate.layers if laminate.cut_with(half) == first.index]
     is_flat = len(halves) > 1 or first.turned
     profile = laminate.as_cut(first) if is_flat else first.profile
     layers = [*same, *(half for half in halves if half is not first)]

@@ -93,7 +93,7 @@ def context(work: Work) -> dict[str, Any]:
 
 
 def preparations(works: Sequence[Work], findings: Sequence[Finding]) -> dict[str, Any]:
-    """Return what is read, cut, printed and dried before the lay-up of designs."""
+    """Return the warnings, and the work that precedes the lay-up: cutting, printing, drying."""
     films = dict.fromkeys(film for work in works for film in work.films if film.warning)
     rules = {finding.rule for finding in findings if finding.verdict == "warn"}
     pressed = [work for work in works if work.schedule.steps]

@@ -176,8 +176,8 @@ def _draw(
         f'<svg x="{x}" y="{y}" width="{wide}" height="{high}" viewBox="{x} {y} {wide} {high}">',
         draw.box((left, top), (right, foot), fill="#ffffff"),
     )
-    placed = [(one, sheet.nest.region(one)) for one in sheet.nest.on_sheet(sheet.number - 1)]
-    visible = [(one, region) for one, region in placed if _meet(region.bounds, strip.bounds)]
+    placed = [(place, sheet.nest.region(place)) for place in sheet.nest.on_sheet(sheet.number - 1)]
+    visible = [(place, region) for place, region in placed if _meet(region.bounds, strip.bounds)]
     for placement, _ in visible:
         name = _part_id(sheet, placement.part)
         picture.part(name, film, strip.matrix(placement), "fresh")
@@ -206,8 +206,8 @@ def _label(
         if key not in places:
             shape = region.mapped(strip.at, strip.scale, mirror=True)
             places[key] = (x, y), labels(words, shape)
-        (first_x, first_y), found = places[key]
-        for place in (one.moved(x - first_x, y - first_y) for one in found):
+        (first_x, first_y), ranked = places[key]
+        for place in (free.moved(x - first_x, y - first_y) for free in ranked):
             if _within(place.box, strip.window) and not any(_meet(place.box, box) for box in taken):
                 taken.append(place.box)
                 picture.add(label(place.at, words, place.size))

@@ -1,4 +1,4 @@
-"""The press steps in order: what is laid, along what, held how, and what all steps share."""
+"""The press steps in order: layers and the edges they are laid along, pins, common settings."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ SETTLED = 1e-6
 """Largest distance of an edge from a circle around its pin for which a turn moves nothing, mm."""
 
 HandTask = Literal["none", "turn", "lay"]
-"""What the hand decides about a layer on its pins: nothing, its angle, its place."""
+"""The hand's task for a layer on its pins: none, its angle, its place."""
 
 
 class ByEye(NamedTuple):
-    """What a hand decides about layers of a pattern, and along what; ``layers`` are named if others
-    of that pattern lie along other edges.
+    """The hand's task for layers of a pattern, and the edge to lay them along; ``layers`` are named
+    if others of that pattern lie along other edges.
     """
 
     hand: HandTask
@@ -189,22 +189,22 @@ class PressPage:
         things = self.things
         hands = {layer.pattern: self._hand(layer) for layer in layers}
         # A pattern may lie on a larger film here and on a smaller one there.
-        found: dict[tuple[str, Alignment | None], ByEye] = {}
+        tasks: dict[tuple[str, Alignment | None], ByEye] = {}
         for layer in layers:
             # The lowest layer on a step's only pin sets the angle that the others are aligned to.
             gives_the_angle = len(self.part.pins) == 1 and things.is_lowest(layer.index)
             hand = hands[layer.pattern]
             if hand == "lay" or (hand == "turn" and not gives_the_angle):
                 edge = things.alignment(layer.index)
-                alike = None if edge is None else edge._replace(numbers=(0, 0))
-                key = layer.pattern, alike
-                found.setdefault(key, ByEye(hand, layer.pattern, edge, []))
-                found[key].layers.append(layer.index)
-        edges = Counter(pattern for pattern, _ in found)
+                key_edge = None if edge is None else edge._replace(numbers=(0, 0))
+                key = layer.pattern, key_edge
+                tasks.setdefault(key, ByEye(hand, layer.pattern, edge, []))
+                tasks[key].layers.append(layer.index)
+        edges = Counter(pattern for pattern, _ in tasks)
         return [
             by_eye if edges[pattern] > 1 else by_eye._replace(layers=[])
             for pattern in edges
-            for by_eye in found.values()
+            for by_eye in tasks.values()
             if by_eye.pattern == pattern
         ]
 
@@ -249,7 +249,7 @@ def _is_loose(work: Work, part: AssemblyStep) -> bool:
 
 
 def every_step(work: Work) -> dict[str, Any]:
-    """Return what all press steps have in common."""
+    """Return the facts common to all press steps."""
     steps = work.schedule.steps
     if not steps:
         return {"press": None}

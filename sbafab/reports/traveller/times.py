@@ -19,8 +19,8 @@ CURE_HOURS = 24.0
 
 class Times(NamedTuple):
     """Minutes: ``warm`` before the clock of every step, ``cool`` after it, ``cure`` and ``test`` of
-    one actuator, and what is ``worked`` until its tubes are glued, at least: press minutes that
-    nobody stated count as 0.
+    one actuator, and the minutes ``worked`` until its tubes are glued, at least: press minutes
+    that are not stated count as 0.
     """
 
     warm: float
@@ -44,13 +44,13 @@ def times(work: Work) -> Times:
     warm = warm_minutes(plate, press.temperature_c) if measured is None else measured
     cool = press.cool_minutes or cool_minutes(plate, press.temperature_c)
     tubes = work.laminate.tube_count
-    held = (2 * acceptance.leak_seconds + acceptance.proof_seconds) / 60
+    tested = (2 * acceptance.leak_seconds + acceptance.proof_seconds) / 60
     pressed = work.schedule.total_press_minutes or 0.0
     return Times(
         warm,
         cool,
         60 * (cure_hours(work.design) or CURE_HOURS) if tubes else 0.0,
-        max(1, tubes) * (held + CONNECT_MINUTES),
+        max(1, tubes) * (tested + CONNECT_MINUTES),
         HANDLING_MINUTES + pressed + len(steps) * (warm + cool),
     )
 
@@ -70,13 +70,14 @@ def assembly_times(works: Sequence[Work]) -> AssemblyTimes:
     """Return the times of an assembly until its parts can be joined."""
     each = [(work, times(work)) for work in works]
     waited = sum(
-        work.runs.count * len(work.schedule.steps) * (one.warm + one.cool) for work, one in each
+        work.runs.count * len(work.schedule.steps) * (minutes.warm + minutes.cool)
+        for work, minutes in each
     )
     pressed = [work.schedule.total_press_minutes for work in works]
-    minutes = sum(work.runs.count * (work.schedule.total_press_minutes or 0.0) for work in works)
+    pressing = sum(work.runs.count * (work.schedule.total_press_minutes or 0.0) for work in works)
     handled = HANDLING_MINUTES * sum(work.runs.copies for work in works)
-    cure = max(one.cure for _, one in each)
-    return AssemblyTimes(waited, handled + minutes + waited, cure, None not in pressed)
+    cure = max(minutes.cure for _, minutes in each)
+    return AssemblyTimes(waited, handled + pressing + waited, cure, None not in pressed)
 
 
 class LaserEstimate(NamedTuple):
