@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,6 +27,7 @@ from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, validated
 from sbafab.design.sections import rule_names
 from sbafab.errors import DesignError, GeometryError
+from sbafab.geometry.edges import unit
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.meshing.wrap import bent_point
@@ -42,20 +42,11 @@ class PartPose(NamedTuple):
     shift: Vector = (0.0, 0.0, 0.0)
 
     def at(self, p: Vector) -> Vector:
-        x, y, z = (
-            sum(a * b for a, b in zip(row, p, strict=True)) + s
-            for row, s in zip(self.rows, self.shift, strict=True)
-        )
-        return x, y, z
+        return _vector(self.points(np.array([p]))[0])
 
     def then(self, inner: PartPose) -> PartPose:
         """Return the pose of a part whose pose in this frame is ``inner``."""
-        columns = tuple(zip(*inner.rows, strict=True))
-        r0, r1, r2 = (
-            tuple(sum(a * b for a, b in zip(row, column, strict=True)) for column in columns)
-            for row in self.rows
-        )
-        return PartPose(((*r0,), (*r1,), (*r2,)), self.at(inner.shift))  # type: ignore[arg-type]
+        return PartPose(_rows(np.array(self.rows) @ np.array(inner.rows)), self.at(inner.shift))
 
     def points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the points (n, 3) in this pose."""
@@ -68,15 +59,23 @@ class PartPose(NamedTuple):
         return self.rows[0][2], self.rows[1][2], self.rows[2][2]
 
 
+def _vector(values: NDArray[np.float64]) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+def _rows(matrix: NDArray[np.float64]) -> Rows:
+    a, b, c = map(_vector, matrix)
+    return a, b, c
+
+
 def shifted(x: float, y: float, z: float) -> PartPose:
     return PartPose(shift=(x, y, z))
 
 
 def about_axis(degrees: float) -> PartPose:
     """A turn about z; quarter turns are exact."""
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    if degrees % 90 == 0:
-        c, s = float(round(c)), float(round(s))
+    c, s = unit(degrees)
     return PartPose(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
 
 
@@ -90,25 +89,10 @@ OUTWARD = PartPose(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
 
 def along(direction: Vector, at: Vector) -> PartPose:
     """Return a pose with its axis along a unit vector, at a point."""
-    z = direction
-    least = min(range(3), key=lambda i: abs(z[i]))
-    helper: Vector = (float(least == 0), float(least == 1), float(least == 2))
-    x = _unit(_cross(helper, z))
-    y = _cross(z, x)
-    return PartPose(((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])), at)
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
-
-
-def _unit(v: Vector) -> Vector:
-    size = math.hypot(*v)
-    return v[0] / size, v[1] / size, v[2] / size
+    z = np.array(direction)
+    x = np.cross(np.eye(3)[np.abs(z).argmin()], z)
+    x /= np.linalg.norm(x)
+    return PartPose(_rows(np.column_stack([x, np.cross(z, x), z])), at)
 
 
 # The tree of parts: the order to build in, and allowed joints.
@@ -227,8 +211,8 @@ class PlacedPart:
     name: str
     part: AnyPart
     pose: PartPose
-    made: PartDesign | None = field(default=None, init=False)
-    radius: float | None = field(default=None, init=False)
+    made: PartDesign | None = None
+    radius: float | None = None
 
     @property
     def turn(self) -> float:
@@ -238,6 +222,8 @@ class PlacedPart:
     @property
     def height(self) -> float:
         """Size along its own axis, mm; an SBA's is computed from the nominal films."""
+        if self.made is not None:
+            return self.made.laminate.thickness
         part = self.part
         if isinstance(part, Tube | Line):
             return part.length
@@ -270,14 +256,9 @@ class PlacedPart:
 
 @dataclass(frozen=True)
 class PlacedSba(PlacedPart):
-    """An SBA in its place; ``radius`` is the radius of the tube it is bent round, if any."""
+    """An SBA in its place."""
 
     made: PartDesign
-    radius: float | None = None
-
-    @property
-    def height(self) -> float:
-        return self.made.laminate.thickness
 
 
 @dataclass(frozen=True)
@@ -354,8 +335,9 @@ def _read_part(assembly: Assembly, name: str, part: Sba) -> Design:
         data.setdefault("name", path.stem)
         _keep_outline(data, part, assembly.folder)
         _keep_kit(data, part, assembly)
-        waived = _waivers(data)
-        rules = [r for r in assembly.rules.waive if r in rule_names() and r not in waived]
+        own = data.get("rules")
+        waived = own.get("waive") if isinstance(own, dict) else None
+        rules = [r for r in assembly.rules.waive if r in rule_names() and r not in (waived or ())]
         return validated(add_waivers(data, rules), records(), path.parent)
     except DesignError as error:
         raise DesignError(f"parts.{name}: {error}") from None
@@ -364,13 +346,6 @@ def _read_part(assembly: Assembly, name: str, part: Sba) -> Design:
 def design_source(design: str, folder: Path) -> str | Path:
     """The source of a design: a bare word names a template, a path starts at the file's folder."""
     return folder / design if Path(design).name != design or "." in design else design
-
-
-def _waivers(data: Mapping[str, Any]) -> list[Any]:
-    """Return the rules that a design file's tables waive, if they are a list."""
-    rules = data.get("rules")
-    waived = rules.get("waive") if isinstance(rules, dict) else None
-    return waived if isinstance(waived, list) else []
 
 
 def _keep_outline(data: dict[str, Any], part: Sba, folder: Path) -> None:
@@ -407,17 +382,13 @@ def _check_root(name: str, source: PartDesign | None) -> None:
 def _placed(name: str, part: AnyPart, source: PartDesign | None, host: PlacedPart) -> PlacedPart:
     _check_kinds(name, part, source, host)
     if part.at == "outside":
-        tube = host.part
-        assert isinstance(tube, Tube)
-        radius = tube.outer_diameter / 2
-        side = about_axis(part.angle)
+        assert isinstance(host.part, Tube)
+        radius, side = host.part.outer_diameter / 2, _frame(host).then(about_axis(part.angle))
         if source is not None:
-            pose = _frame(host).then(side).then(shifted(0.0, 0.0, part.along))
-            return PlacedSba(name, part, pose, source, radius)
-        pose = _frame(host).then(side).then(shifted(radius, 0.0, part.along)).then(OUTWARD)
-        return PlacedPart(name, part, pose)
-    if isinstance(part, Line) and isinstance(host, PlacedSba) and part.at == "inlet":
-        return PlacedPart(name, part, _at_inlet(name, part, host))
+            return PlacedSba(name, part, side.then(shifted(0.0, 0.0, part.along)), source, radius)
+        return PlacedPart(name, part, side.then(shifted(radius, 0.0, part.along)).then(OUTWARD))
+    if isinstance(part, Line) and host.made is not None and part.at == "inlet":
+        return PlacedPart(name, part, _at_inlet(name, part, host, host.made.laminate))
     return _at_pose(name, part, _frame(host).then(_on_axis(part, host)), source)
 
 
@@ -439,23 +410,22 @@ def _on_axis(part: AnyPart, host: PlacedPart) -> PartPose:
     return shifted(x, y, 0.0).then(FLIPPED)
 
 
-def _at_inlet(name: str, line: Line, host: PlacedSba) -> PartPose:
+def _at_inlet(name: str, line: Line, host: PlacedPart, laminate: Laminate) -> PartPose:
     """Return the pose at the mouth of a chamber's inlet, pointing outward."""
-    inlet = inlet_of(name, line, host)
+    inlet = inlet_of(name, line, host.name, laminate)
     (x, y), (u, v) = inlet.mouth, inlet.direction
-    height = host.made.laminate.layers[0].film.thickness
+    height = laminate.layers[0].film.thickness
     start, beyond = host.at((x, y, height)), host.at((x + 1e-4 * u, y + 1e-4 * v, height))
-    way = [(b - a) / 1e-4 for a, b in zip(start, beyond, strict=True)]
-    size = sum(value * value for value in way) ** 0.5
-    return along((way[0] / size, way[1] / size, way[2] / size), start)
+    way = (np.array(beyond) - start) / 1e-4
+    return along(_vector(way / np.linalg.norm(way)), start)
 
 
-def inlet_of(name: str, line: Line, host: PlacedSba) -> Inlet:
+def inlet_of(name: str, line: Line, host: str, laminate: Laminate) -> Inlet:
     """Return the inlet that a line goes into. Raises DesignError if there is none."""
-    inlets: Mapping[str, Inlet] = {inlet.chamber: inlet for inlet in host.made.laminate.inlets}
+    inlets: Mapping[str, Inlet] = {inlet.chamber: inlet for inlet in laminate.inlets}
     if line.chamber not in inlets:
         raise DesignError(
-            f'parts.{name}.chamber = "{line.chamber}" has no inlet in {host.name}; it has '
+            f'parts.{name}.chamber = "{line.chamber}" has no inlet in {host}; it has '
             f"{', '.join(inlets)}"
         )
     return inlets[line.chamber]

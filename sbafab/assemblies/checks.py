@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba, inlet_of
+from sbafab.assemblies.build import Assembled, PlacedPart, inlet_of
 from sbafab.assemblies.records import AssemblyRules, Base, CheckName, Cup, Line, Magnet, Tube
 from sbafab.assemblies.shapes import face, placed_surface
-from sbafab.design.records import Discs
+from sbafab.design.records import Design, Discs
 from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.laminate import outline_diameter
 from sbafab.meshing.surface import Surface, Vector
@@ -55,9 +54,7 @@ def tube_match(assembled: Assembled) -> Iterator[Finding]:
     """Check that an SBA bent round a tube was made for it, or at least goes round it once."""
     tolerance = assembled.assembly.rules.tube_tolerance
     for placed, host in joints(assembled):
-        if not isinstance(placed, PlacedSba) or not isinstance(host.part, Tube):
-            continue
-        if placed.radius is None:
+        if placed.made is None or placed.radius is None or not isinstance(host.part, Tube):
             continue
         outer, both = host.part.outer_diameter, (placed, host)
         wrap = placed.made.design.form.wrap
@@ -75,11 +72,9 @@ def tube_match(assembled: Assembled) -> Iterator[Finding]:
 def inlet_match(assembled: Assembled) -> Iterator[Finding]:
     """Check that a line in an inlet fits the opened strip."""
     for placed, host in joints(assembled):
-        if placed.part.at != "inlet" or not isinstance(placed.part, Line):
+        if placed.part.at != "inlet" or not isinstance(placed.part, Line) or host.made is None:
             continue
-        if not isinstance(host, PlacedSba):
-            continue
-        inlet = inlet_of(placed.name, placed.part, host)
+        inlet = inlet_of(placed.name, placed.part, host.name, host.made.laminate)
         limit, outer = 2 * inlet.width / math.pi, placed.part.outer_diameter
         facts = {"chamber": inlet.chamber, "width": inlet.width}
         good, both = holds(limit, outer), (placed, host)
@@ -352,7 +347,7 @@ def aperture(assembled: Assembled) -> Iterator[Finding]:
 
 
 def _passage(placed: PlacedPart) -> _Passage:
-    if not isinstance(placed, PlacedSba):
+    if placed.made is None:
         size, is_soft = _girth(placed), isinstance(placed.part, Cup)
         return (
             _Passage(placed, size, 0.0, "squeezed")
@@ -363,25 +358,19 @@ def _passage(placed: PlacedPart) -> _Passage:
     if design.form.wrap is not None:
         size = deflated_diameter(design.form.wrap, laminate.thickness)
         return _Passage(placed, size, size, "deflated")
-    lobe = _lobe_width(placed)
+    lobe = _lobe_width(design)
     if lobe is None:
-        return _Passage(placed, _flat_diameter(placed), 0.0, "unfolded")
+        return _Passage(placed, outline_diameter(laminate), 0.0, "unfolded")
     folded = folded_diameter(lobe, factors_of(design).folded(laminate).height)
     return _Passage(placed, folded_diameter(lobe, laminate.thickness), folded, "folded")
 
 
-def _lobe_width(placed: PlacedSba) -> float | None:
+def _lobe_width(design: Design) -> float | None:
     """Return the width in mm of a lobe of a three-lobed actuator; None for others."""
-    design = placed.made.design
     form = design.form
     if not form.is_parallel or form.stacks != LOBES or not isinstance(form.pockets, Discs):
         return None
     return max(form.pockets.diameters) + 2 * design.bond.width
-
-
-def _flat_diameter(placed: PlacedSba) -> float:
-    """Circle round an SBA's axis that holds its widest film, tabs and ears taken off, mm."""
-    return outline_diameter(placed.made.laminate)
 
 
 def _girth(placed: PlacedPart) -> float:
@@ -401,7 +390,7 @@ def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
     lumen = assembled.assembly.deploy.lumen_diameter
     if lumen is None:
         return
-    sizes = [(_deflated(placed, assembled), placed, False) for placed in assembled.parts]
+    sizes = [(_deflated(placed), placed, False) for placed in assembled.parts]
     sizes += [
         (folded, placed, True)
         for placed in assembled.parts
@@ -419,15 +408,15 @@ def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
     yield _judged("lumen-pass", widest < lumen, lumen, widest, "widest", (part,), **facts)
 
 
-def _deflated(placed: PlacedPart, assembled: Assembled) -> float:
-    if not isinstance(placed, PlacedSba):
+def _deflated(placed: PlacedPart) -> float:
+    if placed.made is None:
         return _girth(placed)
     wrap, laminate = placed.made.design.form.wrap, placed.made.laminate
     if wrap is not None:
         return deflated_diameter(wrap, laminate.thickness)
     if placed.radius is not None:
         return 2 * (placed.radius + laminate.thickness)
-    return _flat_diameter(placed)
+    return outline_diameter(laminate)
 
 
 def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
@@ -462,26 +451,20 @@ def collision(assembled: Assembled) -> Iterator[Finding]:
     An SBA bent round a tube lies on it by construction; this pair is not compared.
     """
     surfaces = {p.name: placed_surface(p, filled=True) for p in assembled.parts}
-    boxes = {name: _box(surface) for name, surface in surfaces.items()}
-    solids: dict[str, Any] = {}
+    solids = {name: _solid(surface) for name, surface in surfaces.items()}
     worst = 0.0
-    has_collision = False
     for number, a in enumerate(assembled.parts):
         for b in assembled.parts[:number]:
-            if _lies_on(a, b) or not _meet(boxes[a.name], boxes[b.name]):
+            if _lies_on(a, b) or not _meet(surfaces[a.name], surfaces[b.name]):
                 continue
-            for name in (a.name, b.name):
-                if name not in solids:
-                    solids[name] = _solid(surfaces[name])
             shared = solids[a.name] ^ solids[b.name]
             volume = float(shared.volume())
             worst = max(worst, volume)
             if volume > TOUCH:
-                has_collision = True
-                x, y, z = _box_of(shared).tolist()
+                x, y, z = np.reshape(shared.bounding_box(), (2, 3)).mean(axis=0).tolist()
                 facts = {"x": x, "y": y, "z": z}
                 yield _judged("collision", False, TOUCH, volume, "share", (a, b), "mm3", **facts)
-    if not has_collision:
+    if worst <= TOUCH:
         yield _judged("collision", True, TOUCH, worst, "clear", (), "mm3")
 
 
@@ -492,18 +475,12 @@ def _lies_on(a: PlacedPart, b: PlacedPart) -> bool:
     )
 
 
-def _box(surface: Surface) -> NDArray[np.float64]:
-    return np.array([surface.points.min(axis=0), surface.points.max(axis=0)])
-
-
-def _meet(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
-    return bool((a[0] < b[1]).all() and (b[0] < a[1]).all())
-
-
-def _box_of(solid: Any) -> NDArray[np.float64]:
-    low, high = np.array(solid.bounding_box()).reshape(2, 3)
-    middle: NDArray[np.float64] = (low + high) / 2
-    return middle
+def _meet(a: Surface, b: Surface) -> bool:
+    """Return True if the boxes round two surfaces meet."""
+    (low_a, high_a), (low_b, high_b) = (
+        (surface.points.min(axis=0), surface.points.max(axis=0)) for surface in (a, b)
+    )
+    return bool((low_a < high_b).all() and (low_b < high_a).all())
 
 
 def _solid(surface: Surface) -> Any:
