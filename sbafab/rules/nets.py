@@ -7,11 +7,9 @@ with the nets. A design that declares no nets gets no finding.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from functools import cached_property
-from itertools import chain
 from typing import Literal, NamedTuple
 
 from sbafab.design.records import Design
@@ -73,20 +71,15 @@ class NetFault:
     @property
     def message(self) -> str:
         """The difference in one sentence."""
-        return tell(self.says, {"at": self.at, "interface": self.interface})
+        return tell(self.says, {"at": self.at})
 
     @property
     def where(self) -> Place:
         return Place(self.interface, self.layers, *self.at)
 
 
-@dataclass(frozen=True)
-class NarrowPlace:
-    """The place of a net's voids in one interface that is hardest to open, and its pressure.
-
-    ``left`` mm of the drawn ``width`` remain at worst; ``pressure``, kPa, opens that width, None
-    if no film has elastic constants.
-    """
+class NarrowPlace(NamedTuple):
+    """The place of a net that is hardest to open in an interface; see ``OpeningPlace``."""
 
     net: str
     interface: int
@@ -117,8 +110,7 @@ def check(measures: Measures) -> list[Finding]:
         return []
     read = connectivity(laminate, design)
     findings = [
-        Finding(NAME, "fail", 0.0, 1.0, "faults", fault.where, _in_place(fault))
-        for fault in read.faults
+        Finding(NAME, "fail", 0.0, 1.0, "faults", fault.where, fault.says) for fault in read.faults
     ]
     if not findings:
         nets = declared(laminate)
@@ -126,10 +118,6 @@ def check(measures: Measures) -> list[Finding]:
         facts = {"nets": len(nets), "ports": ports}
         findings.append(judged(NAME, True, 0.0, 0.0, "faults", Place(), "joined", **facts))
     return [*findings, *_openings(read.narrow, laminate, design)]
-
-
-def _in_place(fault: NetFault) -> Clause:
-    return fault.says.also(interface=fault.interface)
 
 
 RULE = Rule(NAME, check, explained(NAME), at_most=True)
@@ -148,25 +136,14 @@ def connectivity(laminate: Laminate, design: Design, faults: bool = True) -> Con
 
     Without ``faults`` the deviations are not searched for.
     """
-    reading = _Reading(laminate)
-    differences = (
-        reading.opens(),
-        reading.shorts(),
-        reading.leaks(),
-        reading.dead_ends(design.rules.longest_dead_end),
-        reading.strays(),
-    )
-    owners = tuple(
-        tuple(sorted(reading.owners.get(reading.part_of[cavity.voids[0]], ())))
-        for cavity in reading.cavities
-    )
-    return Connectivity(
-        reading.cavities,
-        owners,
-        reading.groups(),
-        tuple(chain(*differences)) if faults else (),
-        tuple(reading.narrow(design)) if faults else (),
-    )
+    read = _Reading(laminate)
+    owners = tuple(tuple(sorted(read.owners.get(part, ()))) for part in read.parts)
+    found: list[NetFault] = []
+    if faults:
+        found += [*read.opens(), *read.shorts(), *read.leaks()]
+        found += [*read.dead_ends(design.rules.longest_dead_end), *read.strays()]
+    narrow = tuple(read.narrow(design)) if faults else ()
+    return Connectivity(read.cavities, owners, read.groups(), tuple(found), narrow)
 
 
 def netlist_findings(
@@ -189,7 +166,7 @@ def netlist_findings(
     comparison = compare(read.groups, netlist.nets)
     said = [_missing(name, names) for name in comparison.missing]
     said += [
-        (fault.where, say("netlist.fault", fault=_in_place(fault)))
+        (fault.where, say("netlist.fault", fault=fault.says))
         for fault in read.faults
         if fault.kind in ("open", "short", "leak")
     ]
@@ -227,7 +204,9 @@ class _Terminal(NamedTuple):
 class _Reading:
     """The void graph of a laminate with the places of its ports.
 
-    ``part_of`` numbers the parts into which the voids fall without the outside.
+    ``part_of`` numbers the parts into which the voids fall without the outside, ``parts`` those of
+    the cavities. ``homes`` are the parts of each net's terminals, None for one in no void;
+    ``owners`` the nets that have a terminal in a part.
     """
 
     def __init__(self, laminate: Laminate) -> None:
@@ -237,97 +216,79 @@ class _Reading:
         self.cavities = cavities(laminate, self.graph)
         self.cavity_of = {v: n for n, cavity in enumerate(self.cavities) for v in cavity.voids}
         self.part_of = _parts(self.graph)
-        members = dict.fromkeys(member for net in self.nets for member in net.ports)
-        self.terminals = {member: self._terminals(member) for member in members}
+        self.parts = [self.part_of[cavity.voids[0]] for cavity in self.cavities]
+        self.homes = {net.name: self._home(net) for net in self.nets}
+        owners: dict[int, dict[str, None]] = {}
+        for name, home in self.homes.items():
+            for part in home.values():
+                if part is not None:
+                    owners.setdefault(part, {})[name] = None
+        self.owners = {part: tuple(names) for part, names in owners.items()}
 
     def interface(self, index: int) -> Interface:
         return self.laminate.interfaces[index - 1]
 
-    def part(self, cavity: int) -> int:
-        return self.part_of[self.cavities[cavity].voids[0]]
+    def of_net(self) -> Iterator[tuple[int, Cavity, Interface, tuple[str, ...]]]:
+        """Yield the number of each cavity, the cavity, its interface and the nets of its part."""
+        for number, (cavity, part) in enumerate(zip(self.cavities, self.parts, strict=True)):
+            gap = self.interface(cavity.interface)
+            yield number, cavity, gap, self.owners.get(part, ())
+
+    def _home(self, net: Net) -> dict[_Terminal, int | None]:
+        """The part that holds each terminal of a net.
+
+        A terminal that several cavities may hold lies in the net's main part if one of them does.
+        """
+        rows = [row for member in net.ports for row in self._terminals(member)]
+        parts = {row: [self.parts[number] for number in row.cavities] for row in rows}
+        votes = [part for row in rows for part in set(parts[row])]
+        main = max(dict.fromkeys(votes), key=votes.count, default=None)
+        return {row: main if main in parts[row] else next(iter(parts[row]), None) for row in rows}
 
     # Places of ports.
 
-    def _terminals(self, member: str) -> list[_Terminal]:
+    def _terminals(self, member: str) -> Iterator[_Terminal]:
         laminate, graph = self.laminate, self.graph
-        rows: list[_Terminal] = []
         for port in laminate.ports:
-            if port.name != member:
-                continue
             layers = (port.below, port.above)
-            if port.kind == "hole":
-                opening = graph.holes.get(port.name)
+            if port.name == member and port.kind == "hole":
+                opening = graph.holes.get(member)
                 beside = () if opening is None else self._beside(opening)
                 width = 0.0 if opening is None else _across(graph.openings[opening])
-                rows.append(_Terminal(member, member, beside, port.at, width, False, layers))
-                continue
-            holding = self._holding(port.at, layers)
-            rows.append(_Terminal(member, member, holding, port.at, 0.0, True, layers))
+                yield _Terminal(member, member, beside, port.at, width, False, layers)
+            elif port.name == member:
+                holding = self._holding(port.at, layers)
+                yield _Terminal(member, member, holding, port.at, 0.0, True, layers)
         for number, inlet in enumerate(laminate.inlets):
             if inlet.chamber == member:
-                mouths = graph.joins.get(mouth_of(number), {})
-                beside = tuple(sorted({self.cavity_of[void] for void in mouths}))
-                label = say("nets.inlet", member=member)
-                rows.append(_Terminal(member, label, beside, inlet.mouth, inlet.width, False, ()))
+                beside, label = self._beside(mouth_of(number)), say("nets.inlet", member=member)
+                yield _Terminal(member, label, beside, inlet.mouth, inlet.width, False, ())
         gaps = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
         for chamber in laminate.chambers:
-            balloons = [n for n in range(1, len(gaps) + 1) if chamber.is_in(n)]
-            for balloon in balloons if chamber.name == member else ():
-                layers = (gaps[balloon - 1].below.index, gaps[balloon - 1].above.index)
+            held = [(n, gap) for n, gap in enumerate(gaps, 1) if chamber.is_in(n)]
+            for balloon, gap in held if chamber.name == member else ():
                 label = say("nets.pocket", member=member)
-                if len(balloons) > 1:
+                if len(held) > 1:
                     label = say("nets.pocket-in", member=member, balloon=balloon)
-                rows += [
-                    _Terminal(member, label, self._holding(p, layers), p, 0.0, True, layers)
-                    for p in chamber.centres
-                ]
-        return rows
+                layers = _layers(gap)
+                for p in chamber.centres:
+                    holding = self._holding(p, layers)
+                    yield _Terminal(member, label, holding, p, 0.0, True, layers)
 
     def _holding(self, p: Point, layers: tuple[int, int]) -> tuple[int, ...]:
         """The cavities between a pair of layers that hold a point."""
         return tuple(
             number
             for number, cavity in enumerate(self.cavities)
-            for gap in [self.interface(cavity.interface)]
-            if (gap.below.index, gap.above.index) == layers
+            if _layers(self.interface(cavity.interface)) == layers
             and not cavity.is_open_film
             and cavity.region.contains(p)
         )
 
-    def _beside(self, opening: Void) -> tuple[int, ...]:
-        """The cavities that a hole of a film opens into."""
-        voids = self.graph.joins.get(opening, {})
+    def _beside(self, void: Void) -> tuple[int, ...]:
+        """The cavities that a hole of a film, or a mouth, opens into."""
+        voids = self.graph.joins.get(void, {})
         return tuple(sorted({self.cavity_of[v] for v in voids if v in self.cavity_of}))
-
-    # Parts, and the nets that own them.
-
-    @cached_property
-    def homes(self) -> dict[str, dict[_Terminal, int | None]]:
-        """The part that holds each terminal of a net, by net; None for a terminal in no void.
-
-        A terminal that several cavities may hold lies in the net's main part if one of them does.
-        """
-        homes: dict[str, dict[_Terminal, int | None]] = {}
-        for net in self.nets:
-            rows = [row for member in net.ports for row in self.terminals[member]]
-            votes = [part for row in rows for part in {self.part(c) for c in row.cavities}]
-            main = max(dict.fromkeys(votes), key=votes.count, default=None)
-            home: dict[_Terminal, int | None] = {}
-            for row in rows:
-                parts = [self.part(number) for number in row.cavities]
-                home[row] = main if main in parts else next(iter(parts), None)
-            homes[net.name] = home
-        return homes
-
-    @cached_property
-    def owners(self) -> dict[int, tuple[str, ...]]:
-        """The nets that have a terminal in a part, by the part."""
-        owners: dict[int, dict[str, None]] = {}
-        for name, home in self.homes.items():
-            for part in home.values():
-                if part is not None:
-                    owners.setdefault(part, {})[name] = None
-        return {part: tuple(names) for part, names in owners.items()}
 
     def groups(self) -> tuple[frozenset[str], ...]:
         """The connected members, by part; a member outside all voids is alone."""
@@ -339,22 +300,20 @@ class _Reading:
 
     # Faults.
 
-    def opens(self) -> Iterable[NetFault]:
+    def opens(self) -> Iterator[NetFault]:
         """Yield the terminals in no void, and the parts of a net that are not joined to it."""
-        for net in self.nets:
-            home = self.homes[net.name]
-            main = next((part for part in home.values() if part is not None), None)
+        for name, home in self.homes.items():
             counts = [*home.values()]
-            if main is not None:
-                main = max(
-                    dict.fromkeys(counts), key=lambda p: -1 if p is None else counts.count(p)
-                )
+            parts = [part for part in dict.fromkeys(counts) if part is not None]
+            main = max(parts, key=counts.count, default=None)
             for row in (row for row, part in home.items() if part is None):
-                says = say("nets.open-void", net=net.name, member=row.label)
-                gap = self._between(row.layers)
-                yield NetFault("open", (net.name,), gap, row.layers, row.at, says)
-            for part in dict.fromkeys(p for p in home.values() if p not in (None, main)):
-                yield self._open(net.name, home, part or 0, main or 0)
+                gap = next((g for g in self.laminate.interfaces if _layers(g) == row.layers), None)
+                number = None if gap is None else gap.index
+                says = say("nets.open-void", net=name, member=row.label)
+                yield NetFault("open", (name,), number, row.layers, row.at, says)
+            for part in parts:
+                if part != main and main is not None:
+                    yield self._open(name, home, part, main)
 
     def _open(
         self, name: str, home: Mapping[_Terminal, int | None], part: int, main: int
@@ -374,9 +333,10 @@ class _Reading:
     def _fault(
         self, kind: FaultKind, nets: tuple[str, ...], gap: Interface, p: Point, says: Clause
     ) -> NetFault:
+        says = says.also(interface=gap.index)
         return NetFault(kind, nets, gap.index, gap.layer_indices, p, says)
 
-    def shorts(self) -> Iterable[NetFault]:
+    def shorts(self) -> Iterator[NetFault]:
         """Yield the parts that several nets share, a fault for each further net."""
         for part, names in self.owners.items():
             for name in names[1:]:
@@ -390,7 +350,7 @@ class _Reading:
                 gap = self.interface(self.cavities[number].interface)
                 yield self._fault("short", both, gap, p, says)
 
-    def leaks(self) -> Iterable[NetFault]:
+    def leaks(self) -> Iterator[NetFault]:
         """Yield the places where a net reaches the outside."""
         for void, p in self.graph.joins.get(OUTSIDE, {}).items():
             names = self.owners.get(self.part_of[void], ())
@@ -403,71 +363,53 @@ class _Reading:
                 says = say(sentence, net=names[0], wide=wide)
                 yield self._fault("leak", names, self.interface(void.level), p, says)
 
-    def dead_ends(self, ratio: float) -> Iterable[NetFault]:
+    def dead_ends(self, ratio: float) -> Iterator[NetFault]:
         """Yield the blind ends in the cavities of the nets."""
-        for number, cavity in enumerate(self.cavities):
-            names = self.owners.get(self.part(number), ())
-            if not names:
-                continue
-            gap = self.interface(cavity.interface)
-            terminals = self._ways_on(number)
-            if len(terminals) <= 1:
-                if any(terminal.is_port for terminal in terminals):
-                    continue
-                start = terminals[0].at if terminals else None
-                p = middle(cavity.region) if start is None else self._far_from(number, start)
+        for number, cavity, gap, names in self.of_net():
+            terminals = self._ways_on(number) if names else []
+            if len(terminals) > 1:
+                for end in blind_ends(self.axis(number), terminals, ratio):
+                    says = say("nets.dead-end", net=names[0], depth=end.depth, width=end.width)
+                    yield self._fault("dead-end", names, gap, end.at, says)
+            elif names and not any(terminal.is_port for terminal in terminals):
+                p = self._far_from(number, terminals[0].at) if terminals else middle(cavity.region)
                 blind = "nets.blind-hole" if cavity.is_open_film else "nets.blind-void"
                 yield self._fault("dead-end", names, gap, p, say(blind, net=names[0]))
-                continue
-            for end in blind_ends(self.axis(number), terminals, ratio):
-                says = say("nets.dead-end", net=names[0], depth=end.depth, width=end.width)
-                yield self._fault("dead-end", names, gap, end.at, says)
 
-    def strays(self) -> Iterable[NetFault]:
+    def strays(self) -> Iterator[NetFault]:
         """Yield closed voids outside all nets, and chamber interfaces' voids that open outside."""
         is_open = {self.part_of[void] for void in self.graph.joins.get(OUTSIDE, {})}
         seen: set[int] = set()
-        for number, cavity in enumerate(self.cavities):
-            part = self.part(number)
-            gap = self.interface(cavity.interface)
-            if cavity.is_open_film or part in self.owners or part in seen:
-                continue
+        for number, cavity, gap, names in self.of_net():
+            part = self.parts[number]
             # A slit between balloons, or a flap outside a seam.
-            if part in is_open and not (gap.kind == "chamber" and gap.pressed):
-                continue
-            seen.add(part)
-            p = middle(cavity.region)
-            yield self._fault("stray", (), gap, p, say("nets.stray"))
+            is_slit = part in is_open and not (gap.kind == "chamber" and gap.pressed)
+            if not (cavity.is_open_film or names or part in seen or is_slit):
+                seen.add(part)
+                yield self._fault("stray", (), gap, middle(cavity.region), say("nets.stray"))
 
-    # Widths.
+    # Widths and places.
 
-    def narrow(self, design: Design) -> Iterable[NarrowPlace]:
+    def narrow(self, design: Design) -> Iterator[NarrowPlace]:
         """Yield the place of every cavity of a net that is hardest to open at worst."""
-        for number, cavity in enumerate(self.cavities):
-            names = self.owners.get(self.part(number), ())
+        for _, cavity, gap, names in self.of_net():
             if names and not cavity.is_open_film:
-                gap = self.interface(cavity.interface)
                 edges = VoidEdges.of(gap, design)
                 place = hardest_place(self.laminate, gap, cavity.region, edges)
                 if place is not None:
-                    yield NarrowPlace(names[0], cavity.interface, *place)
-
-    def _width(self, number: int) -> Width | None:
-        return least_width(self.cavities[number].region, 0.0)
+                    yield NarrowPlace(names[0], gap.index, *place)
 
     def axis(self, number: int) -> VoidAxis:
-        width = self._width(number)
+        width = least_width(self.cavities[number].region, 0.0)
         return axis_of(self.cavities[number].region, 0.0 if width is None else width.value)
-
-    # Places.
 
     def _ways_on(self, number: int) -> list[Terminal]:
         """The ports, mouths and vias of a cavity, and the places where it reaches the outside."""
         rows = [
             Terminal(row.at, row.width, row.is_port)
-            for name in self.owners.get(self.part(number), ())
+            for name in self.owners.get(self.parts[number], ())
             for row, part in self.homes[name].items()
-            if number in row.cavities and part == self.part(number) and row.layers
+            if number in row.cavities and part == self.parts[number] and row.layers
         ]
         tubes = set(self.graph.holes.values())
         for void in self.cavities[number].voids:
@@ -486,14 +428,8 @@ class _Reading:
         axis = self.axis(number)
         return axis.centre(int(np.argmax(np.hypot(*(axis.points - start).T))))
 
-    def _between(self, layers: tuple[int, ...]) -> int | None:
-        for gap in self.laminate.interfaces:
-            if (gap.below.index, gap.above.index) == layers:
-                return gap.index
-        return None
-
     def _of_part(self, part: int) -> list[int]:
-        return [n for n in range(len(self.cavities)) if self.part(n) == part]
+        return [number for number, own in enumerate(self.parts) if own == part]
 
     def _gap_between(self, part: int, main: int) -> _Cut:
         """The place where two parts of a net most likely should be joined.
@@ -635,16 +571,15 @@ def _across(opening: Region) -> float:
     return min(high_x - low_x, high_y - low_y)
 
 
+def _layers(gap: Interface) -> tuple[int, int]:
+    return gap.below.index, gap.above.index
+
+
 def _labels(home: Mapping[_Terminal, int | None], part: int) -> list[Clause | str]:
     """The members of a net in a part; inlet or pocket where the other of the two lies elsewhere."""
     here = [row for row, number in home.items() if number == part]
     away = {row.member for row, number in home.items() if number != part}
-    labels = {
-        str(name): name
-        for row in here
-        for name in [row.label if row.member in away else row.member]
-    }
-    return [*labels.values()]
+    return [*dict.fromkeys(row.label if row.member in away else row.member for row in here)]
 
 
 def _openings(
