@@ -197,7 +197,7 @@ def test_between_plates_volumes_rise_with_pressure_where_waves_begin() -> None:
 @pytest.mark.long
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 def test_a_wide_pocket_that_ripples_in_calculix() -> None:
-    pressures = [0.5, 1.0, 2.0, 4.0]
+    pressures = [0.5, 1.0, 2.0]
     own = rippled(Balloon(3.5), pressures, 9)
     found = sector_states(Sector(7.0, 9, round=5, even=True), pressures)
     assert own.shapes.height == pytest.approx([state.stroke for state in found], rel=0.03)

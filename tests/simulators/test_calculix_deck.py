@@ -97,21 +97,20 @@ def test_each_cavity_face_is_pressed_once(lobed: Mesh, tmp_path: Path) -> None:
         assert listed == wanted
 
 
-def test_each_chamber_has_a_ramp_of_its_own(lobed: Mesh, tmp_path: Path) -> None:
-    settings = DeckSettings(dict.fromkeys(("chamber1", "chamber2", "chamber3"), 6.0), ramp=2.0)
-    blocks = read_deck(write_deck(lobed, settings, tmp_path)[0])
-    ramps = named(blocks, "*AMPLITUDE")
-    assert [ramp.options["NAME"] for ramp in ramps] == [f"ramp_chamber{n}" for n in (1, 2, 3)]
-    for ramp in ramps:
-        table = np.array(ramp.rows, dtype=float)
-        np.testing.assert_allclose(table[[0, -1]], [[0, 0], [2, 1]])
-        assert (np.diff(table[:, 0]) > 0).all()
-        np.testing.assert_allclose(table[:, 1], (table[:, 0] / 2) ** 2, rtol=1e-6)
-
-
-def test_every_element_has_the_film_as_material(lobed: Mesh, tmp_path: Path) -> None:
+def test_a_stack_of_film_stands_on_its_base_and_each_chamber_has_a_ramp(
+    lobed: Mesh, tmp_path: Path
+) -> None:
     pressures = dict.fromkeys(("chamber1", "chamber2", "chamber3"), 6.0)
-    blocks = read_deck(write_deck(lobed, DeckSettings(pressures), tmp_path)[0])
+    blocks = read_deck(write_deck(lobed, DeckSettings(pressures, ramp=2.0), tmp_path)[0])
+    ramps = named(blocks, "*AMPLITUDE")
+    assert [ramp.options["NAME"] for ramp in ramps] == [f"ramp_{name}" for name in pressures]
+    for ramp in ramps:
+        time, share = np.array(ramp.rows, dtype=float).T
+        assert time[[0, -1]].tolist() == [0, 2]
+        np.testing.assert_allclose(share, (time / 2) ** 2, rtol=1e-6)
+    assert [block.rows for block in named(blocks, "*BOUNDARY")] == [[["base", "1", "3"]]]
+    (base,) = named(blocks, "*NSET", NSET="base")
+    assert numbers(base) == [node + 1 for node in lobed.node_sets["base"]]
     assert [block.options["TYPE"] for block in named(blocks, "*ELEMENT")] == ["C3D15"] * 4
     (everything,) = named(blocks, "*ELSET", ELSET="all_elements")
     parts = {block.options["ELSET"] for block in named(blocks, "*ELEMENT")}
@@ -120,15 +119,6 @@ def test_every_element_has_the_film_as_material(lobed: Mesh, tmp_path: Path) -> 
     assert section.options == {"ELSET": "all_elements", "MATERIAL": "TPE"}
     assert named(blocks, "*ELASTIC")[0].rows == [["10", "0.2"]]
     assert named(blocks, "*DENSITY")[0].rows == [["1.122e-09"]]
-
-
-def test_a_stack_stands_on_its_base(lobed: Mesh, tmp_path: Path) -> None:
-    pressures = dict.fromkeys(("chamber1", "chamber2", "chamber3"), 6.0)
-    blocks = read_deck(write_deck(lobed, DeckSettings(pressures), tmp_path)[0])
-    assert [block.rows for block in named(blocks, "*BOUNDARY")] == [[["base", "1", "3"]]]
-    assert numbers(named(blocks, "*NSET", NSET="base")[0]) == [
-        node + 1 for node in lobed.node_sets["base"]
-    ]
 
 
 @pytest.mark.parametrize(
@@ -176,16 +166,6 @@ def test_nodes_of_a_sector_stay_on_its_planes(tmp_path: Path) -> None:
     assert planes - tied == on_axis
 
 
-@pytest.mark.parametrize(
-    ("procedure", "line"), [("dynamic", "*DYNAMIC, ALPHA=-0.3"), ("static", "*STATIC")]
-)
-def test_procedure(lone: Mesh, tmp_path: Path, procedure: str, line: str) -> None:
-    settings = DeckSettings({"chamber1": 6.0}, procedure)  # type: ignore[arg-type]
-    text = write_deck(lone, settings, tmp_path)[0].read_text(encoding="ascii")
-    assert line in text.splitlines()
-    assert "*STEP, NLGEOM" in text
-
-
 def test_imperfection_leaves_films_as_thick_and_bonded(lobed: Mesh) -> None:
     settings = DeckSettings({"chamber1": 6.0}, imperfection=0.01)
     mesh = started(lobed, settings)
@@ -199,20 +179,23 @@ def test_imperfection_leaves_films_as_thick_and_bonded(lobed: Mesh) -> None:
     np.testing.assert_allclose(moved[:, 2], mean[column.ravel()], atol=1e-9)
 
 
-def test_abaqus_is_told_the_same_but_for_outputs(lone: Mesh, tmp_path: Path) -> None:
-    calculix, abaqus, _ = (path.read_text("ascii") for path in write_deck(lone, PLAIN, tmp_path))
+def test_abaqus_is_told_the_same_but_for_outputs_and_files_are_the_same_twice(
+    lone: Mesh, tmp_path: Path
+) -> None:
+    first, second = (write_deck(lone, PLAIN, tmp_path / name) for name in ("a", "b"))
+    assert [path.name for path in first] == ["actuator.inp", "abaqus.inp", "mesh.inp"]
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
+    calculix, abaqus, _ = (path.read_text("ascii") for path in first)
+    assert "*STEP, NLGEOM" in calculix
+    assert "*DYNAMIC, ALPHA=-0.3" in calculix
+    static = write_deck(lone, DeckSettings({"chamber1": 6.0}, "static"), tmp_path)[0]
+    assert "*STATIC" in static.read_text("ascii").splitlines()
     same, _, outputs = abaqus.partition("*OUTPUT")
     assert calculix.startswith(same)
     assert "*DLOAD" in same
     # Abaqus's result file knows no TIME POINTS; its output database does.
     assert "FILE" not in outputs
     assert outputs.endswith("*END STEP\n")
-
-
-def test_same_design_same_bytes(lone: Mesh, tmp_path: Path) -> None:
-    first, second = (write_deck(lone, PLAIN, tmp_path / name) for name in ("a", "b"))
-    assert [path.name for path in first] == ["actuator.inp", "abaqus.inp", "mesh.inp"]
-    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
 
 
 def test_settings_of_a_design_take_its_density() -> None:

@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from docs.scripts.drawn_runs import DECKS, run_deck
+from docs.scripts.drawn_runs import DECKS
 from docs.scripts.measured import record
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.simulators.calculix.deck import DeckSettings, deck_settings, started, write_deck
-from sbafab.simulators.calculix.results import Frame, films_meet, read_frd
-from sbafab.simulators.calculix.run import deck_mesh, find_ccx
+from sbafab.simulators.calculix.results import Frame, films_meet, history, read_frd
+from sbafab.simulators.calculix.run import deck_mesh, find_ccx, run_ccx, simulate
 from sbafab.simulators.simulator import SimulationRequest
 
 pytest.importorskip("netgen")
@@ -148,9 +148,10 @@ def test_inertia_is_little_where_a_working_pressure_was_reached() -> None:
         assert float(table.cell(name, "kinetic energy, %")) < 1
 
 
-RUN = ("array", "finger", "folded", "vacuum")
-"""A row of pouches, two unlike films, a fold, a vacuum. The others take minutes of processor time:
-``python -m docs.scripts.drawn_runs`` runs all.
+RUN = ("array", "finger", "folded")
+"""A row of pouches, two unlike films, a fold. ``python -m docs.scripts.drawn_runs`` runs all."""
+LOW = 0.05
+"""Share of a deck's pressure that is reached in one increment: a few iterations show what films do.
 """
 
 
@@ -158,55 +159,56 @@ RUN = ("array", "finger", "folded", "vacuum")
 @needs_ccx
 @pytest.mark.parametrize("template", RUN)
 def test_the_deck_of_a_drawn_template_runs(template: str, tmp_path: Path) -> None:
-    history = run_deck(template, tmp_path)
-    first, last = history.states[0], history.states[-1]
-    if DECKS[template].pressure < 0:
-        assert history.stopped is not None
-        assert "the films meet" in history.stopped
-        assert last.stroke < 0
-        assert all(last.volumes[name] < first.volumes[name] for name in last.volumes)
-        return
-    assert history.stopped is None
-    assert last.stroke > 0.01
-    assert all(last.volumes[name] > first.volumes[name] + 0.1 for name in last.volumes)
+    mesh, settings = deck_of(template)
+    settings = replace(settings, outputs=1)
+    deck = write_deck(mesh, settings, tmp_path)[0]
+    text, steps = re.subn(r"(\*STATIC\n)0\.1, ", r"\g<1>1, ", deck.read_text("ascii"))
+    assert steps == 1
+    deck.write_text(text, "ascii")
+    assert run_ccx(tmp_path, "actuator", 1.0, 600.0) == (1.0, None)
+    run_mesh = started(mesh, settings)
+    frames = read_frd(tmp_path / "actuator.frd", len(mesh.points))
+    laminate = build(load_design(template))
+    first, last = history(run_mesh, laminate, DECKS[template].symmetry, settings, frames[-1:])
+    assert last.stroke > 0
+    assert all(last.volumes[name] > first.volumes[name] + 0.01 for name in last.volumes)
     assert last.stress > 0
-    assert_lips_stayed_together(template, tmp_path)
-    if template == "finger":
-        assert_bends_away_from_the_layer_that_does_not_stretch(tmp_path)
-
-
-def assert_lips_stayed_together(template: str, folder: Path) -> None:
-    """In ccx as in the deck."""
-    mesh, _ = deck_of(template)
-    moved = read_frd(folder / "actuator.frd", len(mesh.points))[-1].displacement
-    equations = _equations(folder / "actuator.inp")
+    # Lips stay together in ccx as in the deck.
+    moved = frames[-1].displacement
+    equations = _equations(deck)
     assert equations
     for (upper, axis, _), (lower, _, _) in equations:
         assert moved[upper, axis - 1] == pytest.approx(moved[lower, axis - 1], abs=1e-5)
+    if template == "finger":
+        # It bends away from the layer that does not stretch: the pouches lie on the upper side,
+        # which becomes the hollow one.
+        x, lower_side = np.abs(run_mesh.points[:, 0]), run_mesh.points[:, 2] < 0.2
+        ends, middle = (lower_side & (x > at) & (x < at + 2) for at in (27, 8))
+        assert moved[ends, 2].mean() > moved[middle, 2].mean()
 
 
-def assert_bends_away_from_the_layer_that_does_not_stretch(folder: Path) -> None:
-    mesh, settings = deck_of("finger")
-    run_mesh = started(mesh, replace(settings, outputs=1))
-    rise = read_frd(folder / "actuator.frd", len(run_mesh.points))[-1].displacement[:, 2]
-    x = run_mesh.points[:, 0]
-    lower = run_mesh.points[:, 2] < 0.2
-    ends = (np.abs(x) > 27) & (np.abs(x) < 29) & lower
-    middle = (np.abs(x) > 8) & (np.abs(x) < 10) & lower
-    # The pouches lie on the upper side, which becomes the hollow one.
-    assert rise[ends].mean() > rise[middle].mean()
+@pytest.mark.long
+@needs_ccx
+def test_films_drawn_together_end_a_run(tmp_path: Path) -> None:
+    """Sheets are not meshed: the films meet at a vacuum that is next to none."""
+    laminate, mesh = build(load_design("vacuum")), MeshSettings(4.0, symmetry="half", gaps=True)
+    settings = replace(deck_settings(laminate, SimulationRequest(-5e-5), "static"), outputs=2)
+    found = simulate(laminate, mesh, settings, tmp_path, 600, lambda *_: None)
+    assert "the films meet" in str(found.stopped)
+    assert found.last.stroke < 0
+    assert found.volumes["stack"] < found.states[0].volumes["stack"]
 
 
 def deck_of(template: str) -> tuple[Mesh, DeckSettings]:
     case = DECKS[template]
     laminate = build(load_design(template))
     mesh = deck_mesh(laminate, MeshSettings(h=case.h, symmetry=case.symmetry))
-    return mesh, deck_settings(laminate, SimulationRequest(case.pressure), "static")
+    return mesh, deck_settings(laminate, SimulationRequest(LOW * case.pressure), "static")
 
 
 @pytest.mark.long
 @needs_ccx
-@pytest.mark.parametrize("template", sorted(DECKS.keys() - {*RUN}))
+@pytest.mark.parametrize("template", sorted(DECKS.keys() - {*RUN, "vacuum"}))
 def test_ccx_reads_the_deck_of_every_other_drawn_template(template: str, tmp_path: Path) -> None:
     """As far as the matrix of the flat films."""
     mesh, settings = deck_of(template)

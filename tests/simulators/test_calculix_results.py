@@ -67,7 +67,7 @@ def test_frd(tmp_path: Path) -> None:
     np.testing.assert_allclose(last.von_mises, [5, 5 * 3**0.5], rtol=1e-5)
 
 
-@pytest.mark.parametrize("cut", [1, 5, 40, 100, 200, 400])
+@pytest.mark.parametrize("cut", [1, 40, 400])
 def test_frd_cut_short(tmp_path: Path, cut: int) -> None:
     path = tmp_path / "actuator.frd"
     path.write_text(frd(0.25, 0.5)[: -5 - cut])
@@ -77,23 +77,16 @@ def test_frd_cut_short(tmp_path: Path, cut: int) -> None:
     assert [frame.time for frame in read_frd(path, 2, whole=False)][:1] == [0.25]
 
 
-def test_frd_of_another_mesh(tmp_path: Path) -> None:
+def test_other_files_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "actuator.frd"
+    with pytest.raises(OutputError, match="cannot be read"):
+        read_frd(path, 2)
     path.write_text(frd(0.25))
     with pytest.raises(OutputError, match="a mesh of 2 nodes, not of this one of 3"):
         read_frd(path, 3)
-
-
-def test_frd_with_words_for_numbers(tmp_path: Path) -> None:
-    path = tmp_path / "actuator.frd"
     path.write_text(frd(0.25).replace(" 2.50000E+00", "      wrong "))
     with pytest.raises(OutputError, match=r"no number at time 0\.25 s"):
         read_frd(path, 2)
-
-
-def test_frd_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="cannot be read"):
-        read_frd(tmp_path / "actuator.frd", 2)
 
 
 STA = """SUMMARY OF JOB INFORMATION
@@ -143,21 +136,16 @@ def states_of(symmetry: Symmetry, by: float = 2.0) -> tuple[Laminate, Mesh, list
 
 @pytest.mark.parametrize("symmetry", ["full", "quarter"])
 def test_air_is_what_the_pocket_holds(symmetry: Symmetry) -> None:
-    laminate, _, (start, end) = states_of(symmetry)
+    laminate, mesh, (start, end) = states_of(symmetry)
     # Pocket area x mask thickness; the quarter stands for a balloon without inlet.
     (interface,) = laminate.interfaces
     area = interface.unbonded.area if symmetry == "full" else np.pi * 2.5**2
     assert start.volumes["chamber1"] == pytest.approx(0.025 * area, rel=2e-3)
     assert end.volumes["chamber1"] == pytest.approx(8 * start.volumes["chamber1"], rel=1e-9)
-
-
-def test_stroke_is_how_far_tip_and_base_part() -> None:
-    _, mesh, (start, end) = states_of("quarter")
-    height = np.ptp(mesh.points[:, 2])
+    # The tip is as far from the base as the films' heights have grown.
     assert start.tip == (0, 0, 0)
-    assert end.stroke == pytest.approx(height, rel=1e-9)
-    assert end.pressures == {"chamber1": 6.0}
-    assert end.tilt is None
+    assert end.stroke == pytest.approx(np.ptp(mesh.points[:, 2]), rel=1e-9)
+    assert (end.pressures, end.tilt) == ({"chamber1": 6.0}, None)
 
 
 def test_tilt_is_the_angle_of_the_tip() -> None:
@@ -186,11 +174,6 @@ def test_air_of_chambers_that_are_images(symmetry: Symmetry) -> None:
     # Each lobe's pocket with its inlet: mask thickness times the area that is not bonded.
     pockets = laminate.interfaces[0].unbonded
     assert list(last.volumes.values()) == pytest.approx([0.025 * pockets.area / 3] * 3, rel=5e-3)
-
-
-def test_pressure_rises_with_the_square_of_time() -> None:
-    shares = [SETTINGS.share(time) for time in (0.0, 0.25, 0.5, 1.0, 1.5)]
-    assert shares == pytest.approx([0, 1 / 16, 1 / 4, 1, 1])
 
 
 def test_csv() -> None:

@@ -13,19 +13,12 @@ from click.testing import CliRunner
 from filelock import FileLock
 
 from sbafab.cli import app
-from sbafab.errors import DesignError
-from sbafab.simulators.simulator import NAMES, SimulationRequest, chamber_pressures, simulator
+from sbafab.simulators.simulator import NAMES, SimulationRequest, chamber_pressures
 from tests.simulators.conftest import StandIn
 from tests.simulators.test_recorded_runs import SOFA
 from tests.site.formats import hold
 
 CHAMBERS = ("chamber1", "chamber2")
-
-
-def test_every_simulator_names_fields_of_a_wish() -> None:
-    fields = set(SimulationRequest.__dataclass_fields__)
-    for name in NAMES:
-        assert set(simulator(name).USES) <= fields
 
 
 @pytest.mark.parametrize(
@@ -39,23 +32,6 @@ def test_every_simulator_names_fields_of_a_wish() -> None:
 )
 def test_chamber_pressures(wish: SimulationRequest, pressures: tuple[float, float]) -> None:
     assert chamber_pressures(CHAMBERS, wish, 6.0) == dict(zip(CHAMBERS, pressures, strict=True))
-
-
-@pytest.mark.parametrize(
-    ("wish", "words"),
-    [
-        (
-            SimulationRequest(chambers={"left": 1.0}),
-            "names chamber left, which is not there; the chambers are",
-        ),
-        (SimulationRequest(-1.0), "pressure of chamber1 = -1 kPa must be from 0 to 1000 kPa"),
-        (SimulationRequest(chambers={"chamber2": 2000.0}), "pressure of chamber2 = 2000 kPa"),
-        (SimulationRequest(0.0), "0 kPa in every chamber"),
-    ],
-)
-def test_pressures_that_cannot_be(wish: SimulationRequest, words: str) -> None:
-    with pytest.raises(DesignError, match=words):
-        chamber_pressures(CHAMBERS, wish, 6.0)
 
 
 @pytest.fixture
@@ -79,17 +55,13 @@ def test_a_simulator_that_is_missing(tmp_path: Path, name: str) -> None:
     ("options", "words"),
     [
         (["--with", "calculix", "--pressure", "6 inches"], "must be a pressure"),
-        (["--with", "calculix", "--pressure", "nan"], "must be a pressure"),
         (["--with", "calculix", "--chamber", "chamber1"], "must be NAME=PRESSURE"),
         (["--with", "calculix", "--chamber", "left=3"], "names chamber left, which is not there"),
         (["--with", "calculix", "--scene", "beam"], "scene is for sofa"),
         (["--with", "calculix", "--h", "3"], "h = 3"),
         (["--with", "sofa", "--h", "0.3"], "h is for calculix"),
-        (["--with", "sofa", "--volume", "chamber1=1 kg"], "must be a volume"),
         (["--with", "sofa", "--volume", "chamber1=8"], "--volume is for --scene volume"),
-        (["--with", "sofa", "--seconds", "-1"], "simulated time = -1 s"),
         (["--with", "sofa", "--export", "--seconds", "nan"], "simulated time = nan s"),
-        (["--with", "mujoco", "--export", "--seconds", "1"], "simulated time = 1 s"),
         (["--with", "calculix", "--minutes", "nan"], "must be a finite number"),
         (["--with", "ansys"], "calculix"),
         (["--with", "calculix", "--pressure", "2000"], "pressure of chamber1 = 2000 kPa"),
@@ -98,7 +70,6 @@ def test_a_simulator_that_is_missing(tmp_path: Path, name: str) -> None:
         (["--with", "sofa", "--pressure", "0"], "0 kPa in every chamber"),
         (["--with", "mujoco", "--pressure", "-5"], "to 1000 kPa; a vacuum is for calculix"),
         (["--with", "sofa", "--scene", "volume", "--volume", "left=3"], "left"),
-        (["--with", "mujoco", "--chamber", "left=3"], "names chamber left, which is not there"),
         (["--with", "mujoco", "--seconds", "1"], "simulated time = 1 s"),
         (["--with", "mujoco", "--h", "3"], "h is for calculix"),
     ],
@@ -127,25 +98,6 @@ def test_a_vacuum_has_one_sign(tmp_path: Path, options: list[str], words: str) -
     assert result.exit_code == 2, result.output
     assert words in result.stderr
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_design_under_a_vacuum_is_drawn_in_by_default(tmp_path: Path) -> None:
-    pytest.importorskip("netgen")
-    given = [
-        "simulate",
-        "vacuum",
-        "--with",
-        "calculix",
-        "--export",
-        "--h",
-        "4",
-        "--symmetry",
-        "half",
-    ]
-    result = CliRunner().invoke(app, [*given, "-o", str(tmp_path)])
-    assert result.exit_code == 0, result.output
-    deck = (tmp_path / "vacuum" / "calculix" / "actuator.inp").read_text()
-    assert "stack -6 kPa" in deck
 
 
 def test_parts_that_are_images_take_one_pressure(tmp_path: Path) -> None:
@@ -189,14 +141,19 @@ def test_export_keeps_what_is_there(tmp_path: Path) -> None:
 def test_decks_of_a_whole_run(tmp_path: Path) -> None:
     pytest.importorskip("netgen")
     arguments = ["--set", "stack.balloons=1", "-o", str(tmp_path), "--json"]
-    exported = ["simulate", "1dof-5mm", "--with", "calculix", "--export", "--pressure", "3"]
-    assert CliRunner().invoke(app, [*exported, *arguments]).exit_code == 0
-    folder = tmp_path / "1dof-5mm"
-    assert "3 kPa" in (folder / "calculix" / "actuator.inp").read_text()
     result = CliRunner().invoke(app, ["generate", "1dof-5mm", "--decks", *arguments])
     assert result.exit_code == 0, result.output
+    folder = tmp_path / "1dof-5mm"
     assert "6 kPa" in (folder / "calculix" / "actuator.inp").read_text()
     assert (folder / "sofa" / "actuator.scn").is_file()
+
+
+def test_a_design_under_a_vacuum_is_drawn_in_by_default(tmp_path: Path) -> None:
+    pytest.importorskip("netgen")
+    given = ["simulate", "vacuum", "--with", "calculix", "--export", "--symmetry", "half"]
+    result = CliRunner().invoke(app, [*given, "--h", "4", "-o", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    assert "stack -6 kPa" in (tmp_path / "vacuum" / "calculix" / "actuator.inp").read_text()
 
 
 def test_a_simulator_that_cannot_take_a_design(tmp_path: Path) -> None:

@@ -432,7 +432,7 @@ def shell_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
         cell_of,
         np.full_like(cell_of, NONE),
     )
-    pockets = {name: MeshedVoid({}, void.under, void.volume) for name, void in stack.voids.items()}
+    pockets = {name: MeshedVoid({}, void.under) for name, void in stack.voids.items()}
     nodes, faces, cavities = _air(stack, swept, pockets, "triangle6", swept.prisms, _one_sided)
     films, sections, thickness = _shell_cell_sets(stack, swept)
     mesh = Mesh(

@@ -170,7 +170,7 @@ def _pocket(
     cells = stack.voids[chamber].under[ply]
     inner = np.unique(plane.triangles[cells])
     fixed = np.intersect1d(inner, np.unique(plane.triangles[plies[ply].bonded]))
-    centres = tuple(i for i, owner in enumerate(stack.centre_chambers) if owner == chamber)
+    centres = tuple(i for i, (owner, _) in enumerate(stack.stacks) if owner == chamber)
     places = [stack.centres[i] for i in centres]
 
     def lift_of(necks: NDArray[np.bool_]) -> Lift:

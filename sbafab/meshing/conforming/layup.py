@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -52,14 +53,10 @@ NEAR = 0.01
 
 
 class Sector(NamedTuple):
-    """Meshed part of the plane, and its symmetry planes by name: directions from the axis.
-
-    ``copies`` of it make up the whole.
-    """
+    """Meshed part of the plane, and its symmetry planes by name: directions from the axis."""
 
     region: Region
     planes: tuple[tuple[str, Point], ...]
-    copies: int
 
     def on_planes(self, points: NDArray[np.float64]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
         """Yield each plane's name and a mask of the points (n, 2) on it."""
@@ -81,18 +78,22 @@ def sector(laminate: Laminate, symmetry: Symmetry) -> Sector | None:
     if symmetry == "full":
         return None
     far = 10 * max(map(abs, laminate.bounds)) + 10
-    regions = _regions(laminate)
+    films = [layer.profile for layer in laminate.tpe_layers]
+    bonds = [interface.bond for interface in laminate.interfaces]
+    regions = list(dict.fromkeys([*films, *bonds]))
     if symmetry == "half":
         if all(_covers(_flipped_y(region), region) for region in regions):
             box = polygon([(-far, 0.0), (far, 0.0), (far, far), (-far, far)])
-            return Sector(box, (("symmetry_y", (1.0, 0.0)),), 2)
+            return Sector(box, (("symmetry_y", (1.0, 0.0)),))
         if all(_covers(region.mirrored(), region) for region in regions):
             box = polygon([(-far, -far), (0.0, -far), (0.0, far), (-far, far)])
-            return Sector(box, (("symmetry_x", (0.0, 1.0)),), 2)
+            return Sector(box, (("symmetry_x", (0.0, 1.0)),))
     elif symmetry == "quarter":
         box = polygon([(-far, 0.0), (0.0, 0.0), (0.0, far), (-far, far)])
-        if _is_on_axis(laminate) and all(_is_quarter(laminate, layer) for layer in regions):
-            return Sector(box, (("symmetry_x", (0.0, 1.0)), ("symmetry_y", (-1.0, 0.0))), 4)
+        # A quarter of a single stack on the axis holds a quarter of its chamber.
+        is_on_axis = [chamber.centres for chamber in laminate.chambers] == [((0.0, 0.0),)]
+        if is_on_axis and all(_is_quarter(laminate, layer) for layer in regions):
+            return Sector(box, (("symmetry_x", (0.0, 1.0)), ("symmetry_y", (-1.0, 0.0))))
     else:
         count = len(laminate.chambers)
         if count > 1 and all(_covers(region.turned(360 / count), region) for region in regions):
@@ -103,23 +104,12 @@ def sector(laminate: Laminate, symmetry: Symmetry) -> Sector | None:
     )
 
 
-def _is_on_axis(laminate: Laminate) -> bool:
-    """Return True for a single stack on the axis: a quarter then holds a quarter of its chamber."""
-    return [chamber.centres for chamber in laminate.chambers] == [((0.0, 0.0),)]
-
-
-def _regions(laminate: Laminate) -> Sequence[Region]:
-    """Each distinct film and bond."""
-    films = [layer.profile for layer in laminate.tpe_layers]
-    return list(dict.fromkeys([*films, *(interface.bond for interface in laminate.interfaces)]))
-
-
 def _lobe(count: int, far: float) -> Sector:
     half = 180 / count
     rays = [unit(half * share) for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
     rim = [(far * x, far * y) for x, y in rays]
     planes = (("symmetry_sector_1", rays[0]), ("symmetry_sector_2", rays[-1]))
-    return Sector(polygon([(0.0, 0.0), *rim]), planes, count)
+    return Sector(polygon([(0.0, 0.0), *rim]), planes)
 
 
 def _flipped_y(region: Region) -> Region:
@@ -155,19 +145,17 @@ def images(laminate: Laminate, symmetry: Symmetry) -> dict[str, str]:
         for name, centres in chambers.items()
         if any(not (disc(centre, NEAR) & part.region).is_empty for centre in centres)
     ]
-    if symmetry != "half":
-        return {name: name if name in meshed else meshed[0] for name in chambers}
     _, (x, y) = part.planes[0]
-    meshed_for = {}
-    for name, centres in chambers.items():
-        a, b = centres[0]
+
+    def meshed_for(name: str) -> str:
+        if name in meshed or symmetry != "half":
+            return name if name in meshed else meshed[0]
+        a, b = chambers[name][0]
         along = a * x + b * y
         image = 2 * along * x - a, 2 * along * y - b
-        distances = {twin: math.dist(image, chambers[twin][0]) for twin in meshed}
-        meshed_for[name] = (
-            name if name in meshed else min(distances, key=lambda twin: distances[twin])
-        )
-    return meshed_for
+        return min(meshed, key=lambda twin: math.dist(image, chambers[twin][0]))
+
+    return {name: meshed_for(name) for name in chambers}
 
 
 # The layup: every TPE film over one triangulation of the plane, and the voids between them.
@@ -201,21 +189,11 @@ class Ply:
         return f"film_{self.layer.name}"
 
 
-@dataclass(frozen=True)
-class MeshedVoid:
-    """Air of a chamber as triangles by ply: open in that film (``in_films``), or ``under`` it.
-
-    ``volume`` is the exact volume in mm3 when flat.
-    """
+class MeshedVoid(NamedTuple):
+    """Air of a chamber as triangles by ply: open in that film (``in_films``), or ``under`` it."""
 
     in_films: Mapping[int, NDArray[np.bool_]]
     under: Mapping[int, NDArray[np.bool_]]
-    volume: float
-
-    @property
-    def is_open(self) -> bool:
-        """True if any of it lies in the meshed part."""
-        return any(bool(cells.any()) for cells in self.under.values())
 
 
 @dataclass(frozen=True)
@@ -236,24 +214,15 @@ class Layup:
     is_thick: bool = True
 
     @property
-    def centres(self) -> tuple[Point, ...]:
-        """The axes of all stacks that are meshed, chamber by chamber."""
-        return tuple(
-            centre
-            for chamber in self.laminate.chambers
-            if chamber.name in self.voids
-            for centre in chamber.centres
-        )
+    def stacks(self) -> list[tuple[str, Point]]:
+        """Chamber and axis of each stack that is meshed, chamber by chamber."""
+        chambers = [chamber for chamber in self.laminate.chambers if chamber.name in self.voids]
+        return [(chamber.name, centre) for chamber in chambers for centre in chamber.centres]
 
     @property
-    def centre_chambers(self) -> tuple[str, ...]:
-        """The chamber of each of the centres."""
-        return tuple(
-            chamber.name
-            for chamber in self.laminate.chambers
-            if chamber.name in self.voids
-            for _ in chamber.centres
-        )
+    def centres(self) -> tuple[Point, ...]:
+        """The axes of all stacks that are meshed."""
+        return tuple(centre for _, centre in self.stacks)
 
 
 def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
@@ -265,58 +234,48 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
     laminate = parted(laminate)
     _check_size(laminate, settings)
     part = sector(laminate, settings.symmetry)
-    clipped: dict[Region, Region] = {}
 
+    @cache
     def clip(region: Region) -> Region:
-        if region not in clipped:
-            clipped[region] = region if part is None else region & part.region
-        return clipped[region]
+        return region if part is None else region & part.region
 
+    chambers = laminate.chambers
     films = [clip(layer.profile) for layer in laminate.tpe_layers]
     bonds = [Region(), *(clip(_bond(laminate, interface)) for interface in laminate.interfaces)]
-    slabs = {chamber.name: list(_void_slabs(laminate, chamber)) for chamber in laminate.chambers}
-    whole_seats = [
-        (chamber.name, s) for chamber in laminate.chambers for s in _seats(laminate, chamber)
-    ]
-    seat_regions = [clip(seat) for _, seat in whole_seats]
-    used = [*films, *bonds, *seat_regions]
-    used += [clip(region) for chamber_slabs in slabs.values() for _, _, region in chamber_slabs]
+    slabs = {chamber.name: list(_void_slabs(laminate, chamber)) for chamber in chambers}
+    seats = {chamber.name: list(_seats(laminate, chamber)) for chamber in chambers}
+    used = [*films, *bonds, *(clip(seat) for of_chamber in seats.values() for seat in of_chamber)]
+    used += [clip(region) for of_chamber in slabs.values() for _, _, region in of_chamber]
     regions = [region for region in dict.fromkeys(used) if not region.is_empty]
     plane = triangulation(regions, settings.h)
     row = {region: index for index, region in enumerate(regions)}
-    nothing = plane.inside[0] & False
 
-    def cells(region: Region) -> NDArray[np.bool_]:
-        covered: NDArray[np.bool_] = nothing
-        if not region.is_empty:
-            covered = plane.inside[row[region]]
+    def cells(*whole: Region) -> NDArray[np.bool_]:
+        rows = [row[clip(region)] for region in whole if not clip(region).is_empty]
+        covered: NDArray[np.bool_] = plane.inside[rows].any(axis=0)
         return covered
 
-    heights = list(_heights(laminate, settings.gaps))
-    plies = tuple(
-        Ply(layer, z, gap, cells(film), cells(bond), film.area, bond.area)
-        for layer, film, bond, (z, gap) in zip(
-            laminate.tpe_layers, films, bonds, heights, strict=True
-        )
-    )
-    for ply in plies:
-        _check_apart(plane, ply)
-    voids = {
-        name: _void(
-            [(place, under, clip(region)) for place, under, region in chamber_slabs], plies, cells
-        )
-        for name, chamber_slabs in slabs.items()
-    }
-    seats = nothing.copy()
-    for seat in seat_regions:
-        seats |= cells(seat)
-    present = {name: void for name, void in voids.items() if void.is_open}
-    shares = {
-        name: sum(clip(seat).area for owner, seat in whole_seats if owner == name)
-        / sum(seat.area for owner, seat in whole_seats if owner == name)
-        for name in present
-    }
-    return Layup(laminate, settings, plane, plies, present, seats, shares, part)
+    plies = []
+    z = 0.0
+    under = [0.0, *(interface.gap for interface in laminate.interfaces)]
+    for layer, film, bond, gap in zip(laminate.tpe_layers, films, bonds, under, strict=True):
+        places = (layer.z, gap) if settings.gaps else (z, 0.0)
+        plies.append(Ply(layer, *places, cells(film), cells(bond), film.area, bond.area))
+        _check_apart(plane, plies[-1])
+        z += layer.film.thickness
+    voids, shares = {}, {}
+    for chamber in chambers:
+        name = chamber.name
+        parts: tuple[dict[int, list[Region]], ...] = ({}, {})
+        for place, is_under, region in slabs[name]:
+            parts[is_under].setdefault(place, []).append(region)
+        void = MeshedVoid(*({k: cells(*of) for k, of in each.items()} for each in parts))
+        if any(bool(covered.any()) for covered in void.under.values()):
+            voids[name] = void
+            whole = sum(seat.area for seat in seats[name])
+            shares[name] = sum(clip(seat).area for seat in seats[name]) / whole
+    standing = cells(*(seat for of_chamber in seats.values() for seat in of_chamber))
+    return Layup(laminate, settings, plane, tuple(plies), voids, standing, shares, part)
 
 
 def _check_size(laminate: Laminate, settings: MeshSettings) -> None:
@@ -349,28 +308,34 @@ def _rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
     """Yield the width of each bonded ring along x and y, and its name."""
     for interface in laminate.interfaces:
         ring = "the neck ring" if interface.kind == "separator" else "the bond round the pocket"
-        layers = f"between layers {interface.below.index} and {interface.above.index}"
         for piece in interface.bond.pieces:
-            (low_x, low_y, high_x, high_y) = piece.outers[0].bounds
             for hole in piece.holes:
-                hole_x, hole_y, right, high = hole.bounds
-                width = min(hole_x - low_x, hole_y - low_y, high_x - right, high_y - high)
-                yield width, f"{ring} {layers}"
+                width = min(_margins(piece.outers[0].bounds, hole.bounds))
+                yield width, f"{ring} {_between(interface)}"
 
 
 def _open_rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
-    """Yield the narrowest width of the bond beside each pocket, and its name.
+    """Yield the widths of the bond beside each pocket, and its name.
 
-    A lone balloon's ring is open at its inlet.
+    A lone balloon's ring is open at its inlet, whose strip runs to the edge of the films.
     """
     for interface in laminate.interfaces:
-        low_x, low_y, high_x, high_y = interface.contact.bounds
         for outer in interface.unbonded.outers:
-            pocket_x, pocket_y, right, high = outer.bounds
-            sides = (pocket_x - low_x, pocket_y - low_y, high_x - right, high_y - high)
-            layers = f"between layers {interface.below.index} and {interface.above.index}"
-            # The inlet's strip runs to the edge of the films.
-            yield from ((s, f"the bond beside the pocket {layers}") for s in sides if s > EDGE)
+            for side in _margins(interface.contact.bounds, outer.bounds):
+                if side > EDGE:
+                    yield side, f"the bond beside the pocket {_between(interface)}"
+
+
+Box = tuple[float, float, float, float]
+
+
+def _margins(outer: Box, inner: Box) -> Box:
+    (a, b, c, d), (e, f, g, h) = outer, inner
+    return e - a, f - b, c - g, d - h
+
+
+def _between(interface: Interface) -> str:
+    return f"between layers {interface.below.index} and {interface.above.index}"
 
 
 def _bond(laminate: Laminate, interface: Interface) -> Region:
@@ -398,22 +363,9 @@ def _seats(laminate: Laminate, chamber: Chamber) -> Iterator[Region]:
 
 
 def _room(laminate: Laminate, centre: Point) -> float:
-    pockets = [i for i in laminate.interfaces if i.kind == "chamber"]
-    return min(
-        distance
-        for interface in pockets
-        for distance in [interface.bond.distance_to_edge(centre)]
-        if distance > 0
-    )
-
-
-def _heights(laminate: Laminate, gaps: bool) -> Iterator[tuple[float, float]]:
-    """Height of each film's lower face, and of the gap under it."""
-    z = 0.0
-    under = [0.0, *(interface.gap for interface in laminate.interfaces)]
-    for layer, gap in zip(laminate.tpe_layers, under, strict=True):
-        yield (layer.z, gap) if gaps else (z, 0.0)
-        z += layer.film.thickness
+    pockets = [i.bond for i in laminate.interfaces if i.kind == "chamber"]
+    distances = [bond.distance_to_edge(centre) for bond in pockets]
+    return min(distance for distance in distances if distance > 0)
 
 
 def _void_slabs(laminate: Laminate, chamber: Chamber) -> Iterator[tuple[int, bool, Region]]:
@@ -425,23 +377,6 @@ def _void_slabs(laminate: Laminate, chamber: Chamber) -> Iterator[tuple[int, boo
             yield films[slab.bottom], False, slab.region
         else:
             yield gaps[slab.bottom], True, slab.region
-
-
-def _void(
-    slabs: list[tuple[int, bool, Region]],
-    plies: tuple[Ply, ...],
-    cells: Callable[[Region], NDArray[np.bool_]],
-) -> MeshedVoid:
-    in_films: dict[int, NDArray[np.bool_]] = {}
-    under: dict[int, NDArray[np.bool_]] = {}
-    volume = 0.0
-    for place, is_under, region in slabs:
-        open_cells = under if is_under else in_films
-        covered = cells(region)
-        open_cells[place] = open_cells[place] | covered if place in open_cells else covered
-        ply = plies[place]
-        volume += region.area * (ply.gap if is_under else ply.thickness)
-    return MeshedVoid(in_films, under, volume)
 
 
 def _check_apart(plane: Plane, ply: Ply) -> None:
