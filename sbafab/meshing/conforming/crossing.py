@@ -25,9 +25,6 @@ if TYPE_CHECKING:
 SLACK = 0.002
 """mm of apparent overlap allowed between films: the error of chords on curved films."""
 
-PARALLEL = 1e-9
-"""mm, and sine, within which frames count as equal."""
-
 
 class Crossing(NamedTuple):
     """Two films, by their index in the layup, that pass ``depth`` mm through each other, and the
@@ -156,13 +153,10 @@ def _between(plane: _Plane, lower: _Film, upper: _Film) -> Crossing | None:
     low_above, high_above = upper.in_frame(lower.top), upper.in_frame(upper.bottom)
     if high_above[:, 2].min() >= low_above[:, 2].max() - SLACK:
         return None
-    if _is_parallel(lower, upper):
-        gaps = [(upper, _upright(plane, lower, upper))]
-    else:
-        gaps = [
-            (upper, plane.over(lower, lower.top, high)),
-            (lower, -plane.over(upper, upper.bottom, low_above)),
-        ]
+    gaps = [
+        (upper, plane.over(lower, lower.top, high)),
+        (lower, -plane.over(upper, upper.bottom, low_above)),
+    ]
     worst: Crossing | None = None
     for film, gap in gaps:
         depth = -gap
@@ -175,21 +169,6 @@ def _between(plane: _Plane, lower: _Film, upper: _Film) -> Crossing | None:
         if worst is None or depth[deepest] > worst.depth:
             worst = Crossing(lower.number, upper.number, float(depth[deepest]), float(x), float(y))
     return worst
-
-
-def _is_parallel(lower: _Film, upper: _Film) -> bool:
-    """Return True if two films have the same upright, one directly above the other."""
-    sideways = lower.axes[:2] @ (upper.shift - lower.shift).ravel()
-    is_parallel = np.abs(lower.axes - upper.axes).max() < PARALLEL
-    return bool(is_parallel and np.abs(sideways).max() < PARALLEL)
-
-
-def _upright(plane: _Plane, lower: _Film, upper: _Film) -> NDArray[np.float64]:
-    """Height of the upper film's nodes over the same nodes of the lower; NaN outside the lower."""
-    below = np.full(len(plane.points), np.nan)
-    below[lower.nodes] = lower.top @ lower.axes[2]
-    gap: NDArray[np.float64] = upper.bottom @ lower.axes[2] - below[upper.nodes]
-    return gap
 
 
 def _is_pierced(plane: _Plane, film: _Film, gap: NDArray[np.float64]) -> NDArray[np.bool_]:
