@@ -47,8 +47,7 @@ def mujoco(sectors: int) -> Stepped | None:
     """Its flexes with rings of so many nodes; None where the package is not there."""
     if find_spec("mujoco") is None:
         return None
-    from sbafab.simulators.mujoco.model import DT
-    from sbafab.simulators.mujoco.run import LEAST_TIME, SECONDS, run
+    from sbafab.simulators.mujoco.run import DT, LEAST_TIME, SECONDS, run
 
     laminate = sbafab.build(DESIGN)
     with tempfile.TemporaryDirectory() as place:

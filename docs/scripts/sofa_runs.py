@@ -24,7 +24,6 @@ from sbafab.process import ignore_progress
 from sbafab.simulators.coarse import CoarseActuator
 from sbafab.simulators.simulator import Result, SimulationRequest
 from sbafab.simulators.sofa import scenes as scene_files
-from sbafab.simulators.sofa import shell
 from sbafab.simulators.sofa.run import run
 
 COMMAND = "python -m docs.scripts.sofa_runs"
@@ -129,7 +128,7 @@ def finer() -> Iterator[list[str]]:
     for sectors in (8, 12, 16):
         with _changed(lambda made, n=sectors: replace(made, sectors=n)):
             done, rate = ran([5.0] * 3)
-        nodes = len(shell.round_actuator(sbafab.build(NAME), sectors).mesh.rest)
+        nodes = len(scene_files.round_actuator(sbafab.build(NAME), sectors).mesh.rest)
         yield row(sectors, nodes, f"{done.last.tip[2]:.2f}", f"{rate:.0f}")
 
 
@@ -182,7 +181,7 @@ def _stack(made: CoarseActuator, **other: object) -> CoarseActuator:
 
 
 def _changed(change: Callable[[CoarseActuator], CoarseActuator]) -> mock._patch[object]:
-    make = shell.round_actuator
+    make = scene_files.round_actuator
     return mock.patch.object(scene_files, "round_actuator", lambda *given: change(make(*given)))
 
 

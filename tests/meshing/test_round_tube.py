@@ -13,9 +13,8 @@ from scipy.optimize import minimize_scalar
 from sbafab.api import build, predict
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.layup import MeshSettings, flat, layup
+from sbafab.meshing.conforming.layup import MeshSettings, flat, layup, round_tube
 from sbafab.meshing.conforming.meshes import conforming_meshes, write_conforming
-from sbafab.meshing.conforming.round_tube import round_tube
 from sbafab.meshing.mesh_files import write_meshes
 
 

@@ -21,7 +21,7 @@ from sbafab.rules.deck import has_failed
 from sbafab.runs.run import Run, RunRequest, generate
 from sbafab.simulators.calculix.deck import deck_settings
 from sbafab.simulators.coarse import CoarseActuator, round_stack, why_not_round
-from sbafab.simulators.mujoco.model import model_text
+from sbafab.simulators.mujoco.run import model_text
 from sbafab.simulators.sofa.scenes import why_no_scene
 
 FILMS = """

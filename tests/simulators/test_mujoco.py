@@ -18,8 +18,7 @@ import sbafab
 from sbafab.errors import DesignError, OutputError
 from sbafab.process import ignore_progress
 from sbafab.simulators.mujoco import run as of_mujoco
-from sbafab.simulators.mujoco.model import coarse_actuator
-from sbafab.simulators.mujoco.run import export, inflate, run, why_not
+from sbafab.simulators.mujoco.run import coarse_actuator, export, inflate, run, why_not
 from sbafab.simulators.simulator import Result, SimulationRequest
 from tests.quick import few
 

@@ -19,8 +19,13 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.simulators.simulator import SimulationRequest
 from sbafab.simulators.sofa.run import export
-from sbafab.simulators.sofa.scenes import beam_of, prism, scenes_of
-from sbafab.simulators.sofa.shell import conforming_shell, round_actuator
+from sbafab.simulators.sofa.scenes import (
+    beam_of,
+    conforming_shell,
+    prism,
+    round_actuator,
+    scenes_of,
+)
 
 FACTS = json.loads(Path(__file__).with_name("sofa_components.json").read_text(encoding="utf-8"))
 SCENES = ("actuator.scn", "actuator_frames.scn", "actuator_volume.scn", "actuator_beam.scn")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sbafab.errors import OutputError
 from sbafab.meshing.conforming.crossing import check_apart
-from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshedVoid
+from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshedVoid, round_tube
 from sbafab.meshing.conforming.mesh import (
     CORNERS,
     FACES,
@@ -26,7 +26,6 @@ from sbafab.meshing.conforming.mesh import (
     volumes,
 )
 from sbafab.meshing.conforming.plane import Plane
-from sbafab.meshing.conforming.round_tube import round_tube
 from sbafab.meshing.surface import Surface, unpaired_edges
 
 # The sweep: nodes and prisms of every film.
