@@ -26,10 +26,6 @@ from sbafab.geometry.edges import (
 )
 from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
 
-CELLS = 16
-"""Width of a grid cell in tolerances, so that most points touch one cell only."""
-
-
 ASLANT = 0.7548776662466927
 """Slope of a line on which few points of a drawing share a projection."""
 
@@ -44,35 +40,18 @@ class PointPool:
     def __init__(
         self, ends: Iterable[Point], inner: Iterable[Point] = (), same: float = SAME
     ) -> None:
-        self._same = same
-        self._rank: dict[Point, int] = {}
-        self._cells: dict[tuple[int, int], list[Point]] = {}
-        first = set(ends)
-        rest = set(inner) - first
-        points = [*first, *rest]
-        near = self._maybe_near(points)
+        self._ends = set(ends)
+        points = self._ends.union(inner)
         self._leader = dict(zip(points, points, strict=True))
-        if not near:
-            return
-        for p in (*sorted(first & near), *sorted(rest & near)):
-            self._add(p)
-
-    def _maybe_near(self, points: Sequence[Point]) -> set[Point]:
-        """Return a superset of the points that lie within the tolerance of another.
-
-        Points are projected on a line at an angle that is rare in drawings.
-        """
-        reach = 1.01 * math.hypot(1, ASLANT) * self._same
-        near: set[Point] = set()
-        along = [p[0] + ASLANT * p[1] for p in points]
-        # Usually empty.
-        if all(u - t >= reach for t, u in pairwise(sorted(along))):
-            return near
-        for a, b in pairwise(sorted(zip(along, points, strict=True))):
-            if b[0] - a[0] < reach:
-                near.add(a[1])
-                near.add(b[1])
-        return near
+        reach = 1.01 * math.hypot(1, ASLANT) * same
+        along = sorted([(p[0] + ASLANT * p[1], p) for p in points])
+        for i, ((t, p), (following, _)) in enumerate(pairwise(along)):
+            if following - t < reach:
+                for u, q in along[i + 1 :]:
+                    if u - t >= reach:
+                        break
+                    if math.dist(p, q) < same:
+                        self._unite(self.snapped(p), self.snapped(q))
 
     def snapped(self, p: Point) -> Point:
         """Return the representative of a pooled point."""
@@ -81,20 +60,8 @@ class PointPool:
             p, leader = leader, self._leader[leader]
         return leader
 
-    def _add(self, p: Point) -> None:
-        self._rank[p] = len(self._rank)
-        self._leader[p] = p
-        width, margin = CELLS * self._same, 1.01 / CELLS
-        u, v = p[0] / width, p[1] / width
-        for column in range(math.floor(u - margin), math.floor(u + margin) + 1):
-            for row in range(math.floor(v - margin), math.floor(v + margin) + 1):
-                for q in self._cells.get((column, row), ()):
-                    if math.dist(p, q) < self._same:
-                        self._unite(self.snapped(p), self.snapped(q))
-        self._cells.setdefault((math.floor(u), math.floor(v)), []).append(p)
-
     def _unite(self, p: Point, q: Point) -> None:
-        first, second = (p, q) if self._rank[p] <= self._rank[q] else (q, p)
+        first, second = sorted((p, q), key=lambda point: (point not in self._ends, point))
         self._leader[second] = first
 
 
@@ -182,16 +149,10 @@ def split_edges(
     cuts: list[list[Point]] = [[] for _ in edges]
     meeting: list[tuple[int, int]] = []
     bounds = [edge.bounds for edge in edges]
-    # An arc may leave the box of its ends by the distance of these ends from its circle.
-    near = [widened(box, tolerance + BENT) for box in bounds]
     for i, j in close_pairs(bounds, tolerance):
         if chain is not None and chain[i] == chain[j] >= 0:
             continue
-        if _stay_apart(edges[i], edges[j], tolerance) or _only_follows(
-            edges[i], edges[j], near[i], near[j], 2 * tolerance
-        ):
-            continue
-        points = meeting_points(edges[i], edges[j], tolerance, (near[i], near[j]))
+        points = meeting_points(edges[i], edges[j], tolerance)
         if points:
             cuts[i] += points
             cuts[j] += points
@@ -219,33 +180,6 @@ def split_edges(
             for p in ends_of_parts
         ),
     )
-
-
-def _stay_apart(a: Edge, b: Edge, tolerance: float) -> bool:
-    """Return True if two arcs lie on circles that do not come near each other."""
-    if not (isinstance(a, Arc) and isinstance(b, Arc)):
-        return False
-    gap, r, s = math.dist(a.centre, b.centre), a.radius, b.radius
-    # Their ends may be off their circles by up to BENT.
-    return max(gap - r - s, abs(r - s) - gap) > tolerance + 2 * BENT
-
-
-def _only_follows(a: Edge, b: Edge, near_a: Bounds, near_b: Bounds, same: float) -> bool:
-    """Return True if one edge starts where the other ends and they are near each other only there.
-
-    Then neither is cut by the other.
-    """
-    if a.end == b.start:
-        x, y = a.end
-    elif a.start == b.end:
-        x, y = a.start
-    else:
-        return False
-    left_a, low, right, high = near_a
-    left_b, low_b, right_b, high_b = near_b
-    aside = max(min(right, right_b) - x, x - max(left_a, left_b))
-    above = max(min(high, high_b) - y, y - max(low, low_b))
-    return aside * aside + above * above < same * same
 
 
 def _share(
@@ -463,7 +397,7 @@ class Arrangement:
         x, y = p
         return sum(
             self.pieces[number].turns * turns_round(self._drawn[number], p)
-            for number in self._index.numbers((x, y, self._index.right, y))
+            for number in self._index.numbers((x, y, math.inf, y))
             if winding[2 * number] is not None
         )
 

@@ -1,11 +1,11 @@
-"""Caches: attributes of records, values stored in contours, results of functions."""
+"""Caches: values stored in records, results of functions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import wraps
 from threading import Lock
-from typing import Any, Generic, ParamSpec, TypeVar, overload
+from typing import Generic, ParamSpec, TypeVar
 
 Value = TypeVar("Value")
 Record = TypeVar("Record")
@@ -14,30 +14,6 @@ Several = TypeVar("Several", bound=tuple[object, ...])
 
 MOST = 256
 """Results kept per function, which bounds the memory over any number of designs."""
-
-
-class cached_attribute(Generic[Value]):  # noqa: N801
-    """An attribute computed at its first use and then stored in its frozen record.
-
-    Like ``functools.cached_property``, but without the lock used before Python 3.12.
-    """
-
-    def __init__(self, compute: Callable[[Any], Value]) -> None:
-        self.compute = compute
-        self.__doc__ = compute.__doc__
-
-    def __set_name__(self, kind: type, name: str) -> None:
-        self.name = name
-
-    @overload
-    def __get__(self, record: None, kind: type) -> cached_attribute[Value]: ...
-    @overload
-    def __get__(self, record: object, kind: type) -> Value: ...
-    def __get__(self, record: object | None, kind: type) -> cached_attribute[Value] | Value:
-        if record is None:
-            return self
-        value = record.__dict__[self.name] = self.compute(record)
-        return value
 
 
 def stored(record: Record, name: str, compute: Callable[[Record], Value]) -> Value:
@@ -135,31 +111,5 @@ def cached(function: Callable[Arguments, Value], most: int = MOST) -> Callable[A
             result = (function(*arguments, **named),)
             results.add(key, result)
         return result[0]
-
-    return cached_function
-
-
-def cached_batch(
-    function: Callable[[list[Several]], Sequence[Value]], most: int = MOST
-) -> Callable[[Sequence[Several]], list[Value]]:
-    """Return a function of many argument tuples at once with a cache of its last ``most`` results.
-
-    Only tuples that are not in the cache are passed on, all together. Results must not be changed.
-    """
-    results: _Results[Value] = _Results(most)
-    by_key = results.by_key
-
-    @wraps(function)
-    def cached_function(batch: Sequence[Several]) -> list[Value]:
-        keys = [_Key(arguments) for arguments in batch]
-        values = {key: by_key[key] for key in keys if key in by_key}
-        new = {
-            key: arguments for key, arguments in zip(keys, batch, strict=True) if key not in values
-        }
-        if new:
-            for key, value in zip(new, function(list(new.values())), strict=True):
-                values[key] = value
-                results.add(key, value)
-        return [values[key] for key in keys]
 
     return cached_function

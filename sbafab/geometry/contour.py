@@ -9,11 +9,10 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from operator import sub
 
-from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import (
     EPSILON,
     SAME,
@@ -35,9 +34,6 @@ Mark = tuple[float, float, float]
 Similarity = Callable[[Point], Point]
 """A similarity of the plane, by its effect on points."""
 
-MANY = 32
-"""Number of edges above which a spatial index pays off."""
-
 
 @dataclass(frozen=True)
 class Contour:
@@ -45,7 +41,7 @@ class Contour:
 
     edges: tuple[Edge, ...]
 
-    @cached_attribute
+    @cached_property
     def area(self) -> float:
         """Enclosed area in mm2: positive counter-clockwise, negative for a hole."""
         ox, oy = self.edges[0].start
@@ -57,32 +53,32 @@ class Contour:
             bulges += edge.segment_area
         return twice / 2 + bulges
 
-    @cached_attribute
+    @cached_property
     def length(self) -> float:
         """Length in mm."""
         return sum([edge.length for edge in self.edges])
 
-    @cached_attribute
+    @cached_property
     def boxes(self) -> tuple[Bounds, ...]:
         """The bounds of each edge."""
         return tuple([edge.bounds for edge in self.edges])
 
-    @cached_attribute
+    @cached_property
     def bounds(self) -> Bounds:
         """Least x, least y, largest x, largest y, mm."""
         return box_round(self.boxes)
 
-    @cached_attribute
+    @cached_property
     def is_hole(self) -> bool:
         """True if the contour runs clockwise."""
         return self.area < 0
 
-    @cached_attribute
+    @cached_property
     def start_hash(self) -> int:
         """A hash of the points where edges start: equal for equal edges, rarely for others."""
         return hash(tuple([edge.start for edge in self.edges]))
 
-    @cached_attribute
+    @cached_property
     def circle(self) -> tuple[Point, float] | None:
         """Centre and radius if the contour is one full circle."""
         first = self.edges[0]
@@ -93,7 +89,7 @@ class Contour:
                 return None
         return first.centre, first.radius
 
-    @cached_attribute
+    @cached_property
     def runs(self) -> tuple[tuple[Edge, ...], ...]:
         """The edges grouped by the line or circle they lie on, from the first corner on."""
         return tuple(runs(self.edges))
@@ -103,7 +99,7 @@ class Contour:
         """x, y and bulge of each vertex, as a DXF polyline carries them."""
         return tuple((*edge.start, edge.bulge) for edge in self.edges)
 
-    @cached_attribute
+    @cached_property
     def marks(self) -> tuple[Mark, ...]:
         """The vertices with their bulges; for a full circle, which may be split anywhere, its
         centre and radius (negative for a hole).
@@ -130,15 +126,7 @@ class Contour:
 
     def reversed(self) -> Contour:
         """Return the contour run through the other way: a hole for an outline."""
-        result = Contour(tuple([edge.reversed() for edge in reversed(self.edges)]))
-        values, new = self.__dict__, result.__dict__
-        new["circle"] = self.circle
-        for name, sign in (("length", 1), ("area", -1)):
-            if name in values:
-                new[name] = sign * values[name]
-        if "bounds" in values:
-            new["bounds"] = values["bounds"]
-        return result
+        return Contour(tuple([edge.reversed() for edge in reversed(self.edges)]))
 
     def mapped(self, point: Similarity, scale: float, mirror: bool) -> Contour:
         """Return the contour under a similarity given by its effect on points."""
@@ -154,27 +142,7 @@ class Contour:
             ]
         )
         image = Contour(edges)
-        values, new = self.__dict__, image.__dict__
-        if "length" in values:
-            new["length"] = scale * values["length"]
-        if "area" in values:
-            # A mirrored image keeps the material on its left once it is reversed.
-            new["area"] = scale * scale * values["area"] * (-1 if mirror else 1)
-        if self.circle is not None:
-            (x, y), radius = point(self.circle[0]), self.circle[1] * scale
-            new["circle"] = (x, y), radius
-            new["bounds"] = x - radius, y - radius, x + radius, y + radius
         return image.reversed() if mirror else image
-
-    @cached_attribute
-    def _simple_circle(self) -> tuple[Point, float, int] | None:
-        """Centre, radius and direction of a full circle that runs round once."""
-        if self.circle is None:
-            return None
-        centre, radius = self.circle
-        if abs(abs(self.area) - math.pi * radius * radius) > SAME * radius:
-            return None
-        return centre, radius, -1 if self.area < 0 else 1
 
     def winding(self, p: Point) -> int:
         """Return the winding number round ``p`` (not on an edge), positive counter-clockwise."""
@@ -182,35 +150,11 @@ class Contour:
         low_x, low_y, high_x, high_y = self.bounds
         if not (low_x <= px <= high_x and low_y <= py <= high_y):
             return 0
-        if self._simple_circle is not None:
-            (cx, cy), radius, turns = self._simple_circle
-            room = radius - math.hypot(px - cx, py - cy)
-            if abs(room) > SAME:
-                return turns if room > 0 else 0
         turns = 0
-        if len(self.edges) < MANY:
-            for edge, box in zip(self.edges, self.boxes, strict=True):
-                if box[1] - EPSILON <= py <= box[3] + EPSILON:
-                    turns += turns_round(edge, p)
-            return turns
-        low, step, rows = self._rows
-        for edge in rows[min(len(rows) - 1, int((py - low) / step))]:
-            turns += turns_round(edge, p)
+        for edge, box in zip(self.edges, self.boxes, strict=True):
+            if box[1] - EPSILON <= py <= box[3] + EPSILON:
+                turns += turns_round(edge, p)
         return turns
-
-    @cached_attribute
-    def _rows(self) -> tuple[float, float, list[list[Edge]]]:
-        """Edges by level: lowest y, height of a row, and each row's edges."""
-        _, low, _, high = self.bounds
-        count = len(self.edges) // 4
-        step = (high - low) / count
-        rows: list[list[Edge]] = [[] for _ in range(count)]
-        for edge, (_, bottom, _, top) in zip(self.edges, self.boxes, strict=True):
-            # One extra row at both ends, since row limits are rounded.
-            first, last = int((bottom - low) / step) - 1, int((top - low) / step) + 1
-            for row in range(max(0, first), min(count - 1, last) + 1):
-                rows[row].append(edge)
-        return low, step, rows
 
     def polygon(self, sagitta: float = 0.001) -> list[Point]:
         """Return vertices of a polygon whose chords stay within ``sagitta`` mm of the arcs."""

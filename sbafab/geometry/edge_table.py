@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from itertools import chain
-from operator import mul
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge
-from sbafab.geometry.nearby import ALONGSIDE, BESIDE, BoundarySide
+from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
 from sbafab.geometry.on_demand import np
 
 if TYPE_CHECKING:
@@ -20,10 +18,8 @@ if TYPE_CHECKING:
     Bools = NDArray[np.bool_]
 
 
-FEW = 20_000
-"""Pairs of boxes up to which all are compared at once."""
-TOGETHER = 64
-"""Size of the batches in which more boxes are compared."""
+AT_ONCE = 200_000
+"""Pairs of boxes compared at once, which bounds the memory."""
 
 
 def dot(a: Floats, b: Floats) -> Floats:
@@ -112,95 +108,20 @@ class EdgeTable:
         return distance
 
 
-class CellOrder:
-    """The order in which an ``EdgeIndex`` of the same edges returns the edges that a box touches.
-
-    ``parts`` are the numbers of edges in each of several indices, one after the other.
-    """
-
-    def __init__(self, box: Floats, parts: Sequence[int]) -> None:
-        count = np.array([part for part in parts if part])
-        begins = count.cumsum() - count
-        low = np.minimum.reduceat(box[:2], begins, axis=1)
-        high = np.maximum.reduceat(box[2:], begins, axis=1)
-        cell = (high - low).max(axis=0) / np.sqrt(count)
-        self.low = low.repeat(count, axis=1)
-        self.cell = np.where(cell == 0, 1.0, cell).repeat(count)
-        self.own: Floats = np.floor((box[:2] - self.low) / self.cell)
-
-    def sorted(self, queries: Floats, places: Indices, edges: Indices) -> Indices:
-        """Return the order of pairs of places and edges; ``queries`` are the places' boxes."""
-        corner = queries[:2].take(places, axis=1) - self.low.take(edges, axis=1)
-        cells = np.floor(corner / self.cell.take(edges))
-        first = np.maximum(cells, self.own.take(edges, axis=1))
-        return np.lexsort((edges, first[1], first[0], places))
-
-
 def touching(queries: Floats, boxes: Floats) -> tuple[Indices, Indices]:
     """Return pairs of numbers (query, box) of all boxes that meet each query, in order."""
-    if queries.shape[1] * boxes.shape[1] <= FEW:
-        return _touching(queries, boxes)
-    pairs = []
-    # Consecutive boxes are usually neighbours.
-    for first in range(0, queries.shape[1], TOGETHER):
-        batch = queries[:, first : first + TOGETHER]
-        near = np.flatnonzero(
-            (boxes[0] <= batch[2].max())
-            & (boxes[2] >= batch[0].min())
-            & (boxes[1] <= batch[3].max())
-            & (boxes[3] >= batch[1].min())
-        )
-        query, box = _touching(batch, boxes[:, near])
-        pairs.append((query + first, near[box]))
-    return tuple(np.concatenate(numbers) for numbers in zip(*pairs, strict=True))  # type: ignore[return-value]
-
-
-def touching_in_parts(
-    queries: Floats, parts: Sequence[int], boxes: Floats, box_parts: Sequence[int]
-) -> tuple[Indices, Indices]:
-    """Return these pairs, comparing each part of the queries with its own boxes only."""
-    if len(parts) > 1 and sum(map(mul, parts, box_parts)) <= FEW:
-        return _touching_in_parts(queries, parts, boxes, box_parts)
-    pairs = []
-    first = box_first = 0
-    for count, box_count in zip(parts, box_parts, strict=True):
-        last, box_last = first + count, box_first + box_count
-        query, box = touching(queries[:, first:last], boxes[:, box_first:box_last])
-        pairs.append((query + first, box + box_first))
-        first, box_first = last, box_last
-    if len(pairs) == 1:
-        return pairs[0]
+    pairs = [(np.zeros(0, np.intp), np.zeros(0, np.intp))]
+    step = max(1, AT_ONCE // max(1, boxes.shape[1]))
+    for start in range(0, queries.shape[1], step):
+        some = queries[:, start : start + step, None]
+        meets = boxes[0] <= some[2]
+        meets &= boxes[2] >= some[0]
+        meets &= boxes[1] <= some[3]
+        meets &= boxes[3] >= some[1]
+        # The few True values are found faster in a flat array.
+        query, box = np.divmod(meets.ravel().nonzero()[0], boxes.shape[1] or 1)
+        pairs.append((query + start, box))
     query, box = (np.concatenate(numbers) for numbers in zip(*pairs, strict=True))
-    return query, box
-
-
-def _touching_in_parts(
-    queries: Floats, parts: Sequence[int], boxes: Floats, box_parts: Sequence[int]
-) -> tuple[Indices, Indices]:
-    """Return these pairs, comparing all pairs of all parts in one array."""
-    each = np.array(box_parts)
-    begins = (each.cumsum() - each).repeat(parts)
-    each = each.repeat(parts)
-    query = np.arange(len(each)).repeat(each)
-    box = np.arange(len(query)) - (each.cumsum() - each - begins).repeat(each)
-    # The test along x rules out most pairs, so few are compared along y.
-    for low, high in ((0, 2), (1, 3)):
-        meets = boxes[low].take(box) <= queries[high].take(query)
-        meets &= boxes[high].take(box) >= queries[low].take(query)
-        (met,) = meets.nonzero()
-        query, box = query.take(met), box.take(met)
-    return query, box
-
-
-def _touching(queries: Floats, boxes: Floats) -> tuple[Indices, Indices]:
-    """Return these pairs, comparing every query with every box."""
-    sides = queries[:, :, None]
-    meets = boxes[0] <= sides[2]
-    meets &= boxes[2] >= sides[0]
-    meets &= boxes[1] <= sides[3]
-    meets &= boxes[3] >= sides[1]
-    # The few True values are found faster in a flat array.
-    query, box = np.divmod(meets.ravel().nonzero()[0], boxes.shape[1] or 1)
     return query, box
 
 
@@ -234,18 +155,81 @@ def crossings(
     return distances, there
 
 
+# The sides of boundaries, which have the material on their left.
+
+
+ALONGSIDE = 1e-3
+"""Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
+
+
+BESIDE = 1e-5
+"""mm by which an edge may miss another's normals because of rounding."""
+
+
+class Foot(NamedTuple):
+    """A point of an edge, and the unit normal into the material there."""
+
+    point: Point
+    normal: Point
+
+
+class BoundarySide:
+    """An edge of a boundary with values that the search uses repeatedly.
+
+    ``half`` is the distance of its ends from its middle, ``lean`` the sine of its half turn.
+    """
+
+    __slots__ = ("box", "edge", "half", "half_turn", "lean", "middle", "normal")
+
+    def __init__(
+        self, edge: Edge, box: Bounds, middle: Point, half_turn: float, half: float
+    ) -> None:
+        self.edge = edge
+        self.box = box
+        self.middle = middle
+        self.normal = left_normal(edge, middle)
+        self.half_turn = half_turn
+        self.half = half
+        self.lean = math.sin(min(half_turn, math.pi / 2))
+
+    def feet(self, p: Point) -> list[Foot]:
+        """Return the points of the edge where its normal passes through ``p``."""
+        edge = self.edge
+        if isinstance(edge, Line):
+            x0, y0 = edge.start
+            x1, y1 = edge.end
+            dx, dy = x1 - x0, y1 - y0
+            square = dx * dx + dy * dy
+            t = ((p[0] - x0) * dx + (p[1] - y0) * dy) / square
+            if not -1e-9 <= t <= 1 + 1e-9:
+                return []
+            length = math.sqrt(square)
+            return [Foot((x0 + t * dx, y0 + t * dy), (-dy / length, dx / length))]
+        cx, cy = edge.centre
+        r = edge.radius
+        ux, uy = p[0] - cx, p[1] - cy
+        distance = math.hypot(ux, uy)
+        if distance < 1e-12:
+            return [Foot(self.middle, left_normal(edge, self.middle))]
+        inward = -1.0 if edge.ccw else 1.0
+        mx, my = self.middle[0] - cx, self.middle[1] - cy
+        least = r * (math.cos(self.half_turn) - 1e-9)
+        feet = []
+        for sign in (1.0, -1.0):
+            vx, vy = sign * ux / distance, sign * uy / distance
+            if vx * mx + vy * my >= least:
+                feet.append(Foot((cx + r * vx, cy + r * vy), (inward * vx, inward * vy)))
+        return feet
+
+
 ROOM = 1e-9
 """Exceeds the rounding of the pairwise tests that follow."""
 
 
 class SideTable:
-    """The sides of one boundary, or of several one after the other, in arrays.
+    """The sides of a boundary in arrays."""
 
-    ``parts`` are the numbers of sides in each boundary; sides of different boundaries never face.
-    """
-
-    def __init__(self, sides: Sequence[BoundarySide], parts: Sequence[int] = ()) -> None:
-        self.parts = parts or [len(sides)]
+    def __init__(self, sides: Sequence[BoundarySide]) -> None:
         self.edges = [side.edge for side in sides]
         self.table = EdgeTable.of(self.edges, [side.box for side in sides])
         rows = [
@@ -255,38 +239,18 @@ class SideTable:
         self.middle, self.normal = columns[0:2], columns[2:4]
         self.half_turn, self.half, self.lean = columns[4:7]
 
-    def pairs(self, aside: float, within: Floats) -> tuple[Indices, Indices]:
-        """Pairs of sides that face each other within a distance, in the order of an ``EdgeIndex``.
+    def pairs(self, aside: float, within: float) -> tuple[Indices, Indices]:
+        """Return pairs (a, b) of sides that may face each other within a distance, in order.
 
-        ``within`` is that distance for each side, mm; ``aside`` the angle that normals may turn by.
+        ``aside`` is the angle that normals may turn by. Normals of ``b`` may meet ``a``; a pair may
+        come both ways.
         """
-        boxes, a, b = self._near(within)
-        far = within.take(a)
-        chosen = self._opposed(a, b, aside) & self._may_hold_feet(b, a, far) & (a != b)
-        a, b = a[chosen], b[chosen]
-        faces = self._may_face(a, b, within.take(a))
-        a, b = a[faces], b[faces]
-        order = CellOrder(self.table.box, self.parts).sorted(boxes, a, b)
-        return a.take(order), b.take(order)
-
-    def later(self, aside: float, within: float) -> list[list[int]]:
-        """For each side, the later ones that it may face within a distance (a slight superset)."""
-        _, a, b = self._near(within)
-        a, b = a[a < b], b[a < b]
-        opposed = self._opposed(a, b, aside)
-        a, b = a[opposed], b[opposed]
-        feet = self._may_hold_feet(a, b, within) | self._may_hold_feet(b, a, within)
-        later: list[list[int]] = [[] for _ in self.edges]
-        for side, facing in zip(a[feet].tolist(), b[feet].tolist(), strict=True):
-            later[side].append(facing)
-        return later
-
-    def _near(self, within: float | Floats) -> tuple[Floats, Indices, Indices]:
-        """Return the boxes of sides widened by ``within``, and pairs of sides whose boxes meet."""
         boxes, box = self.table.box.copy(), self.table.box
         boxes[:2] -= within
         boxes[2:] += within
-        return boxes, *touching_in_parts(boxes, self.parts, box, self.parts)
+        a, b = touching(boxes, box)
+        chosen = self._opposed(a, b, aside) & self._may_hold_feet(b, a, within) & (a != b)
+        return a[chosen], b[chosen]
 
     def _opposed(self, a: Indices, b: Indices, aside: float) -> Bools:
         """Return True for pairs with normals opposed somewhere, to within ``aside`` radians."""
@@ -296,23 +260,7 @@ class SideTable:
         may_face: Bools = opposed | (room > math.pi)
         return may_face
 
-    def _may_face(self, a: Indices, b: Indices, within: Floats) -> Bools:
-        """False for concentric arcs of one direction that lie too far off to face each other.
-
-        The same test as ``width._may_face`` for arcs with the material on the same side.
-        """
-        table = self.table
-        off = table.centre.take(a, axis=1) - table.centre.take(b, axis=1)
-        turn, r, s = table.turn.take(a), table.radius.take(a), table.radius.take(b)
-        concentric = (
-            (np.hypot(off[0], off[1]) < ALONGSIDE) & (turn == table.turn.take(b)) & (turn != 0)
-        )
-        concentric &= np.minimum(r, s) >= 10 * ALONGSIDE
-        across = (turn > 0) & (r + s <= within + 2 * ALONGSIDE)
-        may_face: Bools = ~concentric | across
-        return may_face
-
-    def _may_hold_feet(self, a: Indices, b: Indices, within: float | Floats) -> Bools:
+    def _may_hold_feet(self, a: Indices, b: Indices, within: float) -> Bools:
         """True for pairs where normals of sides ``a`` may meet sides ``b`` within a distance."""
         off, normal = (
             self.middle.take(b, axis=1) - self.middle.take(a, axis=1),

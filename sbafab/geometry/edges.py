@@ -495,55 +495,21 @@ def _off_circle(edge: Edge, head: Arc) -> float:
 # Meeting points of two edges: crossings, touches, and the ends of a shared stretch.
 
 
-EVERYWHERE: Bounds = (-math.inf, -math.inf, math.inf, math.inf)
-
-
-def meeting_points(
-    a: Edge,
-    b: Edge,
-    tolerance: float = EPSILON,
-    boxes: tuple[Bounds, Bounds] = (EVERYWHERE, EVERYWHERE),
-) -> list[Point]:
+def meeting_points(a: Edge, b: Edge, tolerance: float = EPSILON) -> list[Point]:
     """Return the points that lie on both edges, to within the tolerance.
 
-    Overlapping edges give the ends of the shared stretch. ``boxes`` hold all points within the
-    tolerance of each edge, if computed already; no point outside them is returned.
+    Overlapping edges give the ends of the shared stretch.
     """
-    near_a, near_b = boxes
-    low_x, low_y = max(near_a[0], near_b[0]), max(near_a[1], near_b[1])
-    high_x, high_y = min(near_a[2], near_b[2]), min(near_a[3], near_b[3])
-    a0, a1, b0, b1 = a.start, a.end, b.start, b.end
-    points: list[Point] = []
-    if a0 in (b0, b1) or (
-        low_x <= a0[0] <= high_x and low_y <= a0[1] <= high_y and distance_to(b, a0) < tolerance
-    ):
-        points.append(a0)
-    if a1 in (b0, b1) or (
-        low_x <= a1[0] <= high_x and low_y <= a1[1] <= high_y and distance_to(b, a1) < tolerance
-    ):
-        points.append(a1)
-    for p in (b0, b1):
-        within = low_x <= p[0] <= high_x and low_y <= p[1] <= high_y
-        if within and p not in (a0, a1) and distance_to(a, p) < tolerance:
-            points.append(p)
-    if points and _holds(points[0], 2 * tolerance, low_x, low_y, high_x, high_y):
-        return points
+    ends = (b.start, b.end)
+    points = [p for p in (a.start, a.end) if p in ends or distance_to(b, p) < tolerance]
+    points += [p for p in ends if p not in (a.start, a.end) and distance_to(a, p) < tolerance]
     for p in _support_crossings(a, b, tolerance):
-        if not (low_x <= p[0] <= high_x and low_y <= p[1] <= high_y):
-            continue
         # Prefer a known end to a computed point, which is less exact at a touch.
-        if any(math.dist(p, q) <= 2 * tolerance for q in points):
-            continue
-        if distance_to(a, p) < tolerance and distance_to(b, p) < tolerance:
+        if all(math.dist(p, q) > 2 * tolerance for q in points) and (
+            distance_to(a, p) < tolerance and distance_to(b, p) < tolerance
+        ):
             points.append(p)
     return points
-
-
-def _holds(
-    p: Point, reach: float, low_x: float, low_y: float, high_x: float, high_y: float
-) -> bool:
-    """Return True if a whole box lies within ``reach`` of a point."""
-    return math.hypot(max(high_x - p[0], p[0] - low_x), max(high_y - p[1], p[1] - low_y)) <= reach
 
 
 def _support_crossings(a: Edge, b: Edge, tolerance: float) -> list[Point]:

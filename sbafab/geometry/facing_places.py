@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.geometry.cache import cached_batch
+from sbafab.geometry.cache import cached
 from sbafab.geometry.edge_table import (
     SideTable,
     boxes_round,
     columns_of,
     crossings,
     dot,
-    touching_in_parts,
+    touching,
 )
 from sbafab.geometry.edges import Arc, Edge, Point
 from sbafab.geometry.on_demand import np
@@ -79,66 +78,35 @@ class FacingPlaces(NamedTuple):
         return FacingPlaces(self.start[:, some], self.end[:, some], self.value[some])
 
 
-FacingQuery = tuple[Region, float, float, Width | None]
-"""Region, slack (mm), sharp angle (degrees), and least width if measured already."""
+@cached
+def facing_places(
+    region: Region, slack: float, sharp: float, least: Width | None = None
+) -> FacingPlaces:
+    """Return the places of a region that are at most ``slack`` mm wider than the narrowest.
 
-
-@cached_batch
-def facing_places_of(queries: Sequence[FacingQuery]) -> Sequence[FacingPlaces]:
-    """Return the facing places of several regions, each once.
-
-    They are at most ``slack`` mm wider than the narrowest. They include places where edges are
-    square on each other, and samples along nearly parallel edges: these may become the narrowest if
-    a layer turns.
+    They include places where edges are square on each other, and samples along nearly parallel
+    edges: these may become the narrowest if a layer turns. A corner below ``sharp`` degrees has
+    width 0; ``least`` is the least width, if measured already.
     """
-    nowhere = FacingPlaces(np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0))
-    results = [nowhere] * len(queries)
-    searched: dict[int, Gathered] = {}
-    for number, (region, slack, sharp, least_width) in enumerate(queries):
-        boundary = boundary_of(region, sharp)
-        least = least_width or least_of(boundary, math.inf)
-        if least is None:
-            continue
-        if least.value == 0.0:
-            place = np.array([least.start]).T, np.array([least.end]).T
-            results[number] = FacingPlaces(*place, np.zeros(1))
-            continue
-        searched[number] = Gathered(boundary, least.value + slack)
-        search(searched[number])
-    if searched:
-        for number, places in zip(searched, _together(list(searched.values())), strict=True):
-            results[number] = places
-    return results
+    boundary = boundary_of(region, sharp)
+    least = least or least_of(boundary, math.inf)
+    if least is None or least.value == 0.0:
+        ends = [] if least is None else [(*least.start, *least.end)]
+        columns = columns_of(ends, 4)
+        return FacingPlaces(columns[:2], columns[2:], np.zeros(len(ends)))
+    gathered = Gathered(boundary, least.value + slack)
+    search(gathered)
+    offered = columns_of([(*p, *q) for p, q in gathered.offered], 4)
+    start, end = _from_samples(boundary.table, gathered.value)
+    p, q = np.concatenate([offered[:2], start], axis=1), np.concatenate([offered[2:], end], axis=1)
+    first = _first_of_each(p, q)
+    p, q = p.take(first, axis=1), q.take(first, axis=1)
+    clear = _clear(p, q, gathered)
+    return FacingPlaces(p, q, _length(q - p)).at(clear)
 
 
-def _together(searched: Sequence[Gathered]) -> list[FacingPlaces]:
-    """Return the gathered segments and samples of sides of each boundary that no edge crosses."""
-    boundaries = [gathered.boundary for gathered in searched]
-    parts = [len(gathered.sides) for gathered in boundaries]
-    sides = SideTable([side for gathered in boundaries for side in gathered.sides], parts)
-    of_side = np.arange(len(parts)).repeat(parts)
-    within = np.array([gathered.value for gathered in searched])
-    offered = columns_of([(*p, *q) for gathered in searched for p, q in gathered.offered], 4)
-    p, q, side = _from_samples(sides, within[of_side])
-    counts = [len(gathered.offered) for gathered in searched]
-    home = np.concatenate([np.arange(len(parts)).repeat(counts), of_side.take(side)])
-    p, q = np.concatenate([offered[:2], p], axis=1), np.concatenate([offered[2:], q], axis=1)
-    first = _first_of_each(p, q, home)
-    # Boundary by boundary, in the order of the search.
-    first = first.take(home.take(first).argsort(kind="stable"))
-    p, q, home = p.take(first, axis=1), q.take(first, axis=1), home.take(first)
-    clear = _clear(p, q, home, sides, searched)
-    if not clear.all():
-        p, q, home = p[:, clear], q[:, clear], home[clear]
-    value, ends = _length(q - p), home.searchsorted(np.arange(len(parts) + 1)).tolist()
-    return [FacingPlaces(p[:, a:b], q[:, a:b], value[a:b]) for a, b in pairwise(ends)]
-
-
-def _from_samples(sides: SideTable, within: Floats) -> tuple[Floats, Floats, Indices]:
-    """Samples of sides, the feet of their normals on facing sides, and the numbers of the sides.
-
-    ``within`` is the greatest distance of a foot for each side, mm.
-    """
+def _from_samples(sides: SideTable, within: float) -> tuple[Floats, Floats]:
+    """Samples of sides, and the feet of their normals on facing sides ``within`` a distance, mm."""
     a, b = sides.pairs(ASIDE, within)
     points, numbers = sampled(sides.edges)
     counts, samples = np.array(numbers), columns_of(points, 2)
@@ -152,15 +120,14 @@ def _from_samples(sides: SideTable, within: Floats) -> tuple[Floats, Floats, Ind
     )
     p, n = samples.take(row, axis=1), normals.take(row, axis=1)
     feet, inward, there = _feet(p, sides, b.repeat(rows_of_pair))
-    side = a.repeat(rows_of_pair)
     # One row per sample, one column per foot.
     p, n = p[:, :, None], n[:, :, None]
     off = feet - p
     square = dot(n, inward) < -math.cos(ASIDE)
     faces = (dot(off, n) > TOUCH) & (dot(off, inward) < -TOUCH)
-    valid = there & square & faces & (_length(off) <= within.take(side)[:, None])
+    valid = there & square & faces & (_length(off) <= within)
     place, _ = valid.nonzero()
-    return p[:, :, 0].take(place, axis=1), feet[:, valid], side.take(place)
+    return p[:, :, 0].take(place, axis=1), feet[:, valid]
 
 
 def _feet(p: Floats, sides: SideTable, numbers: Indices) -> tuple[Floats, Floats, Bools]:
@@ -196,11 +163,11 @@ def _feet(p: Floats, sides: SideTable, numbers: Indices) -> tuple[Floats, Floats
     return np.stack(points, axis=2), np.stack(normals, axis=2), np.stack(there, axis=1)
 
 
-def _first_of_each(p: Floats, q: Floats, home: Indices) -> Indices:
-    """The numbers of the first segment with given ends, in either order, to 10 nm, by home."""
+def _first_of_each(p: Floats, q: Floats) -> Indices:
+    """The numbers of the first segment with given ends, in either order, to 10 nm."""
     ends = np.rint(np.concatenate([p, q]) * 1e5)
     turned = (ends[0] > ends[2]) | ((ends[0] == ends[2]) & (ends[1] > ends[3]))
-    ends = np.concatenate([np.where(turned, ends[[2, 3, 0, 1]], ends), home[None]])
+    ends = np.where(turned, ends[[2, 3, 0, 1]], ends)
     # A stable order, so that the first of equal segments comes first.
     order = np.lexsort(ends)
     ends = ends.take(order, axis=1)
@@ -209,14 +176,11 @@ def _first_of_each(p: Floats, q: Floats, home: Indices) -> Indices:
     return np.sort(order[is_new])
 
 
-def _clear(
-    p: Floats, q: Floats, home: Indices, sides: SideTable, searched: Sequence[Gathered]
-) -> Bools:
+def _clear(p: Floats, q: Floats, gathered: Gathered) -> Bools:
     """Return True for segments that no edge crosses; doubtful ones are tested one by one."""
-    counts = np.bincount(home, minlength=len(searched)).tolist()
-    boxes = boxes_round(p, q, NEAR)
-    segment, number = touching_in_parts(boxes, counts, sides.table.box, sides.parts)
-    edges = sides.table.at(number)
+    table = gathered.boundary.table.table
+    segment, number = touching(boxes_round(p, q, NEAR), table.box)
+    edges = table.at(number)
     start, off = p.take(segment, axis=1), (q - p).take(segment, axis=1)
     length = _length(off)
     unit = off / length
@@ -236,7 +200,7 @@ def _clear(
     # Not np.unique, which loads masked arrays.
     for place in sorted(set(segment[doubtful].tolist())):
         (px, py), (qx, qy) = p[:, place].tolist(), q[:, place].tolist()
-        clear[place] = searched[home[place]].is_clear((px, py), (qx, qy))
+        clear[place] = gathered.is_clear((px, py), (qx, qy))
     return clear
 
 

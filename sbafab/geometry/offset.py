@@ -25,7 +25,7 @@ from sbafab.geometry.edges import (
     meeting_points,
 )
 from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
-from sbafab.geometry.region import Region, enclosed, union, wound
+from sbafab.geometry.region import Region, enclosed, union
 
 CUSP = 3.0
 """Radians: a path that turns by more is treated as turning back on itself."""
@@ -515,7 +515,7 @@ def _untangled(contour: Contour) -> Contour:
         for i, j in close_pairs(contour.boxes, EPSILON)
     ):
         return contour
-    whole = wound((contour.reversed() if contour.is_hole else contour).edges, 0).contours
+    whole = enclosed([contour.reversed() if contour.is_hole else contour]).contours
     # A larger loop is not rounding: keep it, so that reading the file back reports it.
     if len(whole) != 1 or abs(whole[0].area - abs(contour.area)) > EPSILON * contour.length:
         return contour

@@ -9,20 +9,17 @@ import hashlib
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from sbafab.geometry.arrangement import Arrangement
-from sbafab.geometry.boolean import arranged, bounding, combined, more_than
-from sbafab.geometry.cache import Exact, cached, cached_attribute
+from sbafab.geometry.boolean import combined, more_than
+from sbafab.geometry.cache import Exact, cached
 from sbafab.geometry.contour import (
-    MANY,
     Contour,
     Similarity,
     circle,
     flip,
-    in_reading_order,
     scale,
     shift,
     turn,
@@ -35,7 +32,6 @@ from sbafab.geometry.edges import (
     Line,
     Point,
     box_round,
-    distance_to,
     meeting_points,
     unit,
 )
@@ -51,12 +47,12 @@ class Region(Exact):
 
     contours: tuple[Contour, ...] = ()
 
-    @cached_attribute
+    @cached_property
     def area(self) -> float:
         """Area in mm2."""
         return sum(contour.area for contour in self.contours)
 
-    @cached_attribute
+    @cached_property
     def bounds(self) -> Bounds:
         """Least x, least y, largest x, largest y, mm."""
         return box_round([contour.bounds for contour in self.contours])
@@ -65,21 +61,21 @@ class Region(Exact):
     def is_empty(self) -> bool:
         return not self.contours
 
-    @cached_attribute
+    @cached_property
     def outers(self) -> tuple[Contour, ...]:
         """The outer contours, counter-clockwise."""
         return tuple(contour for contour in self.contours if not contour.is_hole)
 
-    @cached_attribute
+    @cached_property
     def holes(self) -> tuple[Contour, ...]:
         """The contours of holes, clockwise."""
         return tuple(contour for contour in self.contours if contour.is_hole)
 
-    @cached_attribute
+    @cached_property
     def edges(self) -> tuple[Edge, ...]:
         return tuple(edge for contour in self.contours for edge in contour.edges)
 
-    @cached_attribute
+    @cached_property
     def index(self) -> EdgeIndex:
         """The spatial index of the edges."""
         return EdgeIndex(self.edges, [box for contour in self.contours for box in contour.boxes])
@@ -90,7 +86,7 @@ class Region(Exact):
         # A region must not store itself: it would be freed late.
         return (self,) if len(self.outers) == 1 else self._several
 
-    @cached_attribute
+    @cached_property
     def _several(self) -> tuple[Region, ...]:
         groups: list[list[Contour]] = [[outer] for outer in self.outers]
         places = [hole.edges[0].at(0.5) for hole in self.holes]
@@ -109,7 +105,7 @@ class Region(Exact):
             min(enclosing, key=lambda group: group[0].area).append(contour)
         return tuple(Region(tuple(group)) for group in groups)
 
-    @cached_attribute
+    @cached_property
     def key(self) -> str:
         """A name for the shape, from its corners rounded to 1 nm; the same on every machine.
 
@@ -124,7 +120,7 @@ class Region(Exact):
             rings.append(ring[first:] + ring[:first])
         return hashlib.sha256(repr(sorted(rings)).encode()).hexdigest()[:16]
 
-    @cached_attribute
+    @cached_property
     def _hash(self) -> int:
         return hash(tuple(sorted(len(contour.marks) for contour in self.contours)))
 
@@ -135,7 +131,7 @@ class Region(Exact):
         """Return a hash of the contours' exact numbers, in their order."""
         return self._exact_hash
 
-    @cached_attribute
+    @cached_property
     def _exact_hash(self) -> int:
         return hash(tuple([contour.start_hash for contour in self.contours]))
 
@@ -167,21 +163,7 @@ class Region(Exact):
 
     def distance_to_edge(self, p: Point) -> float:
         """Return the least distance in mm from ``p`` to any edge."""
-        if len(self.edges) >= 2 * MANY:
-            return self.index.distance(p)
-        x, y = p
-        least = math.inf
-        for contour in self.contours:
-            left, low, right, high = contour.bounds
-            room = least + EPSILON
-            if left - x > room or x - right > room or low - y > room or y - high > room:
-                continue
-            for edge, (left, low, right, high) in zip(contour.edges, contour.boxes, strict=True):
-                room = least + EPSILON
-                if left - x > room or x - right > room or low - y > room or y - high > room:
-                    continue
-                least = min(least, distance_to(edge, p))
-        return least
+        return self.index.distance(p)
 
     def __or__(self, other: Region) -> Region:
         return union([self, other])
@@ -287,15 +269,6 @@ def enclosed(contours: Iterable[Contour], above: int = 0) -> Region:
     """
     (outlines,) = combined([(contour, 1) for contour in contours], [more_than(above)])
     return Region(outlines)
-
-
-def wound(edges: Sequence[Edge], above: int) -> Region:
-    """Like ``enclosed``, for edges of closed chains in any order, all cut where they meet."""
-    return Region(in_reading_order(arranged([edges], partial(_wound, above))))
-
-
-def _wound(above: int, arrangement: Arrangement) -> list[Contour]:
-    return bounding(arrangement, more_than(above))
 
 
 def centroid(region: Region) -> Point:

@@ -9,30 +9,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import combinations
+from functools import cached_property
 from typing import NamedTuple
 
 from sbafab.geometry.cache import cached, stored
 from sbafab.geometry.contour import Contour, run_sweep
-from sbafab.geometry.edge_table import SideTable
+from sbafab.geometry.edge_table import ALONGSIDE, BoundarySide, Foot, SideTable
 from sbafab.geometry.edges import (
     Arc,
     Bounds,
     Edge,
     Line,
     Point,
+    box_round,
     left_normal,
     left_turn,
     meeting_points,
 )
-from sbafab.geometry.nearby import ALONGSIDE, BoundarySide, EdgeIndex, Foot, widened
+from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.offset import Kerf, Lost, shrink, widths
+from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region, centroid
 
 SHORTER = 1e-9
 """mm by which a segment must be shorter than another to be the narrowest."""
-ROUNDING = 1e-12
-"""mm: more than the rounding of distances."""
 TOUCH = 1e-6
 """mm within which two points are one."""
 ASIDE = math.acos(0.9)
@@ -41,8 +41,6 @@ SQUARE = 0.05
 """Like ASIDE, for edges square on each other: an allowance for rounding and parallel edges."""
 NOTCH = 15.0
 """Degrees: notches sharper than this do not count as slots."""
-MANY_SIDES = 100
-"""Number from which comparing all pairs in arrays is faster."""
 
 
 class Width(NamedTuple):
@@ -63,9 +61,6 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 
     A corner with an interior angle below ``sharp`` degrees has width 0.
     """
-    near = may_be_narrower(region.contours, below)
-    if len(near) < len(region.contours):
-        return least_of(Boundary(near, sharp), below)
     return least_of(boundary_of(region, sharp), below)
 
 
@@ -73,7 +68,7 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
     """Return the narrowest slot, hole or gap between pieces; arguments as in ``least_width``."""
     outside = [stored(contour, "from_outside", Contour.reversed) for contour in region.contours]
-    return least_of(Boundary(may_be_narrower(outside, below), sharp), below)
+    return least_of(Boundary(outside, sharp), below)
 
 
 def place_of(region: Region, lost: Lost, kerf: Kerf) -> Point:
@@ -101,20 +96,14 @@ class Boundary:
             for ends in stored(contour, f"ends{sharp}", lambda c: list(tapered_ends(c, sharp)))
         ]
         self.pinch = pinch(contours, self.corners, sharp)
-        self.widest_least = widest_least(contours)
         self.index = EdgeIndex(
             [side.edge for side in self.sides], [side.box for side in self.sides]
         )
-        self.known_clear: dict[tuple[Point, Point], bool] = {}
-        """Cache by segment: True if no edge crosses it."""
-        self._table: SideTable | None = None
 
-    @property
+    @cached_property
     def table(self) -> SideTable:
         """The sides in arrays."""
-        if self._table is None:
-            self._table = SideTable(self.sides)
-        return self._table
+        return SideTable(self.sides)
 
 
 def _boundary(region: Region, sharp: float) -> Boundary:
@@ -132,11 +121,6 @@ class _Narrowest:
         self.best: Width | None = None
         self.value = below
 
-    @property
-    def most(self) -> float:
-        """Length in mm from which segments are ignored."""
-        return self.value - SHORTER
-
     def offer(self, p: Point, q: Point) -> None:
         value = math.dist(p, q)
         if value < self.value - SHORTER and self.is_clear(p, q):
@@ -151,52 +135,7 @@ class _Narrowest:
         if dx * nx + dy * ny > TOUCH and dx * mx + dy * my < -TOUCH:
             self.offer((px, py), (qx, qy))
 
-    def near(
-        self,
-        a: BoundarySide | Corner,
-        aside: float,
-        after: int = -1,
-        among: Sequence[int] | None = None,
-    ) -> list[tuple[int, BoundarySide]]:
-        """Return numbered sides that a segment shorter than the best so far could join to ``a``.
-
-        Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
-        ``after`` this one. ``among`` limits the candidates.
-        """
-        nx, ny = a.normal
-        turn = a.half_turn + aside
-        sides, index = self.boundary.sides, self.boundary.index
-        straight = -math.cos(turn)
-        box = widened(a.box, self.value)
-        numbers = []
-        for number in index.among(box, index.about(box, after) if among is None else among):
-            if number <= after:
-                continue
-            side = sides[number]
-            mx, my = side.normal
-            room = turn + side.half_turn
-            if room > math.pi or nx * mx + ny * my < (
-                -math.cos(room) if side.half_turn else straight
-            ):
-                numbers.append(number)
-        return [(number, sides[number]) for number in index.in_order(box, numbers)]
-
-    def corners_near(self, a: Corner, after: int) -> Iterator[Corner]:
-        """Yield later corners, numbered above ``after``, that a shorter segment may reach."""
-        index, corners = self.boundary.index, self.boundary.corners
-        box = widened(a.box, self.value)
-        for number in index.in_order(box, index.among(box, index.about(box, after))):
-            corner = corners[number] if number > after else None
-            if corner is not None:
-                yield corner
-
     def is_clear(self, p: Point, q: Point) -> bool:
-        cache = self.boundary.known_clear
-        if (p, q) not in cache:
-            cache[p, q] = self._is_clear(p, q)
-        return cache[p, q]
-
-    def _is_clear(self, p: Point, q: Point) -> bool:
         segment = Line(p, q)
         box = segment.bounds
         for edge in self.boundary.index.touching(widened(box, 10 * TOUCH)):
@@ -213,10 +152,6 @@ class Gathered(_Narrowest):
         super().__init__(boundary, below)
         self.offered: list[tuple[Point, Point]] = []
 
-    @property
-    def most(self) -> float:
-        return self.value
-
     def offer(self, p: Point, q: Point) -> None:
         if math.dist(p, q) <= self.value:
             self.offered.append((p, q))
@@ -225,9 +160,13 @@ class Gathered(_Narrowest):
 def least_of(boundary: Boundary, below: float) -> Width | None:
     if boundary.pinch is not None:
         return Width(0.0, boundary.pinch, boundary.pinch)
+    if not boundary.sides:
+        return None
     # Most edges lie far apart: search far pairs only if no near ones face.
-    reach = min(boundary.index.cell, boundary.widest_least + 2 * SHORTER)
-    farthest = min(below, 2 * boundary.index.across)
+    low_x, low_y, high_x, high_y = box_round([side.box for side in boundary.sides])
+    across = max(high_x - low_x, high_y - low_y)
+    reach = across / math.sqrt(len(boundary.sides))
+    farthest = min(below, 2 * across)
     while True:
         narrowest = _Narrowest(boundary, min(reach, farthest))
         search(narrowest)
@@ -239,15 +178,11 @@ def least_of(boundary: Boundary, below: float) -> Width | None:
 def search(narrowest: _Narrowest) -> None:
     """Offer every place where edges or corners face each other."""
     boundary = narrowest.boundary
-    later: Sequence[Sequence[int] | None] = [None] * len(boundary.sides)
-    if len(boundary.sides) >= MANY_SIDES:
-        later = boundary.table.later(SQUARE, narrowest.value)
-    for i, (a, among) in enumerate(zip(boundary.sides, later, strict=True)):
-        if among == []:
-            continue
-        for _, b in narrowest.near(a, SQUARE, i, among):
-            if a.may_hold_feet(b, narrowest.value) or b.may_hold_feet(a, narrowest.value):
-                _between_edges(a, b, narrowest)
+    sides = boundary.sides
+    a, b = boundary.table.pairs(SQUARE, narrowest.value)
+    pairs = zip(np.minimum(a, b).tolist(), np.maximum(a, b).tolist(), strict=True)
+    for i, j in sorted(set(pairs)):
+        _between_edges(sides[i], sides[j], narrowest)
     _at_corners(boundary.corners, narrowest)
     for p, q in boundary.ends:
         narrowest.offer(p, q)
@@ -273,10 +208,8 @@ def _side(edge: Edge, box: Bounds) -> BoundarySide:
 
 
 def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
-    if _lie_farther(a.edge, b.edge, narrowest.most):
-        return
     if isinstance(a.edge, Arc):
-        if _alongside(a.edge, b.edge) and _may_face(a.edge, b.edge, narrowest.value):
+        if _alongside(a.edge, b.edge):
             _along_each_other(a, b, narrowest)
         # The centre line of a line and an arc, or of two arcs, is square on both.
         origin = b.edge.centre if isinstance(b.edge, Arc) else None
@@ -296,18 +229,6 @@ def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> N
         _along_each_other(a, b, narrowest)
 
 
-def _lie_farther(a: Edge, b: Edge, than: float) -> bool:
-    """Return True if the circles of two arcs are farther apart than ``than`` mm."""
-    if not (isinstance(a, Arc) and isinstance(b, Arc)):
-        return False
-    gap, r, s = math.dist(a.centre, b.centre), a.radius, b.radius
-    apart = max(gap - r - s, abs(r - s) - gap)
-    if apart <= than:
-        return False
-    off = [abs(math.dist(p, e.centre) - e.radius) for e in (a, b) for p in (e.start, e.end)]
-    return apart - sum(off) - ROUNDING > than
-
-
 def _alongside(a: Edge, b: Edge) -> bool:
     if isinstance(a, Arc) and isinstance(b, Arc):
         return math.dist(a.centre, b.centre) < ALONGSIDE
@@ -317,27 +238,7 @@ def _alongside(a: Edge, b: Edge) -> bool:
     return False
 
 
-def _may_face(a: Arc, b: Edge, within: float) -> bool:
-    """Return True if two arcs of nearly one centre may face each other within a distance.
-
-    Material lies across a disc or in a ring, and nowhere between the edges of two holes.
-    """
-    room = 2 * ALONGSIDE
-    if not isinstance(b, Arc) or min(a.radius, b.radius) < 10 * ALONGSIDE:
-        return True
-    if a.ccw and b.ccw:
-        return a.radius + b.radius <= within + room
-    if a.ccw or b.ccw:
-        ring = a.radius - b.radius if a.ccw else b.radius - a.radius
-        return -room <= ring <= within + room
-    return False
-
-
 def _along_each_other(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
-    if bound_a_ring(a.edge, b.edge):
-        for p, q in across_a_ring(a, b):
-            narrowest.offer(p, q)
-        return
     for near, far in ((a, b), (b, a)):
         for p in (near.middle, near.edge.start, near.edge.end):
             here = Foot(p, left_normal(near.edge, p))
@@ -346,19 +247,20 @@ def _along_each_other(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -
 
 
 def _at_corners(corners: Sequence[Corner | None], narrowest: _Narrowest) -> None:
+    boundary = narrowest.boundary
     for i, corner in enumerate(corners):
         if corner is None:
             continue
-        # An edge facing a convex corner may be square on neither of its edges.
-        aside = SQUARE if corner.turn < 0 else math.pi / 2
-        for _, side in narrowest.near(corner, aside):
-            for foot in side.feet(corner.point):
-                _corner_to_edge(corner, side, foot, narrowest)
-        if corner.turn < 0:
+        near = boundary.index.numbers(widened((*corner.point, *corner.point), narrowest.value))
+        for number in near:
+            side = boundary.sides[number]
+            if corner.may_face(side):
+                for foot in side.feet(corner.point):
+                    _corner_to_edge(corner, side, foot, narrowest)
             # A corner may face another one although its edges do not.
-            for facing in narrowest.corners_near(corner, i):
-                if facing.turn < 0:
-                    _between_corners(corner, facing, narrowest)
+            facing = corners[number] if number > i and corner.turn < 0 else None
+            if facing is not None and facing.turn < 0:
+                _between_corners(corner, facing, narrowest)
 
 
 def _between_corners(a: Corner, b: Corner, narrowest: _Narrowest) -> None:
@@ -395,19 +297,25 @@ class Corner:
     ``normal`` is the unit vector halfway between the normals of the two edges.
     """
 
-    __slots__ = ("arriving", "box", "half_turn", "leaving", "normal", "point", "turn")
+    __slots__ = ("arriving", "leaving", "normal", "point", "turn")
 
     def __init__(self, point: Point, arriving: Point, leaving: Point, turn: float) -> None:
         self.point = point
         self.arriving = arriving
         self.leaving = leaving
         self.turn = turn
-        self.half_turn = abs(turn) / 2
-        self.box = (point[0], point[1], point[0], point[1])
         ux, uy = arriving
         half = turn / 2
         c, s = math.cos(half), math.sin(half)
         self.normal = (-ux * s - uy * c, ux * c - uy * s)
+
+    def may_face(self, side: BoundarySide) -> bool:
+        """Return True if the normals of a side are somewhere opposed to those of the corner.
+
+        An edge facing a convex corner may be square on neither of its edges.
+        """
+        room = side.half_turn + abs(self.turn) / 2 + (SQUARE if self.turn < 0 else math.pi / 2)
+        return room > math.pi or _dot(self.normal, side.normal) < -math.cos(room)
 
     def squarely(self, d: Point) -> bool:
         """True if a reflex corner is nearer than its neighbourhood to the end of ``d``."""
@@ -530,106 +438,6 @@ def _between_flanks(
     turn += sum([corners[i % count] for i in range(start, stop + 2)])
     if abs(turn - math.pi) < math.radians(taper):
         yield runs[start % len(runs)].first.start, runs[stop % len(runs)].last.end
-
-
-# Concentric arcs with material between them, which need no search.
-
-
-WIDE = 1e-5
-"""mm: rounding may decide which edges face each other in narrower rings."""
-
-
-def bound_a_ring(a: Edge, b: Edge) -> bool:
-    """True if two edges are concentric arcs with a ring between, the outer counter-clockwise."""
-    if not (isinstance(a, Arc) and isinstance(b, Arc)) or a.ccw == b.ccw or a.centre != b.centre:
-        return False
-    return (a.radius - b.radius if a.ccw else b.radius - a.radius) > WIDE
-
-
-def across_a_ring(a: BoundarySide, b: BoundarySide) -> list[tuple[Point, Point]]:
-    """Return segments across a ring from the middle and ends of each of its two arcs."""
-    segments: list[tuple[Point, Point]] = []
-    for near, far in ((a, b), (b, a)):
-        arc = far.edge
-        assert isinstance(arc, Arc)
-        cx, cy = arc.centre
-        r = arc.radius
-        mx, my = far.middle[0] - cx, far.middle[1] - cy
-        least = r * (math.cos(far.half_turn) - 1e-9)
-        for p in (near.middle, near.edge.start, near.edge.end):
-            ux, uy = p[0] - cx, p[1] - cy
-            distance = math.hypot(ux, uy)
-            vx, vy = ux / distance, uy / distance
-            if vx * mx + vy * my >= least:
-                segments.append((p, (cx + r * vx, cy + r * vy)))
-    return segments
-
-
-# Bounds of widths before a search, from circles and the boxes of contours, which have the material
-# on their left.
-
-
-MANY_CIRCLES = 24
-"""Number from which comparing all pairs costs more than it saves."""
-
-
-def widest_least(contours: Sequence[Contour]) -> float:
-    """Return an upper bound of the least width, mm, from gaps between circles and across them.
-
-    Infinite without circles.
-    """
-    circles = [(*p.circle, p.is_hole) for p in contours if p.circle is not None]
-    least = min((2 * radius for _, radius, is_hole in circles if not is_hole), default=math.inf)
-    if len(circles) > MANY_CIRCLES:
-        return least
-    for (p, r, p_is_hole), (q, s, q_is_hole) in combinations(circles, 2):
-        gap = math.dist(p, q)
-        if p_is_hole and q_is_hole:
-            width = gap - r - s
-        elif p_is_hole != q_is_hole:
-            width = (s - r if p_is_hole else r - s) - gap
-        else:
-            continue
-        if 0 < width < least:
-            least = width
-    return least
-
-
-def may_be_narrower(contours: Sequence[Contour], than: float) -> Sequence[Contour]:
-    """Return the contours without the circles that are at least ``than`` mm wide and isolated.
-
-    No width below ``than`` mm starts, ends or is crossed at these circles.
-    """
-    if math.isinf(than):
-        return contours
-    return [
-        contour
-        for contour in contours
-        if contour.circle is None
-        or (not contour.is_hole and 2 * contour.circle[1] < than)
-        or _has_near(contour, contours, than)
-    ]
-
-
-def _has_near(contour: Contour, contours: Sequence[Contour], reach: float) -> bool:
-    """Return True if another contour may come within ``reach`` of this circle."""
-    assert contour.circle is not None
-    centre, r = contour.circle
-    low_x, low_y, high_x, high_y = widened(contour.bounds, reach)
-    for neighbour in contours:
-        if neighbour is contour:
-            continue
-        if neighbour.circle is not None:
-            there, s = neighbour.circle
-            gap = math.dist(centre, there)
-            if max(gap - r - s, abs(r - s) - gap) < reach:
-                return True
-        elif any(
-            box[0] <= high_x and box[2] >= low_x and box[1] <= high_y and box[3] >= low_y
-            for box in neighbour.boxes
-        ):
-            return True
-    return False
 
 
 # The widest place of a region.

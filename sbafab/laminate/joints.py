@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Literal
 
-from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Edge, Point
 from sbafab.geometry.offset import swept
 from sbafab.geometry.region import Region, union
@@ -69,7 +69,7 @@ class Seam:
         """Length of the path, mm."""
         return sum(edge.length for chain in self.path for edge in chain)
 
-    @cached_attribute
+    @cached_property
     def region(self) -> Region:
         """Region covered by the tool: half of the width on both sides of the path."""
         is_round = self.tool != "roller"

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Literal, get_args
 
 from sbafab.errors import DesignError
-from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Bounds, Point, box_round
 from sbafab.geometry.region import Region, coord, path_data, union
 from sbafab.laminate.films import Film, density_of, in_order, ink
@@ -192,7 +192,7 @@ class Laminate:
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"
 
-    @cached_attribute
+    @cached_property
     def interfaces(self) -> tuple[Interface, ...]:
         """One between every two consecutive TPE layers, bottom to top."""
         regions: dict[tuple[object, ...], Regions] = {}
@@ -271,7 +271,7 @@ class Laminate:
             layers += self.tpe_layers if gap is None else (gap.below, gap.above)
         return tuple(dict.fromkeys(layer.film for layer in layers))
 
-    @cached_attribute
+    @cached_property
     def tpe_layers(self) -> tuple[Layer, ...]:
         """The layers that bond: all of structural films, TPE or further ones."""
         return tuple(layer for layer in self.layers if not layer.is_mask)
@@ -281,7 +281,7 @@ class Laminate:
         """The materials of the bonding films, as text."""
         return ", ".join(in_order(layer.film.material for layer in self.tpe_layers))
 
-    @cached_attribute
+    @cached_property
     def patterns(self) -> dict[str, tuple[Layer, ...]]:
         """One layer of every distinct pattern, in stacking order."""
         groups: dict[str, list[Layer]] = {}
@@ -295,7 +295,7 @@ class Laminate:
         top = self.layers[-1]
         return top.z + top.film.thickness
 
-    @cached_attribute
+    @cached_property
     def bounds(self) -> Bounds:
         """Least x, least y, largest x, largest y of all layers, mm."""
         return box_round([layers[0].profile.bounds for layers in self.patterns.values()])
@@ -324,7 +324,7 @@ class Laminate:
         """Return the index of the layer whose cut file holds this one: its own, unless folded."""
         return self._fold_roots.get(layer.index, layer.index)
 
-    @cached_attribute
+    @cached_property
     def _fold_roots(self) -> dict[int, int]:
         return fold_roots(self.folds)
 
@@ -389,7 +389,7 @@ class Interface:
         """Lines at which one film continues from below to above."""
         return tuple(fold.line for fold in self.folds)
 
-    @cached_attribute
+    @cached_property
     def whole_bond(self) -> Region:
         """The bond, and the bond of the unfolded film beyond each fold, where it has no edge."""
         beyond = [unfolded(self.bond, [line]) for line in self.fold_lines]
@@ -418,7 +418,7 @@ class Interface:
     def layer_indices(self) -> tuple[int, ...]:
         return (self.below.index, *(mask.index for mask in self.masks), self.above.index)
 
-    @cached_attribute
+    @cached_property
     def pattern(self) -> tuple[str, ...]:
         """Equal for interfaces of equal profiles, bonded by equal seams."""
         return (

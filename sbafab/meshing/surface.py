@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-
-from sbafab.geometry.cache import cached_attribute
 
 if TYPE_CHECKING:
     import trimesh
@@ -28,7 +27,7 @@ class Surface:
     points: NDArray[np.float64]
     faces: NDArray[np.int64]
 
-    @cached_attribute
+    @cached_property
     def volume(self) -> float:
         """Enclosed volume in mm3."""
         a, b, c = self.points.take(self.faces.T, axis=0)

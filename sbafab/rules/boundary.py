@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cache
 from typing import Final, NamedTuple
 
 from sbafab.geometry.arrangement import DIGIT, Piece, by_owner, overlay
@@ -270,7 +269,7 @@ def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
                 if rest.contours:
                     remaining.append((below, rest))
                 continue
-            shared, rest = shapes.laid(region, film.profile)
+            shared, rest = _overlaid(region, film.profile)
             if rest.contours:
                 remaining.append((below, rest))
             if shared.contours:
@@ -287,11 +286,6 @@ class _Shapes:
     def __init__(self, laminate: Laminate) -> None:
         self.laminate = laminate
         self.openings = pin_openings(laminate)
-        # Not bound methods: they would form a reference cycle that outlives its last use.
-        self.laid = cache(_overlaid)
-        self.minus = cache(_minus)
-        self.both = cache(Region.__and__)
-        self.union = cache(_union)
 
     def left_by_next(self, index: int, below: Layer, above: Layer) -> Region:
         """Return the part of a film that the film next to it leaves uncovered."""
@@ -304,38 +298,36 @@ class _Shapes:
 
     def kept_apart(self, region: Region, index: int, below: Layer, above: Layer) -> Facing | None:
         """Two films that face each other over a region; None if pins' openings fill the region."""
-        facing = bare = self.minus(region, self.openings)
+        facing = bare = _minus(region, self.openings)
         masks: dict[Region, Layer] = {}
         for layer in reversed(self.laminate.layers[below.index : above.index - 1]):
             if bare.is_empty:
                 break
             if layer.is_mask and layer.profile not in masks:
-                uncovered = self.minus(bare, layer.profile)
+                uncovered = _minus(bare, layer.profile)
                 if uncovered != bare:
                     masks[layer.profile] = layer
                 bare = uncovered
         if not masks and bare.is_empty:
             return None
-        mask = self.union(tuple(masks))
-        unbonded = self.minus(facing, bare) if bare.contours else facing
-        contact = self.both(below.profile, above.profile)
+        mask = union(masks)
+        unbonded = _minus(facing, bare) if bare.contours else facing
+        contact = below.profile & above.profile
         used = tuple(reversed(masks.values()))
         gap = Interface(index, "separator", below, above, used, mask, contact, Region(), unbonded)
         return Facing(gap, bare)
 
 
+@cached
 def _overlaid(region: Region, film: Region) -> tuple[Region, Region]:
     """Return the part of a region that a film covers, and the rest."""
     rest, shared = without_slivers(region - film), without_slivers(region & film)
     return shared, rest if shared.contours else region
 
 
+@cached
 def _minus(region: Region, cut: Region) -> Region:
     return without_slivers(region - cut)
-
-
-def _union(regions: tuple[Region, ...]) -> Region:
-    return union(regions)
 
 
 def pin_openings(laminate: Laminate) -> Region:

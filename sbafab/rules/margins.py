@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 from sbafab.design.records import Design
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edge_table import (
-    CellOrder,
     EdgeTable,
     boxes_round,
     columns_of,
@@ -22,7 +21,7 @@ from sbafab.geometry.edge_table import (
     touching,
 )
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Point, left_normal
-from sbafab.geometry.facing_places import facing_places_of, sampled
+from sbafab.geometry.facing_places import facing_places, sampled
 from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width
@@ -203,7 +202,7 @@ def bond_places(
     ``widest`` is the largest slack of any interface with the same bond; ``profiles`` are those of
     ``layers`` films and masks, by seat, and of seams.
     """
-    (narrow,) = facing_places_of([(bond, widest, SHARP, least)])
+    narrow = facing_places(bond, widest, SHARP, least)
     if slack < widest:
         narrow = narrow.at(narrow.value <= least.value + slack)
     off = narrow.end - narrow.start
@@ -362,8 +361,7 @@ def _owners(p: Floats, normal: Floats, seats: Seats) -> tuple[Indices, Indices, 
     has_square[place[square]] = True
     chosen = square | ~has_square.take(place)
     place, number = place[chosen], number[chosen]
-    order = CellOrder(table.box, [len(table.radius)]).sorted(boxes, place, number)
-    place, owner = place.take(order), np.concatenate(numbered).take(number.take(order))
+    owner = np.concatenate(numbered).take(number)
     # Each owner once a place, where it comes first.
     _, firsts = np.unique(place * len(owners) + owner, return_index=True)
     firsts.sort()

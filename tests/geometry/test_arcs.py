@@ -16,7 +16,7 @@ from sbafab.geometry.arcs import (
     fit_arcs,
 )
 from sbafab.geometry.contour import Contour
-from sbafab.geometry.edges import Arc, Line, distance_to
+from sbafab.geometry.edges import Arc, distance_to
 from tests.quick import few
 
 FULL = (0.0, math.tau)
@@ -57,27 +57,6 @@ def test_neighbours_meet_and_share_a_tangent(name: str) -> None:
         assert math.atan2(ux * vy - uy * vx, ux * vx + uy * vy) == pytest.approx(0, abs=1e-5)
 
 
-def test_arcs_are_few_beside_chords_of_the_same_tolerance() -> None:
-    curve, (first, last) = CURVES["ellipse"]
-    assert len(fit_arcs(curve, first, last)) < _chords(5, 3) / 4
-
-
-def _chords(a: float, b: float) -> float:
-    """Chords an ellipse needs: the integral of sqrt(curvature / 8 tolerance) along it."""
-    steps = 1000
-    total = 0.0
-    for k in range(steps):
-        t = math.tau * k / steps
-        speed = math.hypot(a * math.sin(t), b * math.cos(t))
-        total += speed * math.sqrt(a * b / speed**3 / (8 * TOLERANCE)) * math.tau / steps
-    return total
-
-
-def test_area_of_an_ellipse() -> None:
-    contour = Contour(elliptical_arc((0, 0), (5, 0), (0, 3), *FULL))
-    assert contour.area == pytest.approx(math.pi * 15, abs=TOLERANCE * contour.length)
-
-
 def test_half_axes_of_a_circle_give_exact_arcs() -> None:
     edges = elliptical_arc((1, 2), (3, 4), (-4, 3), *FULL)
     assert [type(edge) for edge in edges] == [Arc] * 4
@@ -90,12 +69,6 @@ def test_mirrored_half_axes_and_a_falling_parameter_turn_the_other_way() -> None
     falling = elliptical_arc((0, 0), (5, 0), (0, 3), math.tau, 0.0)
     for edges in (mirrored, falling):
         assert Contour(edges).area == pytest.approx(-math.pi * 15, rel=1e-4)
-
-
-def test_a_straight_curve_gives_lines() -> None:
-    edges = fit_arcs(bezier([(0, 0), (1, 1), (2, 2), (3, 3)]), 0.0, 1.0)
-    assert all(isinstance(edge, Line) for edge in edges)
-    assert sum(edge.length for edge in edges) == pytest.approx(3 * math.sqrt(2))
 
 
 def _spike(t: float) -> tuple[tuple[float, float], tuple[float, float]]:

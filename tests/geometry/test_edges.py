@@ -1,136 +1,98 @@
-"""Single edges: bulges, bounds, nearest points, parallel edges."""
+"""Single edges and runs of them: bulges, bounds, nearest points, parallel edges, meeting points."""
 
 from __future__ import annotations
 
 import math
+import pickle
+from itertools import pairwise
 
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
+from sbafab.geometry.contour import Contour, circle, tidy
 from sbafab.geometry.edges import (
+    EPSILON,
     Arc,
+    Edge,
     Line,
+    Point,
     distance_to,
     edge_from_bulge,
     left_normal,
     meeting_points,
+    runs,
+    same_support,
     unit,
 )
 
 QUARTER = Arc((3.0, 1.0), (1.0, 3.0), (1.0, 1.0), 2.0, True)
 HALF = Arc((3.0, 1.0), (-1.0, 1.0), (1.0, 1.0), 2.0, True)
 
-
-@pytest.mark.parametrize(("arc", "turn"), [(QUARTER, 90), (HALF, 180)])
-def test_bulge_is_the_tangent_of_a_quarter_of_the_sweep(arc: Arc, turn: float) -> None:
-    assert arc.bulge == pytest.approx(math.tan(math.radians(turn) / 4), abs=1e-15)
-    assert arc.reversed().bulge == pytest.approx(-arc.bulge, abs=1e-15)
+places = st.tuples(st.floats(-9, 9), st.floats(-9, 9))
+bulges = st.sampled_from([0.0, 1.0, -1.0]) | st.floats(0.01, 1) | st.floats(-1, -0.01)
 
 
-@pytest.mark.parametrize("bulge", [0.2, -0.37, 1.0, -1.0])
-def test_an_arc_comes_back_from_its_bulge(bulge: float) -> None:
-    edge = edge_from_bulge((0.3, -0.2), (1.7, 2.1), bulge)
-    assert isinstance(edge, Arc)
-    assert edge.bulge == pytest.approx(bulge, abs=1e-12)
-    assert math.dist(edge.centre, edge.start) == pytest.approx(math.dist(edge.centre, edge.end))
-    assert edge.ccw is (bulge > 0)
+@st.composite
+def edges(draw: st.DrawFn) -> Edge:
+    start, end = draw(places), draw(places)
+    assume(math.dist(start, end) > 0.1)
+    return edge_from_bulge(start, end, draw(bulges))
 
 
-def test_a_bulge_of_zero_is_a_line() -> None:
-    assert edge_from_bulge((0, 0), (1, 2), 0.0) == Line((0, 0), (1, 2))
+@given(edges(), places, st.floats(0, 1))
+def test_an_edge_against_points_all_along_it(edge: Edge, p: Point, share: float) -> None:
+    along = [edge.at(k / 2000) for k in range(2001)]
+    step = edge.length / 2000
+    assert sum(math.dist(a, b) for a, b in pairwise(along)) == pytest.approx(edge.length, rel=1e-5)
+    assert distance_to(edge, p) == pytest.approx(min(math.dist(p, q) for q in along), abs=step)
+    assert edge.farthest_from(p) == pytest.approx(max(math.dist(p, q) for q in along), abs=step)
+    xs, ys = zip(*along, strict=True)
+    assert edge.bounds == pytest.approx((min(xs), min(ys), max(xs), max(ys)), abs=step)
+    assert edge.farthest_along((1.0, 2.0), (0.6, 0.8)) == pytest.approx(
+        max(0.6 * (x - 1) + 0.8 * (y - 2) for x, y in along), abs=step
+    )
+    q = edge.at(share)
+    assert edge.parameter(q) == pytest.approx(share, abs=1e-6)
+    for offset in (0.3, -0.3):
+        moved, (nx, ny) = edge.offset(offset), left_normal(edge, q)
+        if moved is not None:
+            expected = (q[0] - offset * nx, q[1] - offset * ny)
+            assert distance_to(moved, expected) == pytest.approx(0, abs=1e-6)
+            assert edge.to_left(expected) == pytest.approx(-offset, abs=1e-6)
 
 
-def test_length_and_segment_area_of_a_quarter_arc() -> None:
+@given(edges())
+def test_an_edge_comes_back_from_its_bulge_and_from_its_reverse(edge: Edge) -> None:
+    back = edge_from_bulge(edge.start, edge.end, edge.bulge)
+    assert back.bulge == pytest.approx(edge.bulge, abs=1e-12)
+    turned = edge.reversed()
+    assert turned.reversed() == edge
+    assert turned.bulge == pytest.approx(-edge.bulge, abs=1e-12)
+    assert turned.segment_area == pytest.approx(-edge.segment_area)
+    assert turned.bounds == edge.bounds
+    assert pickle.loads(pickle.dumps(edge)) == edge
+
+
+def test_a_quarter_and_a_half_by_their_formulas() -> None:
+    assert QUARTER.bulge == pytest.approx(math.tan(math.pi / 8), abs=1e-15)
+    assert HALF.bulge == pytest.approx(1.0, abs=1e-15)
     assert QUARTER.length == pytest.approx(math.pi)
     assert QUARTER.segment_area == pytest.approx(4 * (math.pi / 4 - 1 / 2))
-    assert QUARTER.reversed().segment_area == pytest.approx(-QUARTER.segment_area)
-
-
-@pytest.mark.parametrize(
-    ("first", "last", "box"),
-    [
-        (-45, 45, (1 + math.sqrt(2), 1 - math.sqrt(2), 3, 1 + math.sqrt(2))),
-        (45, 135, (1 - math.sqrt(2), 1 + math.sqrt(2), 1 + math.sqrt(2), 3)),
-        (135, 225, (-1, 1 - math.sqrt(2), 1 - math.sqrt(2), 1 + math.sqrt(2))),
-        (225, 315, (1 - math.sqrt(2), -1, 1 + math.sqrt(2), 1 - math.sqrt(2))),
-        (0, 180, (-1, 1, 3, 3)),
-        (90, 270, (-1, -1, 1, 3)),
-        (50, 60, None),
-    ],
-)
-def test_bounds_hold_the_quadrant_points_passed(
-    first: float, last: float, box: tuple[float, float, float, float] | None
-) -> None:
-    start, end = HALF.on_circle(math.radians(first)), HALF.on_circle(math.radians(last))
-    arc = Arc(start, end, HALF.centre, HALF.radius, True)
-    expected = box or (end[0], start[1], start[0], end[1])
-    assert arc.bounds == pytest.approx(expected, abs=1e-12)
-    assert arc.reversed().bounds == pytest.approx(expected, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("point", "distance"),
-    [
-        ((4.0, 4.0), 3 * math.sqrt(2) - 2),
-        ((1.5, 1.5), 2 - math.sqrt(0.5)),
-        ((3.0, 0.0), 1.0),
-        ((0.0, 3.0), 1.0),
-        ((-1.0, -1.0), math.hypot(2, 4)),
-        ((1.0, 1.0), 2.0),
-    ],
-)
-def test_distance_to_a_quarter_arc(point: tuple[float, float], distance: float) -> None:
-    assert distance_to(QUARTER, point) == pytest.approx(distance)
-    assert distance_to(QUARTER.reversed(), point) == pytest.approx(distance)
-
-
-def test_distance_to_a_line_ends_at_its_ends() -> None:
-    line = Line((0, 0), (4, 3))
-    assert distance_to(line, (7, 7)) == pytest.approx(5)
-    assert distance_to(line, (-3, 4)) == pytest.approx(5)
-
-
-def test_a_point_at_half_the_length_halves_both_kinds_of_edge() -> None:
-    assert Line((0, 0), (4, 2)).at(0.5) == (2, 1)
-    assert QUARTER.at(0.5) == pytest.approx((1 + math.sqrt(2), 1 + math.sqrt(2)))
-    assert QUARTER.parameter(QUARTER.at(0.25)) == pytest.approx(0.25)
-
-
-def test_parallel_edges_lie_to_the_right_of_travel() -> None:
-    assert Line((0, 0), (2, 0)).offset(0.5) == Line((0, -0.5), (2, -0.5))
-    outward = QUARTER.offset(0.5)
-    inward = QUARTER.reversed().offset(0.5)
-    assert outward is not None
-    assert inward is not None
-    assert (outward.radius, inward.radius) == (2.5, 1.5)
-    assert outward.start == pytest.approx((3.5, 1.0))
+    assert distance_to(QUARTER, (1.0, 1.0)) == 2.0
+    assert distance_to(QUARTER, (-1.0, -1.0)) == pytest.approx(math.hypot(2, 4))
     assert QUARTER.reversed().offset(2.0) is None
 
 
-def test_left_of_a_counter_clockwise_arc_is_its_centre() -> None:
-    assert left_normal(QUARTER, QUARTER.start) == pytest.approx((-1, 0))
-    assert left_normal(Line((0, 0), (1, 0)), (0.5, 0)) == pytest.approx((0, 1))
-
-
-def test_crossing_circles_meet_where_the_formula_says() -> None:
+def test_edges_that_meet() -> None:
     # Unit circles 1 apart cross at x = 1/2, y = sqrt(3)/2.
-    a = Arc((1, 0), (-1, 0), (0, 0), 1.0, True)
-    b = Arc((2, 0), (0, 0), (1, 0), 1.0, True)
+    a, b = Arc((1, 0), (-1, 0), (0, 0), 1.0, True), Arc((2, 0), (0, 0), (1, 0), 1.0, True)
     (crossing,) = [p for p in meeting_points(a, b) if p[1] > 0.1]
     assert crossing == pytest.approx((0.5, math.sqrt(0.75)), abs=1e-12)
-
-
-def test_tangent_circles_meet_once() -> None:
-    a = Arc((0, -1), (0, 1), (0, 0), 1.0, True)
-    b = Arc((3, 2), (3, -2), (3, 0), 2.0, True)
+    a, b = Arc((0, -1), (0, 1), (0, 0), 1.0, True), Arc((3, 2), (3, -2), (3, 0), 2.0, True)
     assert meeting_points(a, b) == [pytest.approx((1, 0))]
-
-
-def test_overlapping_lines_meet_at_the_ends_of_the_shared_stretch() -> None:
     points = meeting_points(Line((0, 0), (3, 0)), Line((5, 0), (2, 0)))
     assert sorted(points) == [(2, 0), (3, 0)]
-
-
-def test_lines_that_stop_short_of_each_other_do_not_meet() -> None:
     assert meeting_points(Line((0, 0), (1, 0)), Line((2, -1), (2, 1))) == []
 
 
@@ -142,3 +104,66 @@ def test_the_box_of_an_arc_holds_ends_that_lie_off_its_circle() -> None:
         arc = Arc(start, (2.0 * vx, 2.0 * vy), (0.0, 0.0), 2.0, True)
         assert arc.bounds[side] == start[side % 2]
         assert arc.reversed().bounds == arc.bounds
+
+
+# Edges are gathered by line and circle, and never round a corner, however finely it is drawn.
+
+
+def closed(points: list[Point]) -> tuple[Edge, ...]:
+    return tuple(Line(a, b) for a, b in pairwise([*points, points[0]]))
+
+
+def shoelace(points: list[Point]) -> float:
+    return sum(x * v - u * y for (x, y), (u, v) in pairwise([*points, points[0]])) / 2
+
+
+def blunt(turn: float, step: float) -> list[Point]:
+    """A quadrilateral with a corner of ``turn`` radians, ``step`` mm on whose sides are edges."""
+    (ux, uy), corner = (math.cos(turn), math.sin(turn)), (5.0, 0.0)
+    along = [(corner[0] + ux * s, corner[1] + uy * s) for s in (step, 5.0)]
+    return [(0.0, 0.0), (corner[0] - step, 0.0), corner, *along, (5.0, 1.0)]
+
+
+FINE = [(x / 50, y / 50) for x, y in (unit(360.0 * i / 1000) for i in range(1000))]
+
+
+@pytest.mark.parametrize("points", [blunt(0.002, 2e-5), blunt(0.02, 2e-5), FINE])
+def test_a_corner_or_curve_of_tiny_edges_stays(points: list[Point]) -> None:
+    loop = closed(points)
+    assert all(same_support(a, b) for a, b in pairwise(loop[:4]))
+    contour = tidy(loop)
+    assert contour is not None
+    # A line across the corner would take 12.5 mm2 times its turn.
+    assert contour.area == pytest.approx(shoelace(points), abs=1e-6)
+    assert len(contour.edges) < len(loop)
+
+
+def test_a_spiral_of_arcs_is_no_circle() -> None:
+    spiral = []
+    for i in range(40):
+        radius, centre = 1.0 - 1e-6 * i, 1e-6 * i
+        ends = (centre + radius, 0.0), (centre - radius, 0.0)
+        spiral.append(Arc(*ends, (centre, 0.0), radius, True))
+    assert all(same_support(a, b) for a, b in pairwise(spiral))
+    for run in runs((*spiral, Line((0.0, 0.0), (1.0, 0.0)))):
+        radii = [edge.radius for edge in run if isinstance(edge, Arc)]
+        assert max(radii, default=0.0) - min(radii, default=0.0) <= 1.7e-5
+
+
+def test_straight_edges_and_a_circle_are_one_run_each() -> None:
+    square = closed([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)])
+    assert [len(run) for run in runs(square)] == [3, 1, 1, 1]
+    assert len(Contour(circle((0.0, 0.0), 1.0).edges).runs) == 1
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_sliver_does_not_take_its_lobe_with_it(turn: int) -> None:
+    """5 mm of 4 nm, on average under what is dust, and a lobe at its end."""
+    sliver = [(0.0, 0.0), (5.0, 0.0), (5.0, 4e-6), (0.0, 4e-6)]
+    assert tidy(closed(sliver[::turn])) is None
+    for high, wide in ((0.0006, 0.02), (0.002, 0.01)):
+        lobed = [*sliver[:2], (5.0, high), (5.0 - wide, high), (5.0 - wide, 4e-6), sliver[3]]
+        contour = tidy(closed(lobed[::turn]))
+        assert abs(shoelace(lobed)) < 2 * EPSILON * 10
+        assert contour is not None
+        assert contour.area == pytest.approx(turn * shoelace(lobed), rel=1e-6)

@@ -1,130 +1,84 @@
-"""Edges filed by place, against a look at every one of them."""
+"""Boxes and edges near each other, against a look at every one of them."""
 
 from __future__ import annotations
 
 import math
 import random
-import sys
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from sbafab.geometry import nearby
-from sbafab.geometry.edges import Arc, Bounds, Edge, Line, distance_to
+from sbafab.geometry import edge_table, nearby
+from sbafab.geometry.edge_table import touching
+from sbafab.geometry.edges import Bounds, Edge, distance_to, edge_from_bulge
 from sbafab.geometry.nearby import EdgeIndex, close_pairs
 
+# Whole numbers, so that many boxes touch at an edge or a corner.
+places = st.integers(0, 40).map(float)
+boxes = st.builds(
+    lambda x, y, w, h: (x, y, x + w, y + h), places, places, *[st.integers(0, 6).map(float)] * 2
+)
 
-def scattered(seed: int) -> list[Edge]:
-    draw = random.Random(seed)
+
+def meet(a: Bounds, b: Bounds, reach: float = 0.0) -> bool:
+    across = max(a[0] - b[2], b[0] - a[2])
+    return across <= reach and max(a[1] - b[3], b[1] - a[3]) <= reach
+
+
+@given(st.lists(boxes, max_size=40), st.sampled_from([0.0, 1.5]))
+def test_close_pairs_come_within_reach_however_they_are_found(
+    listed: list[Bounds], reach: float
+) -> None:
+    expected = {(i, j) for j, b in enumerate(listed) for i in range(j) if meet(listed[i], b, reach)}
+    pairs = close_pairs(listed, reach)
+    assert {(min(pair), max(pair)) for pair in pairs} == expected
+    assert len(pairs) == len(expected)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(nearby, "FEW_BOXES", 0)
+        patch.setattr(nearby, "AT_ONCE", 10)
+        assert not listed or close_pairs(listed, reach) == pairs
+
+
+@given(st.lists(boxes, max_size=20), st.lists(boxes, max_size=20))
+def test_boxes_touch_in_arrays(queries: list[Bounds], targets: list[Bounds]) -> None:
+    columns = [np.array(each, dtype=float).reshape(-1, 4).T for each in (queries, targets)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(edge_table, "AT_ONCE", 20)
+        pairs = zip(*(numbers.tolist() for numbers in touching(*columns)), strict=True)
+    expected = [(i, j) for i, a in enumerate(queries) for j, b in enumerate(targets) if meet(a, b)]
+    assert list(pairs) == expected
+
+
+def scattered(draw: random.Random) -> list[Edge]:
     edges: list[Edge] = []
     for _ in range(60):
         x, y = draw.uniform(0, 20), draw.uniform(0, 10)
         turn, length = draw.uniform(0, math.tau), draw.choice([0.1, 1.0, 8.0])
         end = (x + length * math.cos(turn), y + length * math.sin(turn))
-        if draw.random() < 0.5:
-            edges.append(Line((x, y), end))
-        else:
-            middle = ((x + end[0]) / 2, (y + end[1]) / 2)
-            edges.append(Arc((x, y), end, middle, length / 2, True))
+        edges.append(edge_from_bulge((x, y), end, draw.choice([0.0, 1.0, draw.uniform(-1, 1)])))
     return edges
 
 
-def meet(a: Bounds, b: Bounds) -> bool:
-    return a[0] <= b[2] and b[0] <= a[2] and a[1] <= b[3] and b[1] <= a[3]
-
-
 @pytest.mark.parametrize("seed", range(4))
-def test_an_index_gives_the_edges_whose_boxes_meet_each_once(seed: int) -> None:
-    edges = scattered(seed)
+def test_an_index_knows_the_edges_in_a_box_and_the_nearest_one(seed: int) -> None:
+    draw = random.Random(seed)
+    edges = scattered(draw)
     index = EdgeIndex(edges)
-    draw = random.Random(seed + 100)
     for _ in range(40):
-        x, y, size = draw.uniform(-5, 25), draw.uniform(-5, 15), draw.choice([0.0, 0.5, 30.0])
+        x, y, size = draw.uniform(-5, 25), draw.uniform(-5, 15), draw.choice([0.0, 0.5, 40.0])
         box = (x, y, x + size, y + size)
         expected = [number for number, edge in enumerate(edges) if meet(edge.bounds, box)]
-        assert sorted(index.numbers(box)) == expected
-        inside = all(
-            box[0] <= low_x and box[1] <= low_y and high_x <= box[2] and high_y <= box[3]
-            for low_x, low_y, high_x, high_y in (edge.bounds for edge in edges)
-        )
-        assert index.all_within(box) == inside
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_few_edges_come_in_the_order_of_many(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    edges = scattered(seed)
-    index, draw = EdgeIndex(edges), random.Random(seed + 300)
-    for _ in range(40):
-        x, y, size = draw.uniform(-5, 25), draw.uniform(-5, 15), draw.choice([0.0, 3.0, 30.0])
-        box = (x, y, x + size, y + size)
-        monkeypatch.setattr(nearby, "FEW_EDGES", 100)
-        few = index.numbers(box)
-        monkeypatch.setattr(nearby, "FEW_EDGES", 0)
-        assert index.numbers(box) == few
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_the_distance_is_that_of_the_nearest_edge(seed: int) -> None:
-    edges = scattered(seed)
-    index = EdgeIndex(edges)
-    draw = random.Random(seed + 200)
-    for _ in range(40):
-        p = draw.uniform(-30, 50), draw.uniform(-30, 40)
-        assert index.distance(p) == pytest.approx(min(distance_to(edge, p) for edge in edges))
-
-
-@pytest.mark.parametrize("reach", [0.0, 0.7])
-def test_pairs_of_many_boxes_come_as_those_of_few(
-    reach: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    draw = random.Random(5)
-    boxes: list[Bounds] = []
-    for _ in range(600):
-        x, y = draw.choice([round(draw.uniform(0, 50)), draw.uniform(0, 50)]), draw.uniform(0, 50)
-        size = draw.choice([0.0, 0.5, 9.0])
-        boxes.append((x, y, x + size, y + size * draw.random()))
-    pairs = list(close_pairs(boxes, reach))
-    monkeypatch.setattr(nearby, "AT_ONCE", 100)
-    assert list(close_pairs(boxes, reach)) == pairs
-    monkeypatch.setattr(nearby, "MANY_BOXES", sys.maxsize)
-    assert list(close_pairs(boxes, reach)) == pairs
-    monkeypatch.setattr(nearby, "FEW_BOXES", sys.maxsize)
-    assert list(close_pairs(boxes, reach)) == pairs
-    assert len(pairs) > 500
-
-
-def test_the_distance_to_a_single_edge_is_found_from_anywhere() -> None:
-    index = EdgeIndex([Line((0.0, 0.0), (1.0, 0.0))])
-    for x, y, expected in ((0.5, 3.0, 3.0), (-1.9, 0.0, 1.9), (5.0, 3.0, 5.0), (0.2, -0.1, 0.1)):
-        assert index.distance((x, y)) == pytest.approx(expected)
+        assert index.numbers(box) == expected
+        inside = [box[0] <= b[0] and box[1] <= b[1] and b[2] <= box[2] and b[3] <= box[3]
+                  for b in (edge.bounds for edge in edges)]  # fmt: skip
+        assert index.all_within(box) == all(inside)
+        for p in ((x, y), draw.choice(edges).at(draw.random())):
+            assert index.distance(p) == min(distance_to(edge, p) for edge in edges)
 
 
 def test_an_empty_index_holds_nothing() -> None:
     index = EdgeIndex([])
-    assert list(index.numbers((-1.0, -1.0, 1.0, 1.0))) == []
+    assert index.numbers((-1.0, -1.0, 1.0, 1.0)) == []
     assert index.distance((0.0, 0.0)) == math.inf
-
-
-def test_close_pairs_are_those_whose_boxes_come_within_reach() -> None:
-    draw = random.Random(11)
-    corners = [(draw.uniform(0, 50), draw.uniform(0, 50)) for _ in range(80)]
-    boxes = [(x, y, x + draw.uniform(0, 6), y + draw.uniform(0, 6)) for x, y in corners]
-    for reach in (0.0, 1.5):
-        expected = {
-            frozenset((i, j))
-            for i, a in enumerate(boxes)
-            for j, b in enumerate(boxes[:i])
-            if max(a[0] - b[2], b[0] - a[2]) <= reach and max(a[1] - b[3], b[1] - a[3]) <= reach
-        }
-        pairs = list(close_pairs(boxes, reach))
-        assert {frozenset(pair) for pair in pairs} == expected
-        assert len(pairs) == len(expected)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_the_least_distance_is_that_of_all_edges_on_an_edge_and_off_it(seed: int) -> None:
-    edges = scattered(seed)
-    index, draw = EdgeIndex(edges), random.Random(seed)
-    places = [(draw.uniform(-30, 50), draw.uniform(-30, 40)) for _ in range(20)]
-    places += [edge.at(draw.random()) for edge in edges]
-    for p in places:
-        assert index.distance(p) == min(distance_to(edge, p) for edge in edges)

@@ -1,115 +1,134 @@
-"""Regions: area, containment, names of shapes, similarities, flattening."""
+"""Regions: profiles, containment, names of shapes, similarities, sections, flattening, caches."""
 
 from __future__ import annotations
 
 import itertools
 import math
+import random
 
 import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from svgelements import Arc as SvgArc
+from svgelements import Path
 
-from sbafab.geometry.contour import Contour
-from sbafab.geometry.edges import Arc, Point
-from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, union
+from sbafab.geometry.cache import MOST, cached
+from sbafab.geometry.contour import (
+    Contour,
+    Copies,
+    circle,
+    facets,
+    in_reading_order,
+    nanometres,
+)
+from sbafab.geometry.edges import Arc, Line, Point
+from sbafab.geometry.offset import fillet
+from sbafab.geometry.region import (
+    Region,
+    centroid,
+    difference,
+    disc,
+    path_data,
+    polygon,
+    rectangle,
+    section,
+    stadium,
+    strip,
+    union,
+)
 
 RING = disc((0, 0), 3) - disc((0.5, 0), 1)
+HALF = disc((3.0, -1.0), 2.0) & rectangle((3.0, -5.0), (9.0, 5.0))
+STAR = polygon([(0, 0), (2, 2), (4, 0), (3, 2), (4, 4), (2, 2.5), (0, 4), (1, 2)])
+PLATE = fillet(disc((0.0, 0.0), 3.25) | strip((0.0, 0.0), (8.25, 0.0), 3.1), 1.0)
+# Shape, area, bounds, perimeter, and numbers of arcs and of lines.
+PROFILES = {
+    "disc": (disc((1.5, -2.0), 3.25), math.pi * 3.25**2, (-1.75, -5.25, 4.75, 1.25),
+             math.tau * 3.25, 4, 0),
+    "stadium": (stadium((1, 2), 11.5, 20), math.pi * 5.75**2 + 11.5 * 8.5, (-4.75, -8, 6.75, 12),
+                math.pi * 11.5 + 17, 4, 2),
+    "rectangle": (rectangle((1, 1), (3, 4)), 6, (1, 1, 3, 4), 10, 0, 4),
+    "strip": (strip((1, 1), (4, 5), 0.8), 4, (0.68, 0.76, 4.32, 5.24), 11.6, 0, 4),
+    "triangle, clockwise": (polygon([(0, 3), (4, 0), (0, 0)]), 6, (0, 0, 4, 3), 12, 0, 3),
+    "ring": (RING, 8 * math.pi, (-3, -3, 3, 3), 8 * math.pi, 8, 0),
+}  # fmt: skip
 
 
-def test_area_of_a_disc_minus_a_disc() -> None:
-    assert RING.area == pytest.approx(math.pi * 8)
-    assert (len(RING.outers), len(RING.holes)) == (1, 1)
-    assert RING.outers[0].area == pytest.approx(math.pi * 9)
-    assert RING.holes[0].area == pytest.approx(-math.pi)
+@pytest.mark.parametrize("name", PROFILES)
+def test_profiles_and_similar_ones_by_their_formulas(name: str) -> None:
+    shape, area, bounds, length, arcs, lines = PROFILES[name]
+    assert shape.bounds == pytest.approx(bounds)
+    assert sum(contour.is_hole for contour in shape.contours) == len(shape.holes)
+    images = [shape, shape.turned(37), shape.mirrored(), shape.moved(5, -2)]
+    for image, factor in (*((image, 1) for image in images), (shape.scaled(2), 2)):
+        assert image.area == pytest.approx(factor**2 * area, rel=1e-14)
+        assert sum(c.length for c in image.contours) == pytest.approx(factor * length)
+        kinds = [type(edge) for edge in image.edges]
+        assert (kinds.count(Arc), kinds.count(Line)) == (arcs, lines)
+    assert shape.turned(37).turned(-37).moved(1, 1).moved(-1, -1) == shape
+    assert shape.moved(5, -2).bounds == pytest.approx(
+        (bounds[0] + 5, bounds[1] - 2, bounds[2] + 5, bounds[3] - 2)
+    )
 
 
-def test_holes_run_clockwise() -> None:
-    assert RING.outers[0].winding((2.0, 2.0)) == 1
-    assert RING.holes[0].winding((0.5, 0.1)) == -1
-    assert RING.holes[0].winding((2.0, 2.0)) == 0
+def test_round_contours_are_circles_whatever_their_edges_are_split_into() -> None:
+    assert stadium((1, 2), 4, 4) == disc((1, 2), 2)
+    assert disc((1, 2), 2).contours[0].circle == ((1, 2), 2)
+    assert RING.turned(90).holes[0].circle == (pytest.approx((0, 0.5)), 1)
+    ends: tuple[Point, Point] = (2, 0), (-2, 0)
+    halves = Contour((Arc(*ends, (0, 0), 2.0, True), Arc(*ends[::-1], (0, 0), 2.0, True)))
+    assert halves.circle == ((0, 0), 2)
+    assert stadium((0, 0), 2, 3).contours[0].circle is None
+    assert [bulge for *_, bulge in circle((0, 0), 2).vertices] == pytest.approx(
+        [math.tan(math.pi / 8)] * 4
+    )
 
 
-@pytest.mark.parametrize(
-    ("point", "inside"),
-    [
-        # Level with the compass vertices of one circle or the other, and with none.
-        ((-2.9, 0.0), True),
-        ((-0.6, 0.0), True),
-        ((0.0, 0.0), False),
-        ((1.4, 0.0), False),
-        ((2.9, 0.0), True),
-        ((3.1, 0.0), False),
-        ((-3.1, 0.0), False),
-        ((1.6, 1.0), True),
-        ((-2.0, -1.0), True),
-        ((-4.0, -3.0), False),
-        ((0.1, 2.9), True),
-        ((0.5, 0.99), False),
-        ((0.5, 1.01), True),
-        ((0.5, -0.99), False),
-        ((0.0, 2.999), True),
-        ((0.0, -3.001), False),
-        # On the chord of a quarter arc, which is no edge.
-        ((1.5, 1.5), True),
-        ((1.0, 0.5), False),
-        ((0.0, 0.5), False),
-    ],
-)
-def test_containment_level_with_vertices_and_on_chords(point: Point, inside: bool) -> None:
-    assert RING.contains(point) is inside
-    assert RING.mirrored().contains((-point[0], point[1])) is inside
-    assert RING.turned(90).contains((-point[1], point[0])) is inside
+# Level with corners, compass points of circles and chords of quarter arcs, and with none.
+LEVELS = [k / 8 for k in range(-26, 40)]
 
 
-def test_containment_agrees_with_distance_on_a_grid_of_a_stadium() -> None:
-    region = stadium((0, 0), 4, 10)
-    for i, j in itertools.product(range(-13, 14), repeat=2):
-        x, y = i / 4, j / 2
-        distance = math.hypot(x, max(0.0, abs(y) - 3))
-        if distance != 2:
-            assert region.contains((x, y)) is (distance < 2), (x, y)
-
-
-def test_containment_level_with_corners_of_a_star() -> None:
-    star = polygon([(0, 0), (2, 2), (4, 0), (3, 2), (4, 4), (2, 2.5), (0, 4), (1, 2)])
-    assert star.contains((1.5, 2.0))
-    assert star.contains((2.9, 2.0))
-    assert not star.contains((0.9, 2.0))
-    assert not star.contains((3.1, 2.0))
-    assert not star.contains((2.0, 0.0))
-    assert not star.contains((-1.0, 0.0))
-    assert not star.contains((2.0, 4.0))
+@pytest.mark.parametrize("region", [RING, STAR, stadium((0, 0), 2, 5) - disc((0, 1), 0.5)])
+def test_containment_level_with_corners_and_on_chords(region: Region) -> None:
+    flat = region.shapely(1e-6)
+    for p in itertools.product(LEVELS, repeat=2):
+        if region.distance_to_edge(p) > 1e-5:
+            inside = flat.contains(shapely.Point(p))
+            assert region.contains(p) is inside, p
+            assert region.mirrored().contains((-p[0], p[1])) is inside, p
+            assert region.turned(90).contains((-p[1], p[0])) is inside, p
 
 
 def started_elsewhere(region: Region, by: int) -> Region:
     return Region(tuple(Contour((*c.edges[by:], *c.edges[:by])) for c in region.contours))
 
 
-@pytest.mark.parametrize("by", [1, 2, 3])
-def test_the_key_forgets_where_a_contour_starts(by: int) -> None:
-    for region in (disc((1, 2), 3), stadium((0, 0), 2, 7), RING, rectangle((0, 0), (3, 4))):
-        assert started_elsewhere(region, by).key == region.key
-        assert started_elsewhere(region, by) == region
-
-
-def test_the_key_forgets_the_order_of_construction() -> None:
+def test_the_key_forgets_starts_and_order_and_tells_shapes_apart() -> None:
+    shapes = [disc((1, 2), 3), disc((1, 2), 3.00001), disc((1.00001, 2), 3), RING]
+    shapes += [rectangle((0, 0), (3, 4)), rectangle((0, 0), (4, 3)), stadium((0, 0), 2, 7)]
+    assert len({shape.key for shape in shapes}) == len(set(shapes)) == len(shapes)
+    for shape, by in itertools.product(shapes, (1, 2, 3)):
+        assert started_elsewhere(shape, by).key == shape.key
+        assert started_elsewhere(shape, by).moved(1e-6, 0) == shape
     discs = [disc((2 * math.cos(a), 2 * math.sin(a)), 1.5) for a in (0, 2, 4)]
-    keys = {union(order).key for order in itertools.permutations(discs)}
-    assert len(keys) == 1
+    assert len({union(order).key for order in itertools.permutations(discs)}) == 1
     holes = [disc((x, 0.2), 0.4) for x in (-1, 0, 1)]
     body = rectangle((-3, -2), (3, 2))
     drilled = {((body - a) - b) - c for a, b, c in itertools.permutations(holes)}
     assert drilled == {body - union(holes)}
 
 
-def test_the_key_tells_shapes_apart() -> None:
-    shapes = [
-        disc((0, 0), 3),
-        disc((0, 0), 3.00001),
-        disc((1e-5, 0), 3),
-        rectangle((0, 0), (2, 3)),
-        rectangle((0, 0), (3, 2)),
-        RING,
-    ]
-    assert len({shape.key for shape in shapes}) == len(shapes)
+def test_shapes_a_hair_apart_are_equal_wherever_their_numbers_round_to() -> None:
+    """Coordinates half way between two nanometres: a hair decides what they round to."""
+    for x in (0.0000005, 1.2345675, -3.0000015):
+        for shape in (disc((x, 0), 2), rectangle((x, 0), (3, 2)), stadium((x, x), 2, 5)):
+            assert len({shape, shape.moved(1e-11, -1e-11), shape.moved(-1e-11, 1e-11)}) == 1
+    shape = stadium((0, 0), 2, 5) - disc((0, 1), 0.5)
+    assert shape == shape.moved(1e-6, 1e-6)
+    assert shape != shape.moved(1e-5, 0)
+    assert shape != stadium((0, 0), 2, 5) - disc((0, 1), 0.50001)
+    assert rectangle((0, 0), (2, 2)) != disc((1, 1), 1)
 
 
 def test_pieces_take_their_own_holes() -> None:
@@ -117,24 +136,34 @@ def test_pieces_take_their_own_holes() -> None:
     island = disc((2, 2), 0.5) - disc((2, 2), 0.25)
     right = rectangle((6, 0), (9, 3)) - disc((7, 1), 0.5)
     areas = sorted(piece.area for piece in union([left, island, right]).pieces)
-    expected = [math.pi * (0.25 - 0.0625), 9 - math.pi / 4, 16 - 4]
-    assert areas == pytest.approx(expected)
+    assert areas == pytest.approx([math.pi * (0.25 - 0.0625), 9 - math.pi / 4, 16 - 4])
 
 
-def test_similarities_keep_area_and_place() -> None:
-    assert RING.moved(5, -2).bounds == pytest.approx((2, -5, 8, 1))
-    assert RING.turned(37).area == pytest.approx(RING.area)
-    assert RING.turned(90).holes[0].circle == (pytest.approx((0, 0.5)), 1)
-    assert RING.mirrored().holes[0].circle == (pytest.approx((-0.5, 0)), 1)
-    assert RING.mirrored().area == pytest.approx(RING.area)
-    assert RING.scaled(2).area == pytest.approx(4 * RING.area)
-    assert RING.turned(37).turned(-37).moved(1, 1).moved(-1, -1) == RING
+def test_centres_of_area() -> None:
+    assert centroid(HALF) == pytest.approx((3.0 + 4 * 2.0 / (3 * math.pi), -1.0), abs=1e-9)
+    for region in (HALF, PLATE - disc((1.5, 0.5), 1.0), disc((0, 0), 1) | disc((7, 3), 2)):
+        centre = region.shapely(1e-6).centroid
+        assert centroid(region) == pytest.approx((centre.x, centre.y), abs=1e-5)
 
 
-def test_vertices_carry_the_bulge_of_quarter_arcs() -> None:
-    bulges = [bulge for _, _, bulge in disc((0, 0), 2).contours[0].vertices]
-    assert bulges == pytest.approx([math.tan(math.pi / 8)] * 4)
-    assert [bulge for _, _, bulge in rectangle((0, 0), (1, 1)).contours[0].vertices] == [0] * 4
+def test_contours_are_read_in_one_order_whatever_differs_by_less_than_a_nanometre() -> None:
+    values = (0.0, 1.2e-6, -1.2e-6, 1.7e-6, -1.7e-6, 12.345678)
+    assert [nanometres(x) for x in values] == [0, 1, -1, 2, -2, 12_345_678]
+    hair = 3e-7
+    left, lower = rectangle((-2.0, -1.0), (-1.0, 1.0)), rectangle((1.0, -3.0), (2.0, -2.0))
+    upper = rectangle((1.0 - hair, 2.0), (2.0, 3.0))
+    hole = circle((0.0, 0.0), 0.25).reversed()
+    expected = (left.contours[0], lower.contours[0], upper.contours[0], hole)
+    for order in itertools.permutations(expected):
+        assert in_reading_order(order) == expected
+
+
+# Flattening: shared chords, area kept or sagitta kept.
+
+
+def shoelace(points: list[Point]) -> float:
+    pairs = zip(points, points[1:] + points[:1], strict=True)
+    return sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in pairs) / 2
 
 
 @pytest.mark.parametrize("sagitta", [0.1, 0.01, 0.0005])
@@ -152,45 +181,121 @@ def rounded(points: list[Point]) -> set[Point]:
 
 
 def test_shared_arcs_give_shared_vertices() -> None:
-    whole = disc((0.3, 0.2), 2)
-    cut = rectangle((0, -5), (5, 5))
-    ((inside,),) = (whole & cut).polygons(0.001)
-    ((outside,),) = (whole - cut).polygons(0.001)
-    ((ring,),) = whole.polygons(0.001)
-    _, hole = (rectangle((-3, -3), (3, 3)) - whole).polygons(0.001)[0]
+    whole, cut = disc((0.3, 0.2), 2), rectangle((0, -5), (5, 5))
+    ((inside,),), ((outside,),) = (whole & cut).polygons(), (whole - cut).polygons()
+    ((ring,),) = whole.polygons()
+    _, hole = (rectangle((-3, -3), (3, 3)) - whole).polygons()[0]
     corners = rounded([(0, 0.2 + s * math.sqrt(4 - 0.09)) for s in (-1, 1)])
     assert rounded(inside) & rounded(outside) == corners
     assert rounded(inside) | rounded(outside) == rounded(ring) | corners
     assert rounded(hole) == rounded(ring)
 
 
-def test_even_the_thinnest_lens_flattens_to_a_ring() -> None:
-    lens = disc((-0.9995, 0), 1) & disc((0.9995, 0), 1)
-    ((ring,),) = lens.polygons(0.001)
-    assert len(ring) >= 3
+@given(st.floats(0.05, 40), st.sampled_from([0.0005, 0.002, 0.02]), st.floats(0.1, 0.9))
+def test_facets_of_a_circle_keep_its_area_however_it_is_split(
+    radius: float, sagitta: float, share: float
+) -> None:
+    whole = circle((1.7, -0.3), radius)
+    points = facets(whole, sagitta)
+    assert shoelace(points) == pytest.approx(math.pi * radius**2, rel=1e-12)
+    reach = math.dist((1.7, -0.3), points[0])
+    middle = math.dist((1.7, -0.3), [(a + b) / 2 for a, b in zip(*points[:2], strict=True)])
+    assert middle < radius < reach
+    assert reach - middle <= sagitta * 1.01 or len(points) == 12
+    first = whole.edges[0]
+    split = (first.part(first.start, first.at(share)), first.part(first.at(share), first.end))
+    for other in (whole.reversed(), Contour((*split, *whole.edges[1:]))):
+        assert rounded(facets(other, sagitta)) == rounded(points)
 
 
-def test_a_circle_is_known_whatever_its_edges_are_split_into() -> None:
-    halves = Contour(
-        (
-            Arc((2, 0), (-2, 0), (0, 0), 2.0, True),
-            Arc((-2, 0), (2, 0), (0, 0), 2.0, True),
-        )
-    )
-    assert halves.circle == ((0, 0), 2)
-    assert halves.area == pytest.approx(4 * math.pi)
-    assert stadium((0, 0), 2, 3).contours[0].circle is None
+def test_facets_keep_corners_and_have_three_vertices_at_least() -> None:
+    (contour,) = stadium((0.0, 0.0), 11.5, 20.0).contours
+    points = facets(contour, 0.002)
+    assert {(x, y) for x in (5.75, -5.75) for y in (4.25, -4.25)} <= set(points)
+    assert shoelace(points) == pytest.approx(contour.area, rel=5e-5)
+    (cut,) = (disc((0.0, 0.0), 1.0) & rectangle((0.999, -1.0), (2.0, 1.0))).contours
+    ((lens,),) = (disc((-0.9995, 0), 1) & disc((0.9995, 0), 1)).polygons()
+    assert min(len(facets(cut, 0.05)), len(lens)) >= 3
 
 
-def test_shapes_a_hair_apart_are_equal_wherever_their_numbers_round_to() -> None:
-    """Coordinates half way between two nanometres: a hair decides what they round to."""
-    for x in (0.0000005, 1.2345675, -3.0000015):
-        for shape in (disc((x, 0), 2), rectangle((x, 0), (3, 2)), stadium((x, x), 2, 5)):
-            assert len({shape, shape.moved(1e-11, -1e-11), shape.moved(-1e-11, 1e-11)}) == 1
-    shape = stadium((0, 0), 2, 5) - disc((0, 1), 0.5)
-    assert shape == shape.moved(1e-6, 1e-6)
-    assert shape != shape.moved(1e-5, 0)
-    assert shape != stadium((0, 0), 2, 5) - disc((0, 1), 0.50001)
-    assert rectangle((0, 0), (2, 2)) != disc((1, 1), 1)
-    turned = Region(tuple(Contour((*c.edges[1:], c.edges[0])) for c in shape.contours))
-    assert turned.moved(1e-6, 0) == shape
+# Sections by lines, and SVG paths.
+
+
+SLANT = math.sqrt(0.5)
+SECTIONS = [
+    *((disc((1, 0), 2.5), (0, y), (1, 0), [(1 - (6.25 - y * y) ** 0.5, 1 + (6.25 - y * y) ** 0.5)])
+      for y in (0.0, 0.3, 2.49)),
+    (disc((0, 0), 3.25) - disc((0, 0), 0.5), (0, 0), (SLANT, SLANT), [(-3.25, -0.5), (0.5, 3.25)]),
+    (rectangle((2, -1), (5, 1)), (10, 0), (-1, 0), [(5, 8)]),
+    (strip((-9, 0), (9, 0), 1.6), (0, 0), (0.6, 0.8), [(-1, 1)]),
+    (disc((0, 0), 1), (0, 1.5), (1, 0), []),
+    (disc((0, 0), 1), (0, 1), (1, 0), []),
+    (Region(), (0, 0), (1, 0), []),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("region", "origin", "direction", "expected"), SECTIONS)
+def test_sections_by_closed_formulas(
+    region: Region, origin: Point, direction: Point, expected: list[Point]
+) -> None:
+    stretches = section(region, origin, direction)
+    assert stretches == [pytest.approx(stretch, abs=1e-9) for stretch in expected]
+
+
+@pytest.mark.parametrize("region", [PLATE - disc((0, 0), 0.5), stadium((1, 2), 11.5, 20)])
+def test_area_survives_the_way_through_svg(region: Region) -> None:
+    area = 0.0
+    for piece in Path(path_data(region)).as_subpaths():
+        points = []
+        for segment in list(Path(piece))[1:]:
+            steps = 2000 if isinstance(segment, SvgArc) else 1
+            points += [segment.point(i / steps) for i in range(steps)]
+        area += shoelace([(p.x, p.y) for p in points])
+    assert area == pytest.approx(region.area, rel=1e-4)
+
+
+def test_arcs_stay_arcs_in_svg() -> None:
+    assert path_data(disc((0.0, 0.0), 3.25)).count("A3.25 3.25 0 0 1") == 4
+    assert path_data(Region()) == ""
+
+
+# Caches by exact numbers, and copies of contours.
+
+
+def test_a_hair_makes_another_key_and_few_results_are_kept() -> None:
+    calls: list[Region] = []
+
+    @cached
+    def area(region: Region, times: float = 1.0) -> float:
+        calls.append(region)
+        return times * region.area
+
+    exact, hair = disc((0.0, 0.0), 2.0), disc((0.0, 0.0), 2.0 + 1e-9)
+    assert exact == hair, "regions are equal within SAME"
+    assert area(exact) == area(disc((0.0, 0.0), 2.0)) != area(hair)
+    assert area(exact, 2.0) == 2 * area(exact)
+    assert len(calls) == 3
+    for k in range(MOST + 1):
+        area(disc((0.0, 0.0), 3.0 + k))
+    area(exact)
+    assert len(calls) == 3 + MOST + 1 + 1
+    cut, cutter = rectangle((0.0, 0.0), (7.0, 3.0)), disc((0.0, 0.0), 2.25)
+    assert difference(cut, cutter) is difference(cut.moved(0, 0), cutter)
+
+
+def test_moved_contours_are_copies_and_others_are_not() -> None:
+    copies = Copies()
+    [slot] = stadium((1.0, 2.0), 3.0, 8.0).contours
+    draw = random.Random(3)
+    for _ in range(9):
+        moved = stadium((draw.uniform(-9, 9), draw.uniform(-9, 9)), 3.0, 8.0).contours[0]
+        assert copies.first(slot) is copies.first(moved) is slot
+    for b in (
+        stadium((1.0, 2.0), 3.0, 8.0 + 1e-6),
+        stadium((1.0, 2.0), 8.0, 3.0).turned(90.0),
+        stadium((1.0, 2.0), 3.0, 8.0).mirrored().scaled(1.0000001),
+        disc((1.0, 2.0), 1.5),
+        rectangle((0.0, 0.0), (3.0, 8.0)),
+    ):
+        assert copies.first(b.contours[0]) is not slot
+    assert copies.first(slot.reversed()) is not slot

@@ -4,23 +4,16 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Callable
 
 import pytest
 import shapely
 
 from sbafab.geometry.contour import Contour
-from sbafab.geometry.edges import Arc, Point
+from sbafab.geometry.edges import Point
+from sbafab.geometry.facing_places import facing_places
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union
-from sbafab.geometry.width import (
-    Boundary,
-    Gathered,
-    _along_each_other,
-    _may_face,
-    _side,
-    inscribed_disc,
-    least_gap,
-    least_width,
-)
+from sbafab.geometry.width import Width, inscribed_disc, least_gap, least_width
 from tests.quick import few
 
 AXIS = (0.0, 0.0)
@@ -62,6 +55,8 @@ WIDTHS = {
     "flat end of a taper": (rounded_arm(10.0), 1.0),
     "arc facing a line": (rectangle((-5, 0), (5, 3.4)) - disc((0.0, 3.4), 3.0), 0.4),
     "crescent tip": (disc(AXIS, 2) - disc((0.5, 0.0), 1.5), 0.0),
+    "cusp": (rectangle(AXIS, (3.0, 1.0)) - disc((0.0, 1.0), 1.0), 0.0),
+    "leaning side": (polygon([AXIS, (4, 0), (4, 1), (0.01, 1)]), 0.0),
     "triangle tip": (polygon([AXIS, (4, 0), (0, 3)]), 0.0),
     "pieces that touch": (rectangle(AXIS, (1, 1)) | rectangle((1, 1), (2, 2)), 0.0),
     "lobes in a plate": (union([disc((x, 0.0), 2.0) for x in (-1.5, 1.5)]), 2 * (4 - 2.25) ** 0.5),
@@ -72,59 +67,47 @@ GAPS = {
     "slit": (rectangle((-5, -5), (5, 5)) - rectangle((0.0, -1.0), (0.15, 1.0)), 0.15),
     "notch from outside": (disc(AXIS, 5.0) - strip((2.0, 0.0), (6.0, 0.0), 0.3), 0.3),
     "disc beside strip": (disc((0.0, 2.0), 1.5) | rectangle((-4, -1), (4, 0)), 0.5),
+    # A disc resting on a bar, filled on its left: the notch on its right ends in nothing.
+    "notch that ends in nothing": (
+        union([rectangle((-1, -1), (3, 0)), rectangle((-1, -1), (0, 2)), disc((0.0, 1.0), 1.0)]),
+        0.0,
+    ),
     "island": ((disc(AXIS, 5) - disc(AXIS, 3)) | disc((0.5, 0.0), 1.0), 1.5),
 }
 
 
-@pytest.mark.parametrize("name", WIDTHS)
-def test_width_is_the_closed_formula(name: str) -> None:
-    region, expected = WIDTHS[name]
-    width = least_width(region)
+ALLOWED = {
+    "leaning side": (polygon([AXIS, (4, 0), (4, 1), (0.01, 1)]), 1.0),
+    "altitude of a triangle": (polygon([AXIS, (4, 0), (0, 3)]), 2.4),
+}
+"""Shapes with corners sharper than 90 degrees, which are allowed here."""
+
+
+@pytest.mark.parametrize(
+    ("least", "sharp", "region", "expected"),
+    [
+        *((least_width, 90.0, *case) for case in WIDTHS.values()),
+        *((least_gap, 90.0, *case) for case in GAPS.values()),
+        *((least_width, 15.0, *case) for case in ALLOWED.values()),
+    ],
+)
+def test_width_and_gap_are_the_closed_formulas(
+    least: Callable[..., Width | None], sharp: float, region: Region, expected: float
+) -> None:
+    width = least(region, sharp)
     assert width is not None
     assert width.value == pytest.approx(expected, abs=EXACT)
     assert math.dist(width.start, width.end) == pytest.approx(expected, abs=EXACT)
-
-
-@pytest.mark.parametrize("name", GAPS)
-def test_gap_is_the_closed_formula(name: str) -> None:
-    region, expected = GAPS[name]
-    gap = least_gap(region)
-    assert gap is not None
-    assert gap.value == pytest.approx(expected, abs=EXACT)
+    for limit, is_below in ((expected + 0.01, True), (expected, expected == 0.0)):
+        below = least(region, sharp, limit)
+        assert (below is not None) == is_below
+        assert below is None or below.value == pytest.approx(expected, abs=EXACT)
 
 
 @pytest.mark.parametrize("region", [disc(AXIS, 1.0), rectangle(AXIS, (2.0, 1.0)), Region()])
-def test_a_convex_piece_alone_has_no_gap(region: Region) -> None:
+def test_a_convex_piece_alone_has_no_gap_and_nothing_no_width(region: Region) -> None:
     assert least_gap(region) is None
-
-
-def test_nothing_has_no_width() -> None:
-    assert least_width(Region()) is None
-
-
-def test_a_right_angle_is_not_sharp_but_less_is() -> None:
-    leaning = polygon([AXIS, (4, 0), (4, 1), (0.01, 1)])
-    assert least_width(leaning).value == 0.0
-    blunt = least_width(leaning, sharp=15.0)
-    assert blunt is not None
-    assert blunt.value == pytest.approx(1.0, abs=EXACT)
-
-
-def test_a_cusp_belongs_to_the_side_it_points_into() -> None:
-    sliver = rectangle(AXIS, (3.0, 1.0)) - disc((0.0, 1.0), 1.0)
-    assert least_width(sliver).value == 0.0
-    # A disc resting on a bar, filled on its left: the notch on its right ends in nothing.
-    notched = union(
-        [rectangle((-1, -1), (3, 0)), rectangle((-1, -1), (0, 2)), disc((0.0, 1.0), 1.0)]
-    )
-    assert least_gap(notched).value == 0.0
-    assert least_width(notched).value == pytest.approx(1.0, abs=EXACT)
-
-
-def test_a_triangle_allowed_its_tips_measures_its_least_altitude() -> None:
-    width = least_width(polygon([AXIS, (4, 0), (0, 3)]), sharp=15.0)
-    assert width is not None
-    assert width.value == pytest.approx(2.4, abs=EXACT)
+    assert (least_width(region) is None) == region.is_empty
 
 
 def test_the_place_is_where_the_ring_is_thinnest() -> None:
@@ -189,7 +172,7 @@ def sharp_holes_in_a_plate(seed: int) -> Region:
     return disc((0.0, 0.0), 12.0) - union(holes)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(10))
 def test_webs_between_sharp_corners_agree_with_shapely(seed: int) -> None:
     """Corners face each other where none of their edges does."""
     region = sharp_holes_in_a_plate(seed)
@@ -200,7 +183,7 @@ def test_webs_between_sharp_corners_agree_with_shapely(seed: int) -> None:
     assert width.value == pytest.approx(apart, abs=2.1e-5)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_erosion_by_half_the_width_breaks_the_plate(seed: int) -> None:
     region = holes_in_a_plate(seed)
     width = least_width(region)
@@ -216,17 +199,6 @@ def test_erosion_by_half_the_width_breaks_the_plate(seed: int) -> None:
 
     assert boundaries(0.99) == len(region.contours)
     assert boundaries(1.01) != len(region.contours)
-
-
-def test_only_what_is_narrower_than_asked_for_is_found() -> None:
-    bar = rectangle(AXIS, (4.0, 1.0))
-    assert least_width(bar, 15.0, 1.0) is None
-    result = least_width(bar, 15.0, 1.01)
-    assert result is not None
-    assert result.value == pytest.approx(1.0, abs=EXACT)
-    slit = rectangle((-5, -5), (5, 5)) - rectangle((0.0, -1.0), (0.15, 1.0))
-    assert least_gap(slit, 15.0, 0.1) is None
-    assert least_gap(slit, 15.0, 0.2) is not None
 
 
 def test_the_least_width_of_a_finely_drawn_ring_is_found_among_far_and_near_edges() -> None:
@@ -247,65 +219,6 @@ def test_the_least_width_of_a_finely_drawn_ring_is_found_among_far_and_near_edge
     assert width.value == pytest.approx(flat, abs=EXACT)
     assert gap is not None
     assert gap.value == pytest.approx(10.0 * flat, abs=EXACT)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_arcs_of_nearly_one_centre_that_are_left_out_face_each_other_nowhere(seed: int) -> None:
-    draw = random.Random(seed)
-    left_out = 0
-    for _ in range(300):
-        within = draw.uniform(0.05, 8)
-        arcs = []
-        for _ in range(2):
-            (x, y), radius = (draw.uniform(-4e-4, 4e-4), draw.uniform(-4e-4, 4e-4)), 2.0
-            radius += draw.choice([0.0, 1e-4, -5e-4, draw.uniform(-1.9, 2)])
-            first, ccw = draw.uniform(0, math.tau), draw.random() < 0.5
-            last = first + draw.uniform(0.1, 3) * (1 if ccw else -1)
-            start, end = (
-                (x + radius * math.cos(turn), y + radius * math.sin(turn)) for turn in (first, last)
-            )
-            arcs.append(Arc(start, end, (x, y), radius, ccw))
-        a, b = arcs
-        if _may_face(a, b, within):
-            continue
-        left_out += 1
-        gathered = Gathered(Boundary([], 30.0), within)
-        _along_each_other(_side(a, a.bounds), _side(b, b.bounds), gathered)
-        assert gathered.offered == []
-    assert 50 < left_out < 250
-
-
-def test_across_a_ring_lies_what_every_foot_tells(monkeypatch: pytest.MonkeyPatch) -> None:
-    draw = random.Random(8)
-    offered = 0
-    for _ in range(200):
-        centre = draw.uniform(-9, 9), draw.uniform(-9, 9)
-        outer, inner = (
-            Arc(
-                (centre[0] + r * math.cos(t), centre[1] + r * math.sin(t)),
-                (centre[0] + r * math.cos(t + turn), centre[1] + r * math.sin(t + turn)),
-                centre,
-                r,
-                True,
-            )
-            for r in (draw.uniform(2, 4), draw.uniform(1, 2))
-            for t in [draw.choice([0.0, draw.uniform(-3, 3)])]
-            for turn in [draw.choice([math.pi / 2, draw.uniform(0.1, 3)])]
-        )
-        sides = [_side(arc, arc.bounds) for arc in (outer, inner.reversed())]
-        if draw.random() < 0.5:
-            sides.reverse()
-        segments = []
-        for is_known in (True, False):
-            gathered = Gathered(Boundary([], 30.0), 9.0)
-            if not is_known:
-                monkeypatch.setattr("sbafab.geometry.width.bound_a_ring", lambda *_: False)
-            _along_each_other(*sides, gathered)
-            monkeypatch.undo()
-            segments.append(gathered.offered)
-        assert segments[0] == segments[1]
-        offered += len(segments[0])
-    assert offered > 300
 
 
 def _ring(count: int) -> Region:
@@ -332,3 +245,41 @@ def test_the_inscribed_disc_by_hand(region: Region, radius: float, centre: Point
     assert found.radius <= radius + 1e-9
     if centre is not None:
         assert found.centre == pytest.approx(centre, abs=3e-2)
+
+
+# All narrow places of a region, not only the narrowest.
+
+
+FRAME = rectangle((0.0, 0.0), (10.0, 6.0)) - rectangle((1.0, 1.5), (9.0, 4.0))
+
+
+def facing_pairs(region: Region, slack: float) -> list[Width]:
+    places = facing_places(region, slack, 90.0)
+    ends = zip(places.start.T.tolist(), places.end.T.tolist(), places.value.tolist(), strict=True)
+    return [Width(value, tuple(start), tuple(end)) for start, end, value in ends]
+
+
+def test_a_ring_is_narrow_in_every_direction() -> None:
+    pairs = facing_pairs(disc(AXIS, 3.0) - disc(AXIS, 2.0), 0.1)
+    assert [pair.value for pair in pairs] == pytest.approx([1.0] * len(pairs))
+    angles = sorted(math.degrees(math.atan2(*reversed(pair.middle))) % 360 for pair in pairs)
+    steps = [after - before for before, after in zip(angles, angles[1:], strict=False)]
+    assert max(*steps, 360 - angles[-1] + angles[0]) <= 15 + 1e-6
+
+
+def test_slack_says_how_much_wider_a_place_may_be() -> None:
+    # Webs of 1 left and right, 1.5 below and 2 above the window.
+    for slack, widths in ((0.4, {1.0}), (0.6, {1.0, 1.5}), (1.1, {1.0, 1.5, 2.0})):
+        pairs = facing_pairs(FRAME, slack)
+        assert {round(pair.value, 6) for pair in pairs} == widths
+        ends = {frozenset((tuple(pair.start), tuple(pair.end))) for pair in pairs}
+        assert len(ends) == len(pairs)
+    # Both ends of the narrowest webs.
+    assert {1.5, 4.0} <= {round(pair.middle[1], 6) for pair in facing_pairs(FRAME, 0.1)}
+
+
+def test_the_narrowest_is_the_least_width() -> None:
+    region = FRAME - disc((5.0, 5.0), 0.7)
+    least = least_width(region)
+    assert least is not None
+    assert min(pair.value for pair in facing_pairs(region, 0.5)) == pytest.approx(least.value)

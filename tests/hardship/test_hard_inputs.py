@@ -12,9 +12,9 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.errors import GeometryError, SbafabError
 from sbafab.geometry.edges import Line
-from sbafab.geometry.region import wound
 from sbafab.output import checked
 from tests.hardship.starting import WITHOUT_PRIVILEGES
+from tests.hunt.oracle import laid_over
 
 pytestmark = pytest.mark.long
 
@@ -118,10 +118,10 @@ def test_other_line_ends_and_marks_are_read(content: bytes, tmp_path: Path) -> N
 
 def test_what_the_geometry_cannot_resolve_names_the_design(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(GeometryError, match=r"x 1\.000000, y 2\.000000 .*change a size"):
-        wound([Line((1.0, 2.0), (3.0, 4.0))], 0)
+        laid_over([Line((1.0, 2.0), (3.0, 4.0))])
 
     def unresolved(*_: object) -> object:
-        return wound([Line((1.0, 2.0), (3.0, 4.0))], 0)
+        return laid_over([Line((1.0, 2.0), (3.0, 4.0))])
 
     monkeypatch.setattr(checked, "build", unresolved)
     with pytest.raises(SbafabError, match=r"design 1dof-5mm cannot be resolved: .*change a size"):

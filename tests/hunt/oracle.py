@@ -7,7 +7,7 @@ beside the edges are asked one by one: a winding number for booleans, a distance
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from random import Random
 
 import numpy as np
@@ -17,6 +17,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from sbafab.errors import GeometryError
+from sbafab.geometry.boolean import arranged, bounding
 from sbafab.geometry.contour import LEAST_AREA
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, left_normal
 from sbafab.geometry.offset import grow
@@ -81,6 +82,11 @@ def chords(edges: Sequence[Edge], sagitta: float) -> tuple[Floats, Counts]:
     angle = np.arctan2(*(start - centre).T[::-1])[own] + sweep[own] * part / counts[own]
     on_circle = centre[own] + radius[own, None] * np.array([np.cos(angle), np.sin(angle)]).T
     return np.where((part == 0)[:, None], start[own], on_circle), counts
+
+
+def laid_over(edges: Iterable[Edge], above: int = 0) -> Region:
+    """What closed chains wind round more than ``above`` times, every edge cut where it is met."""
+    return Region(tuple(arranged([edges], lambda it: bounding(it, lambda turns: turns > above))))
 
 
 def perimeter(*regions: Region) -> float:
