@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from sbafab.as_built.as_cut import check_sequence, sound_digest
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.lightburn import ENDING
-from sbafab.cutting.machine_files import ENDINGS, rdworks_difference
+from sbafab.cutting.machine_files import PROGRAMS, rdworks_difference
 from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.errors import OutputError
 from sbafab.meshing.surface import Surface, open_edges
@@ -51,7 +51,7 @@ def file_difference(actual: Path, expected: Path, name: str) -> str:
     if data == expected_data:
         return ""
     compare = _readers().get(expected.suffix)
-    if expected.name.endswith(ENDINGS["rdworks"]):
+    if expected.name.endswith(PROGRAMS["rdworks"].ending):
         compare = rdworks_difference
     if compare is None:
         return f"{name} is not what design.toml makes: its bytes differ"
@@ -82,7 +82,7 @@ def unreadable(path: Path) -> str:
 
 
 def _is_cut(path: Path) -> bool:
-    is_ours = path.suffix == ".dxf" and not path.name.endswith(ENDINGS["rdworks"])
+    is_ours = path.suffix == ".dxf" and not path.name.endswith(PROGRAMS["rdworks"].ending)
     return is_ours and path.parent.name in CUT_FOLDERS
 
 

@@ -10,9 +10,10 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from sbafab.cutting.beam_paths import CORNER, SHARE
+from sbafab.cutting.beam_paths import CORNER, SHARE, LaserRun
 from sbafab.cutting.entries import Entries
 from sbafab.cutting.properties import CUT_INNER, CUT_OUTER
 from sbafab.cutting.verify import TOLERANCE
@@ -45,6 +46,61 @@ class BeamRun(NamedTuple):
 
     layer: str
     curves: Sequence[BeamCurve]
+
+
+# Machine files read back, against the runs that were written.
+
+
+def check_runs(path: Path, read: Sequence[BeamRun], expected: Sequence[LaserRun]) -> None:
+    """Raises OutputError with the file and the place of the first run that differs."""
+    difference = run_difference(read, expected)
+    if difference:
+        raise OutputError(f"{path.name}: {difference}; regenerate it")
+
+
+def run_difference(read: Sequence[BeamRun], expected: Sequence[LaserRun]) -> str:
+    """Return text on a run that is missing, on another layer, or off by more than TOLERANCE;
+    "" without any.
+    """
+    if len(read) != len(expected):
+        return f"it has {len(read)} lines, not {len(expected)}"
+    for drawn, run in zip(read, expected, strict=True):
+        x, y = run.edges[0].start
+        place = f"the line at x {x:.3f}, y {y:.3f}"
+        if drawn.layer != run.layer:
+            return f"{place} is one of {drawn.layer}, not of {run.layer}"
+        if run.circle is None and not _agrees(drawn.curves, run.edges):
+            return f"{place} differs from what was written"
+        if run.circle is not None and not _is_round(drawn.curves, *run.circle):
+            return f"{place} is not the circle that was written"
+    return ""
+
+
+def _agrees(curves: Sequence[BeamCurve], edges: Sequence[Edge]) -> bool:
+    """Return True if curves lie on edges, one by one; arcs may be read in several pieces."""
+    if math.dist(curves[0].start, edges[0].start) > TOLERANCE:
+        return False
+    number, share = 0, 0.0
+    for curve in curves:
+        if number == len(edges):
+            return False
+        edge = edges[number]
+        if any(distance_to(edge, curve.at(t)) > TOLERANCE for t in BETWEEN):
+            return False
+        share = edge.parameter(curve.end)
+        if math.dist(curve.end, edge.end) <= TOLERANCE:
+            number, share = number + 1, 0.0
+    return number == len(edges) and share == 0.0
+
+
+def _is_round(curves: Sequence[BeamCurve], centre: Point, radius: float) -> bool:
+    points = [curve.at(t) for curve in curves for t in BETWEEN]
+    low, high = (f(x for x, _ in points) for f in (min, max))
+    on = all(abs(math.dist(p, centre) - radius) <= TOLERANCE for p in points)
+    return on and high - low > 1.9 * radius
+
+
+# The parts' cuts against the contours of the sheet, measured.
 
 
 class _Stretch(NamedTuple):

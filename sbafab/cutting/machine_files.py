@@ -9,13 +9,13 @@ Both files follow general knowledge of the programs, which have not been run.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from html import escape
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from sbafab.cutting.beam_check import BETWEEN, BeamCurve, BeamRun
+from sbafab.cutting.beam_check import BeamRun, check_runs, run_difference
 from sbafab.cutting.beam_paths import LaserRun
 from sbafab.cutting.dxf_read import drawn_entity
 from sbafab.cutting.dxf_write import number
@@ -34,8 +34,6 @@ from sbafab.geometry.contour import circle
 from sbafab.geometry.edges import Arc, Edge, Line, Point
 from sbafab.geometry.region import chain_data, coord
 
-ENDINGS: dict[LaserProgram, str] = {"rdworks": "_rdworks.dxf", "epilog": "_epilog.svg"}
-"""Suffix of a machine file's name, after the sheet's name."""
 RGB = {ENGRAVE: "#000000", CUT_INNER: "#0000ff", CUT_OUTER: "#ff0000", CUT_SHEET: "#ff00ff"}
 """Colours of the layers in the order of cutting, pure ones that a driver can map."""
 HAIRLINE = 0.0254
@@ -45,92 +43,10 @@ UNITLESS, MILLIMETRES = 0, 4
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-def machine_text(program: LaserProgram, runs: Sequence[LaserRun], size: Point, title: str) -> str:
-    """Return the file of a film sheet of a size in mm for a laser program, runs in their order."""
-    cut = [run for run in runs if run.layer != REFERENCE]
-    return _rdworks(cut) if program == "rdworks" else _epilog(cut, size, title)
-
-
-def read_machine_file(path: Path, program: LaserProgram) -> list[BeamRun]:
-    """Return the beam's runs in a machine file, in its order. Raises OutputError."""
-    try:
-        return [*(_read_rdworks(path) if program == "rdworks" else _read_epilog(path))]
-    except OutputError as error:
-        raise OutputError(f"{path.name}: {error}; regenerate it") from error
-    except (OSError, ValueError, LookupError, ArithmeticError, SyntaxError) as error:
-        raise OutputError(f"{path.name}: it cannot be read ({error}); regenerate it") from error
-
-
-def rdworks_difference(path: Path, expected: Path) -> str:
-    """Return text on an RDWorks file's difference from the expected one; "" if it cuts the same.
-
-    Raises OutputError if the file cannot be read.
-    """
-    read, runs = (read_machine_file(file, "rdworks") for file in (path, expected))
-    if len(read) != len(runs):
-        return f"it has {len(read)} lines, not {len(runs)}"
-    for drawn, run in zip(read, runs, strict=True):
-        x, y = run.curves[0].start
-        if drawn.layer != run.layer:
-            return f"the line at x {x:.3f}, y {y:.3f} is one of {drawn.layer}, not of {run.layer}"
-        edges = [edge for edge in run.curves if isinstance(edge, Line | Arc)]
-        if not _agrees(drawn.curves, edges):
-            return f"the line at x {x:.3f}, y {y:.3f} is another"
-    return ""
-
-
-def verify_machine_file(path: Path, program: LaserProgram, expected: Sequence[LaserRun]) -> None:
-    """Reads the file at ``path`` and compares it with the expected runs.
-
-    Raises OutputError with the place of a run that is missing, on another layer, or off by more
-    than TOLERANCE.
-    """
-    read = read_machine_file(path, program)
-    runs = [run for run in expected if run.layer != REFERENCE]
-    if len(read) != len(runs):
-        raise OutputError(f"{path.name}: it has {len(read)} lines, not {len(runs)}; regenerate it")
-    for drawn, run in zip(read, runs, strict=True):
-        x, y = run.edges[0].start
-        place = f"{path.name}: the line at x {x:.3f}, y {y:.3f}"
-        if drawn.layer != run.layer:
-            raise OutputError(f"{place} is one of {drawn.layer}, not of {run.layer}; regenerate it")
-        if run.circle is None and not _agrees(drawn.curves, run.edges):
-            raise OutputError(f"{place} differs from what was written; regenerate it")
-        if run.circle is not None and not _is_round(drawn.curves, run.circle):
-            raise OutputError(f"{place} is not the circle that was written; regenerate it")
-
-
-def _agrees(curves: Sequence[BeamCurve], edges: Sequence[Edge]) -> bool:
-    """Return True if curves lie on edges, one by one; arcs may be read in several pieces."""
-    if math.dist(curves[0].start, edges[0].start) > TOLERANCE:
-        return False
-    number_, share = 0, 0.0
-    for curve in curves:
-        if number_ == len(edges):
-            return False
-        edge = edges[number_]
-        for t in BETWEEN:
-            p = curve.at(t)
-            if math.dist(p, edge.nearest(p)) > TOLERANCE:
-                return False
-        share = edge.parameter(curve.end)
-        if math.dist(curve.end, edge.end) <= TOLERANCE:
-            number_, share = number_ + 1, 0.0
-    return number_ == len(edges) and share == 0.0
-
-
-def _is_round(curves: Sequence[BeamCurve], expected: tuple[Point, float]) -> bool:
-    centre, radius = expected
-    points = [curve.at(t) for curve in curves for t in BETWEEN]
-    low, high = (f(x for x, _ in points) for f in (min, max))
-    on = all(abs(math.dist(p, centre) - radius) <= TOLERANCE for p in points)
-    return on and high - low > 1.9 * radius
-
-
 # RDWorks: DXF R12.
 
 
-def _rdworks(runs: Sequence[LaserRun]) -> str:
+def _rdworks(runs: Sequence[LaserRun], _size: Point, _title: str) -> str:
     layers = [layer for layer in RGB if any(run.layer == layer for run in runs)]
     table = "".join(
         f"  0\nLAYER\n  2\n{layer}\n 70\n0\n 62\n{COLOURS[layer]}\n  6\nCONTINUOUS\n"
@@ -203,7 +119,7 @@ def _epilog(runs: Sequence[LaserRun], size: Point, title: str) -> str:
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{across}mm" height="{up}mm" '
         f'viewBox="0 0 {across} {up}">',
-        f"<title>{title.replace('&', '&amp;').replace('<', '&lt;')}</title>",
+        f"<title>{escape(title)}</title>",
     ]
     for layer, colour in RGB.items():
         drawn = [run for run in runs if run.layer == layer]
@@ -282,3 +198,58 @@ def _read_epilog(path: Path) -> Iterator[BeamRun]:
                 or abs(segment.end - segment.start) > TOLERANCE / 10
             ]
             yield BeamRun(layer, curves)
+
+
+# The table of programs, and what all of them share.
+
+
+class MachineFile(NamedTuple):
+    """The file of a laser program: its name's end after the sheet's name, its writer and reader."""
+
+    ending: str
+    text: Callable[[Sequence[LaserRun], Point, str], str]
+    read: Callable[[Path], Iterable[BeamRun]]
+
+
+PROGRAMS: dict[LaserProgram, MachineFile] = {
+    "rdworks": MachineFile("_rdworks.dxf", _rdworks, _read_rdworks),
+    "epilog": MachineFile("_epilog.svg", _epilog, _read_epilog),
+}
+
+
+def machine_text(program: LaserProgram, runs: Sequence[LaserRun], size: Point, title: str) -> str:
+    """Return the file of a film sheet of a size in mm for a laser program, runs in their order."""
+    return PROGRAMS[program].text(_cut(runs), size, title)
+
+
+def _cut(runs: Sequence[LaserRun]) -> list[LaserRun]:
+    """The runs without the frame, which these programs would cut."""
+    return [run for run in runs if run.layer != REFERENCE]
+
+
+def read_machine_file(path: Path, program: LaserProgram) -> list[BeamRun]:
+    """Return the beam's runs in a machine file, in its order. Raises OutputError."""
+    try:
+        return [*PROGRAMS[program].read(path)]
+    except OutputError as error:
+        raise OutputError(f"{path.name}: {error}; regenerate it") from error
+    except (OSError, ValueError, LookupError, ArithmeticError, SyntaxError) as error:
+        raise OutputError(f"{path.name}: it cannot be read ({error}); regenerate it") from error
+
+
+def verify_machine_file(path: Path, program: LaserProgram, expected: Sequence[LaserRun]) -> None:
+    """Reads the file at ``path`` and compares it with the expected runs. Raises OutputError."""
+    check_runs(path, read_machine_file(path, program), _cut(expected))
+
+
+def rdworks_difference(path: Path, expected: Path) -> str:
+    """Return text on an RDWorks file's difference from the expected one; "" if it cuts the same.
+
+    Raises OutputError if the file cannot be read.
+    """
+    read, runs = (read_machine_file(file, "rdworks") for file in (path, expected))
+    wanted = [
+        LaserRun(layer, tuple(edge for edge in curves if isinstance(edge, Line | Arc)), False)
+        for layer, curves in runs
+    ]
+    return run_difference(read, wanted)

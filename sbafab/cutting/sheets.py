@@ -25,10 +25,10 @@ from sbafab.cutting.lightburn import (
     read_project,
     runs_text,
     sheet_layers,
-    verify_runs,
+    verify_project,
 )
 from sbafab.cutting.machine_files import (
-    ENDINGS,
+    PROGRAMS,
     machine_text,
     read_machine_file,
     verify_machine_file,
@@ -216,9 +216,9 @@ def _write_project(
     layers = sheet_layers({run.layer for run in runs}, settings.recipes.get(material, NO_RECIPES))
     notes = {**properties, **entries.properties}
     path.write_bytes(runs_text(layers, runs, notes, advice_of(settings, material)).encode())
-    verify_runs(path, layers, runs)
+    verify_project(path, layers, runs)
     if not entries.is_plain:
-        check_cuts(path, read_project(path).cut_runs, Region(tuple(layout.contours)), entries)
+        check_cuts(path, read_project(path).runs, Region(tuple(layout.contours)), entries)
     return runs
 
 
@@ -231,24 +231,19 @@ def _write_machine_file(
     """
     if program is None or layout.around.frame is None:
         return None
-    path = sheet.with_name(f"{sheet.stem}{ENDINGS[program]}")
+    path = sheet.with_name(f"{sheet.stem}{PROGRAMS[program].ending}")
     text = machine_text(program, runs, layout.around.frame, title)
     path.write_bytes(text.encode())
     verify_machine_file(path, program, runs)
-    cuts = parts_cut(path, program)
+    cuts = read_machine_file(path, program)
     check_cuts(path, cuts, Region(tuple(layout.contours)), layout.entries)
     return f"{FOLDER}/{path.name}"
 
 
-def parts_cut(path: Path, program: LaserProgram) -> list[BeamRun]:
-    """Return the runs of a machine file that cut the parts."""
-    runs = read_machine_file(path, program)
-    return [run for run in runs if run.layer in (CUT_INNER, CUT_OUTER)]
-
-
-def check_cuts(path: Path, cuts: Sequence[BeamRun], region: Region, entries: Entries) -> None:
-    """Raises OutputError with the file if its cuts differ from the requested contours."""
+def check_cuts(path: Path, runs: Sequence[BeamRun], region: Region, entries: Entries) -> None:
+    """Raises OutputError with the file if its cuts of parts differ from the requested contours."""
     try:
+        cuts = [run for run in runs if run.layer in (CUT_INNER, CUT_OUTER)]
         check_beam_runs(cuts, region, entries)
     except OutputError as error:
         raise OutputError(f"{path.name}: {error}; regenerate it") from error

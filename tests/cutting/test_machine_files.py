@@ -19,7 +19,7 @@ from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.entries import PLAIN, Entries
 from sbafab.cutting.machine_files import (
-    ENDINGS,
+    PROGRAMS,
     machine_text,
     read_machine_file,
     verify_machine_file,
@@ -41,11 +41,6 @@ OBLONG = stadium((50.0, 30.0), 16.0, 36.0)
 PARTS = Region((*RING.contours, *OBLONG.contours))
 AREA = math.pi * (10**2 - 4**2) + math.pi * 8**2 + 20 * 16
 """mm2: a ring, and a stadium."""
-PROGRAMS: tuple[LaserProgram, ...] = ("rdworks", "epilog")
-
-
-def test_the_parts_are_what_they_are_called() -> None:
-    assert pytest.approx(AREA) == PARTS.area
 
 
 def runs_of(entries: Entries) -> list[LaserRun]:
@@ -53,7 +48,7 @@ def runs_of(entries: Entries) -> list[LaserRun]:
 
 
 def written(folder: Path, program: LaserProgram, entries: Entries = PLAIN) -> Path:
-    path = folder / f"TPE_1{ENDINGS[program]}"
+    path = folder / f"TPE_1{PROGRAMS[program].ending}"
     path.write_text(machine_text(program, runs_of(entries), SIZE, "arm & co <1>"))
     return path
 
