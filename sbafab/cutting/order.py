@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 from sbafab.design.sections import Laser
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region
 
 ORIGIN: Point = (0.0, 0.0)
@@ -59,19 +60,15 @@ def _start(contour: Contour) -> Point:
 def _short(contours: Iterable[Contour], here: Point) -> list[Contour]:
     """A short path through all contours: on to the nearest, then crossings undone."""
     rest = list(contours)
-    starts = [_start(contour) for contour in rest]
-    remaining = PointsLeft(starts)
+    starts = np.array([_start(contour) for contour in rest]).reshape(-1, 2)
     path: list[Contour] = []
-    place = here
+    place = np.array(here)
     while len(path) < len(rest):
-
-        def way(number: int, place: Point = place) -> float:
-            # Rounding lets equal ways stay equal on every machine; the first of them wins.
-            return round(math.dist(place, starts[number]), 6)
-
-        number = remaining.take(place, way)
+        # Rounding lets equal ways stay equal on every machine; the first of them wins.
+        number = int(np.round(np.hypot(*(starts - place).T), 6).argmin())
         path.append(rest[number])
-        place = starts[number]
+        place = starts[number].copy()
+        starts[number] = math.inf
     for _ in range(SWEEPS):
         if not _undo_crossings(path, here):
             break
@@ -112,8 +109,6 @@ def _worth_a_look(stops: Sequence[Point]) -> list[bool]:
 
     All stretches are tested at once; a saving above half of ``SHORTER`` counts.
     """
-    import numpy as np
-
     count = len(stops) - 1
     xy = np.array(stops)
     worth = np.zeros(count, dtype=bool)
@@ -153,78 +148,3 @@ def _apart(a: Bounds, b: Bounds) -> float:
     across = max(a[0] - b[2], b[0] - a[2], 0.0)
     along = max(a[1] - b[3], b[1] - a[3], 0.0)
     return math.hypot(across, along)
-
-
-# Repeated nearest-point queries without looking at all points.
-
-
-SLACK = 1e-5
-"""mm by which a measure may fall short of the distance of two points: it may be rounded."""
-
-
-class PointsLeft:
-    """Points filed by the cells of a square grid, which is made again as they grow few."""
-
-    def __init__(self, points: Sequence[Point]) -> None:
-        self._points = points
-        self._file(range(len(points)))
-
-    def _file(self, numbers: Sequence[int]) -> None:
-        """About one point a cell, and of points on a line no more cells than points."""
-        points = [self._points[number] for number in numbers] or [(0.0, 0.0)]
-        self._low = min(x for x, _ in points), min(y for _, y in points)
-        high = max(x for x, _ in points), max(y for _, y in points)
-        across, along = high[0] - self._low[0], high[1] - self._low[1]
-        longest = max(across, along) / len(points)
-        self._cell = max(math.sqrt(across * along / len(points)), longest) or 1.0
-        self._last = self._place(high)
-        self._cells: dict[tuple[int, int], list[int]] = {}
-        for number in numbers:
-            self._cells.setdefault(self._place(self._points[number]), []).append(number)
-        self._count = self._filed = len(numbers)
-
-    def _place(self, p: Point) -> tuple[int, int]:
-        (x, y), (low_x, low_y) = p, self._low
-        return math.floor((x - low_x) / self._cell), math.floor((y - low_y) / self._cell)
-
-    def take(self, p: Point, measure: Callable[[int], float]) -> int:
-        """Takes the point of the least measure, of equal ones the first, and returns its number.
-
-        ``measure`` of a number is in mm and no less than the point's distance from ``p``.
-        """
-        if 2 * self._count < self._filed:
-            self._file(sorted(number for cell in self._cells.values() for number in cell))
-        x, y = self._place(p)
-        (last_x, last_y), cell = self._last, self._cell
-        ring = max(0, -x, -y, x - last_x, y - last_y)
-        best, nearest, home = math.inf, -1, (0, 0)
-        points, cells = self._points, self._cells
-        while best > (ring - 1) * cell - SLACK:
-            for place in self._ring(x, y, ring):
-                for number in cells.get(place, ()):
-                    if math.dist(p, points[number]) > best + SLACK:
-                        continue
-                    value = measure(number)
-                    if value < best or (value == best and number < nearest):
-                        best, nearest, home = value, number, place
-            ring += 1
-        self._cells[home].remove(nearest)
-        self._count -= 1
-        return nearest
-
-    def _ring(self, x: int, y: int, ring: int) -> Iterator[tuple[int, int]]:
-        """The cells a number of cells away, as far as there are any."""
-        last_x, last_y = self._last
-        if ring == 0:
-            yield x, y
-            return
-        left, right = max(0, x - ring), min(last_x, x + ring)
-        for row in {y - ring, y + ring}:
-            if 0 <= row <= last_y:
-                for column in range(left, right + 1):
-                    yield column, row
-        bottom, top = max(0, y - ring + 1), min(last_y, y + ring - 1)
-        for column in {x - ring, x + ring}:
-            if 0 <= column <= last_x:
-                for row in range(bottom, top + 1):
-                    yield column, row

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import DATUM_ARM, Surroundings
-from sbafab.cutting.order import PointsLeft
 from sbafab.cutting.properties import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour
-from sbafab.geometry.edges import Bounds, Edge, Line, Point, distance_to
+from sbafab.geometry.edges import Edge, Line, Point, distance_to
+from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region
 
 TOLERANCE = 0.001
@@ -161,15 +161,11 @@ def _paired(
     ours: Sequence[Contour], theirs: Sequence[Contour]
 ) -> Iterator[tuple[Contour, Contour]]:
     """Each of our contours with the unmatched contour of theirs whose box is most similar."""
-    boxes = [contour.bounds for contour in theirs]
-    rest = PointsLeft([box[:2] for box in boxes])
+    boxes = np.array([contour.bounds for contour in theirs])
     for contour in ours:
-        box = contour.bounds
-
-        def unlike(number: int, box: Bounds = box) -> float:
-            return math.dist(boxes[number], box)
-
-        yield contour, theirs[rest.take(box[:2], unlike)]
+        number = int(np.abs(boxes - contour.bounds).sum(axis=1).argmin())
+        boxes[number] = math.inf
+        yield contour, theirs[number]
 
 
 def _same(contour: Contour, second: Contour, room: float = ROUNDING) -> bool:
