@@ -8,10 +8,9 @@ from collections.abc import Sequence
 
 from sbafab.cutting.properties import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
-from sbafab.geometry.contour import COPIED, LEAST_AREA, Contour, Copies, between, circle, tidy
+from sbafab.geometry.contour import LEAST_AREA, Contour, circle, tidy
 from sbafab.geometry.edges import (
     EPSILON,
-    Arc,
     Edge,
     Point,
     edge_from_bulge,
@@ -117,27 +116,15 @@ def _between(edge: Edge, start: Point, end: Point) -> Edge:
     return edge_from_bulge(start, end, edge.bulge)
 
 
-def check_clear(contours: Sequence[Contour], copies: Copies | None = None) -> None:
-    """Raise OutputError if an edge is drawn twice or contours touch or cross.
-
-    ``copies`` caches the shapes of equal contours.
-    """
+def check_clear(contours: Sequence[Contour]) -> None:
+    """Raise OutputError if an edge is drawn twice or contours touch or cross."""
     rounds = [_full_circle(contour) for contour in contours]
-    copies = copies or Copies()
     for contour, circled in zip(contours, rounds, strict=True):
-        if circled is None and copies.first(contour) is contour:
+        if circled is None:
             _check_own(contour)
-    lying = [copies.lying(contour) for contour in contours]
-    # Pairs of copies that lie to each other as an earlier pair does are as clear as that one.
-    clear = set()
     for i, j in close_pairs([contour.bounds for contour in contours], EPSILON):
-        if _are_clear(rounds[i], rounds[j]):
-            continue
-        (first, here), (second, there) = lying[i], lying[j]
-        pair = first, second, between(here, there)
-        if pair not in clear:
+        if not _are_clear(rounds[i], rounds[j]):
             _check_two(contours[i], contours[j])
-            clear.add(pair)
 
 
 def _full_circle(contour: Contour) -> tuple[Point, float] | None:
@@ -205,18 +192,14 @@ def _check_edges(a: Edge, b: Edge, neighbours: bool) -> None:
         raise OutputError(f"contours touch or cross at x {x:.3f}, y {y:.3f}; part them.")
 
 
-def nested_region(
-    inner: Sequence[Contour], outer: Sequence[Contour], copies: Copies | None = None
-) -> Region:
+def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
     """The region with these holes and outlines, drawn in either sense.
 
     Raises OutputError for a contour whose nesting contradicts its layer.
     """
     drawn = [*inner, *outer]
-    copies = copies or Copies()
-    turns: dict[int, int | None] = {}
     turned = []
-    for index, (contour, depth) in enumerate(zip(drawn, _depths(drawn, copies), strict=True)):
+    for index, (contour, depth) in enumerate(zip(drawn, _depths(drawn), strict=True)):
         is_hole = index < len(inner)
         x, y = contour.edges[0].start
         if (depth % 2 == 1) != is_hole:
@@ -228,40 +211,8 @@ def nested_region(
         if abs(contour.area) < LEAST_AREA:
             raise OutputError(f"contour at x {x:.3f}, y {y:.3f} encloses nothing; remove it.")
         right = contour if contour.is_hole == is_hole else contour.reversed()
-        if right.circle is not None:
-            turned.append(_whole(right, *right.circle))
-            continue
-        first = copies.first(right)
-        if first is right:
-            turns[id(first)] = _turn(first.edges, (tidy(right.edges) or right).edges)
-        turned.append(_from(right, turns[id(first)]) or tidy(right.edges) or right)
+        turned.append(_whole(right, *right.circle) if right.circle else tidy(right.edges) or right)
     return Region(tuple(turned))
-
-
-def _turn(edges: Sequence[Edge], neighbours: Sequence[Edge]) -> int | None:
-    """The index of the edge from which the others equal these; None if they are different."""
-    turn = next((i for i, edge in enumerate(edges) if _run_equally(edge, neighbours[0])), 0)
-    turned = (*edges[turn:], *edges[:turn])
-    is_same = len(turned) == len(neighbours) and all(map(_run_equally, turned, neighbours))
-    return turn if is_same else None
-
-
-def _run_equally(first: Edge, second: Edge) -> bool:
-    """Return True if two edges agree; their ends need no check, being the next edges' starts."""
-    if math.dist(first.start, second.start) > COPIED or type(first) is not type(second):
-        return False
-    return not (isinstance(first, Arc) and isinstance(second, Arc)) or (
-        math.dist(first.centre, second.centre) <= COPIED
-        and abs(first.radius - second.radius) <= COPIED
-        and first.ccw == second.ccw
-    )
-
-
-def _from(contour: Contour, turn: int | None) -> Contour | None:
-    """The contour from one of its edges on."""
-    if not turn:
-        return contour if turn == 0 else None
-    return Contour((*contour.edges[turn:], *contour.edges[:turn]))
 
 
 def _whole(contour: Contour, centre: Point, radius: float) -> Contour:
@@ -276,19 +227,14 @@ def _whole(contour: Contour, centre: Point, radius: float) -> Contour:
     return whole.reversed() if is_hole else whole
 
 
-def _depths(contours: Sequence[Contour], copies: Copies) -> list[int]:
+def _depths(contours: Sequence[Contour]) -> list[int]:
     """Return the number of other contours that enclose each contour."""
     count = len(contours)
     places = [contour.edges[0].at(0.5) for contour in contours]
     depths = [0] * count
     boxes = [*(contour.bounds for contour in contours), *((*p, *p) for p in places)]
-    by_pair: dict[tuple[int, tuple[int, int]], bool] = {}
     for pair in close_pairs(boxes, 0.0):
         holder, inner = min(pair), max(pair) - count
         if holder < count and inner >= 0 and inner != holder:
-            shape, here = copies.lying(contours[holder])
-            place = shape, between(here, places[inner])
-            if place not in by_pair:
-                by_pair[place] = contours[holder].winding(places[inner]) != 0
-            depths[inner] += by_pair[place]
+            depths[inner] += contours[holder].winding(places[inner]) != 0
     return depths

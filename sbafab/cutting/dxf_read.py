@@ -15,7 +15,7 @@ from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
 from sbafab.cutting.dxf_write import skeleton
 from sbafab.cutting.properties import COLOURS, CUT_INNER, CUT_OUTER, REFERENCE, SEAM
 from sbafab.errors import OutputError
-from sbafab.geometry.contour import Contour, Copies, circle
+from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, edge_from_bulge, quarter_arcs
 from sbafab.geometry.region import Region
 
@@ -449,9 +449,8 @@ def _put_together(
     if document is not None:
         check_appearance(document)
     contours = {layer: [*closed[layer], *closed_loops(loose[layer])] for layer in closed}
-    copies = Copies()
-    check_clear([*contours[CUT_INNER], *contours[CUT_OUTER]], copies)
-    region = nested_region(contours[CUT_INNER], contours[CUT_OUTER], copies)
+    check_clear([*contours[CUT_INNER], *contours[CUT_OUTER]])
+    region = nested_region(contours[CUT_INNER], contours[CUT_OUTER])
     return ReadBack(region, properties, units, tuple(layers), tuple(other_kinds), tuple(strokes))
 
 

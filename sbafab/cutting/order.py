@@ -60,9 +60,9 @@ def _start(contour: Contour) -> Point:
 def _short(contours: Iterable[Contour], here: Point) -> list[Contour]:
     """A short path through all contours: on to the nearest, then crossings undone."""
     rest = list(contours)
-    starts = np.array([_start(contour) for contour in rest]).reshape(-1, 2)
+    starts = np.array([_start(contour) for contour in rest], dtype=float).reshape(-1, 2)
     path: list[Contour] = []
-    place = np.array(here)
+    place = np.array(here, dtype=float)
     while len(path) < len(rest):
         # Rounding lets equal ways stay equal on every machine; the first of them wins.
         number = int(np.round(np.hypot(*(starts - place).T), 6).argmin())

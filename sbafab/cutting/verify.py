@@ -161,7 +161,7 @@ def _paired(
     ours: Sequence[Contour], theirs: Sequence[Contour]
 ) -> Iterator[tuple[Contour, Contour]]:
     """Each of our contours with the unmatched contour of theirs whose box is most similar."""
-    boxes = np.array([contour.bounds for contour in theirs])
+    boxes = np.array([contour.bounds for contour in theirs], dtype=float)
     for contour in ours:
         number = int(np.abs(boxes - contour.bounds).sum(axis=1).argmin())
         boxes[number] = math.inf

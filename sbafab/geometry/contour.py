@@ -6,12 +6,10 @@ A contour keeps the material on its left: outer contours run counter-clockwise, 
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from operator import sub
 
 from sbafab.geometry.edges import (
     EPSILON,
@@ -398,58 +396,3 @@ def in_reading_order(contours: Sequence[Contour]) -> tuple[Contour, ...]:
 def _reading_order(contour: Contour) -> tuple[bool, int, int, int]:
     low_x, low_y, high_x, _ = contour.bounds
     return contour.is_hole, nanometres(low_x), nanometres(low_y), nanometres(high_x)
-
-
-# Contours that are copies of each other, so that measures of one hold for all.
-
-
-COPIED = 1e-8
-"""mm: ten times the rounding of numbers in files; far below the distances of distinct edges."""
-
-
-class Copies:
-    """Contours, each matched with an earlier one of the same form at another place, if any."""
-
-    def __init__(self) -> None:
-        self._by_size: dict[tuple[int, ...], list[tuple[list[float], Contour]]] = defaultdict(list)
-        self._firsts: dict[int, tuple[Contour, Contour]] = {}
-
-    def first(self, contour: Contour) -> Contour:
-        """Return the first contour that equals this one moved, edge by edge, else this one.
-
-        Ends, centres and radii agree within ``COPIED``.
-        """
-        if id(contour) not in self._firsts:
-            self._firsts[id(contour)] = contour, self._match(contour)
-        return self._firsts[id(contour)][1]
-
-    def _match(self, contour: Contour) -> Contour:
-        ox, oy = contour.edges[0].start
-        numbers: list[float] = []
-        for edge in contour.edges:
-            x, y = edge.start
-            numbers += (x - ox, y - oy)
-            if isinstance(edge, Arc):
-                (x, y), radius = edge.centre, edge.radius
-                numbers += (x - ox, y - oy, radius if edge.ccw else -radius)
-        low_x, low_y, high_x, high_y = contour.bounds
-        # Copies nearly always share a rounded size, and other contours rarely do.
-        sizes = round(100 * (high_x - low_x)), round(100 * (high_y - low_y))
-        candidates = self._by_size[len(contour.edges), len(numbers), *sizes]
-        for candidate, first in candidates:
-            if max(map(abs, map(sub, numbers, candidate))) < COPIED:
-                return first
-        candidates.append((numbers, contour))
-        return contour
-
-    def lying(self, contour: Contour) -> tuple[int, Point]:
-        """Return a number for the contour's form, and its position: centre, or start point."""
-        if contour.circle is not None:
-            centre, radius = contour.circle
-            return -round(radius / COPIED), centre
-        return id(self.first(contour)), contour.edges[0].start
-
-
-def between(a: Point, b: Point) -> tuple[int, int]:
-    """Return the vector from the first of two points to the second, in whole ``COPIED``."""
-    return round((b[0] - a[0]) / COPIED), round((b[1] - a[1]) / COPIED)

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.errors import OutputError
-from sbafab.geometry.contour import COPIED, Copies
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to, line_circle, meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Region, disc
@@ -65,15 +64,11 @@ def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: flo
     ]
     entries = [*regions, *pins]
     rounds = [_round(region) for _, region in entries]
-    gaps = _Gaps()
     for i, j in close_pairs([region.bounds for _, region in entries], stock.spacing):
         if min(i, j) >= len(regions) or _circle_gap(rounds[i], rounds[j]) >= stock.spacing:
             continue
         pair = entries[i][1], entries[j][1]
-        if gaps.least(*pair) >= stock.spacing - slack:
-            continue
         gap = least_distance(*pair, stock.spacing)
-        gaps.add(*pair, min(gap.value, stock.spacing))
         if gap.value < stock.spacing - slack:
             (x, y), (first, second) = gap.place, (entries[min(i, j)][0], entries[max(i, j)][0])
             how = f"are {gap.value:.4f} mm apart" if gap.value > 0 else "overlap"
@@ -81,42 +76,6 @@ def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: flo
                 f"{first} and {second} {how} at x {x:.3f}, y {y:.3f}; the spacing is "
                 f"{stock.spacing:g} mm; nest again."
             )
-
-
-class _Gaps:
-    """Gaps between outlines, by pair of shapes and relative place, for copies of a pair."""
-
-    def __init__(self) -> None:
-        self._copies = Copies()
-        self._shapes: dict[int, tuple[Region, int]] = {}
-        self._known: dict[tuple[int, int, int, int], tuple[Point, float]] = {}
-
-    def least(self, a: Region, b: Region) -> float:
-        """Return a lower bound of the gap of two regions, mm."""
-        key, (x, y) = self._between(a, b)
-        if key not in self._known:
-            return 0.0
-        # A copy moved by some distance comes nearer by no more than that.
-        place, gap = self._known[key]
-        return gap - math.dist(place, (x, y)) - 4 * COPIED
-
-    def add(self, a: Region, b: Region, gap: float) -> None:
-        key, shift = self._between(a, b)
-        self._known[key] = shift, gap
-
-    def _between(self, a: Region, b: Region) -> tuple[tuple[int, int, int, int], Point]:
-        """Return the shapes of two regions and their relative place, rounded and exact."""
-        (x, y), (u, v) = a.contours[0].edges[0].start, b.contours[0].edges[0].start
-        shape_a, shape_b = self._shape(a), self._shape(b)
-        return (shape_a, shape_b, round((u - x) / NEAR), round((v - y) / NEAR)), (u - x, v - y)
-
-    def _shape(self, region: Region) -> int:
-        if id(region) not in self._shapes:
-            # Regions of several pieces are not matched as copies.
-            alone = len(region.contours) == 1
-            shape = id(self._copies.first(region.contours[0]) if alone else region)
-            self._shapes[id(region)] = region, shape
-        return self._shapes[id(region)][1]
 
 
 def _round(region: Region) -> tuple[Point, float]:

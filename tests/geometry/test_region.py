@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import random
 
 import pytest
 import shapely
@@ -16,7 +15,6 @@ from svgelements import Path
 from sbafab.geometry.cache import MOST, cached
 from sbafab.geometry.contour import (
     Contour,
-    Copies,
     circle,
     facets,
     in_reading_order,
@@ -259,7 +257,7 @@ def test_arcs_stay_arcs_in_svg() -> None:
     assert path_data(Region()) == ""
 
 
-# Caches by exact numbers, and copies of contours.
+# Caches by exact numbers.
 
 
 def test_a_hair_makes_another_key_and_few_results_are_kept() -> None:
@@ -281,21 +279,3 @@ def test_a_hair_makes_another_key_and_few_results_are_kept() -> None:
     assert len(calls) == 3 + MOST + 1 + 1
     cut, cutter = rectangle((0.0, 0.0), (7.0, 3.0)), disc((0.0, 0.0), 2.25)
     assert difference(cut, cutter) is difference(cut.moved(0, 0), cutter)
-
-
-def test_moved_contours_are_copies_and_others_are_not() -> None:
-    copies = Copies()
-    [slot] = stadium((1.0, 2.0), 3.0, 8.0).contours
-    draw = random.Random(3)
-    for _ in range(9):
-        moved = stadium((draw.uniform(-9, 9), draw.uniform(-9, 9)), 3.0, 8.0).contours[0]
-        assert copies.first(slot) is copies.first(moved) is slot
-    for b in (
-        stadium((1.0, 2.0), 3.0, 8.0 + 1e-6),
-        stadium((1.0, 2.0), 8.0, 3.0).turned(90.0),
-        stadium((1.0, 2.0), 3.0, 8.0).mirrored().scaled(1.0000001),
-        disc((1.0, 2.0), 1.5),
-        rectangle((0.0, 0.0), (3.0, 8.0)),
-    ):
-        assert copies.first(b.contours[0]) is not slot
-    assert copies.first(slot.reversed()) is not slot
