@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, MutableMapping
+from collections import UserDict
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
@@ -65,37 +65,19 @@ HOMES = {**dict.fromkeys(GROUPS["Make"], "make"), "schema": "formats", "import":
 """Modules with another name than their command."""
 
 
-class CommandTable(MutableMapping[str, click.Command]):
+class CommandTable(UserDict[str, Any]):
     """Commands by name; a command's module is imported when the command is first looked up."""
 
-    def __init__(self) -> None:
-        self._loaded: dict[str, click.Command | None] = dict.fromkeys(SUMMARIES)
-
     def __getitem__(self, name: str) -> click.Command:
-        command = self._loaded[name]
+        command: click.Command | None = self.data[name]
         if command is None:
             module = import_module(f"sbafab.cli.{HOMES.get(name, name)}")
-            command = self._loaded[name] = getattr(module, BUILTIN.get(name, name))
+            command = self.data[name] = getattr(module, BUILTIN.get(name, name))
             add_verbosity(command)
         return command
 
-    def __setitem__(self, name: str, command: click.Command) -> None:
-        self._loaded[name] = command
 
-    def __delitem__(self, name: str) -> None:
-        del self._loaded[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._loaded
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._loaded)
-
-    def __len__(self) -> int:
-        return len(self._loaded)
-
-
-COMMANDS = CommandTable()
+COMMANDS = CommandTable(dict.fromkeys(SUMMARIES))
 EXTRAS = {
     "calibrate": ("emcee", "sbafab calibrate"),
     "control": ("gymnasium", "an environment of Gymnasium, from Python"),

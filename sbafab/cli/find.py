@@ -50,7 +50,6 @@ from sbafab.search.quantities import (
     quantity_lines,
     read_all,
     read_sure,
-    shown_interval,
     shown_value,
 )
 from sbafab.search.space import FindRequest, figure_text, read_free
@@ -317,10 +316,8 @@ def _print_quantities(result: FoundDesign) -> None:
 
 def _interval_text(result: FoundDesign, subject: Requirement | Goal) -> str:
     """Return the 90 % interval in parentheses; empty without one."""
-    interval = result.intervals.get(subject.quantity.label)
-    if interval is None or result.best.value(subject) < 0:
-        return ""
-    return f" ({shown_interval(interval)})"
+    ends = result.interval_text(subject)
+    return f" ({ends})" if ends else ""
 
 
 def _print_trust(result: FoundDesign, label: str) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import math
-import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -15,9 +14,7 @@ from click.shell_completion import CompletionItem
 
 from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.design.files import key_paths, template_summaries
-from sbafab.design.units import KILOPASCALS, MILLILITRES_PER_MINUTE
-
-_WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
+from sbafab.design.units import KILOPASCALS, MILLILITRES_PER_MINUTE, in_first_unit, share_of
 
 
 @dataclass(frozen=True)
@@ -30,12 +27,10 @@ class MeasuredQuantity:
 
     def read(self, written: str) -> float:
         """Return a quantity in the first unit; raises BadParameter for other text."""
-        match = _WRITTEN.fullmatch(written)
-        unit = match and (match[2] or next(iter(self.units)))
-        if match is None or unit not in self.units:
+        number = in_first_unit(written, self.units)
+        if number is None:
             allowed = f"a {self.name} such as {self.example}; the units are {', '.join(self.units)}"
             raise click.BadParameter(f"{written!r} must be {allowed}")
-        number = float(match[1]) * self.units[unit]
         if not math.isfinite(number):
             raise click.BadParameter(f"{written!r} must be a finite {self.name}")
         return number
@@ -220,11 +215,10 @@ def _target(_: click.Context, __: click.Parameter, text: str | None) -> float | 
     """Return a share from 0.95 or 95%; raises BadParameter for none, all and other text."""
     if text is None:
         return None
-    match = _WRITTEN.fullmatch(text)
-    share = float(match[1]) / (100 if match[2] else 1) if match and match[2] in ("", "%") else 0.0
-    if not 0 < share < 1:
+    target = share_of(text)
+    if target is None or not 0 < target < 1:
         raise click.BadParameter(f"{text!r} must be a share above 0 and below 1, as 0.95 or 95%")
-    return share
+    return target
 
 
 def target_yield_option(words: str) -> Callable[[Command], Command]:

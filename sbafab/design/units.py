@@ -37,7 +37,23 @@ MILLILITRES_PER_MINUTE = {"ml/min": 1.0, "ul/min": 0.001, "ml/s": 60.0, "l/min":
 """Size of each unit in ml/min."""
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _WRITTEN = re.compile(rf"\s*([-+]?{_NUMBER})\s*([^\d\s]*)\s*")
-_MEASURED = re.compile(rf"\s*([-+]?{_NUMBER})\s*(\S*)\s*")
+MEASURED = re.compile(rf"\s*([-+]?{_NUMBER})\s*(\S*)\s*")
+"""A number, and the unit after it."""
+
+
+def in_first_unit(text: str, units: Mapping[str, float]) -> float | None:
+    """Return the number of a text, alone or with one of ``units``, in the first of them; None for
+    other text.
+    """
+    written = MEASURED.fullmatch(text)
+    size = written and units.get(written[2] or next(iter(units)))
+    return float(written[1]) * size if written and size is not None else None
+
+
+def share_of(text: str) -> float | None:
+    """Return the share of a text such as 0.95 or 95%; None for other text."""
+    found = in_first_unit(text, {"": 1.0, "%": 0.01})
+    return None if found is None else round(found, 12)
 
 
 def millimetres(value: object) -> float:
@@ -107,15 +123,15 @@ class InUnit:
         """Raises ValueError with a sentence on the allowed form."""
         if not isinstance(value, str):
             return value
-        written = _MEASURED.fullmatch(value)
-        if written is None or (written[2] and written[2] not in self.units):
+        number = in_first_unit(value, self.units)
+        if number is None:
             first, *others = self.units
             more = f" (or {', '.join(others)})" if others else ""
             raise ValueError(
                 f'must be a number, in {first}, or a text with its unit{more}, such as "'
                 f'{self.example}"'
             )
-        return float(written[1]) * self.units.get(written[2], 1.0)
+        return number
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> Any:
         return BeforeValidator(self.read).__get_pydantic_core_schema__(source, handler)
@@ -134,7 +150,7 @@ UNITS = (*MILLIMETRES, *MEGAPASCALS.units, *CELSIUS.units, *DENSITIES.units)
 
 def is_measured(text: str) -> bool:
     """Return True for the text of a number, alone or with a unit that files take."""
-    written = _MEASURED.fullmatch(text)
+    written = MEASURED.fullmatch(text)
     return written is not None and written[2] in ("", *UNITS)
 
 

@@ -99,6 +99,11 @@ class FoundDesign:
         """Requirements and rules that the best design breaks, one sentence each."""
         return misses(self.request, self.best)
 
+    def interval_text(self, subject: Requirement | Goal) -> str:
+        """Return the 90 % interval of a requirement or the goal without its unit; empty without."""
+        interval = self.intervals.get(subject.quantity.label)
+        return shown_interval(interval) if interval and self.best.value(subject) >= 0 else ""
+
 
 def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDesign:
     """Return the best design, or the nearest miss. Raises DesignError for an impossible request."""
@@ -557,24 +562,22 @@ def found_toml(
     data = override(read_toml(design_path(source)), changes)
     data = override(data, [_paths_beside(target, data, request.design)])
     first = {key: value for key, value in data.items() if not isinstance(value, dict)}
+
+    def interval(subject: Requirement | Goal) -> str:
+        ends = found.interval_text(subject)
+        return f"; 90 % interval {ends}" if ends else ""
+
     head = [f"Found by sbafab find, from {Path(source).name}: {format_keys(best.values)}."]
     for row in request.requirements:
         value = figure_text(request, best, row)
-        head.append(f"{row.quantity.label} = {value} ({row.bound}{_interval_text(found, row)})")
+        head.append(f"{row.quantity.label} = {value} ({row.bound}{interval(row)})")
     goal = request.goal
     value = shown_value(goal.quantity, best.value(goal))
-    head.append(f"{goal.quantity.label} = {value} (the goal{_interval_text(found, goal)})")
+    head.append(f"{goal.quantity.label} = {value} (the goal{interval(goal)})")
     head += [f"{name}: {measured.sentence()}" for name, measured in found.measured.items()]
     head += [f"{name}: {FLAGS[flag]}" for name, flags in found.flags.items() for flag in flags]
     comments = "".join(f"# {line}".rstrip() + "\n" for line in head)
     return f"{comments}\n{tomli_w.dumps(first | data)}"
-
-
-def _interval_text(found: FoundDesign, subject: Requirement | Goal) -> str:
-    interval = found.intervals.get(subject.quantity.label)
-    if interval is None or found.best.value(subject) < 0:
-        return ""
-    return f"; 90 % interval {shown_interval(interval)}"
 
 
 def _paths_beside(target: Path, data: Mapping[str, Any], design: Design) -> dict[str, str]:

@@ -19,7 +19,14 @@ from typing import Any
 
 from sbafab.design.files import key_paths, listed, shown
 from sbafab.design.records import Design, Form, Slots
-from sbafab.design.units import KILOPASCALS, MILLILITRES_PER_MINUTE, millimetres
+from sbafab.design.units import (
+    KILOPASCALS,
+    MEASURED,
+    MILLILITRES_PER_MINUTE,
+    in_first_unit,
+    millimetres,
+    share_of,
+)
 from sbafab.errors import DesignError
 from sbafab.laminate.burst import NOT_BURST, Burst, burst
 from sbafab.laminate.laminate import Laminate, film_mass
@@ -136,7 +143,6 @@ UNITS = {
 }
 """Units of masses, forces, angles, times, stiffness and pressures; lengths have the units of design
 files."""
-_VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 UNDER_VACUUM = ("slip",)
 """Quantities at pressures below atmospheric."""
 KEYS = {"lumen": "lumen.diameter"}
@@ -258,7 +264,7 @@ def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -
 def _with_flow(places: list[str], text: str, flow_ml_min: float) -> RequestedQuantity:
     """Return the time to 10 kPa with water at a flow. Raises DesignError."""
     for place in places:
-        match = _VALUE.fullmatch(place)
+        match = MEASURED.fullmatch(place)
         if len(places) > 1 or match is None or match[2] not in MILLILITRES_PER_MINUTE:
             raise DesignError(f"{shown(text)}: a time takes one flow, such as time@35ml/min")
         flow_ml_min = float(match[1]) * MILLILITRES_PER_MINUTE[match[2]]
@@ -278,7 +284,7 @@ def _kilopascals(place: str) -> float | None:
 
     MPa and mPa are not the same: an ambiguous unit is rejected.
     """
-    match = _VALUE.fullmatch(place)
+    match = MEASURED.fullmatch(place)
     written = match[2] if match else ""
     units = [unit for unit in KILOPASCALS if unit.lower() == written.lower()]
     if match is None or not units or (units == ["MPa"] and written != "MPa"):
@@ -291,7 +297,13 @@ def read_limit(quantity: RequestedQuantity, text: str) -> float:
     if quantity.name == "yield":
         return read_share(text)
     if quantity.unit in UNITS:
-        limit = _measured(quantity.unit, text)
+        units = UNITS[quantity.unit]
+        number = in_first_unit(text, units)
+        if number is None:
+            raise ValueError(
+                f"must be a number, in {quantity.unit} or with one of {', '.join(units)}"
+            )
+        limit = number
     else:
         try:
             limit = millimetres(text)
@@ -304,34 +316,24 @@ def read_limit(quantity: RequestedQuantity, text: str) -> float:
     return limit
 
 
-def _measured(unit: str, text: str) -> float:
-    match = _VALUE.fullmatch(text)
-    if match is None or (match[2] or unit) not in UNITS[unit]:
-        raise ValueError(f"must be a number, in {unit} or with one of {', '.join(UNITS[unit])}")
-    return float(match[1]) * UNITS[unit][match[2] or unit]
-
-
 def read_share(text: str) -> float:
     """Return a share from a text such as 0.95 or 95%. Raises ValueError with the end of a
     sentence.
     """
-    match = _VALUE.fullmatch(text)
-    if match is None or match[2] not in ("", "%"):
-        raise ValueError("must be a share such as 0.95 or 95%")
-    share = float(match[1]) / (100 if match[2] else 1)
-    if not 0 <= share <= 1:
+    read = share_of(text)
+    if read is None or not 0 <= read <= 1:
         raise ValueError("must be a share from 0 to 1, such as 0.95 or 95%")
-    return share
+    return read
 
 
 def read_sure(text: str) -> float:
     """Return a probability from a text such as 0.9 or 90%. Raises ValueError with the end of a
     sentence.
     """
-    share = read_share(text)
-    if not 0.5 < share < 1:
+    sure = read_share(text)
+    if not 0.5 < sure < 1:
         raise ValueError("must be above 0.5 and below 1, such as 0.9 or 90%")
-    return share
+    return sure
 
 
 def shown_value(quantity: RequestedQuantity, value: float) -> str:

@@ -11,7 +11,6 @@ from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import assembly_sha256, assembly_toml, load
 from sbafab.assemblies.records import Assembly
 from sbafab.design.records import design_toml
-from sbafab.errors import DesignError
 from sbafab.reports.traveller.page import record_text
 from sbafab.results.builds import promised
 from sbafab.results.recording import matching
@@ -37,23 +36,6 @@ def test_python_records_what_the_command_does(tmp_path: Path) -> None:
     told = sbafab.report(lab)
     assert (told.records, told.items) == (4, 3)
     assert Lab(lab).contents().records[0] == first
-
-
-@pytest.mark.parametrize(
-    ("said", "says"),
-    [
-        ({"leak": "pass"}, "needs its serial"),
-        ({"serial": "A1"}, "A1 has no result; give leak"),
-        ({"serial": "A1", "leak": "maybe"}, "must be '', 'pass' or 'fail'"),
-        ({"serial": "A1", "stroke_mm": -1}, "stroke_mm = -1 must be greater than 0"),
-        ({"serial": "A1", "leak": "pass", "table": "x.csv"}, "leave out serial, leak"),
-    ],
-)
-def test_bad_input_is_one_sentence(said: dict[str, object], says: str, tmp_path: Path) -> None:
-    lab = tmp_path / "lab.sqlite"
-    with pytest.raises(DesignError, match=says):
-        sbafab.record("1dof-5mm", lab=lab, **SMALL, **said)
-    assert not lab.exists()
 
 
 def test_an_assembly_is_recorded_as_a_whole(tmp_path: Path) -> None:

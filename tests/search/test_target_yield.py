@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import pytest
-
 import sbafab
 from sbafab.actuators import build
-from sbafab.errors import DesignError
 from sbafab.rules.registration_yield import simulate
 
 ROUGH = {
@@ -33,18 +30,3 @@ def test_the_changed_design_reaches_the_share_and_costs_what_its_ears_do() -> No
     # Builds drawn by a third seed.
     share = simulate(build(design), design.with_("rules.yield_builds=1000"), 91).whole
     assert share.interval[1] >= 0.9
-
-
-def test_keys_that_are_given_stay() -> None:
-    keys = ("registration.method=channel-pin", "bond.width=0.75", "mask.overhang=0.5")
-    reached = sbafab.reach_yield("1dof-5mm", ROUGH, *keys, target=0.99)
-    assert reached.design is None
-    assert reached.comparison is None
-    assert "does not reach a yield of 0.99" in reached.sentence
-    assert "bond.width" in reached.sentence
-
-
-@pytest.mark.parametrize("target", [0.0, 1.0, -0.5, 120.0, float("nan")])
-def test_a_share_out_of_range_is_refused(target: float) -> None:
-    with pytest.raises(DesignError, match=r"rules\.target_yield"):
-        sbafab.reach_yield("1dof-5mm", ROUGH, target=target)

@@ -5,9 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
-import signal
-import subprocess
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -250,45 +247,6 @@ def test_no_tab_saves_over_what_the_other_has_saved(
     other.close()
 
 
-def test_a_dead_worker_is_a_message_and_work_goes_on(chrome: Any, tmp_path: Path) -> None:
-    (tmp_path / FILE).write_text(DESIGN, encoding="utf-8")
-    with served(tmp_path, FILE) as link:
-        watched = Watched(chrome, link)
-        watched.ready()
-        port = link.split(":")[2].split("/")[0]
-        for pid in workers_of(port):
-            os.kill(pid, signal.SIGKILL)
-        watched.say("studio.edit([['stack.balloons', '5']])")
-        watched.until("studio.laminate.balloons === 5 || studio.error?.kind === 'crashed'")
-        watched.say("studio.edit([['stack.balloons', '8']])")
-        watched.until("studio.laminate.balloons === 8")
-        watched.close()
-
-
-def workers_of(port: str) -> list[int]:
-    """Processes that the server at this port has started, for its workers."""
-    listing = subprocess.run(
-        ["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True
-    )
-    rows = [line.split(None, 2) for line in listing.stdout.splitlines()[1:]]
-    servers = {
-        pid
-        for pid, _, words in rows
-        if "studio" in words and str(os.getpid()) in _parents(pid, rows)
-    }
-    assert port
-    return [int(pid) for pid, parent, words in rows if parent in servers and "spawn_main" in words]
-
-
-def _parents(pid: str, rows: list[list[str]]) -> set[str]:
-    above = {one: parent for one, parent, _ in rows}
-    found = set()
-    while pid in above:
-        pid = above[pid]
-        found.add(pid)
-    return found
-
-
 @pytest.mark.parametrize("source", ["template", "link", None])
 def test_the_gallery_opens_only_where_no_design_is_given(
     chrome: Any, tmp_path: Path, source: str | None
@@ -332,6 +290,12 @@ def test_phone_width(chrome: Any, link: str, scheme: str) -> None:
     page.get_by_role("button", name="Findings").click()
     assert page.locator(".finding").first.is_visible()
     assert watched.say("document.documentElement.scrollWidth") <= 390
+    page.evaluate("text => studio.open(text)", api.template("pouch"))
+    watched.ready()
+    for name in ("Draw", "Nets"):
+        page.get_by_role("tab", name=name).click()
+        assert watched.say("document.documentElement.scrollWidth") <= 390
+    assert page.locator("#view-nets .void").count() > 0
     assert watched.complaints == []
     watched.close()
 

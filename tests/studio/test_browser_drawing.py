@@ -267,18 +267,6 @@ def test_edges_of_the_sketch_are_those_of_closed_formulas(sketch: Sketch) -> Non
     assert worst < 1e-6
 
 
-def test_the_view_fits_a_phone(chrome: Any, drawing_link: tuple[str, Path]) -> None:
-    watched = Watched(
-        chrome, drawing_link[0], viewport={"width": 390, "height": 844}, has_touch=True
-    )
-    watched.ready()
-    watched.page.get_by_role("tab", name="Draw").click()
-    assert watched.say("document.documentElement.scrollWidth") <= 390
-    assert watched.page.locator("#view-draw .points input").first.is_visible()
-    assert watched.complaints == []
-    watched.close()
-
-
 def test_a_design_without_shapes_has_no_such_view(sketch: Sketch) -> None:
     sketch.page.evaluate("text => studio.open(text)", api.template("1dof-5mm"))
     sketch.seen.until("studio.laminate?.name === '1dof-5mm'")

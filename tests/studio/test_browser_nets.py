@@ -174,14 +174,3 @@ def test_a_design_without_nets_shows_its_chambers(nets: Watched) -> None:
     nets.page.evaluate("text => studio.open(text)", opened_text)
     nets.until("studio.family === 'assembly'")
     assert not nets.page.get_by_role("tab", name="Nets").is_visible()
-
-
-def test_the_view_fits_a_phone(chrome: Any, nets_link: str) -> None:
-    watched = Watched(chrome, nets_link, viewport={"width": 390, "height": 844}, has_touch=True)
-    watched.ready()
-    watched.page.get_by_role("tab", name="Nets").click()
-    watched.until("studio.nets !== null")
-    assert watched.say("document.documentElement.scrollWidth") <= 390
-    assert watched.page.locator("#view-nets .void").count() == 4
-    assert watched.complaints == []
-    watched.close()

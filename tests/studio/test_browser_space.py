@@ -252,32 +252,3 @@ def test_without_webgl2_every_view_says_so_and_the_rest_works(chrome: Any, link:
         watched.page.get_by_role("tab", name=tab).click()
     assert watched.complaints == []
     watched.close()
-
-
-def test_a_picture_has_the_dots_of_its_screen(chrome: Any, link: str) -> None:
-    watched = Watched(chrome, "about:blank", device_scale_factor=2)
-    # With a graphics card; without one frames are as fine as the processor can.
-    watched.context.add_init_script(
-        "const own = WebGL2RenderingContext.prototype.getParameter;"
-        "WebGL2RenderingContext.prototype.getParameter = function (what) {"
-        " return what === 0x9246 ? 'A graphics card' : own.call(this, what); };"
-    )
-    watched.page.goto(link)
-    watched.ready()
-    sizes = (
-        "(c => [c.width, c.height, 2 * c.clientWidth, 2 * c.clientHeight])"
-        "(studio.solid.stage.canvas)"
-    )
-    for width in (1440, 1100):
-        watched.page.set_viewport_size({"width": width, "height": 900})
-        watched.page.wait_for_timeout(300)
-        found = watched.say(sizes)
-        assert found[:2] == found[2:]
-        assert found[0] > 400
-    # On another screen it is as fine as that.
-    session = watched.context.new_cdp_session(watched.page)
-    screen = {"width": 1200, "height": 900, "deviceScaleFactor": 1, "mobile": False}
-    session.send("Emulation.setDeviceMetricsOverride", screen)
-    watched.until("(c => c.width === c.clientWidth)(studio.solid.stage.canvas)")
-    assert watched.complaints == []
-    watched.close()

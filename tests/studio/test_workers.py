@@ -114,6 +114,26 @@ def test_a_process_that_hangs_holds_its_own_tab_alone(tmp_path: Path) -> None:
     assert second[-1] == third[-1] == "checked"
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no process is killed here")
+def test_a_killed_process_is_a_message_and_work_goes_on(tmp_path: Path) -> None:
+    async def both() -> tuple[list[str], list[str]]:
+        pool, begun = WorkerPool(60, 1, warm=False), asyncio.Event()
+        try:
+            killed = pool.ask(("tab", "live"), job(tmp_path, edited(TEXT, LONG)))
+            first = asyncio.create_task(heard(killed, begun))
+            await begun.wait()
+            assert pool.workers[0].process.pid is not None
+            os.kill(pool.workers[0].process.pid, signal.SIGKILL)
+            told = await first
+            newer = pool.ask(("tab", "live"), job(tmp_path, edited(TEXT, SHORT)))
+            return told, await heard(newer, asyncio.Event())
+        finally:
+            pool.stop()
+
+    first, second = asyncio.run(both())
+    assert (first[-1], second[-1]) == ("crashed", "checked")
+
+
 def test_a_pool_refuses_before_it_answers(tmp_path: Path) -> None:
     async def filled() -> None:
         pool = WorkerPool(60, 1, warm=False)
