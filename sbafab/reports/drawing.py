@@ -6,7 +6,7 @@ Every function returns SVG elements. Coordinates are millimetres on the page, y 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,7 +14,7 @@ from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Point
 from sbafab.geometry.region import Region, coord, section
 from sbafab.laminate.films import MASKS, Film, ink
-from sbafab.laminate.laminate import Inlet, Laminate, Layer
+from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.markup import escape
 
 Anchor = Literal["start", "middle", "end"]
@@ -209,29 +209,18 @@ def spread(targets: Sequence[float], gap: float, low: float, high: float) -> lis
 
     They stay between ``low`` and ``high`` if all fit.
     """
-    if not targets:
-        return []
-    groups: list[list[float]] = []
-    for place in targets:
-        groups.append([place, 1])
-        while len(groups) > 1 and _overlap(groups[-2], groups[-1], gap):
-            centre, count = groups.pop()
-            before = groups[-1]
-            before[0] = (before[0] * before[1] + centre * count) / (before[1] + count)
-            before[1] += count
-    places = [
-        centre + (i - (count - 1) / 2) * gap for centre, count in groups for i in range(int(count))
-    ]
-    for i, place in enumerate(places):
-        places[i] = max(place, low + i * gap)
+    groups: list[tuple[float, int]] = []
+    for target in targets:
+        centre, count = target, 1
+        while groups and centre - groups[-1][0] < gap * (groups[-1][1] + count) / 2:
+            before, more = groups.pop()
+            centre = (before * more + centre * count) / (more + count)
+            count += more
+        groups.append((centre, count))
+    places = [centre + (i - (n - 1) / 2) * gap for centre, n in groups for i in range(n)]
+    places = [max(place, low + i * gap) for i, place in enumerate(places)]
     last = len(places) - 1
-    for i in range(last, -1, -1):
-        places[i] = min(places[i], high - (last - i) * gap)
-    return places
-
-
-def _overlap(below: list[float], above: list[float], gap: float) -> bool:
-    return above[0] - below[0] < gap * (below[1] + above[1]) / 2
+    return [min(place, high - (last - i) * gap) for i, place in enumerate(places)]
 
 
 def _unit(a: Point, b: Point) -> Point:
@@ -280,13 +269,12 @@ Dimension = Circle | WidthDimension
 def dimensions(laminate: Laminate, layer: Layer) -> list[Dimension]:
     """Everything dimensioned in a drawing of a layer, beside its overall width and height."""
     profile = layer.profile
-    around = circumscribed(profile)
-    widths = inlet_width(laminate, layer), piece_width(profile)
     return [
-        *circles(laminate, layer),
-        *radii(profile),
-        *([around] if around is not None else []),
-        *(width for width in widths if width is not None),
+        *_circles(laminate, layer),
+        *_radii(profile),
+        *_circumscribed(profile),
+        *_inlet_width(laminate, layer),
+        *_piece_width(profile),
     ]
 
 
@@ -303,22 +291,20 @@ def length(value: float) -> str:
     return f"{value:.2f}"
 
 
-def circles(laminate: Laminate, layer: Layer) -> list[Circle]:
-    """The full circles of a profile, equal ones together, named by their meaning.
+def _circles(laminate: Laminate, layer: Layer) -> Iterator[Circle]:
+    """Yield the full circles of a profile, equal ones together, named by their meaning.
 
     The outline of a single disc is left out: its overall width gives it.
     """
-    groups: dict[tuple[str, float], list[Contour]] = {}
+    groups: dict[tuple[str, float], list[Point]] = {}
     for contour in layer.profile.contours:
         if contour.circle is not None and not is_disc(layer.profile, contour):
-            name = _circle_name(laminate, layer, contour)
-            groups.setdefault((name, round(contour.circle[1], 4)), []).append(contour)
-    callouts = []
-    for (name, radius), contours in groups.items():
-        centre = max((c.circle[0] for c in contours if c.circle), key=lambda p: (p[0], p[1]))
+            centre, radius = contour.circle
+            name = _hole_name(laminate, layer, centre) if contour.is_hole else ""
+            groups.setdefault((name, round(radius, 4)), []).append(centre)
+    for (name, radius), centres in groups.items():
         words = f"{name} ⌀{length(2 * radius)}".strip()
-        callouts.append(Circle(_counted(len(contours), words), centre, radius))
-    return callouts
+        yield Circle(_counted(len(centres), words), max(centres), radius)
 
 
 def is_disc(profile: Region, outer: Contour) -> bool:
@@ -326,11 +312,7 @@ def is_disc(profile: Region, outer: Contour) -> bool:
     return outer.circle is not None and profile.outers == (outer,)
 
 
-def _circle_name(laminate: Laminate, layer: Layer, contour: Contour) -> str:
-    assert contour.circle is not None
-    centre = contour.circle[0]
-    if not contour.is_hole:
-        return ""
+def _hole_name(laminate: Laminate, layer: Layer, centre: Point) -> str:
     if any(math.dist(centre, bore.centre) < SAME for bore in laminate.bores):
         return "neck ring" if layer.role == "separator-mask" else "bore"
     if laminate.lumen and math.hypot(*centre) < SAME:
@@ -340,78 +322,59 @@ def _circle_name(laminate: Laminate, layer: Layer, contour: Contour) -> str:
     return tooling if is_pinned else ""
 
 
-def radii(profile: Region) -> list[Circle]:
-    """The arcs of edges that are not full circles, equal radii together, largest first."""
+def _radii(profile: Region) -> Iterator[Circle]:
+    """Yield the arcs of edges that are not full circles, equal radii together, largest first."""
     groups: dict[float, list[Arc]] = {}
     for contour in profile.contours:
-        if contour.circle is None:
-            for edge in contour.edges:
-                if isinstance(edge, Arc):
-                    groups.setdefault(round(edge.radius, 3), []).append(edge)
-    callouts = []
+        for edge in contour.edges if contour.circle is None else ():
+            if isinstance(edge, Arc):
+                groups.setdefault(round(edge.radius, 3), []).append(edge)
     for radius in sorted(groups, reverse=True)[:MOST_RADII]:
         arcs = groups[radius]
-        pointed = max(arcs, key=lambda arc: round(arc.at(0.5)[0] + arc.at(0.5)[1], 6))
-        words = _counted(len(_distinct(arc.centre for arc in arcs)), f"R{length(radius)}")
-        callouts.append(Circle(words, pointed.centre, pointed.radius, pointed.at(0.5)))
-    return callouts
+        pointed = max(arcs, key=lambda arc: round(sum(arc.at(0.5)), 6))
+        words = _counted(len({_rounded(arc.centre) for arc in arcs}), f"R{length(radius)}")
+        yield Circle(words, pointed.centre, pointed.radius, pointed.at(0.5))
 
 
-def circumscribed(profile: Region) -> Circle | None:
-    """The circle about the axis that a lobed profile fits, inlet tabs and strips aside."""
-    axis = (0.0, 0.0)
-    reaches: dict[Point, float] = {}
-    for contour in profile.outers:
-        for edge in contour.edges:
-            if isinstance(edge, Arc) and edge.ccw and math.dist(edge.centre, axis) > SAME:
-                centre = _rounded(edge.centre)
-                reaches[centre] = math.dist(edge.centre, axis) + edge.radius
-    if len(reaches) < 2 or max(reaches.values()) - min(reaches.values()) > SAME:
-        return None
-    radius = max(reaches.values())
-    return Circle(f"fits ⌀{length(2 * radius)}", axis, radius, phantom=True)
+def _circumscribed(profile: Region) -> Iterator[Circle]:
+    """Yield the circle about the axis that a lobed profile fits, inlet tabs and strips aside."""
+    reaches = {
+        _rounded(edge.centre): math.hypot(*edge.centre) + edge.radius
+        for contour in profile.outers
+        for edge in contour.edges
+        if isinstance(edge, Arc) and edge.ccw and math.hypot(*edge.centre) > SAME
+    }
+    radius = max(reaches.values(), default=0.0)
+    if len(reaches) > 1 and radius - min(reaches.values()) <= SAME:
+        yield Circle(f"fits ⌀{length(2 * radius)}", (0.0, 0.0), radius, phantom=True)
 
 
-def piece_width(profile: Region) -> WidthDimension | None:
-    """The width of one of several equal pieces that are not discs (oblong chambers)."""
+def _inlet_width(laminate: Laminate, layer: Layer) -> Iterator[WidthDimension]:
+    """Yield the width of the inlet strip or tab, if any, at the inlet farthest right."""
+    cuts = []
+    for inlet in laminate.inlets if layer.role != "separator-mask" else ():
+        # On the tab, clear of the fillets at its root.
+        back, (u, v) = min(0.3 * inlet.length, 1.0), inlet.direction
+        x, y = inlet.mouth[0] - back * u, inlet.mouth[1] - back * v
+        spans = section(layer.profile, (x, y), (-v, u))
+        for span in [span for span in spans if span[0] < 0 < span[1]][:1]:
+            ends = sorted([(x - s * v, y + s * u) for s in span], key=lambda p: (p[1], p[0]))
+            cuts.append((inlet.mouth, span[1] - span[0], ends))
+    if cuts:
+        _, width, (start, end) = max(cuts)
+        words = f"{'strip' if layer.is_mask else 'tab'} {length(width)} wide"
+        yield WidthDimension(_counted(len(cuts), words), start, end)
+
+
+def _piece_width(profile: Region) -> Iterator[WidthDimension]:
+    """Yield the width of one of several equal pieces that are not discs (oblong chambers)."""
     boxes = [outer.bounds for outer in profile.outers]
     sizes = {(round(b[2] - b[0], 4), round(b[3] - b[1], 4)) for b in boxes}
-    if len(boxes) < 2 or len(sizes) != 1 or profile.outers[0].circle is not None:
-        return None
-    low_x, low_y, high_x, high_y = max(boxes)
-    y = low_y + 0.3 * (high_y - low_y)
-    words = _counted(len(boxes), f"{length(high_x - low_x)} wide")
-    return WidthDimension(words, (low_x, y), (high_x, y))
-
-
-def inlet_width(laminate: Laminate, layer: Layer) -> WidthDimension | None:
-    """The width of the inlet strip or tab, if any, at the inlet farthest right."""
-    if layer.role == "separator-mask":
-        return None
-    spans = [(inlet, span) for inlet in laminate.inlets if (span := _across(layer, inlet))]
-    if not spans:
-        return None
-    inlet, (start, end) = max(spans, key=lambda item: (item[0].mouth[0], item[0].mouth[1]))
-    name = "strip" if layer.is_mask else "tab"
-    (x, y), (u, v) = _station(inlet), inlet.direction
-    ends = sorted(((x - s * v, y + s * u) for s in (start, end)), key=lambda p: (p[1], p[0]))
-    words = _counted(len(spans), f"{name} {length(end - start)} wide")
-    return WidthDimension(words, ends[0], ends[1])
-
-
-def _across(layer: Layer, inlet: Inlet) -> tuple[float, float] | None:
-    u, v = inlet.direction
-    for start, end in section(layer.profile, _station(inlet), (-v, u)):
-        if start < 0 < end:
-            return start, end
-    return None
-
-
-def _station(inlet: Inlet) -> Point:
-    """On the tab, clear of the fillets at its root."""
-    (x, y), (u, v) = inlet.mouth, inlet.direction
-    back = min(0.3 * inlet.length, 1.0)
-    return x - back * u, y - back * v
+    if len(boxes) > 1 and len(sizes) == 1 and profile.outers[0].circle is None:
+        low_x, low_y, high_x, high_y = max(boxes)
+        y = low_y + 0.3 * (high_y - low_y)
+        words = _counted(len(boxes), f"{length(high_x - low_x)} wide")
+        yield WidthDimension(words, (low_x, y), (high_x, y))
 
 
 def layer_numbers(indices: Sequence[int]) -> str:
@@ -436,10 +399,6 @@ def _run_words(run: list[int]) -> str:
 
 def _counted(count: int, words: str) -> str:
     return words if count == 1 else f"{count}{TIMES} {words}"
-
-
-def _distinct(points: Iterable[Point]) -> set[Point]:
-    return {_rounded(p) for p in points}
 
 
 def _rounded(p: Point) -> Point:

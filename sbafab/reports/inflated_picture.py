@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -117,21 +117,24 @@ def write_picture(
     """
     ending = path.suffix.lower()
     if ending not in ENDINGS:
-        raise DesignError(f"{path.name} must end in {', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}")
+        raise _wrong_ending(path)
     pose = pose_of(laminate, stack, wish)
     if ending == ".glb":
-        _write_glb(inflated(laminate, stack, pose), pose, path)
+        nodes = [
+            Node(part.name, part.surface, "TPE", linear(_colour(part, pose, max(pose.pressures))))
+            for part in inflated(laminate, stack, pose)
+        ]
+        write_scene(nodes, path)
     elif ending == ".png":
-        path.write_bytes(picture_png(laminate, stack, pose, wish))
+        path.write_bytes(pictures_at_one_scale([(laminate, stack, pose)], wish)[0])
     else:
-        poses = list(_poses(stack, pose, wish))
-        path.write_bytes(animation(laminate, stack, poses, wish, ending, progress))
+        poses = _poses(stack, pose, wish)
+        path.write_bytes(_animation(laminate, stack, poses, wish, ending, progress))
     return pose
 
 
-def picture_png(laminate: Laminate, stack: Stack, pose: Pose, wish: PictureRequest) -> bytes:
-    """One pose, with a caption, as PNG."""
-    return pictures_at_one_scale([(laminate, stack, pose)], wish)[0]
+def _wrong_ending(path: Path) -> DesignError:
+    return DesignError(f"{path.name} must end in {', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}")
 
 
 def pictures_at_one_scale(
@@ -148,13 +151,13 @@ def pictures_at_one_scale(
     ]
 
 
-def animation(
+def _animation(
     laminate: Laminate,
     stack: Stack,
     poses: Sequence[Pose],
     wish: PictureRequest,
-    ending: str = ".gif",
-    progress: Callable[[int, int], None] | None = None,
+    ending: str,
+    progress: Callable[[int, int], None] | None,
 ) -> bytes:
     """Poses one after the other, in an endless loop, as GIF or WebP."""
     from PIL import Image
@@ -169,65 +172,47 @@ def animation(
         if progress is not None:
             progress(len(images), len(poses))
     out = BytesIO()
+    moving: dict[str, Any] = {"save_all": True, "duration": FRAME_MS, "loop": 0}
     if ending == ".webp":
-        images[0].save(
-            out,
-            "WEBP",
-            save_all=True,
-            append_images=images[1:],
-            duration=FRAME_MS,
-            loop=0,
-            quality=82,
-            method=4,
-        )
+        images[0].save(out, "WEBP", append_images=images[1:], quality=82, method=4, **moving)
         return out.getvalue()
     # One palette for all: from the first, the middle and the last third frame side by side.
-    third = len(images) // 3
-    sample = Image.new("RGB", (images[0].width, 3 * images[0].height))
-    for place, image in enumerate((images[0], images[third], images[2 * third])):
-        sample.paste(image, (0, place * image.height))
-    palette = sample.quantize(SHADES, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    frames[0].save(
-        out,
-        "GIF",
-        save_all=True,
-        append_images=frames[1:],
-        duration=FRAME_MS,
-        loop=0,
-        optimize=False,
-        disposal=1,
-    )
+    third, (width, height) = len(images) // 3, images[0].size
+    sample = Image.new("RGB", (width, 3 * height))
+    for place in range(3):
+        sample.paste(images[place * third], (0, place * height))
+    plain = Image.Dither.NONE
+    palette = sample.quantize(SHADES, method=Image.Quantize.MAXCOVERAGE, dither=plain)
+    first, *rest = (image.quantize(palette=palette, dither=plain) for image in images)
+    first.save(out, "GIF", append_images=rest, optimize=False, disposal=1, **moving)
     return out.getvalue()
 
 
 def _poses(stack: Stack, last: Pose, wish: PictureRequest) -> list[Pose]:
     """Poses of an animation, which ends where it began."""
     turns = [number / wish.frames * math.tau for number in range(wish.frames)]
-    poses: list[Pose] = []
+    steps = [[p * ((1 - math.cos(turn)) / 2) ** 1.5 for p in last.pressures] for turn in turns]
     if wish.motion == "circle":
         if stack.chambers < 3:
             raise DesignError("pressure goes round three chambers or more; use motion inflate")
         most = max(last.pressures)
         at = [math.atan2(float(y), float(x)) for x, y in stack.axes]
-        steps = [tuple(most * _swell(math.cos(turn - angle)) for angle in at) for turn in turns]
-    else:
-        steps = [
-            tuple(p * ((1 - math.cos(turn)) / 2) ** 1.5 for p in last.pressures) for turn in turns
-        ]
+        steps = [[most * _swell(turn - angle) for angle in at] for turn in turns]
+    poses: list[Pose] = []
     for step in steps:
-        poses.append(stack.pose(step, near=poses[-1] if poses else None))
+        poses.append(stack.pose(tuple(step), near=poses[-1] if poses else None))
     return poses
 
 
-def _swell(cosine: float) -> float:
-    """Share of the pressure by distance around from a chamber: full at 1, none from -0.5 on."""
-    share: float = max(0.0, (cosine + 0.5) / 1.5) ** 1.5
+def _swell(angle: float) -> float:
+    """Share of the pressure at an angle from a chamber: full at 0, none from 120 degrees on."""
+    share: float = max(0.0, (math.cos(angle) + 0.5) / 1.5) ** 1.5
     return share
 
 
 def _view(surfaces: Sequence[Surface], wish: PictureRequest) -> View:
-    box = framed(wish.width, wish.height, MARGIN, FOOT)
+    """The view of a picture before it is reduced."""
+    box = framed(ENLARGED * wish.width, ENLARGED * wish.height, MARGIN, FOOT)
     return view_of(surfaces, wish.elevation, wish.azimuth, box)
 
 
@@ -242,7 +227,8 @@ def _image(
     """One pose in colours up to the pressure ``most``, by default its highest."""
     most = max(pose.pressures) if most is None else most
     image = _rendered(parts, [_colour(part, pose, most) for part in parts], view, wish)
-    inscribe(image, caption, max(11, round(wish.height / 40)), pixels_per_mm=view.scale)
+    size = max(11, round(wish.height / 40))
+    inscribe(image, caption, size, pixels_per_mm=view.scale / ENLARGED)
     return image
 
 
@@ -274,13 +260,6 @@ def _caption(laminate: Laminate, pose: Pose, calibration: str) -> list[str]:
     return [beside.short, caption] if beside else [caption]
 
 
-def _write_glb(parts: Sequence[InflatedPart], pose: Pose, path: Path) -> None:
-    most = max(pose.pressures)
-    write_scene(
-        [Node(p.name, p.surface, "TPE", linear(_colour(p, pose, most))) for p in parts], path
-    )
-
-
 # Pictures of an actuator without a model for inflation: flat, as PNG and as GLB for viewers.
 
 
@@ -299,13 +278,12 @@ def write_flat_picture(laminate: Laminate, path: Path, width: int, height: int) 
             f"{path.name} would show {laminate.name} move, but {WHY}: a .png or .glb shows it "
             "flat, and sbafab simulate inflates it"
         )
+    if ending not in ENDINGS:
+        raise _wrong_ending(path)
     if ending == ".png":
-        captioned = replace(laminate, notes=(WHY,))
-        path.write_bytes(solid_png(captioned, width, height))
-    elif ending == ".glb":
-        write_glb(solid(laminate), path, laminate.bonded_materials)
+        path.write_bytes(solid_png(replace(laminate, notes=(WHY,)), width, height))
     else:
-        raise DesignError(f"{path.name} must end in {', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}")
+        write_glb(solid(laminate), path, laminate.bonded_materials)
 
 
 # Smooth surfaces as a picture: lit, with shade in crevices and on the ground, anti-aliased.
@@ -326,21 +304,19 @@ def _rendered(
     parts: Sequence[InflatedPart], colours: Sequence[RGB], view: View, wish: PictureRequest
 ) -> Image:
     """The parts on a white background, with their shadow on the ground."""
-    x, y = view.centre
-    large = View(view.axes, view.scale * ENLARGED, (ENLARGED * x, ENLARGED * y))
     size = wish.width * ENLARGED, wish.height * ENLARGED
     lamp = np.array(LAMP) / np.linalg.norm(LAMP)
     surfaces = [part.surface for part in parts]
-    buffer = rasterize(surfaces, large, *size, lamp, [part.normals for part in parts])
+    buffer = rasterize(surfaces, view, *size, lamp, [part.normals for part in parts])
     palette = np.array([*colours, PAPER], dtype=float)
     is_paper = buffer.body < 0
     share = (buffer.light - AMBIENT) / (1 - AMBIENT)
-    level = (0.62 + 0.42 * share) * (1 - _crevices(buffer, large.scale))
+    level = (0.62 + 0.42 * share) * (1 - _crevices(buffer, view.scale))
     level[edges(buffer, EDGE_MM) & ~is_paper] *= EDGE
     rgb = palette[buffer.body] * np.where(is_paper, 1.0, level)[:, :, None]
     gloss = GLOSS * np.clip(share, 0, 1) ** SHARPNESS
     rgb += np.where(is_paper, 0.0, gloss)[:, :, None] * (255 - rgb)
-    shadow = _shadow(surfaces, large, size)
+    shadow = _shadow(surfaces, view, size)
     return image_of(rgb * np.where(is_paper, 1 - SHADOW * shadow, 1.0)[:, :, None])
 
 
@@ -358,14 +334,11 @@ def _crevices(buffer: Buffer, scale: float) -> Floats:
 def _blurred(values: Floats, pixels: float) -> Floats:
     """Box means over squares about this many pixels wide, twice, for a soft edge."""
     half = max(1, round(pixels / 2))
-    for _ in range(2):
-        for axis in (0, 1):
-            ends = [(half + 1, half) if i == axis else (0, 0) for i in (0, 1)]
-            total = np.cumsum(np.pad(values, ends, mode="edge"), axis=axis)
-            width = 2 * half + 1
-            upper = np.take(total, range(width, total.shape[axis]), axis=axis)
-            lower = np.take(total, range(total.shape[axis] - width), axis=axis)
-            values = (upper - lower) / width
+    width = 2 * half + 1
+    for _ in range(4):
+        # Down the rows, which are the columns of the next round.
+        total = np.cumsum(np.pad(values, ((half + 1, half), (0, 0)), mode="edge"), axis=0)
+        values = ((total[width:] - total[:-width]) / width).T
     return values
 
 
@@ -380,10 +353,9 @@ def _shadow(surfaces: Sequence[Surface], view: View, size: tuple[int, int]) -> F
     x, y, _ = view.flat(fallen).T
     inside = (x >= 0) & (x < size[0]) & (y >= 0) & (y < size[1]) & (rise >= -1e-6)
     cell = max(1, round(view.scale * 0.25))
-    shape = size[1] // cell + 1, size[0] // cell + 1
-    hit = np.zeros(shape)
-    near = np.exp(-rise[inside] / 12.0)
-    np.maximum.at(hit, ((y[inside] // cell).astype(int), (x[inside] // cell).astype(int)), near)
+    hit = np.zeros((size[1] // cell + 1, size[0] // cell + 1))
+    row, column = ((values[inside] // cell).astype(int) for values in (y, x))
+    np.maximum.at(hit, (row, column), np.exp(-rise[inside] / 12.0))
     # Points are sparse where triangles are large: the blur closes the gaps.
     soft = _blurred(hit, SOFT_MM * view.scale / cell) * 2.2
     soft = _blurred(np.clip(soft, 0, 1), SOFT_MM * view.scale / cell)

@@ -80,19 +80,16 @@ def _grid(cards: Sequence[Card], block: float) -> PageGrid:
     for scale in SCALES:
         cell = _cell(cards, scale)
         columns = min(len(cards), math.floor(wide / cell[0]))
-        if columns == 0:
-            continue
-        rows = math.ceil(len(cards) / columns)
-        columns = math.ceil(len(cards) / rows)
-        height = rows * cell[1] + 2 * MARGIN + block
-        if best is None or height <= PAGE[1] or largest * scale >= LEAST_DRAWN:
-            best = PageGrid(scale, columns, (wide / columns, cell[1]), (PAGE[0], height))
-        if height <= PAGE[1]:
-            break
-    if best is not None:
-        return best
+        if columns:
+            rows = math.ceil(len(cards) / columns)
+            columns = math.ceil(len(cards) / rows)
+            height = rows * cell[1] + 2 * MARGIN + block
+            if best is None or height <= PAGE[1] or largest * scale >= LEAST_DRAWN:
+                best = PageGrid(scale, columns, (wide / columns, cell[1]), (PAGE[0], height))
+            if height <= PAGE[1]:
+                break
     page = cell[0] + 2 * MARGIN, len(cards) * cell[1] + 2 * MARGIN + block
-    return PageGrid(SCALES[-1], 1, cell, page)
+    return best or PageGrid(SCALES[-1], 1, cell, page)
 
 
 def _cell(cards: Sequence[Card], scale: float) -> Point:
@@ -349,14 +346,13 @@ def _overall(card: Card, frame: CardFrame) -> list[str]:
     """Width below and height at the left, outside the whole drawing."""
     profile = card.layers[0].profile
     low_x, low_y, high_x, high_y = profile.bounds
-    x0, top = frame.at((low_x, high_y))
-    right, bottom = frame.at((high_x, low_y))
+    (x0, top), (right, bottom) = frame.at((low_x, high_y)), frame.at((high_x, low_y))
     edge_left, edge_bottom = frame.at((card.bounds[0], card.bounds[1]))
     below, beside = edge_bottom - bottom + 3.8, x0 - edge_left + 3.8
-    width, height = length(high_x - low_x), length(high_y - low_y)
-    corners = (x0, bottom), (right, bottom)
+    corners, width = ((x0, bottom), (right, bottom)), length(high_x - low_x)
     if is_disc(profile, profile.outers[0]):
         return draw.dimension(*corners, f"⌀{width}", (0.0, 1.0), below)
+    height = length(high_y - low_y)
     return [
         *draw.dimension(*corners, width, (0.0, 1.0), below),
         *draw.dimension((x0, top), (x0, bottom), height, (-1.0, 0.0), beside),
@@ -372,11 +368,15 @@ def _callouts(card: Card, frame: CardFrame, column: float, room: Point) -> list[
         elbow, label = (column - 1.6, row), (column - 0.4, row)
         parts.append(draw.text((column, row + 1.05), mark.words))
         if isinstance(mark, WidthDimension):
-            start, end = frame.at(mark.start), frame.at(mark.end)
-            parts += draw.across(start, end)
+            parts += draw.across(frame.at(mark.start), frame.at(mark.end))
             parts.append(draw.line([aim, elbow, label], colour=draw.GREY))
-        else:
-            parts += draw.leader(_touch(mark, frame, elbow), elbow, label, dot=False)
+            continue
+        tip = aim
+        if mark.toward is None and not mark.phantom:
+            # The arrow meets the circle radially under its leader.
+            (x, y), r = aim, mark.radius * frame.scale / math.dist(aim, elbow)
+            tip = x + r * (elbow[0] - x), y + r * (elbow[1] - y)
+        parts += draw.leader(tip, elbow, label, dot=False)
     return parts
 
 
@@ -388,13 +388,3 @@ def _aim(mark: Circle | WidthDimension, frame: CardFrame) -> Point:
         r = mark.radius * math.sqrt(0.5)
         return frame.at((mark.centre[0] + r, mark.centre[1] - r))
     return frame.at(mark.toward or mark.centre)
-
-
-def _touch(mark: Circle, frame: CardFrame, elbow: Point) -> Point:
-    """Return point where the arrow meets the circle: radially under its leader, or on the arc."""
-    if mark.toward is not None or mark.phantom:
-        return _aim(mark, frame)
-    x, y = frame.at(mark.centre)
-    away = math.dist((x, y), elbow)
-    r = mark.radius * frame.scale / away
-    return x + r * (elbow[0] - x), y + r * (elbow[1] - y)
