@@ -451,7 +451,7 @@ def collision(assembled: Assembled) -> Iterator[Finding]:
     An SBA bent round a tube lies on it by construction; this pair is not compared.
     """
     surfaces = {p.name: placed_surface(p, filled=True) for p in assembled.parts}
-    solids = {name: _solid(surface) for name, surface in surfaces.items()}
+    solids = {name: surface.manifold() for name, surface in surfaces.items()}
     worst = 0.0
     for number, a in enumerate(assembled.parts):
         for b in assembled.parts[:number]:
@@ -481,17 +481,6 @@ def _meet(a: Surface, b: Surface) -> bool:
         (surface.points.min(axis=0), surface.points.max(axis=0)) for surface in (a, b)
     )
     return bool((low_a < high_b).all() and (low_b < high_a).all())
-
-
-def _solid(surface: Surface) -> Any:
-    from manifold3d import Manifold, Mesh64
-
-    return Manifold(
-        Mesh64(
-            vert_properties=np.ascontiguousarray(surface.points),
-            tri_verts=surface.faces.astype(np.uint64),
-        )
-    )
 
 
 # All checks, by stable names.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    import manifold3d
     import trimesh
 
 Vector = tuple[float, float, float]
@@ -38,6 +39,13 @@ class Surface:
         import trimesh
 
         return trimesh.Trimesh(self.points, self.faces, process=False)
+
+    def manifold(self) -> manifold3d.Manifold:
+        """Return the solid inside a closed surface."""
+        from manifold3d import Manifold, Mesh64
+
+        faces = np.ascontiguousarray(self.faces.astype(np.uint64))
+        return Manifold(Mesh64(np.ascontiguousarray(self.points), faces))
 
 
 def open_edges(surface: Surface) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.assemblies.build import Assembled, PartDesign, PlacedPart, PlacedSba
+from sbafab.assemblies.checks import TOUCH
 from sbafab.assemblies.shapes import placed_surface
 from sbafab.design.records import Discs, Slots
 from sbafab.meshing.surface import Surface
@@ -322,8 +323,6 @@ def _grip_figures(
 # other actuator is inflated; parts on the arm move with its tip.
 
 
-TOUCHING = 0.05
-"""Overlap in mm3 that still counts as touching, as in the check of the deflated assembly."""
 FARTHEST = 10.0
 """Clearances are computed up to this distance, mm."""
 SLIGHTEST = 0.1
@@ -411,18 +410,13 @@ class _Scene:
         own = self._solids(placed)
         # Parts on it move along; the part under it touches it as when flat.
         apart = {*self._carried(placed.name), placed.part.on}
-        is_earlier = True
-        for other in self.assembled.parts:
-            is_earlier = is_earlier and other.name != placed.name
-            if (
-                other.name in apart
-                or other.part.kind == "line"
-                or (is_earlier and other.name in self.stacks)
-            ):
-                continue
-            volume = _shared_volume(own, self._solids(other))
-            if volume > TOUCHING:
-                yield Touch(placed.name, other.name, volume)
+        names = [part.name for part in self.assembled.parts]
+        apart.update(name for name in names[: names.index(placed.name)] if name in self.stacks)
+        for other in self._others(placed):
+            if other.name not in apart:
+                volume = _shared_volume(own, self._solids(other))
+                if volume > TOUCH:
+                    yield Touch(placed.name, other.name, volume)
 
     def bends(
         self, placed: PlacedSba, pause: Callable[[], None]
@@ -444,7 +438,7 @@ class _Scene:
             bent = self._bent(arm, chambers, self.pressure)
             for part, theirs in arm.beside.items():
                 volume = _shared_volume(bent.facing(part), theirs)
-                if volume > TOUCHING:
+                if volume > TOUCH:
                     met.add(part)
                     first = self._first(arm, part, chambers, bent.pose)
                     start, measured = max(first.pressures), its_stack.counterparts.get("bend", "")
@@ -461,14 +455,17 @@ class _Scene:
     def _arm(self, placed: PlacedSba) -> _Arm:
         arm = _Arm(placed, self.stacks[placed.name], [], {})
         moving = self._carried(placed.name)
-        for part in self.assembled.parts:
-            if part.name == placed.name or part.part.kind == "line":
-                continue
+        for part in self._others(placed):
             if part.name in moving:
-                arm.carried.extend(self._solids(part, self._lift(part) - self.rises[placed.name]))
+                lift = self._lift(part) - self.rises[placed.name]
+                arm.carried.extend(self._solids(part, lift))
             else:
                 arm.beside[part.name] = self._solids(part)
         return arm
+
+    def _others(self, placed: PlacedPart) -> list[PlacedPart]:
+        parts = self.assembled.parts
+        return [part for part in parts if part is not placed and part.part.kind != "line"]
 
     def _bent(self, arm: _Arm, chambers: Sequence[int], pressure: float) -> _Bent:
         """Return the arm bent by some chambers, and the parts on it."""
@@ -500,7 +497,7 @@ class _Scene:
         for _ in range(HALVINGS):
             middle = math.sqrt(low * high)
             tried = self._bent(arm, chambers, middle)
-            if _shared_volume(tried.facing(part), arm.beside[part]) > TOUCHING:
+            if _shared_volume(tried.facing(part), arm.beside[part]) > TOUCH:
                 high, pose = middle, tried.pose
             else:
                 low = middle
@@ -522,15 +519,8 @@ def _posed(placed: PlacedSba, its_stack: Stack, pose: Pose, lift: Array) -> Soli
     pieces = []
     for part in inflated(placed.made.laminate, its_stack, pose, COARSE):
         points = placed.upright(part.surface.points) + lift
-        pieces += _manifold(replace(part.surface, points=points)).decompose()
+        pieces += Surface(points, part.surface.faces).manifold().decompose()
     return pieces
-
-
-def _manifold(surface: Surface) -> manifold3d.Manifold:
-    import manifold3d
-
-    faces = np.ascontiguousarray(surface.faces.astype(np.uint64))
-    return manifold3d.Manifold(manifold3d.Mesh64(np.ascontiguousarray(surface.points), faces))
 
 
 def _as_it_is(placed: PlacedPart, lift: Array) -> Solids:
@@ -547,7 +537,7 @@ def _as_it_is(placed: PlacedPart, lift: Array) -> Solids:
             rows = np.column_stack([np.array(placed.pose.rows), np.array(placed.pose.shift) + lift])
             return [cylinder.translate((0.0, 0.0, low)).transform(rows)]
     surface = placed_surface(placed, filled=True)
-    return [_manifold(replace(surface, points=surface.points + lift))]
+    return [surface.manifold().translate(tuple(lift.tolist()))]
 
 
 def _shared_volume(first: Solids, second: Solids) -> float:

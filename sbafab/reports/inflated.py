@@ -8,7 +8,7 @@ this distance (``models.balloon``). The bonded web around the pockets follows th
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from sbafab.geometry.region import Region, disc, section, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import Surface
-from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon import inflate
 from sbafab.models.parabola import inverse
 from sbafab.models.pneumatics import FLUIDS, Line
 
@@ -127,31 +127,21 @@ class _Level:
 
 def _meridians(stack: Stack, pose: Pose) -> list[list[FilmMeridian]]:
     """The films of each level and chamber; equal ones are computed once."""
-    keys = [
-        [
-            (int(kind), round(SAME * p), max(round(SAME * gap), round(SAME * LEAST_GAP)))
-            for p, gap in zip(pose.pressures, gaps, strict=True)
+    gaps = np.maximum(np.rint(SAME * np.asarray(pose.gaps)), round(SAME * LEAST_GAP))
+    p = np.rint(SAME * np.asarray(pose.pressures))
+    keys = np.stack(np.broadcast_arrays(stack.levels[:, None], p, gaps), axis=-1)
+    distinct, numbers = np.unique(keys.reshape(-1, 3), axis=0, return_inverse=True)
+    films: list[FilmMeridian] = []
+    for kind, each in enumerate(stack.maps):
+        _, p, gap = distinct[distinct[:, 0] == kind].T / SAME
+        balloon, shapes = each.balloon, inflate(each.balloon, p, gap, tied=True)
+        part = slice(balloon.neck_edge, balloon.edge + 1)
+        shares = np.clip(shapes.z[:, part] / (gap[:, None] / 2), 0.0, 1.0)
+        films += [
+            FilmMeridian(r[part], share, float(balloon.pocket - r[balloon.edge]), balloon.pocket)
+            for r, share in zip(shapes.r, shares, strict=True)
         ]
-        for kind, gaps in zip(stack.levels, pose.gaps, strict=True)
-    ]
-    distinct = sorted({key for row in keys for key in row})
-    by_key: dict[tuple[int, int, int], FilmMeridian] = {}
-    for kind in sorted({key[0] for key in distinct}):
-        kind_keys = [key for key in distinct if key[0] == kind]
-        p, gap = (np.array([key[place] for key in kind_keys]) / SAME for place in (1, 2))
-        by_key.update(zip(kind_keys, _films(stack.maps[kind].balloon, p, gap), strict=True))
-    return [[by_key[key] for key in row] for row in keys]
-
-
-def _films(balloon: Balloon, p: Array, gap: Array) -> list[FilmMeridian]:
-    shapes = inflate(balloon, p, gap, tied=True)
-    part = slice(balloon.neck_edge, balloon.edge + 1)
-    shares = np.clip(shapes.z[:, part] / (gap[:, None] / 2), 0.0, 1.0)
-    drawn = balloon.pocket - shapes.r[:, balloon.edge]
-    return [
-        FilmMeridian(r, share, float(inward), balloon.pocket)
-        for r, share, inward in zip(shapes.r[:, part], shares, drawn, strict=True)
-    ]
+    return [[films[number] for number in row] for row in numbers.reshape(gaps.shape)]
 
 
 def _balloon(level: _Level, axis: Array, film: FilmMeridian, around: int) -> Surface:
@@ -178,14 +168,8 @@ def _balloon(level: _Level, axis: Array, film: FilmMeridian, around: int) -> Sur
     c, d = a + around, b + around
     # The first and the last ring are one point each, on the axis.
     number = np.clip(np.arange(len(points)) - (around - 1), 0, len(points) - 2 * around + 1)
-    faces = number[
-        np.concatenate(
-            [
-                np.stack([a, c, b], -1)[1:].reshape(-1, 3),
-                np.stack([b, c, d], -1)[:-1].reshape(-1, 3),
-            ]
-        )
-    ]
+    upper, lower = np.stack([a, c, b], -1)[1:], np.stack([b, c, d], -1)[:-1]
+    faces = number[np.concatenate([upper, lower]).reshape(-1, 3)]
     return Surface(points[around - 1 : len(points) - around + 1], faces)
 
 
@@ -214,30 +198,24 @@ def _webs(
 
 def _web(laminate: Laminate, stack: Stack, i: int) -> Region:
     """The plate of a level without its pockets and ears; inlet tabs are part of the lowest."""
-    lower, upper = laminate.tpe_layers[2 * i : 2 * i + 2]
+    plate = union([layer.profile for layer in laminate.tpe_layers[2 * i : 2 * i + 2]])
+    if laminate.registration == "ears":
+        tabs = [plate & tab for inlet in laminate.inlets for tab in _tab(plate, inlet)]
+        plate = union([plate & laminate.outline, *tabs])
     radius = stack.maps[stack.levels[i]].balloon.pocket - HIDDEN
-    pockets = union(disc((float(x), float(y)), radius) for x, y in stack.axes)
-    return _trimmed(laminate, union([lower.profile, upper.profile])) - pockets
+    return plate - union(disc((float(x), float(y)), radius) for x, y in stack.axes)
 
 
-def _trimmed(laminate: Laminate, plate: Region) -> Region:
-    """The plate after the ears are cut off; its inlet tabs stay."""
-    if laminate.registration != "ears":
-        return plate
-    tabs = [plate & _tab(plate, inlet) for inlet in laminate.inlets]
-    return union([plate & laminate.outline, *tabs])
+def _tab(plate: Region, inlet: Inlet) -> Iterator[Region]:
+    """Yield the straight strip from the axis to an inlet's mouth, as wide as the plate is there.
 
-
-def _tab(plate: Region, inlet: Inlet) -> Region:
-    """The straight strip from the axis to an inlet's mouth, as wide as the plate is there."""
+    Only the films of the bottom balloon have tabs.
+    """
     (x, y), (u, v) = inlet.mouth, inlet.direction
-    end = x - INSIDE * u, y - INSIDE * v
-    width = sum(high - low for low, high in section(plate, end, (-v, u)) if low < 0 < high)
-    if not width:
-        # Only the films of the bottom balloon have tabs.
-        return Region()
-    length = math.hypot(x, y)
-    return strip((x - length * u, y - length * v), inlet.mouth, width)
+    end, long = (x - INSIDE * u, y - INSIDE * v), math.hypot(x, y)
+    for low, high in section(plate, end, (-v, u)):
+        if low < 0 < high:
+            yield strip((x - long * u, y - long * v), inlet.mouth, high - low)
 
 
 def _joined(surfaces: Sequence[Surface]) -> Surface:
