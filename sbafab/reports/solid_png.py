@@ -275,20 +275,15 @@ def cutaway(laminate: Laminate) -> RemovedSector:
         sector = math.pi / count
         while sector < LEAST_SECTOR:
             sector += math.tau / count
-        return _sector(laminate, laminate.chambers[0].name, (0.0, 0.0), last - sector, last)
-    # The chamber at the sector's open side: the quarter then cuts no other.
-    places = [(p, chamber.name) for chamber in laminate.chambers for p in chamber.centres]
-    places = places or [(port.at, port.name) for port in laminate.ports]
-    apex, name = max(places, key=lambda place: place[0][0] * v - place[0][1] * u)
-    return _sector(laminate, name, apex, last - math.pi / 2, last)
-
-
-def _sector(
-    laminate: Laminate, chamber: str, apex: Point, first: float, last: float
-) -> RemovedSector:
+        apex, name, first = (0.0, 0.0), laminate.chambers[0].name, last - sector
+    else:
+        # The chamber at the sector's open side: the quarter then cuts no other.
+        places = [(p, chamber.name) for chamber in laminate.chambers for p in chamber.centres]
+        places = places or [(port.at, port.name) for port in laminate.ports]
+        apex, name = max(places, key=lambda place: place[0][0] * v - place[0][1] * u)
+        first = last - math.pi / 2
     low_x, low_y, high_x, high_y = laminate.bounds
     reach = 4.0 * math.hypot(high_x - low_x, high_y - low_y)
-    x, y = apex
     rays = [first, (first + last) / 2, last]
-    tips = [(x + reach * math.cos(a), y + reach * math.sin(a)) for a in rays]
-    return RemovedSector(chamber, apex, first, last, polygon([apex, *tips]))
+    tips = [(apex[0] + reach * math.cos(a), apex[1] + reach * math.sin(a)) for a in rays]
+    return RemovedSector(name, apex, first, last, polygon([apex, *tips]))

@@ -433,7 +433,8 @@ def _rows(
         low, high = middle - half, middle + half
         free = (n for n, row in enumerate(rows) if not any(a < high and low < b for a, b in row))
         row = next(free, len(rows))
-        rows[row:] = rows[row:] or [[]]
+        if row == len(rows):
+            rows.append([])
         rows[row].append((low, high))
         parts += _dimension(section, span, name, y, away, ROW_STEP * (row + 1))
     return parts, len(rows)
