@@ -40,7 +40,6 @@ from sbafab.output.manifest import as_json
 from sbafab.pressing.cycles import batch_entry
 from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json
 from sbafab.process import Progress
-from sbafab.rules.finding import Finding
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 from sbafab.simulators.simulator import (
     Name,
@@ -398,26 +397,14 @@ def work_of(build: Build, sheets: Sequence[SheetFile], folder: str = "") -> Work
     # `check` and `cut` have no pages for the bench.
     from sbafab.reports.traveller.work import Work
 
-    return Work(build.design, build.laminate, build.schedule, sheets, build.findings, folder)
-
-
-def findings_page(
-    name: str, sha256: str, builds: Sequence[Build], between: Sequence[Finding]
-) -> str:
-    """Return the designer's page: of every design, and of the checks ``between`` its parts."""
-    # The page of findings shares its pictures with the traveller.
-    from sbafab.reports.traveller.findings import Inspected, findings_html
-
-    inspected = [
-        Inspected(each.design.name, each.findings, each.laminate, each.design) for each in builds
-    ]
-    if between:
-        inspected.append(Inspected("Between the parts", between))
-    return findings_html(name, sha256, inspected)
+    return Work(build.design, build.laminate, build.findings, build.curves, sheets, folder)
 
 
 def _findings(folder: DesignFolder) -> str:
-    return findings_page(folder.design.name, folder.build.sha256, [folder.build], ())
+    # The page of findings shares its pictures with the traveller.
+    from sbafab.reports.traveller.findings import findings_html
+
+    return findings_html(folder.design.name, folder.build.sha256, [folder.build])
 
 
 def _checks(folder: DesignFolder) -> str:

@@ -24,7 +24,6 @@ from sbafab.output.artefacts import (
     Artefact,
     DesignFolder,
     RunPart,
-    findings_page,
     work_of,
     write_artefacts,
     write_nested_sheets,
@@ -159,9 +158,11 @@ def _write_assembly(
         write_text(path / TRAVELLER, traveller)
         write_text(path / BENCH, bench)
     sha256 = assembly_sha256(assembled)
-    write_text(
-        path / FINDINGS, findings_page(order.name, sha256, order.builds, order.between or ())
-    )
+    # Only a folder that is written has pages.
+    from sbafab.reports.traveller.findings import findings_html
+
+    page = findings_html(order.name, sha256, order.builds, order.between or ())
+    write_text(path / FINDINGS, page)
     designs = [build.design for build in order.builds]
     found = checks(order.findings, "design", order.name, designs)
     write_text(path / "checks.json", as_json(found))

@@ -17,7 +17,6 @@ from sbafab.design.kits import read_kit, write_kit
 from sbafab.design.records import Design, design_toml, resolved
 from sbafab.design.sections import Acceptance, Laser, Press, Registration, Rules, Sheets
 from sbafab.errors import DesignError
-from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.times import times
 from sbafab.reports.traveller.work import Work
 
@@ -137,10 +136,7 @@ def test_the_time_of_curing_is_that_of_the_kits_adhesive(lab: Path) -> None:
         ([f"kit={lab}", "order.cure_hours=2"], 2),
     ):
         design = load_design("1dof-5mm", changes)
-        laminate = build(design)
-        planned = schedule(laminate, design)
-        work = Work(design, laminate, planned, ())
-        assert times(work).cure == 60 * cure
+        assert times(Work(design, build(design), ())).cure == 60 * cure
 
 
 def test_another_kit_takes_the_place_of_the_first_one(lab: Path) -> None:

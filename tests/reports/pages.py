@@ -14,8 +14,6 @@ from sbafab.actuators import build, load_design
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.cycles import design_runs
-from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.bench import bench_html
 from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.work import Work
@@ -38,9 +36,8 @@ def built(template: str, *assignments: str) -> tuple[Design, Laminate]:
 def work_of(template: str, *assignments: str, sheets: Any = None, **more: Any) -> Work:
     """Return the work of a template; ``sheets`` makes its sheets of a laminate and copies."""
     design, laminate = built(template, *assignments)
-    plan = schedule(laminate, design, design_runs(design, laminate).cycles)
     files = () if sheets is None else sheets(laminate, design.order.quantity)
-    return Work(design, laminate, plan, files, **more)
+    return Work(design, laminate, more.pop("findings", ()), sheets=files, **more)
 
 
 def page(work: Work) -> Any:

@@ -14,8 +14,6 @@ from sbafab.assemblies.build import assemble
 from sbafab.assemblies.checks import run_checks
 from sbafab.assemblies.files import assembly_of
 from sbafab.design.files import read_toml, templates_folder
-from sbafab.pressing.cycles import design_runs
-from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.assembly_page import AssemblyWork, assembly_html
 from sbafab.reports.traveller.batch import tray_html
 from sbafab.reports.traveller.bench import bench_html
@@ -76,9 +74,8 @@ def test_pages_of_an_assembly(name: str) -> None:
     assembled = assemble(assembly_of(data, templates_folder() / "some.toml"))
     works = []
     for part in assembled.designs:
-        plan = schedule(part.laminate, part.design, design_runs(part.design, part.laminate).cycles)
         folder = f"{part.design.name}/"
-        works.append(Work(part.design, part.laminate, plan, (), (), folder))
+        works.append(Work(part.design, part.laminate, (), folder=folder))
     checks = tuple(run_checks(assembled))
     made = AssemblyWork(assembled, "0" * 64, works, (), checks, (), (), b"\x89PNG")
     bench = bench_html(name, "0" * 64, works, assembled)

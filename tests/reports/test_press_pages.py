@@ -91,7 +91,7 @@ def test_the_places_of_a_full_plate_are_said_as_a_grid() -> None:
     )
     assert found is not None
     columns, right, back = int(found[1]), float(found[2]), float(found[3])
-    for n, place in enumerate(work.runs.places):
+    for n, place in enumerate(work.cycles.places):
         assert place == pytest.approx(((n % columns) * right, (n // columns) * back), abs=2e-2)
     assert "place 2 by" not in words
 

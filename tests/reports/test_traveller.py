@@ -127,7 +127,7 @@ def test_the_same_design_gives_the_same_bytes() -> None:
 def test_release_films_count_every_press_cycle(copies: int, cycles: int) -> None:
     """Two new ones each time the press closes, one below what is turned over."""
     work = work_of("1dof-5mm", f"order.copies={copies}", "order.at_once=4")
-    assert work.runs.count == cycles
+    assert work.cycles.count == cycles
     assert release_films(work) == 2 * cycles * len(work.schedule.steps) + 1
 
 

@@ -49,7 +49,7 @@ def values(work: Work) -> dict[str, Any]:
     copies = range(1, work.copies + 1) if is_batch else ()
     return {
         "is_eared": laminate.registration == "ears",
-        "serials": [serial(work.runs, n, design.order.batch) for n in copies],
+        "serials": [serial(work.cycles, n, design.order.batch) for n in copies],
         "inlets": _boxes([inlet.chamber for inlet in laminate.inlets]),
         "holes": _boxes(ports),
         "tube": tube_name(design),

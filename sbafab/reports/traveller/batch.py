@@ -38,7 +38,7 @@ class CopyRow(NamedTuple):
 
 def batch_page(work: Work) -> dict[str, Any] | None:
     """Return the batch of a design; None for a single copy. Cycles of one size share a column."""
-    runs, batch = work.runs, work.design.order.batch
+    runs, batch = work.cycles, work.design.order.batch
     if runs.copies == 1:
         return None
     sizes = list(dict.fromkeys(runs.cycles))
@@ -96,7 +96,7 @@ def _picture(work: Work, runs: Runs) -> str:
 
 def tray_html(work: Work) -> str:
     """Return tray.html: the patterns with their counts, for a phone beside the tray."""
-    laminate, runs = work.laminate, work.runs
+    laminate, runs = work.laminate, work.cycles
     cycles = [(f"Cycle {cycle_name(n)}", size) for n, size in enumerate(runs.cycles, 1)]
     if len(cycles) > MOST_CYCLES:
         cycles = [(cycles_of(runs, size), size) for size in dict.fromkeys(runs.cycles)]

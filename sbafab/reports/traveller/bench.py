@@ -249,7 +249,7 @@ def _tools(works: Sequence[Work], films: Iterable[Film]) -> dict[str, object]:
 
 def _plate(work: Work) -> dict[str, Any]:
     """Return the base plate of a design: the accuracy of its holes and their table, mm."""
-    design, laminate, runs = work.design, work.laminate, work.runs
+    design, laminate, runs = work.design, work.laminate, work.cycles
     machine, pin = design.registration.plate_made_by, design.thickest_pin
     several = len(laminate.pins) > 1
     finer = several and design.registration.pin_error is None and machine == "jig-borer"
@@ -287,7 +287,7 @@ def _heat_and_force(works: Sequence[Work]) -> dict[str, Any]:
         "reach": heating.platen_c - (heating.platen_c - heating.start_c) * math.exp(-1),
         "patience": PATIENCE,
         "most_raised": MOST_RAISED,
-        "closings": sum(work.runs.count * len(work.schedule.steps) for work in works),
+        "closings": sum(work.cycles.count * len(work.schedule.steps) for work in works),
         "pressures": (low, high),
         "film_classes": film_classes(low, high),
         "pound_kpa": pound,

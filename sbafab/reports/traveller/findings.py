@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from sbafab.design.records import Design
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.laminate.laminate import Laminate
+from sbafab.orders.build import Build
 from sbafab.reports.nets_svg import nets_svg
 from sbafab.reports.traveller.formatting import frame, render
 from sbafab.rules.finding import Finding
@@ -33,47 +33,40 @@ class Hand(NamedTuple):
     share: float
 
 
-@dataclass(frozen=True)
-class Inspected:
-    """A design with its findings; the laminate is None for the checks of an assembly."""
-
-    name: str
-    findings: Sequence[Finding]
-    laminate: Laminate | None = None
-    design: Design | None = None
-
-
-def findings_html(title: str, sha256: str, inspected: Sequence[Inspected]) -> str:
-    """Return the whole page, with one chapter per design."""
-    chapters = [_chapter(design) for design in inspected]
+def findings_html(
+    title: str, sha256: str, builds: Sequence[Build], between: Sequence[Finding] = ()
+) -> str:
+    """Return the whole page: a chapter per design, and one of the checks ``between`` parts."""
+    chapters = [_chapter(build) for build in builds]
+    if between:
+        chapters.append(_sorted("Between the parts", between))
     return render("findings.html.j2", **frame(title, sha256), shapes="", chapters=chapters)
 
 
-def _chapter(inspected: Inspected) -> dict[str, Any]:
-    """Return the chapter on one design; ``design_hand`` is the placement error that it states."""
-    laminate, design, findings = inspected.laminate, inspected.design, inspected.findings
+def _sorted(name: str, findings: Sequence[Finding]) -> dict[str, Any]:
+    """Return a chapter of findings, those that fail or warn first."""
     is_open = [f for f in findings if f.verdict in ("fail", "warn") or f.by_user]
-    chapter: dict[str, Any] = {
-        "name": inspected.name,
-        "open": is_open,
-        "rest": [finding for finding in findings if finding not in is_open],
-        "nets": "",
-        "design_hand": None,
-        "hands": (),
-    }
-    if laminate is None or design is None:
-        return chapter
+    rest = [finding for finding in findings if finding not in is_open]
+    return {"name": name, "open": is_open, "rest": rest, "nets": "", "design_hand": None}
+
+
+def _chapter(build: Build) -> dict[str, Any]:
+    """Return the chapter on one design; ``design_hand`` is the placement error that it states."""
+    laminate, design = build.laminate, build.design
+    chapter = _sorted(design.name, build.findings)
     if laminate.nets:
         drawing = nets_svg(laminate, connectivity(laminate, design))
         chapter["nets"] = drawing[drawing.index("<svg") :]
-    measured = next((finding.measured for finding in findings if finding.rule == YIELD), None)
+    measured = next((one.measured for one in build.findings if one.rule == YIELD), None)
     if measured is not None:
         hand = design.registration
-        chapter["design_hand"] = Hand(hand.hand_placement, hand.hand_turn, measured)
-        chapter["hands"] = other_hands(laminate, design)
-        chapter["needs_jig"] = design.plate_machine == "jig-borer" and len(laminate.pins) > 1
-        chapter["for_a_mill"] = for_a_cnc_mill("design.toml")
-        chapter["has_channel_pins"] = laminate.registration == "channel-pin"
+        chapter |= {
+            "design_hand": Hand(hand.hand_placement, hand.hand_turn, measured),
+            "hands": other_hands(laminate, design),
+            "needs_jig": design.plate_machine == "jig-borer" and len(laminate.pins) > 1,
+            "for_a_mill": for_a_cnc_mill("design.toml"),
+            "has_channel_pins": laminate.registration == "channel-pin",
+        }
     return chapter
 
 

@@ -45,7 +45,7 @@ THREAD = Item("Thread", "ties supply tubes, loose enough for them to slide")
 
 def bill_csv(work: Work) -> str | None:
     """Return the bill of a batch as a table; None for one copy."""
-    if work.runs.copies == 1:
+    if work.cycles.copies == 1:
         return None
     rows: list[Sequence[object]] = [BILL_COLUMNS]
     for item in bill(work):
@@ -121,11 +121,11 @@ def supplies(work: Work) -> Iterator[Item]:
         yield _underlay(work, work.underlay)
         words = f"{TAPE}, 0.06 mm thick, 10 mm wide: along the plate's edges, off the films"
         yield Item("Tape", words)
-    if work.runs.together > 1:
+    if work.cycles.together > 1:
         words = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
         yield Item("Tray", words, str(trays(work)), trays(work))
         if work.design.order.tray is not False:
-            pages = len(tray_sheets(work.laminate)) * work.runs.together
+            pages = len(tray_sheets(work.laminate)) * work.cycles.together
             words = "tray.pdf printed at 100 % on plain paper; its bars must measure 100 mm"
             yield Item("Tray plan", words, count(pages, "page"), pages)
 
@@ -134,7 +134,7 @@ def _pins(work: Work) -> Iterator[Item]:
     holes = pin_holes([step.pin_settings for step in work.schedule.steps])
     sizes = Counter(
         (pin.diameter, length)
-        for pin in work.laminate.pins * work.runs.together
+        for pin in work.laminate.pins * work.cycles.together
         if pin.name in holes
         for length in holes[pin.name].lengths
     )
@@ -190,7 +190,7 @@ def _build_up(work: Work) -> Iterator[Item]:
 
 def _underlay(work: Work, path: str) -> Item:
     """Return the pages to print, and the paper if A4 and Letter are too small."""
-    spread = leaves(work.laminate, work.runs.places, work.schedule.steps[0].platen_mm)
+    spread = leaves(work.laminate, work.cycles.places, work.schedule.steps[0].platen_mm)
     width, height = (max(leaf.size[axis] for leaf in spread) for axis in (0, 1))
     paper = "A4 or Letter"
     if (width, height) != PAPER:
@@ -217,19 +217,19 @@ def prints(work: Work) -> int:
     """Return the number of underlay prints needed: one per hot closing, one per tray."""
     if work.underlay is None:
         return 0
-    return work.runs.count * sum(map(has_underlay, work.schedule.steps)) + trays(work)
+    return work.cycles.count * sum(map(has_underlay, work.schedule.steps)) + trays(work)
 
 
 def trays(work: Work) -> int:
     """Return the number of trays for films between steps: one per cycle of several laminates."""
-    return work.runs.count if work.runs.together > 1 else 0
+    return work.cycles.count if work.cycles.together > 1 else 0
 
 
 def release_films(work: Work) -> int:
     """Return the release films for all cycles: two new ones each time the press closes on a step,
     and one for films that are turned over.
     """
-    return 2 * work.runs.count * len(work.schedule.steps) + turns_over(work)
+    return 2 * work.cycles.count * len(work.schedule.steps) + turns_over(work)
 
 
 def turns_over(work: Work) -> bool:

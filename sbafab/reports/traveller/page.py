@@ -83,7 +83,7 @@ def context(work: Work) -> dict[str, Any]:
         "step_pages": steps.step_pages(work),
         "joint_pages": joint_pages(work),
         "times": times(work),
-        "batch_times": batch_times(work.runs, work.schedule),
+        "batch_times": batch_times(work.cycles, work.schedule),
         "cure_is_stated": cure_hours(design) is not None,
         "in_chapter": False,
         "again": False,

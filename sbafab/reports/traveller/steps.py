@@ -258,7 +258,7 @@ def every_step(work: Work) -> dict[str, Any]:
     kinds: dict[tuple[bool, bool], list[Step]] = {}
     for step in steps:
         kinds.setdefault((bool(step.pin_settings), has_underlay(step)), []).append(step)
-    cycles = [f"cycle {cycle_name(n)}" for n in range(1, work.runs.count + 1)]
+    cycles = [f"cycle {cycle_name(n)}" for n in range(1, work.cycles.count + 1)]
     return {
         "press": steps[0],
         "heating": work.schedule.heating,

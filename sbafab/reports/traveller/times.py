@@ -70,12 +70,12 @@ def assembly_times(works: Sequence[Work]) -> AssemblyTimes:
     """Return the times of an assembly until its parts can be joined."""
     each = [(work, times(work)) for work in works]
     waited = sum(
-        work.runs.count * len(work.schedule.steps) * (minutes.warm + minutes.cool)
+        work.cycles.count * len(work.schedule.steps) * (minutes.warm + minutes.cool)
         for work, minutes in each
     )
     pressed = [work.schedule.total_press_minutes for work in works]
-    pressing = sum(work.runs.count * (work.schedule.total_press_minutes or 0.0) for work in works)
-    handled = HANDLING_MINUTES * sum(work.runs.copies for work in works)
+    pressing = sum(work.cycles.count * (work.schedule.total_press_minutes or 0.0) for work in works)
+    handled = HANDLING_MINUTES * sum(work.cycles.copies for work in works)
     cure = max(minutes.cure for _, minutes in each)
     return AssemblyTimes(waited, handled + pressing + waited, cure, None not in pressed)
 
