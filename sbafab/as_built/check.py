@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import TypeAdapter
 
 from sbafab.actuators import load_design
 from sbafab.as_built.as_cut import (
@@ -58,7 +58,7 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.netlist import read_netlist
-from sbafab.models.figures import Factors, PredictionRequest
+from sbafab.models.figures import PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.orders.build import Build, make_build
 from sbafab.orders.order import SCHEMA, Order, of_assembly
@@ -531,56 +531,15 @@ def _mesh_difference(folder: Path, actual: dict[str, Any], expected: dict[str, A
     return ""
 
 
-class _PredictionRequest(BaseModel):
-    pressures_kpa: tuple[float, ...]
-    flow_ml_min: float
-    volumes_ul: tuple[float, ...]
-    press_factor: float
-    contact_factor: float
-    pocket_loss: float
-    modulus_mpa: float | None
-    modulus_ratio: float
-    water_delay: float
-    air_delay: float
-    loss_share: float
-    calibration: str
-    overrides: dict[str, float]
-
-
-class _PredictionFile(BaseModel):
-    """The request in ``predict.json``."""
-
-    asked: _PredictionRequest
-
-
-def _factors(request: _PredictionRequest) -> Factors:
-    """Return the factors of a prediction without calibration."""
-    return Factors(
-        request.press_factor,
-        request.contact_factor,
-        request.pocket_loss,
-        request.modulus_mpa,
-        request.modulus_ratio,
-        request.water_delay,
-        request.air_delay,
-        request.loss_share,
-    )
-
-
 def _prediction_problems(folder: Path, fresh: Path, built: AsBuiltFolder) -> list[Problem]:
     """Return differences of the prediction from one for the same request."""
     claims = built.claims
     if "predict.json" not in claims.files:
         return []
     try:
-        request = _PredictionFile.model_validate_json((folder / "predict.json").read_bytes()).asked
-        asked = PredictionRequest(
-            request.pressures_kpa,
-            request.flow_ml_min,
-            request.volumes_ul,
-            None if request.calibration else _factors(request),
-            request.overrides,
-        )
+        said = json.loads((folder / "predict.json").read_bytes())["asked"]
+        factors = None if said["calibration"] else said
+        asked = TypeAdapter(PredictionRequest).validate_python({**said, "calibration": factors})
         written = fresh / "prediction"
         written.mkdir()
         prediction = predict(built.design, asked)
@@ -588,7 +547,7 @@ def _prediction_problems(folder: Path, fresh: Path, built: AsBuiltFolder) -> lis
         again = DesignFolder(built.build, wanted, (), written, ignore_progress)
         again.prediction = prediction
         write_artefacts(again, [row for row in ARTEFACTS if row.part == "predict"])
-    except (ValueError, OSError) as error:
-        message = f"predict.json does not say what was asked for ({error})"
-        return [Problem(DESIGNED, f"{message}; regenerate the folder")]
+    except (ValueError, LookupError, TypeError, OSError):
+        message = "predict.json does not say what was asked for; regenerate the folder"
+        return [Problem(DESIGNED, message)]
     return _compared(folder, written, claims.files, claims.generator)

@@ -77,10 +77,10 @@ def test_a_new_fit_without_a_test_gives_the_record() -> None:
     """The sampler's seeds are fixed: only other versions of numpy and emcee may move a figure."""
     pytest.importorskip("emcee")
     (paper,) = (source for source in shipped_evidence() if source.id == "paper")
-    only = ("energy", "force-3dof")
+    only = ("energy",)
     rows = list(held_out.point_rows(list(held_out.left_out_curves([paper], only))))
     kept = [row for row in TABLES["points"].rows if row[1] in only]
-    assert len(rows) == 6
+    assert len(rows) == len(kept) > 0
     for new, old in zip(rows, kept, strict=True):
         assert new[:4] == list(old[:4])
         ends = [[float(cell) for cell in row[4:7]] for row in (new, old)]

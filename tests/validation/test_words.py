@@ -27,7 +27,7 @@ def _answers(folder: Path) -> dict[str, Any]:
     )
     table = sweep(request, folder).table
     first = table.first(Quantity.BLOCKED_FORCE, Conditions(share=0.0))
-    found = sbafab.find(design, least={"stroke@10kPa": 2.0, "force@0mm": 0.1}, tries=40)
+    found = sbafab.find(design, least={"stroke@10kPa": 2.0, "force@0mm": 0.1}, tries=12)
     return {
         "verdict": [line.quantity for line in prediction.verdict],
         "chosen": [figure.key for figure in prediction.figures if not figure.other],
