@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
-import pytest
-
 from tests.cli.conftest import Run
 
 RECIPE = """
@@ -21,10 +19,7 @@ source = "material test of day one"
 """
 
 
-def test_a_recipe_of_the_kit_is_in_the_project_of_its_film(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_recipe_of_the_kit_is_in_the_project_of_its_film(run: Run) -> None:
     assert run("new", "kit", "lab.toml")[0] == 0
     kit = Path("lab.toml")
     kit.write_text(kit.read_text() + RECIPE)
@@ -61,10 +56,7 @@ def test_a_recipe_of_the_kit_is_in_the_project_of_its_film(
     assert "two recipes to cut Stretchlon 200 of 0.038 mm on K40; keep one" in err
 
 
-def test_a_faulty_recipe_of_a_kit_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_faulty_recipe_of_a_kit_is_named(run: Run) -> None:
     assert run("new", "kit", "lab.toml")[0] == 0
     whole = {
         "film": '"Stretchlon 200"',

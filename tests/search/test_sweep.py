@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import re
 from collections.abc import Iterable
 from importlib.util import find_spec
@@ -159,23 +158,6 @@ def test_what_was_measured_before_is_not_measured_again(
     monkeypatch.setattr(module, "fingerprint", lambda: "0.0+other")
     with pytest.raises(AssertionError, match="again"):
         _swept(found.folder.parent)
-
-
-@pytest.mark.long
-def test_a_row_that_a_journal_lost_is_the_only_one_measured(
-    found: SweptDesigns, tmp_path: Path
-) -> None:
-    folder = tmp_path / "1dof-5mm-sweep"
-    folder.mkdir()
-    lines = (found.folder / "journal.jsonl").read_bytes().splitlines(keepends=True)
-    (folder / "journal.jsonl").write_bytes(b"".join(lines[1:3]) + lines[3][:50])
-    again = _swept(tmp_path, workers=2, all_columns=True)
-    assert again.measured == 2
-    for name in ("sweep.csv", *(["sweep.parquet"] if HAS_PARQUET else []), "sweep.html"):
-        assert (folder / name).read_bytes() == (found.folder / name).read_bytes()
-    keys = [json.loads(line)["key"] for line in (folder / "journal.jsonl").read_text().splitlines()
-            if line.endswith("}}")]  # fmt: skip
-    assert len(keys) == len(set(keys)) == 4
 
 
 def test_a_sweep_of_arrays_is_that_of_texts_and_has_its_table_as_rows(

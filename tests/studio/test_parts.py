@@ -18,7 +18,7 @@ from sbafab.errors import DesignError
 from sbafab.studio.editing import edited
 from sbafab.studio.forms import assembly
 from sbafab.studio.jobs import JOBS, refusal
-from tests.studio.worked import job
+from tests.studio.worked import EnoughError, given_up_at, job
 
 APERTURE = api.template("aperture")
 BASE = """
@@ -153,20 +153,11 @@ def test_findings_of_an_assembly_name_their_design(tmp_path: Path) -> None:
 
 
 def test_a_change_ends_the_check_of_an_assembly_between_two_rules(tmp_path: Path) -> None:
-    class EnoughError(Exception):
-        pass
-
     seen: list[str] = []
-    beats = 0
-
-    def beat() -> None:
-        nonlocal beats
-        beats += "prediction" in seen
-        if beats == 3:
-            raise EnoughError
+    stop = given_up_at(3)
 
     def follow() -> None:
-        for answer in JOBS["live"](job(tmp_path, BASE), beat):
+        for answer in JOBS["live"](job(tmp_path, BASE), lambda: "prediction" in seen and stop()):
             seen.append(answer["kind"])
 
     with pytest.raises(EnoughError):
