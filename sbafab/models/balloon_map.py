@@ -111,9 +111,6 @@ BY_PRESSURE = np.zeros((3, DEGREE + 1, DEGREE + 1))
 BY_PRESSURE[0], BY_PRESSURE[1, :, :-1], BY_PRESSURE[2, :, :-2] = PIECES, SLOPES, CURVES
 """Weights of a piece's coefficients by powers: of values, first and second derivatives."""
 COUNTS = np.arange(DEGREE + 1)[:, None]
-RATES = np.diag(np.arange(1.0, DEGREE + 1), 1)
-WITH_RATES = np.stack([np.eye(DEGREE + 1), RATES, RATES @ RATES], axis=1).reshape(-1, DEGREE + 1)
-"""Matrix from the powers of a polynomial to those of its value and first two derivatives."""
 
 
 def _near_pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
@@ -245,7 +242,7 @@ class BalloonMap:
         p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
         table = self.splines(p)[:, :, which].reshape(DEGREE + 1, -1)
         begins = np.arange(p.size).reshape(p.shape)
-        return Along(*horner(table, begins, h * self.spans, p.size, with_rates=True))
+        return Along(*horner(table, begins, h * self.spans, p.size))
 
     def free_height(self, pressure: ArrayLike) -> Array:
         """Return the height in mm of the unloaded balloon."""
@@ -319,10 +316,10 @@ def pieces(coefficients: Array) -> Array:
 
 
 def horner(
-    table: Array, which: NDArray[np.int_], y: Array, stride: int = 1, with_rates: bool = False
-) -> Array:
-    """Return splines (powers, rows) at heights ``y``, in pieces: their values (...), or these and
-    the first and second derivatives (3, ...) ``with_rates``.
+    table: Array, which: NDArray[np.int_], y: Array, stride: int = 1, with_rates: bool = True
+) -> tuple[Array, Array, Array]:
+    """Return splines (powers, rows) at heights ``y``, in pieces: their values, and their first and
+    second derivatives unless these are left out as 0.
 
     ``which`` is the row of each spline's first piece; its next one is ``stride`` rows on.
     """
@@ -333,14 +330,19 @@ def horner(
     if stride != 1:
         piece *= stride
     powers = table.take(which + piece, axis=-1)
-    if with_rates:
-        powers = (WITH_RATES @ powers.reshape(DEGREE + 1, -1)).reshape(-1, 3, *powers.shape[1:])
-    values = powers[DEGREE] * u
-    for power in powers[DEGREE - 1 : 0 : -1]:
-        values += power
-        values *= u
-    values += powers[0]
-    return np.asarray(values)
+    value = powers[DEGREE] * u
+    value += powers[DEGREE - 1]
+    first = second = powers[DEGREE]
+    for number, power in enumerate(powers[DEGREE - 2 :: -1]):
+        if with_rates:
+            if number:
+                second = second * u
+                second += first
+            first = first * u
+            first += value
+        value *= u
+        value += power
+    return value, first, 2 * second
 
 
 @lru_cache(maxsize=64)

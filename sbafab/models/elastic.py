@@ -36,6 +36,7 @@ from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
 from sbafab.models.quantity import Conditions, ModelId, Quantity, chamber_count
 from sbafab.models.rippled import compressed_shapes, free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
+from sbafab.models.stack_poses import BatchPoses
 
 Inflated = Mapping[Balloon, Shapes]
 ELASTIC = Model(
@@ -512,8 +513,7 @@ def bend_relation(request: PredictionRequest, stack: Stack) -> Relation:
     for chambers in range(1, stack.chambers):
         poses = _poses(stack, chambers, pressures)
         label = f"{chamber_count(chambers)}, the others empty"
-        x = [pose.pressures[0] for pose in poses]
-        lines.append(Trace(label, x, [pose.bend for pose in poses], model))
+        lines.append(Trace(label, poses.pressures[:, 0].tolist(), poses.bends.tolist(), model))
     return Relation(
         "bend", "Bending against pressure", "pressure, kPa", "bend of the top, deg", tuple(lines)
     )
@@ -528,22 +528,18 @@ def workspace_traces(request: PredictionRequest, stack: Stack) -> list[Trace]:
         for chambers in range(1, stack.chambers):
             poses = _poses(stack, chambers, pressures, rest)
             label = f"elastic stack, {chamber_count(chambers)} to 10 kPa, the others {words}"
-            aside = [float(np.hypot(*pose.tip[:2])) for pose in poses]
-            lines.append(Trace(label, aside, [pose.height for pose in poses], model))
+            aside = np.hypot(*poses.tips[:, :2].T)
+            lines.append(Trace(label, aside.tolist(), poses.heights.tolist(), model))
     return lines
 
 
-def _poses(
-    stack: Stack, chambers: int, pressures: Sequence[float] | Array, rest: float = 0.0
-) -> list[Pose]:
-    poses: list[Pose] = []
-    for pressure in pressures:
-        try:
-            near = poses[-1] if poses else None
-            poses.append(stack.pose(_pressures(stack, chambers, float(pressure), rest), near=near))
-        except DesignError:
-            break
-    return poses
+def _poses(stack: Stack, chambers: int, pressures: Array, rest: float = 0.0) -> BatchPoses:
+    """Return the poses at rising pressures in some chambers, up to the first that has none."""
+    rows = np.full((len(pressures), stack.chambers), rest)
+    rows[:, :chambers] = pressures[:, None]
+    states = stack.equilibria(rows[rows.max(1) <= stack.most_pressure], None)
+    count = int(np.logical_and.accumulate(states.is_met).sum())
+    return stack.poses_of(states.part(slice(count)))
 
 
 # Clearances of an inflated stack.

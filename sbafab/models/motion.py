@@ -107,27 +107,29 @@ class SupplyStep(NamedTuple):
     stack: PosedStack
     load: Load | None
 
-    def after(self, states: Equilibria, supply: Supply) -> Equilibria:
-        """Return the states after a step; of ``states`` only pressures and freedoms count. Raises
-        DesignError for the first that has no pose.
+    def after(self, begin: Balance, pressures: Array, supply: Supply) -> tuple[Balance, Array]:
+        """Return the balance and the pressures (n, chambers) in kPa after a step. Raises
+        DesignError for the first state that has no pose.
         """
-        p, at = states.pressures.copy(), states.freedoms.copy()
+        stack, at, p = self.stack, begin.freedoms.copy(), pressures.copy()
         is_solved = np.zeros(len(p), dtype=bool)
         if self.load is None or self.load.wall is None:
             size = CHUNK if self.load is None else LOADED_CHUNK
-            for begin in range(0, len(p), size):
-                part = slice(begin, begin + size)
+            for first in range(0, len(p), size):
+                part = slice(first, first + size)
                 is_solved[part] = self._together(at[part], p[part], supply.at(part))
-        # Pumps may have left chambers under suction.
-        found = self.stack.settled(p, Balance.stable(at), self.load, sucked=True)
-        for number in np.flatnonzero(~is_solved | (found.excess > 0)):
+        is_solved &= stack.excess(at, self.load) <= 0
+        found = Balance.stable(at)
+        for number in np.flatnonzero(~is_solved):
             one = slice(number, number + 1)
-            start = self.stack.by_level(states.freedoms[one])
-            old = self.stack.equilibria(states.pressures[one], self.load, start, sucked=True)
+            start = stack.by_level(begin.freedoms[one])
+            # Pumps may have left chambers under suction.
+            old = stack.equilibria(pressures[one], self.load, start, sucked=True)
             alone = supply.at(one).with_volumes(old.volumes, old.pressures)
-            pose = self._alone(self.stack.pose_of(old), alone)
-            put(found, one, self.stack.states_of(pose, self.load))
-        return found
+            states = stack.states_of(self._alone(stack.pose_of(old), alone), self.load)
+            put(found, one, states.balance)
+            p[one] = states.pressures
+        return found, p
 
     @np.errstate(over="ignore", invalid="ignore")
     def _together(self, at: Array, p: Array, supply: Supply) -> NDArray[np.bool_]:
@@ -390,11 +392,10 @@ class Motion:
             # A pump that stands still is shut: its chamber may come to suction where a load bends
             # it open.
             supply = Supply(self.line, acts * values, acts, None, -SUCTION)
-        acting = self.stack.acting(self.load)
-        supplied = SupplyStep(self.stack, acting)
-        self.pose = self.stack.pose_of(
-            supplied.after(self.stack.states_of(self.pose, acting), supply)
-        )
+        stack, load = self.stack, self.stack.acting(self.load)
+        begin = stack.states_of(self.pose, load)
+        found, p = SupplyStep(stack, load).after(begin.balance, begin.pressures, supply)
+        self.pose = stack.pose_of(stack.settled(p, found, load, sucked=True))
         self.sources = tuple(values.tolist())
         if flows is not None:
             self.sources = tuple(
@@ -409,36 +410,33 @@ class Motion:
 class BatchMotion:
     """N moving stacks, as ``Motion``: ``step`` them, then read ``pressures``, ``tips``, ``times``.
 
-    ``states`` are their equilibria; ``times`` (N,) in s; ``line`` feeds each chamber.
+    ``balance`` and ``pressures`` (N, chambers) in kPa are their states, ``start`` the first one;
+    ``times`` (N,) in s; ``line`` feeds each chamber.
     """
 
     stack: PosedStack
     line: Line
     load: Load | None
     start: Equilibria
-    states: Equilibria
+    balance: Balance
+    pressures: Array
     times: Array
 
     def restart(self, where: Any) -> None:
         """Put some of the states (a mask, their numbers or a slice) at the start, at 0 s."""
         self.times[where] = 0.0
-        for whole, row in zip(self.states, self.start, strict=True):
-            whole[where] = row
-
-    @property
-    def pressures(self) -> Array:
-        """Pressures in the chambers in kPa: (N, chambers)."""
-        return self.states.pressures.copy()
+        put(self.balance, where, self.start.balance)
+        self.pressures[where] = self.start.pressures
 
     @property
     def tips(self) -> Array:
         """Middles of the top plates in mm: (N, 3)."""
-        return self.stack.tips(self.states.freedoms)
+        return self.stack.tips(self.balance.freedoms)
 
     @property
     def poses(self) -> BatchPoses:
         """The poses now."""
-        return self.stack.poses_of(self.states)
+        return self.stack.poses_of(self.stack.settled(self.pressures, self.balance, self.load))
 
     @one_blas_thread
     def step(self, dt: float, pressures: ArrayLike) -> None:
@@ -449,7 +447,8 @@ class BatchMotion:
         sources = self.stack.table(pressures, len(self.times))
         acts = np.clip(self.times + dt - self.line.delay, 0.0, dt)[:, None]
         supply = Supply(self.line, np.zeros_like(sources), acts, sources, 0.0)
-        self.states = SupplyStep(self.stack, self.load).after(self.states, supply)
+        step = SupplyStep(self.stack, self.load)
+        self.balance, self.pressures = step.after(self.balance, self.pressures, supply)
         self.times += dt
 
 

@@ -284,7 +284,7 @@ class Search:
             away = np.linalg.norm(places[rest] - self.stack.tips(states.freedoms), axis=-1)
             is_nearer = states.is_met & (away < best[rest])
             best[rest[is_nearer]] = away[is_nearer]
-            put(found, rest[is_nearer], Equilibria(*(part[is_nearer] for part in states)))
+            put(found, rest[is_nearer], states.part(is_nearer))
             rest = np.flatnonzero(~self._is_met(places, found))
             if not rest.size:
                 break

@@ -239,21 +239,17 @@ def _energy_descent(
         matrix = with_diagonal_blocks(rest, now.blocks)
         flat = newton_step(now.gradient, matrix, None if quick else is_positive_definite(matrix))
         flat = _rim_limited(springs, at, flat, now.gradient, rest, now.blocks)
-        if quick:
+        largest = np.abs(flat).max(-1)
+        if quick and largest.max() > STRAIGHT:
             flat = _refined(springs, at, flat, now, rest)
-        largest, move, value = np.abs(flat).max(-1), flat.reshape(at.shape), now.value
-        last = (matrix, now.blocks)
-        is_still = np.zeros(len(at), dtype=bool) if quick else _is_still(now, flat)
-        is_over = (
-            is_still | (largest <= enough) | is_last_step(largest, before, quick or SMALLEST_STEP)
-        )
+            largest = np.abs(flat).max(-1)
+        move, value, last = flat.reshape(at.shape), now.value, (matrix, now.blocks)
+        is_last = is_last_step(largest, before, quick or SMALLEST_STEP)
         if load.wall is not None:
             gain = -(flat * now.gradient).sum(-1)
-            is_over &= (
-                is_still
-                | (largest <= enough)
-                | (largest < PLATE_LAST_STEP) & (gain < PLATE_LAST_GAIN)
-            )
+            is_last &= (largest < PLATE_LAST_STEP) & (gain < PLATE_LAST_GAIN)
+        is_still = np.zeros_like(is_last) if quick else _is_still(now, flat)
+        is_over = is_last | is_still | (largest <= enough)
         if is_over.any():
             is_stable = is_over.copy()
             is_stable[is_over] = is_positive_definite(matrix[is_over])
@@ -351,9 +347,7 @@ def _refined(springs: Springs, at: Array, flat: Array, now: LoadedEnergy, rest: 
 
     Films, and rims that meet on the way, are most of the nonlinearity.
     """
-    (live,) = (np.abs(flat).max(-1) > STRAIGHT).nonzero()
-    if not live.size:
-        return flat
+    live = np.flatnonzero(np.abs(flat).max(-1) > STRAIGHT)
     found, outside = flat.copy(), now.gradient - now.spring_gradient.reshape(flat.shape)
     if len(live) < len(flat):
         at, rest, outside, springs = at[live], rest[live], outside[live], springs.at(live)

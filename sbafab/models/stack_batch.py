@@ -76,8 +76,15 @@ class StackBatch:
         begin = (0.0,) * self.stack.chambers if pressures is None else pressures
         start = self.stack.states_of(self.stack.pose(begin, **load), acting)
         parts: list[Any] = [part.repeat(count, axis=0) for part in start]
+        states = Equilibria(*parts)
         return BatchMotion(
-            self.stack, line or Line(), acting, start, Equilibria(*parts), np.zeros(count)
+            self.stack,
+            line or Line(),
+            acting,
+            start,
+            states.balance,
+            states.pressures,
+            np.zeros(count),
         )
 
 

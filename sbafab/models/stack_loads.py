@@ -316,7 +316,7 @@ class Springs:
         """
         count = len(self.places.chambers)
         gaps = by_row(freedoms, self.places.meet)
-        value, first, second = horner(self.table, self.begins, gaps[..., :count], self.stride, True)
+        value, first, second = horner(self.table, self.begins, gaps[..., :count], self.stride)
         value = value @ self.places.shares
         gradient = by_row(first, self.places.ring)
         matrix = by_row(second, self.places.squares).reshape(*gradient.shape, 3)
@@ -328,14 +328,17 @@ class Springs:
             matrix += stiffer
         return value, gradient, matrix
 
-    def _orders(self, freedoms: Array, orders: Sequence[int], with_rates: bool = False) -> Array:
-        """Return potentials (order 0), volumes (1) and their rates by pressure (2), without
-        contacts, at each point of the rings: (orders, ..., rows, points), with their derivatives by
-        height before these.
+    def _orders(
+        self, freedoms: Array, first: int, last: int, with_rates: bool = True
+    ) -> tuple[Array, Array]:
+        """Return potentials (order 0), volumes (1) and their rates by pressure (2) from ``first``
+        to ``last``, without contacts, at each point of the rings, and their derivatives by height:
+        (orders, ..., rows, points) each.
         """
         gaps = by_row(freedoms, self.places.meet)[..., : len(self.places.chambers)]
-        begins = np.stack([self.begins + order * self.step for order in orders])
-        return horner(self.table, begins, gaps, self.stride, with_rates)
+        steps = self.step * np.arange(first, last + 1)
+        begins = self.begins + steps[(..., *(None,) * self.begins.ndim)]
+        return horner(self.table, begins, gaps, self.stride, with_rates)[:2]
 
     def _by_freedoms(self, rates: Array) -> Array:
         """Return rates (..., rows, points) by height as those of each balloon by its level's
@@ -348,19 +351,19 @@ class Springs:
         """Return by each freedom the potential of each balloon in mN (or mN mm), without contacts,
         and its volume in ul: (..., rows, chambers, 3) each.
         """
-        films, filling = self._by_freedoms(self._orders(freedoms, (0, 1), with_rates=True)[1])
+        films, filling = self._by_freedoms(self._orders(freedoms, 0, 1)[1])
         return films, filling
 
     def contents(self, freedoms: Array) -> tuple[Array, Array]:
         """Return ul in each balloon (..., rows, chambers), and the potential of each row."""
-        stored, volumes = self._orders(freedoms, (0, 1))
+        (stored, volumes), _ = self._orders(freedoms, 0, 1, with_rates=False)
         return _by_chamber(volumes), stored @ self.places.shares
 
     def volumes(self, freedoms: Array) -> tuple[Array, Array, Array]:
         """Return ul in each balloon (..., rows, chambers), its rates by freedoms (..., rows,
         chambers, 3), and by pressure with all plates held (..., rows, chambers).
         """
-        (values, swelling), (first, _), _ = self._orders(freedoms, (1, 2), with_rates=True)
+        (values, swelling), (first, _) = self._orders(freedoms, 1, 2)
         return _by_chamber(values), self._by_freedoms(first), _by_chamber(swelling)
 
 
@@ -588,7 +591,8 @@ class LoadedEnergy(NamedTuple):
         moments = self.works[..., :3].reshape(*self.gradient.shape, 3)
         half = self.flat_motions[..., :3] @ moments.swapaxes(-1, -2)
         half *= base_side(half.shape[-1] // 3)
-        return -(half + half.swapaxes(-1, -2))
+        whole = half + half.swapaxes(-1, -2)
+        return np.negative(whole, out=whole)
 
     def deeper(self, touch: PlateContact) -> Array:
         """Return a contact's depths in mm by a unit of each freedom: (..., points, freedoms)."""

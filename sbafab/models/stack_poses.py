@@ -48,7 +48,7 @@ NO_LOAD: dict[str, Any] = {"tip_load": (0.0, 0.0, 0.0), "gravity": False, "plate
 NOT_FOUND = (
     "no equilibrium of the stack found at these pressures, under this load; try a smaller one"
 )
-CHUNK, LOADED_CHUNK = 256, 64
+CHUNK, LOADED_CHUNK = 512, 48
 """States solved together, without and with a load: more bring no speed, and cost memory."""
 
 
@@ -138,6 +138,15 @@ class Equilibria(NamedTuple):
     is_stable: NDArray[np.bool_]
     is_found: NDArray[np.bool_]
     excess: Array
+
+    def part(self, which: Any) -> Equilibria:
+        """Return some of the states."""
+        return Equilibria(*(part[which] for part in self))
+
+    @property
+    def balance(self) -> Balance:
+        """The freedoms in balance."""
+        return Balance(self.freedoms, self.pushes, self.is_stable, self.is_found)
 
     @property
     def is_met(self) -> NDArray[np.bool_]:
@@ -349,12 +358,17 @@ class PosedStack:
         """Return the states of a balance at pressures (n, chambers) in kPa."""
         if springs is None:
             springs = self.springs(pressures, sucked, by_level=load is not None)
-        counts, tops = self.row_counts[load is None], self.row_tops[load is None]
+        counts = self.row_counts[load is None]
         each, stored = springs.contents(found.freedoms)
         volumes = counts @ each
         energies = stored @ counts + (pressures * volumes).sum(-1)
-        excess = (found.freedoms @ self.centres - tops).max((1, 2))
+        excess = self.excess(found.freedoms, load)
         return Equilibria(pressures, found.freedoms, volumes, energies, *found[1:], excess)
+
+    def excess(self, freedoms: Array, load: Load | None) -> Array:
+        """Return by how many mm a balloon rises above its map: (n,)."""
+        gaps = freedoms @ self.centres
+        return np.asarray((gaps - self.row_tops[load is None]).max((1, 2)))
 
     def pose_of(self, states: Equilibria, number: int = 0) -> Pose:
         """Return one of the states as a pose. Raises DesignError if it has none."""
