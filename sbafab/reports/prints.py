@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 from sbafab.cutting.fixture import whole_plate
@@ -140,22 +141,14 @@ def _curve(edge: Edge) -> str:
     if not isinstance(edge, Arc):
         return f"{_at(edge.end)} l"
     parts = max(1, math.ceil(abs(edge.sweep) / MOST_SWEEP - 1e-9))
-    step = edge.sweep / parts
-    # Handles of this length put the curve's middle on the arc.
-    handle = 4 / 3 * math.tan(step / 4) * edge.radius
+    # Handles of this length, in radii, put the curve's middle on the arc.
+    handle, (x, y) = 4 / 3 * math.tan(edge.sweep / parts / 4), edge.centre
     curves = []
-    for part in range(parts):
-        first, last = (edge.start_angle + step * n for n in (part, part + 1))
-        (x0, y0), (x1, y1) = (_round(edge, angle) for angle in (first, last))
-        leave = x0 - handle * math.sin(first), y0 + handle * math.cos(first)
-        arrive = x1 + handle * math.sin(last), y1 - handle * math.cos(last)
+    for (x0, y0), (x1, y1) in pairwise(edge.at(part / parts) for part in range(parts + 1)):
+        leave = x0 - handle * (y0 - y), y0 + handle * (x0 - x)
+        arrive = x1 + handle * (y1 - y), y1 - handle * (x1 - x)
         curves.append(f"{_at(leave)} {_at(arrive)} {_at((x1, y1))} c")
     return " ".join(curves)
-
-
-def _round(edge: Arc, angle: float) -> Point:
-    (x, y), r = edge.centre, edge.radius
-    return x + r * math.cos(angle), y + r * math.sin(angle)
 
 
 # What all pages have: a title, how to use the print, and bars that check its size.
