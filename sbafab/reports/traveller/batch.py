@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from sbafab.cutting.fixture import whole_plate
 from sbafab.geometry.region import coord
@@ -27,17 +27,11 @@ MOST_CYCLES = 6
 """Up to this many cycles each has a box on tray.html; otherwise cycles of one size share one."""
 
 
-class CopyRow(NamedTuple):
-    """The serial of a copy, with its cycle and place in the press, from 1."""
-
-    copy: int
-    serial: str
-    cycle: str
-    place: int
-
-
 def batch_page(work: Work) -> dict[str, Any] | None:
-    """Return the batch of a design; None for a single copy. Cycles of one size share a column."""
+    """Return the batch of a design; None for a single copy. Cycles of one size share a column.
+
+    ``copies`` have number, serial, cycle and place in the press, from 1.
+    """
     runs, batch = work.cycles, work.design.order.batch
     if runs.copies == 1:
         return None
@@ -50,7 +44,7 @@ def batch_page(work: Work) -> dict[str, Any] | None:
         "cycle_names": [cycles_of(runs, size) for size in sizes],
         "patterns": work.laminate.patterns,
         "copies": [
-            CopyRow(copy, serial(runs, copy, batch), cycle_name(cycle), place)
+            (copy, serial(runs, copy, batch), cycle_name(cycle), place)
             for copy in range(1, runs.copies + 1)
             for cycle, place in [runs.position(copy)]
         ],
