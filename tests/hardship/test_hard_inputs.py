@@ -12,7 +12,7 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.errors import GeometryError, SbafabError
 from sbafab.geometry.edges import Line
-from sbafab.output import checked
+from sbafab.orders import build as builds
 from tests.hardship.starting import WITHOUT_PRIVILEGES
 from tests.hunt.oracle import laid_over
 
@@ -123,9 +123,9 @@ def test_what_the_geometry_cannot_resolve_names_the_design(monkeypatch: pytest.M
     def unresolved(*_: object) -> object:
         return laid_over([Line((1.0, 2.0), (3.0, 4.0))])
 
-    monkeypatch.setattr(checked, "build", unresolved)
+    monkeypatch.setattr(builds, "build", unresolved)
     with pytest.raises(SbafabError, match=r"design 1dof-5mm cannot be resolved: .*change a size"):
-        checked.check(load_design("1dof-5mm"))
+        builds.make_build(load_design("1dof-5mm"))
 
 
 @pytest.mark.parametrize("before", ["", "import sys; sys.stdout.reconfigure(encoding='ascii')\n"])

@@ -33,9 +33,9 @@ from sbafab.models.pneumatics import seconds
 from sbafab.models.quantity import FigureKey
 from sbafab.studio.jobs import elastic
 from sbafab.studio.moving import stack_model
-from tests.cli.test_predict_command import run as run_predict
 from tests.shared import shared
 from tests.studio.worked import job
+from tests.validation.commands import run_predict
 from tests.validation.test_validation_table import rows
 
 MADE = ("1dof-5mm", "1dof-10mm", "3dof-15mm")

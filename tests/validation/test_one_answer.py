@@ -30,8 +30,8 @@ from sbafab.models.formulas import size_phrases, sizes
 from sbafab.models.intervals import factors_of
 from sbafab.search.quantities import Subject, read_quantity
 from sbafab.studio.jobs import elastic, motion
-from tests.cli.test_predict_command import run as run_predict
 from tests.studio.worked import job
+from tests.validation.commands import run_predict
 
 NAME = "3dof-15mm"
 ONE_ANSWER = 1e-6
