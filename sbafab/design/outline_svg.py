@@ -8,33 +8,29 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
 
-from sbafab.design.strands import (
-    Strand,
-    Traced,
-    nothing_on,
-    place,
-    refuse_more_than_limit,
-)
+from sbafab.design.strands import Strand, Traced, nothing_on, place, refuse_more_than_limit
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import bezier, elliptical_arc, fit_arcs
 from sbafab.geometry.edges import EPSILON, Edge, Line, Point
+
+if TYPE_CHECKING:
+    from svgelements import Matrix
 
 PLAIN = (
     "save it as plain SVG: paths and basic shapes in groups, numbers without units, clones "
     "unlinked, clips and effects released"
 )
+DRAW_AGAIN = "draw it again"
 MOST_ELEMENTS = 2000
 WHITE = " \t\r\n"
 """Exactly the characters that are space in SVG."""
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+NUMBER = r"(?>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _NUMBER = re.compile(NUMBER, re.ASCII)
-_FLAG = re.compile(r"[01]")
-_BETWEEN = re.compile(r"\s*(?:,\s*)?", re.ASCII)
 
 
 def svg_strands(path: Path, layer: str | None = None) -> Traced:
@@ -52,39 +48,60 @@ def svg_strands(path: Path, layer: str | None = None) -> Traced:
     return Traced(_strands(list(_drawn(root)), page.scale), page.description)
 
 
-def _strands(drawn: list[DrawnShape], scale: float) -> Iterator[Strand]:
-    from svgelements import Path as PathData
-
-    for element, matrix in drawn:
-        text = path_data(element)
-        try:
-            segments = list(PathData(text))
-        except Exception:
-            # Extremely large numbers fail anywhere in the library, with any built-in error.
-            raise DesignError(
-                f"holds a <{local(element)}> that cannot be read; draw it again"
-            ) from None
-        yield from _subpaths(segments, _placement(matrix, scale))
+# Numbers, paths and transforms as SVG 2 writes them: the library reads damaged ones in its own way.
 
 
-def _numbers(text: str, are_arcs: bool = False) -> Iterator[str]:
-    """Yield the numbers of a list separated by spaces or commas.
+_SPACE = r"[ \t\r\n]*"
+_BETWEEN = rf"{_SPACE},?{_SPACE}"
 
-    ``are_arcs``: in each group of seven the fourth and fifth are flags, which need no separator.
-    Raises ValueError, with the text from there on, for anything else.
-    """
-    at, count = len(text) - len(text.lstrip(WHITE)), 0
-    while at < len(text):
-        is_flag = are_arcs and count % 7 in (3, 4)
-        match = (_FLAG if is_flag else _NUMBER).match(text, at)
-        if match is None:
-            raise ValueError(text[at : at + 20])
-        yield match[0] if is_flag else repr(float(match[0]))
-        count += 1
-        between = _BETWEEN.match(text, match.end())
-        at = between.end() if between else match.end()
-        if at == len(text) and text.rstrip(WHITE).endswith(","):
-            raise ValueError(",")
+
+def _row(*kinds: str) -> str:
+    return _BETWEEN.join(kinds)
+
+
+def _repeated(*kinds: str) -> str:
+    return rf"{_SPACE}{_row(*kinds)}(?:{_BETWEEN}{_row(*kinds)})*+"
+
+
+_ARC = (*[NUMBER] * 3, "[01]", "[01]", NUMBER, NUMBER)
+_COMMAND = "|".join(
+    f"[{letters}]{_repeated(*kinds)}"
+    for letters, kinds in (
+        ("MmLlTt", [NUMBER] * 2),
+        ("HhVv", [NUMBER]),
+        ("SsQq", [NUMBER] * 4),
+        ("Cc", [NUMBER] * 6),
+        ("Aa", _ARC),
+    )
+)
+_PATH = re.compile(rf"{_SPACE}(?:(?:{_COMMAND}|[Zz]){_SPACE})*+", re.ASCII)
+_POINTS = re.compile(rf"(?:{_repeated(NUMBER, NUMBER)})?+{_SPACE}", re.ASCII)
+_VIEW = re.compile(rf"{_SPACE}{_row(*[f'({NUMBER})'] * 4)}{_SPACE}", re.ASCII)
+_CALL = "|".join(
+    rf"{name}{_SPACE}\({_SPACE}{_row(*[NUMBER] * count)}{_SPACE}\)"
+    for name, counts in {
+        "matrix": (6,),
+        "rotate": (3, 1),
+        "scale": (2, 1),
+        "skew[XY]": (1,),
+        "translate": (2, 1),
+    }.items()
+    for count in counts
+)
+_TRANSFORM = re.compile(rf"{_SPACE}(?:(?:{_CALL}){_BETWEEN})*+", re.ASCII)
+_UNLIKE = re.compile(r"([CcSs][^A-DF-Za-df-z]*)(?=[Tt])|([QqTt][^A-DF-Za-df-z]*)(?=[Ss])")
+"""Curves before smooth ones of the other degree, which begin without a tangent to continue. The
+library would mirror one; a line of zero length between them prevents it."""
+
+
+def _sound(pattern: re.Pattern[str], text: str, what: str, remedy: str) -> str:
+    """Return a text that matches, as the library reads it. Raises DesignError where it does not."""
+    match = pattern.match(text)
+    end = match.end() if match else 0
+    if end < len(text):
+        raise DesignError(f'has {what} that is damaged at "{text[end : end + 20]}"; {remedy}')
+    # The library stops at a number that ends in a dot.
+    return re.sub(r"(?<=\d)\.(?!\d)", "", text)
 
 
 # The page: what a user unit is in mm (SVG 2, sections 7 and 8).
@@ -154,10 +171,8 @@ def _view(root: ElementTree.Element) -> tuple[float, float] | None:
     text = root.get("viewBox")
     if text is None:
         return None
-    try:
-        _, _, width, height = map(float, _numbers(text))
-    except ValueError:
-        width = height = 0.0
+    match = _VIEW.fullmatch(text)
+    width, height = (float(match[3]), float(match[4])) if match else (0.0, 0.0)
     if not (0 < width < FARTHEST_PAGE and 0 < height < FARTHEST_PAGE):
         raise DesignError("has a viewBox that is not four numbers with a positive size")
     return width, height
@@ -220,16 +235,14 @@ VALUES = {
 _DECLARATION = re.compile(r"[{;]\s*([^\s{};:]+)\s*:")
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 """The name of a layer or group as shown by Inkscape."""
-Matrix = tuple[float, float, float, float, float, float]
-"""a to f, as SVG's matrix() has them."""
-UNIT: Matrix = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+LONGEST_TRANSFORM = 10_000
 
 
 class DrawnShape(NamedTuple):
-    """A shape and its transform to the drawing's user units."""
+    """A shape and its transforms to the drawing's user units, the outermost first."""
 
     element: ElementTree.Element
-    matrix: Matrix
+    transform: str
 
 
 def local(element: ElementTree.Element) -> str:
@@ -276,7 +289,7 @@ def _drawn(root: ElementTree.Element) -> Iterator[DrawnShape]:
     """Yield the drawn shapes, in order."""
     space = root.tag.removesuffix("svg")
     # Outermost last, so that the next one is the last of the list.
-    waiting = [(root, UNIT)]
+    waiting = [(root, "")]
     while waiting:
         element, outer = waiting.pop()
         name = local(element)
@@ -286,11 +299,14 @@ def _drawn(root: ElementTree.Element) -> Iterator[DrawnShape]:
             raise DesignError(f"holds <{name}>; {PLAIN}")
         if not _is_displayed(element):
             continue
-        matrix = _product(outer, _transform(element.get("transform", "")))
+        own = element.get("transform", "").strip(WHITE).removeprefix("none")
+        outer += " " + _sound(_TRANSFORM, own, "a transform", "apply it to the path")
+        if len(outer) > LONGEST_TRANSFORM:
+            raise DesignError("has a very long transform; apply it to the path")
         if name in SHAPES:
-            yield DrawnShape(element, matrix)
+            yield DrawnShape(element, outer)
         else:
-            waiting += [(inner, matrix) for inner in reversed(element)]
+            waiting += [(inner, outer) for inner in reversed(element)]
 
 
 def _is_displayed(element: ElementTree.Element) -> bool:
@@ -333,203 +349,82 @@ def _keep_layer(root: ElementTree.Element, layer: str) -> None:
                 holder.remove(child)
 
 
-LONGEST_TRANSFORM = 10_000
-TRANSFORMS = {
-    "matrix": (6,),
-    "rotate": (1, 3),
-    "scale": (1, 2),
-    "skewX": (1,),
-    "skewY": (1,),
-    "translate": (1, 2),
-}
-"""Allowed counts of numbers, by name."""
-_TRANSFORM = re.compile(r"\s*(?:,\s*)?([A-Za-z]+)\s*\(([^()]*)\)\s*", re.ASCII)
-
-
-def _transform(text: str) -> Matrix:
-    """Return the matrix of a transform attribute. Raises DesignError if it is damaged."""
-    if text.strip(WHITE) in ("", "none"):
-        return UNIT
-    if len(text) > LONGEST_TRANSFORM:
-        raise DesignError("has a very long transform; apply it to the path")
-    from svgelements import Matrix as ReadMatrix
-
-    matrix, end = UNIT, 0
-    while end < len(text):
-        match = _TRANSFORM.match(text, end)
-        try:
-            values = list(_numbers(match[2])) if match else []
-        except ValueError:
-            values = []
-        if match is None or len(values) not in TRANSFORMS.get(match[1], ()):
-            raise DesignError(
-                f'has a transform that is damaged at "{text[end : end + 20]}"; apply it to the path'
-            )
-        step = ReadMatrix(f"{match[1]}({' '.join(values)})")
-        matrix = _product(matrix, (step.a, step.b, step.c, step.d, step.e, step.f))
-        end = match.end()
-    return matrix
-
-
-def _product(outer: Matrix, inner: Matrix) -> Matrix:
-    """Return the matrix that applies ``inner`` and then ``outer``."""
-    a, b, c, d, e, f = outer
-    x, y, z, w, u, v = inner
-    return (
-        *(a * x + c * y, b * x + d * y),
-        *(a * z + c * w, b * z + d * w),
-        *(a * u + c * v + e, b * u + d * v + f),
-    )
-
-
-# Basic shapes of SVG as the paths that they stand for (SVG 2, sections 9 and 10).
+# Shapes as strands, by the library.
 
 
 SIZES = frozenset({"height", "r", "rx", "ry", "width"})
-TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
-"""Numbers per repetition of a path command."""
-UNLIKE = frozenset({"CT", "ST", "QS", "TS"})
-"""Smooth curves after curves of the other degree: these begin without a tangent to continue. The
-library would mirror one; a line of zero length between them prevents it."""
-_COMMANDS = re.compile(r"([MmLlHhVvCcSsQqTtAaZz])")
 
 
-def path_data(element: ElementTree.Element) -> str:
-    """Return the path data of a shape, in user units; empty if nothing is drawn.
+def _strands(drawn: list[DrawnShape], scale: float) -> Iterator[Strand]:
+    from svgelements import Matrix
+
+    for element, transform in drawn:
+        try:
+            segments = _segments(element)
+            matrix = Matrix(transform)
+        except DesignError:
+            raise
+        except Exception:
+            # Extremely large numbers fail anywhere in the library, with any built-in error.
+            raise DesignError(
+                f"holds a <{local(element)}> that cannot be read; draw it again"
+            ) from None
+        yield from _subpaths(segments, _Placement(matrix, scale))
+
+
+def _segments(element: ElementTree.Element) -> list[Any]:
+    """Return the segments of a shape, in user units; none if nothing is drawn.
 
     Raises DesignError for a damaged shape, and for lengths with units.
     """
+    import svgelements
+
     name = local(element)
     if name == "path":
-        return " ".join(_commands(element.get("d", "")))
+        return list(svgelements.Path(_path_data(element.get("d", ""))))
+    values = {key: element.get(key, "").strip(WHITE) for key in SHAPES[name]}
     if name in ("polyline", "polygon"):
-        return _corners(element.get("points", ""), name)
-    value = {key: _length(element, key) for key in SHAPES[name]}
-    number = {key: quantity or 0.0 for key, quantity in value.items()}
-    if name == "line":
-        return "M {x1!r} {y1!r} L {x2!r} {y2!r}".format_map(number)
-    if name == "circle":
-        return _ellipse(number["cx"], number["cy"], number["r"], number["r"])
-    if name == "ellipse":
-        if (value["rx"] is None) != (value["ry"] is None):
-            raise DesignError("has <ellipse> with only one of rx and ry; give both")
-        return _ellipse(*number.values())
-    # A missing radius equals the other one.
-    rx, ry = (value["rx"], value["ry"]) if value["rx"] is not None else (value["ry"],) * 2
-    return _rect(number, rx or 0.0, rx or 0.0 if ry is None else ry)
+        refuse_more_than_limit(len(_NUMBER.findall(values["points"])) // 2)
+        values["points"] = _sound(_POINTS, values["points"], f"<{name}> with points", DRAW_AGAIN)
+    else:
+        for key, text in values.items():
+            _refuse_length(name, key, text.removesuffix("px"))
+    if name == "ellipse" and (values["rx"] == "") != (values["ry"] == ""):
+        raise DesignError("has <ellipse> with only one of rx and ry; give both")
+    kind = {"line": "SimpleLine"}.get(name, name.capitalize())
+    given = {key: text for key, text in values.items() if text}
+    return list(getattr(svgelements, kind)(given).segments(transformed=False))
 
 
-def _length(element: ElementTree.Element, key: str) -> float | None:
-    text = element.get(key, "").strip(WHITE).removesuffix("px")
-    if text == "":
-        return None
-    match = _NUMBER.fullmatch(text)
-    if match is None or not math.isfinite(float(text)):
-        raise DesignError(f'has {key} "{text[:40]}" on <{local(element)}>, no coordinate; {PLAIN}')
-    if key in SIZES and float(text) < 0:
-        raise DesignError(f"has <{local(element)}> with {key} {text}, which is negative")
-    return float(text)
+def _refuse_length(name: str, key: str, text: str) -> None:
+    if text and (_NUMBER.fullmatch(text) is None or not math.isfinite(float(text))):
+        raise DesignError(f'has {key} "{text[:40]}" on <{name}>, no coordinate; {PLAIN}')
+    if text and key in SIZES and float(text) < 0:
+        raise DesignError(f"has <{name}> with {key} {text}, which is negative")
 
 
-def _ellipse(cx: float, cy: float, rx: float, ry: float) -> str:
-    if rx == 0 or ry == 0:
-        return ""
-    stops = ((cx, cy + ry), (cx - rx, cy), (cx, cy - ry), (cx + rx, cy))
-    arcs = (f"A {rx!r} {ry!r} 0 0 1 {x!r} {y!r}" for x, y in stops)
-    return f"M {cx + rx!r} {cy!r} {' '.join(arcs)} Z"
-
-
-def _rect(number: dict[str, float], rx: float, ry: float) -> str:
-    x, y, width, height = (number[key] for key in ("x", "y", "width", "height"))
-    if width == 0 or height == 0:
-        return ""
-    rx, ry = min(rx, width / 2), min(ry, height / 2)
-    right, bottom = x + width, y + height
-    if rx == 0 or ry == 0:
-        return f"M {x!r} {y!r} H {right!r} V {bottom!r} H {x!r} Z"
-    turn = f"A {rx!r} {ry!r} 0 0 1"
-    return (
-        f"M {x + rx!r} {y!r} H {right - rx!r} {turn} {right!r} {y + ry!r} "
-        f"V {bottom - ry!r} {turn} {right - rx!r} {bottom!r} "
-        f"H {x + rx!r} {turn} {x!r} {bottom - ry!r} V {y + ry!r} {turn} {x + rx!r} {y!r} Z"
-    )
-
-
-def _corners(text: str, name: str) -> str:
-    try:
-        coordinates = list(_numbers(text))
-    except ValueError as error:
-        raise DesignError(
-            f'has <{name}> with points that stop at "{error}"; draw it again'
-        ) from None
-    if len(coordinates) % 2:
-        raise DesignError(f"has <{name}> with an odd count of numbers in points; draw it again")
-    if not coordinates:
-        return ""
-    refuse_more_than_limit(len(coordinates) // 2)
-    pairs = [f"{x} {y}" for x, y in zip(coordinates[::2], coordinates[1::2], strict=True)]
-    return f"M {' L '.join(pairs)}{' Z' if name == 'polygon' else ''}"
-
-
-def _commands(text: str) -> Iterator[str]:
-    """Yield path data with every command and number separate. Raises DesignError if it is
-    damaged.
-    """
-    if text.strip(WHITE) in ("", "none"):
-        return
-    # A move and a closing beside each segment at most.
-    refuse_more_than_limit(sum(1 for _ in _COMMANDS.finditer(text)) // 3)
-    start, *rest = _COMMANDS.split(text)
-    letters, bodies = rest[::2], rest[1::2]
-    if start.strip(WHITE) or not letters or letters[0] not in "Mm":
-        raise DesignError("has <path> with d that does not begin with a move; draw it again")
+def _path_data(text: str) -> str:
+    """Return the data of a path as the library reads it. Raises DesignError if it is damaged."""
+    text = text.strip(WHITE).removeprefix("none")
     # A letter and seven numbers make the longest segment, an arc.
     refuse_more_than_limit(len(_NUMBER.findall(text)) // 8)
-    for before, letter, body in zip(["", *letters], letters, bodies, strict=False):
-        takes = TAKES[letter.upper()]
-        try:
-            values = list(_numbers(body, takes == 7))
-        except ValueError as error:
-            raise DesignError(
-                f'has <path> with d that is damaged at "{error}"; draw it again'
-            ) from None
-        if (takes == 0 and values) or (takes and (not values or len(values) % takes)):
-            raise DesignError(
-                f'has <path> with d that is damaged at "{letter}{body.strip()[:20]}"; draw it again'
-            )
-        if before.upper() + letter.upper() in UNLIKE:
-            yield from ("l", "0", "0")
-        if takes == 7:
-            yield from _arcs(letter, values)
-        else:
-            yield letter
-            yield from values
+    if text and text[0] not in "Mm":
+        raise DesignError("has <path> with d that does not begin with a move; draw it again")
+    return _UNLIKE.sub(r"\g<0>l0 0", _sound(_PATH, text, "<path> with d", DRAW_AGAIN))
 
 
-def _arcs(letter: str, values: list[str]) -> Iterator[str]:
-    """Yield arcs one by one; those without a radius are lines."""
-    for first in range(0, len(values), 7):
-        rx, ry, *rest = values[first : first + 7]
-        if float(rx) == 0 or float(ry) == 0:
-            yield from ("L" if letter == "A" else "l", *rest[-2:])
-        else:
-            yield from (letter, rx, ry, *rest)
+class _Placement(NamedTuple):
+    """The map from a shape's points to mm, by the shape's transform and the page's scale."""
+
+    matrix: Matrix
+    scale: float
+
+    def __call__(self, p: Any) -> Point:
+        x, y = self.matrix.point_in_matrix_space(p)
+        return place(self.scale * x, -self.scale * y)
 
 
-ToMillimetres = Callable[[Any], Point]
-
-
-def _placement(matrix: Matrix, scale: float) -> ToMillimetres:
-    """Return the map from a shape's points to mm, by the shape's transform and the page's scale."""
-    a, b, c, d, e, f = matrix
-
-    def point(p: Any) -> Point:
-        return place(scale * (a * p.x + c * p.y + e), -scale * (b * p.x + d * p.y + f))
-
-    return point
-
-
-def _subpaths(segments: list[Any], point: ToMillimetres) -> Iterator[Strand]:
+def _subpaths(segments: list[Any], point: _Placement) -> Iterator[Strand]:
     """Yield a strand from every move to the next, or to where the path is closed."""
     edges: list[Edge] = []
     for segment in segments:
@@ -545,12 +440,12 @@ def _subpaths(segments: list[Any], point: ToMillimetres) -> Iterator[Strand]:
         yield tuple(edges)
 
 
-def _edges(segment: Any, point: ToMillimetres) -> tuple[Edge, ...]:
+def _edges(segment: Any, point: _Placement) -> tuple[Edge, ...]:
     kind = type(segment).__name__
     if segment.start is None or segment.end is None:
         return ()
     start, end = point(segment.start), point(segment.end)
-    if kind == "Arc":
+    if kind == "Arc" and min(segment.rx, segment.ry) > 0:
         centre = point(segment.center)
         major, minor = (
             (p[0] - centre[0], p[1] - centre[1]) for p in (point(segment.prx), point(segment.pry))

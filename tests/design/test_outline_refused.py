@@ -26,15 +26,10 @@ def _endless_spline(space: Any) -> None:
 
 
 BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
-    "nothing": (lambda m: m.add_text("pocket"), "no closed path"),
     "two": (lambda m: (m.add_circle((0, 0), 2), m.add_circle((0, 0), 1)), "2 closed paths"),
     "open": (
         lambda m: m.add_lwpolyline([(-3, -2), (3, -2), (3, 2), (-3, 2), (-3, -1.98)]),
         r"gap of 0\.0200 mm at x -3\.0000, y -\d\.",
-    ),
-    "loose line": (
-        lambda m: (m.add_circle((0, 0), 3), m.add_line((0, 0), (1, 0))),
-        r"is open: a gap of 1\.0000 mm",
     ),
     "drawn twice": (
         lambda m: (m.add_circle((0, 0), 2), m.add_circle((0, 0), 2)),
@@ -43,10 +38,6 @@ BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
     "bow tie": (
         lambda m: m.add_lwpolyline([(-3, -2), (3, 2), (3, -2), (-3, 2)], close=True),
         r"crosses or touches itself at x 0\.0000, y 0\.0000",
-    ),
-    "corner on an edge": (
-        lambda m: m.add_lwpolyline([(-3, -2), (3, -2), (3, 2), (1, -2), (-3, 2)], close=True),
-        r"crosses or touches itself at x 1\.0000, y -2\.0000",
     ),
     "corner on a corner": (
         lambda m: m.add_lwpolyline(
@@ -59,9 +50,7 @@ BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
         "has its centroid outside itself",
     ),
     "too large": (lambda m: m.add_circle((0, 0), 75.1), r"150\.2 x 150\.2 mm"),
-    "too small": (lambda m: m.add_circle((0, 0), 0.4), r"0\.8 x 0\.8 mm"),
     "NaN": (lambda m: m.add_circle((0, math.nan), 4), "coordinate of x 0, y nan"),
-    "infinite": (lambda m: m.add_line((0, 0), (math.inf, 0)), "coordinate of x inf"),
     "tilted": (
         lambda m: m.add_circle((0, 0), 4, dxfattribs={"extrusion": (0, 1, 0)}),
         "CIRCLE that is tilted",
@@ -79,21 +68,9 @@ BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda m: [m.add_line(a, b) for a, b in pairwise(RISING)],
         "LINE at z 3 where another point is at z 0; lay the whole outline flat",
     ),
-    "polyline that rises": (lambda m: m.add_polyline3d(RISING), "POLYLINE at z 3"),
-    "spline that rises": (
-        lambda m: m.add_open_spline([(*p, p[0]) for p in [*ARROW, ARROW[0]]]),
-        "SPLINE at z",
-    ),
     "spline through points that rise": (
         lambda m: m.add_spline([(*p, p[0]) for p in [*ARROW, ARROW[0]]]),
         "SPLINE at z",
-    ),
-    "half at a height": (
-        lambda m: (
-            m.add_arc((0, 0), 4, 0, 180),
-            m.add_arc((0, 0, 5), 4, 180, 360),
-        ),
-        "ARC at z 5 where another point is at z 0",
     ),
     "half at a height, from behind": (
         lambda m: (
@@ -102,29 +79,10 @@ BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
         ),
         "ARC at z -5 where another point is at z 5",
     ),
-    "light polyline at another height": (
-        lambda m: (
-            m.add_lwpolyline([(-3, -2), (3, -2)], dxfattribs={"elevation": 1}),
-            m.add_lwpolyline([(3, -2), (0, 4), (-3, -2)]),
-        ),
-        "LWPOLYLINE at z 0",
-    ),
     "ellipse that rises": (lambda m: m.add_ellipse((0, 0), (5, 1, 2), 0.4), "ELLIPSE at z 2"),
     "mesh": (lambda m: m.add_polymesh((3, 3)), "POLYLINE that is a mesh"),
-    "construction line": (
-        lambda m: (m.add_circle((0, 0), 3), m.add_xline((0, 0), (1, 0))),
-        "entity XLINE, which is not read; explode",
-    ),
-    "block beside the outline": (
-        lambda m: (m.add_circle((0, 0), 3), m.add_blockref("POCKET", (0, 0))),
-        "entity INSERT",
-    ),
     "invisible": (
         lambda m: m.add_circle((0, 0), 3, dxfattribs={"invisible": 1}),
-        "hidden entities only",
-    ),
-    "layer that is off": (
-        lambda m: (m.doc.layers.add("A").off(), m.add_circle((0, 0), 3, dxfattribs={"layer": "A"})),
         "hidden entities only",
     ),
     "blocks are not followed": (lambda m: m.add_blockref("POCKET", (0, 0)), "entity INSERT"),
@@ -147,15 +105,10 @@ def test_other_units_are_refused(tmp_path: Path) -> None:
 
 BAD_SVG = {
     "doctype": ("<circle r='2'/><!DOCTYPE svg>", PAGE, "DOCTYPE"),
-    "clone": ('<defs><circle id="a" r="2"/></defs><use href="#a"/>', PAGE, "clone"),
-    "two subpaths": ('<path d="M-3-2h6v6h-6z m1 1h1v1h-1z"/>', PAGE, "2 closed paths"),
     "open": ('<path d="M-3-2h6v6h-6"/>', PAGE, r"gap of 6\.0000 mm"),
     "cusp": ('<path d="M-2.5-2C2.5 3-2.5 3 2.5-2z"/>', PAGE, r"cusp near x -?0\.0000, y -1\.7500"),
-    "flattened": ('<ellipse rx="2" ry="3" transform="scale(2 1e-9)"/>', PAGE, "cusp near"),
     "overflow": ('<circle r="1e400"/>', PAGE, "coordinate"),
-    "garbage": ('<path d="garbage"/>', PAGE, "does not begin with a move"),
     "no view": ('<circle r="2"/>', 'width="4mm" viewBox="0 0 0 1"', "viewBox"),
-    "no width": ('<circle r="2"/>', 'width="0mm" viewBox="0 0 1 1"', "width or height"),
     "many elements": ("<g/>" * 2001, PAGE, "more than 2000 elements"),
     "nested deeply": ("<g>" * 1500 + "</g>" * 1500, PAGE, "no closed path"),
     "long path": (f'<path d="M0 0{"c1 1 2 2 3 3" * 3000}"/>', PAGE, "more than 5000 edges"),
@@ -173,9 +126,7 @@ def test_an_svg_that_is_no_outline_is_refused(tmp_path: Path, name: str) -> None
 
 BAD_FILES = {
     "text.dxf": (b"not a drawing", "not a sound DXF file"),
-    "cut_short.dxf": (b"0\nSECTION\n2\nENTITIES\n0\nCIRCLE\n", "not a sound DXF file"),
     "large.dxf": (b"0" * 5_000_001, "5,000,001 bytes"),
-    "picture.png": (b"", r"neither \.dxf nor \.svg"),
     "page.svg": (b"<html/>", "not an SVG"),
     "utf16.svg": ("<svg/>".encode("utf-16"), "UTF-8"),
 }
@@ -207,10 +158,3 @@ def test_a_compensated_cut_file_is_no_outline(tmp_path: Path, state: str) -> Non
             read_outline(path)
     else:
         assert read_outline(path).area == pytest.approx(9 * math.pi)
-
-
-def test_a_block_among_the_entities_is_refused(tmp_path: Path) -> None:
-    path = dxf(tmp_path, lambda space: space.add_circle((1, 2), 3))
-    path.write_text(path.read_text().replace("  0\nCIRCLE\n", "  0\nBLOCK\n"))
-    with pytest.raises(DesignError, match="BLOCK"):
-        read_outline(path)
