@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from sbafab.design.files import FITS, checked, override
 from sbafab.design.films import UNCALIBRATED
 from sbafab.design.kits import SCHEMA, Kit, KitFile, load_kit
-from sbafab.design.records import Design, with_unused, without_none
+from sbafab.design.records import Design, dotted, with_unused, without_none
 from sbafab.design.sections import Models
 from sbafab.laminate.films import Film
 
@@ -54,8 +54,6 @@ NO_ACTUATOR = (
 
 
 PINNED = ("pin_diameter", "pin_clearance", "full_bond_pins")
-
-
 BONDED = (
     *("temperature_c", "pressure_kpa", "platen_width", "platen_length", "flash_bottom_minutes"),
     *("bond_bottom_minutes", "flash_middle_minutes", "bond_all_minutes"),
@@ -141,16 +139,8 @@ def _values(kit: Kit) -> Iterator[tuple[str, object]]:
     """Every key given by a kit, with its value in a design."""
     record = checked(KitFile, {"schema": SCHEMA, "name": "x", "version": "x", **kit.tables}, {})
     usual = without_none(record.model_dump(mode="json"))
-    for key in _dotted(kit.tables):
+    for key, _ in dotted(kit.tables):
         yield key, _at(usual, key)
-
-
-def _dotted(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from _dotted(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}"
 
 
 def _at(table: Any, key: str) -> object:

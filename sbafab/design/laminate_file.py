@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -165,48 +165,34 @@ def _document(laminate: Laminate) -> dict[str, Any]:
         return rows[id(region)]
 
     layers = [
-        {
-            "index": layer.index,
-            "role": layer.role,
-            "film": films.of(asdict(layer.film)),
-            "shape": shape(layer.profile),
-            "balloon": layer.balloon,
-            "z": layer.z,
-            "pieces": layer.pieces,
-            "pattern": layer.pattern,
-            "turned": layer.turned,
-        }
+        {name: getattr(layer, name, None) for name in LayerRow.model_fields}
+        | {"film": films.of(asdict(layer.film)), "shape": shape(layer.profile)}
         for layer in laminate.layers
     ]
     outline = shape(laminate.outline)
-    return {
-        "schema": SCHEMA,
-        "name": laminate.name,
-        "family": laminate.family,
-        "registration": laminate.registration,
-        "balloons": laminate.balloons,
-        "lumen": laminate.lumen,
-        "tube": laminate.tube,
-        "pins_in_full_bonds": laminate.pins_in_full_bonds,
-        "middle_first": laminate.middle_first,
-        "notes": laminate.notes,
+    converted = {
+        "schema_id": SCHEMA,
         "films": films.values,
         "layers": layers,
-        "chambers": [asdict(chamber) for chamber in laminate.chambers],
-        "bores": [asdict(bore) for bore in laminate.bores],
-        "inlets": [asdict(inlet) for inlet in laminate.inlets],
-        "pins": [asdict(pin) for pin in laminate.pins],
         "seams": [
             {**asdict(seam), "path": [[*map(_edge_row, chain)] for chain in seam.path]}
             for seam in laminate.seams
         ],
-        "folds": [asdict(fold) for fold in laminate.folds],
-        "ports": [asdict(port) for port in laminate.ports],
-        "nets": [asdict(net) for net in laminate.nets],
-        "bonds": [asdict(bond) for bond in laminate.bonds],
         "outline": outline,
         "shapes": shapes.values,
     }
+    return {
+        info.alias or name: converted[name]
+        if name in converted
+        else _plain(getattr(laminate, name))
+        for name, info in LaminateDocument.model_fields.items()
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Records as tables of their values."""
+    is_rows = isinstance(value, tuple) and all(map(is_dataclass, value))
+    return [asdict(row) for row in value] if is_rows else value
 
 
 def _shape_rows(region: Region) -> list[list[list[float | bool]]]:
@@ -255,10 +241,8 @@ def read_laminate(path: Path) -> Laminate:
 
 def _laminate(document: LaminateDocument) -> Laminate:
     shapes = [Region(tuple(map(_contour, shape))) for shape in document.shapes]
-    return Laminate(
-        name=document.name,
-        family=document.family,
-        layers=tuple(
+    converted = {
+        "layers": tuple(
             Layer(
                 film=document.films[row.film],
                 profile=shapes[row.shape],
@@ -266,27 +250,14 @@ def _laminate(document: LaminateDocument) -> Laminate:
             )
             for row in document.layers
         ),
-        chambers=document.chambers,
-        bores=document.bores,
-        inlets=document.inlets,
-        pins=document.pins,
-        lumen=document.lumen,
-        balloons=document.balloons,
-        registration=document.registration,
-        notes=document.notes,
-        outline=shapes[document.outline],
-        pins_in_full_bonds=document.pins_in_full_bonds,
-        middle_first=document.middle_first,
-        tube=document.tube,
-        seams=tuple(
+        "outline": shapes[document.outline],
+        "seams": tuple(
             Seam(path=tuple(map(_edges, row.path)), **row.model_dump(exclude={"path"}))
             for row in document.seams
         ),
-        folds=document.folds,
-        ports=document.ports,
-        nets=document.nets,
-        bonds=document.bonds,
-    )
+    }
+    plain = LaminateDocument.model_fields.keys() - {"schema_id", "films", "shapes", *converted}
+    return Laminate(**{name: getattr(document, name) for name in plain}, **converted)
 
 
 def _contour(rows: Iterable[Sequence[Any]]) -> Contour:
