@@ -361,10 +361,14 @@ def build(design: DrawnDesign) -> Laminate:
 
     Raises DesignError with the key at fault, or with the reason why its films cannot be joined.
     """
-    _check(design)
+    _refuse(_faults(design))
     shapes = ShapeRegions(design.shapes.by_name, design.drawings)
     balloons = design.stack.balloons
-    cuts = _cuts(design, shapes)
+    numbers = balloon_numbers(design.layer_roles, design.seamed_layers)
+    cuts = [
+        CutFilm(row.role, shapes.of(row.shape, f"layer {number}"), balloon, row.pieces)
+        for number, (row, balloon) in enumerate(zip(design.layers, numbers, strict=True), start=1)
+    ]
     chambers = tuple(
         Chamber(chamber.name, chamber.centres, chamber.balloons or ())
         for chamber in design.chambers
@@ -376,6 +380,7 @@ def build(design: DrawnDesign) -> Laminate:
         if len(chamber.balloons or range(balloons)) > 1
     )
     stack = _turned(layers(cuts, design), design)
+    tube = design.inlet.tube_outer_diameter
     laminate = Laminate(
         name=design.name,
         family=design.family,
@@ -394,185 +399,146 @@ def build(design: DrawnDesign) -> Laminate:
         tube=None if design.tube is None else design.tube.outer_diameter,
         outline=Region() if design.body is None else shapes.of(design.body, "body"),
         seams=tuple(
-            Seam(
-                seam.name,
-                *seam.layers,
-                _seam_path(seam, shapes),
-                seam.width,
-                seam.tool,
-                seam.kind,
-                number,
-            )
-            for number, seam in enumerate(design.seams or (), start=1)
+            Seam(row.name, *row.layers, _seam_path(row, shapes), row.width, row.tool, row.kind, n)
+            for n, row in enumerate(design.seams or (), start=1)
         ),
         folds=tuple(
             replace(fold, line=toward(fold.line, stack[fold.lower - 1].profile))
             for fold in design.stated_folds
         ),
         ports=tuple(
-            Port(port.name, *port.layers, port.at, port.kind, _tube_on(port, design))
-            for port in design.ports or ()
+            Port(row.name, *row.layers, row.at, row.kind, tube if row.kind == "hole" else None)
+            for row in design.ports or ()
         ),
         nets=tuple(Net(name, members) for name, members in _nets(design).items()),
         bonds=design.stated_bonds,
     )
-    _check_folds(laminate, design)
+    _refuse(_faults_of_folds(laminate, design))
     joinings(laminate)
     return laminate
-
-
-def _tube_on(port: DrawnPort, design: DrawnDesign) -> float | None:
-    return design.inlet.tube_outer_diameter if port.kind == "hole" else None
 
 
 def _nets(design: DrawnDesign) -> Mapping[str, tuple[str, ...]]:
     return {} if design.nets is None else design.nets.by_name
 
 
-def _check(design: DrawnDesign) -> None:
-    """Raises DesignError for parts that make no laminate."""
-    roles = [layer.role for layer in design.layers]
-    if not roles:
-        raise DesignError('layers is missing; add a list of {role = "...", shape = "..."}')
-    if not design.chambers and not any(port.kind == "hole" for port in design.ports or ()):
-        raise DesignError(
-            "chambers is missing; add a list of {name, centres, mouth, angle}, or a port of kind "
-            '"hole" to a net'
-        )
-    _check_centres(design)
-    names = [chamber.name for chamber in design.chambers]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise DesignError(f"chambers has {shown(twice)} twice; give each chamber its name")
+def _faults(design: DrawnDesign) -> Iterator[str]:
+    """Yield what makes parts no laminate; each fault rests on those before it."""
+    if not design.layers:
+        yield 'layers is missing; add a list of {role = "...", shape = "..."}'
+    yield from _faults_of_names(design)
     if design.registration.method == "ears" and design.pins is None:
-        raise DesignError(
+        yield (
             "registration.method = 'ears' adds parts to layers, and drawn ones stay as they are; "
             'set it to "channel-pin", or draw the ears and list their pins'
         )
-    _check_order(roles)
-    pairs = chamber_gaps(roles, design.seamed_layers)
-    _check_seams(design, list(pairs))
-    _check_ports(design)
-    _check_nets(design)
-    count = sum(pairs.values())
+    yield from _faults_of_order(design.layer_roles)
+    yield from _faults_of_joints(design)
+    yield from _faults_of_nets(design)
+    count = sum(chamber_gaps(design.layer_roles, design.seamed_layers).values())
     if not count:
-        raise DesignError(
+        yield (
             "layers has no gap with a chamber; lay a chamber-mask between two films, or bond them "
             "by seams"
         )
     if count != design.stack.balloons:
-        raise DesignError(
+        yield (
             f"stack.balloons = {design.stack.balloons}, and layers has {count} gaps with a "
             "chamber; each balloon has one: leave stack.balloons out, or correct the roles"
         )
     for number, chamber in enumerate(design.chambers):
-        strange = [balloon for balloon in chamber.balloons or () if not 1 <= balloon <= count]
-        if strange:
-            raise DesignError(
-                f"chambers.{number}.balloons = {strange[0]} is none of the {count} gaps with a "
-                "chamber; they count from 1 at the bottom"
-            )
-
-
-def _check_centres(design: DrawnDesign) -> None:
-    """Raises DesignError for a centre given twice."""
-    for chamber in design.chambers:
-        for number, centre in enumerate(chamber.centres):
-            if centre in chamber.centres[:number]:
-                raise DesignError(
-                    f"chambers has the centre {list(centre)} of {chamber.name} twice; remove one"
+        for balloon in chamber.balloons or ():
+            if not 1 <= balloon <= count:
+                yield (
+                    f"chambers.{number}.balloons = {balloon} is none of the {count} gaps with a "
+                    "chamber; they count from 1 at the bottom"
                 )
 
 
-def _check_order(roles: Sequence[str]) -> None:
-    """Raises DesignError for layers that make no stack."""
+def _faults_of_names(design: DrawnDesign) -> Iterator[str]:
+    """Yield missing chambers, and names and centres given twice."""
+    chambers, ports = design.chambers, design.ports or ()
+    if not chambers and not any(port.kind == "hole" for port in ports):
+        yield (
+            "chambers is missing; add a list of {name, centres, mouth, angle}, or a port of kind "
+            '"hole" to a net'
+        )
+    for chamber in chambers:
+        for centre in _twice(chamber.centres):
+            yield f"chambers has the centre {list(centre)} of {chamber.name} twice; remove one"
+    for key, rows in (("chamber", chambers), ("seam", design.seams or ())):
+        for name in _twice([row.name for row in rows]):
+            yield f"{key}s has {shown(name)} twice; give each {key} its name"
+    for name in _twice([row.name for row in (*chambers, *ports)]):
+        yield (
+            f"ports has {shown(name)}, which is the name of another port or chamber; give each its "
+            "own"
+        )
+
+
+def _faults_of_joints(design: DrawnDesign) -> Iterator[str]:
+    """Yield folds, seams and ports that lie between no neighbouring films."""
+    ports = design.ports or ()
+    pairs = chamber_gaps(design.layer_roles, design.seamed_layers)
+    joints = [
+        (f"fold of layers {f.lower} and {f.upper}", (f.lower, f.upper)) for f in design.stated_folds
+    ]
+    joints += [(f"seam {seam.name}", seam.layers) for seam in design.seams or ()]
+    joints += [(f"port {port.name}", port.layers) for port in ports]
+    for joint, pair in joints:
+        if pair not in pairs:
+            yield (
+                f"{joint}: layers {list(pair)} are not two films that lie next to each other, "
+                f"which are {', '.join(str(list(pair)) for pair in pairs)}"
+            )
+    first, *_, last = [*pairs, *pairs]
+    for port in ports:
+        if port.kind == "hole" and port.layers not in (first, last):
+            yield (
+                f"port {port.name} is a hole between layers {list(port.layers)}, and a tube goes "
+                f"through the bottom or the top film; give {list(first)} or {list(last)}, or join "
+                "them by a hole in each film between"
+            )
+
+
+def _twice(values: Sequence[Any]) -> list[Any]:
+    return [value for number, value in enumerate(values) if value in values[:number]]
+
+
+def _faults_of_order(roles: Sequence[str]) -> Iterator[str]:
+    """Yield what makes layers no stack."""
     masks = [role.endswith("-mask") for role in roles]
     if masks.count(False) < 2:
-        raise DesignError(
-            f"layers has {masks.count(False)} structural films; a laminate has two at least"
-        )
+        yield f"layers has {masks.count(False)} structural films; a laminate has two at least"
     for number in (1, len(roles)):
         if masks[number - 1]:
-            raise DesignError(
+            yield (
                 f"layer {number} is a {roles[number - 1]} with no film on its other side; masks "
                 "lie between films: add one, or remove the mask"
             )
     for number, (role, mask) in enumerate(zip(roles[1:], roles, strict=False), start=2):
         if role.endswith("-mask") and mask.endswith("-mask") and role != mask:
-            raise DesignError(
+            yield (
                 f"layer {number} is a {role} on a {mask}: masks between two films have one role, "
                 "that of the gap"
             )
 
 
-def _check_seams(design: DrawnDesign, pairs: Sequence[tuple[int, int]]) -> None:
-    """Raises DesignError for seams and folds that do not lie between neighbouring films."""
-    for fold in design.stated_folds:
-        if (fold.lower, fold.upper) not in pairs:
-            raise DesignError(
-                f"fold of layers {fold.lower} and {fold.upper}: they are not two films that lie "
-                f"next to each other, which are {', '.join(str(list(pair)) for pair in pairs)}"
-            )
-    seams = design.seams or ()
-    names = [seam.name for seam in seams]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise DesignError(f"seams has {shown(twice)} twice; give each seam its name")
-    for seam in seams:
-        if seam.layers not in pairs:
-            raise DesignError(
-                f"seam {seam.name}: layers {list(seam.layers)} are not two films that lie next to "
-                f"each other, which are {', '.join(str(list(pair)) for pair in pairs)}"
-            )
-
-
-def _check_ports(design: DrawnDesign) -> None:
-    """Raises DesignError for ports that lie between no neighbouring films, or share a name."""
-    films = [n for n, row in enumerate(design.layers, 1) if not row.role.endswith("-mask")]
-    pairs = list(pairwise(films))
-    names = {chamber.name for chamber in design.chambers}
-    for port in design.ports or ():
-        if port.name in names:
-            raise DesignError(
-                f"ports has {shown(port.name)}, which is the name of another port or chamber; give "
-                "each its own"
-            )
-        names.add(port.name)
-        if port.layers not in pairs:
-            raise DesignError(
-                f"port {port.name}: layers {list(port.layers)} are not two films that lie next to "
-                f"each other, which are {', '.join(str(list(pair)) for pair in pairs)}"
-            )
-        if port.kind == "hole" and not {films[0], films[-1]} & {*port.layers}:
-            raise DesignError(
-                f"port {port.name} is a hole between layers {list(port.layers)}, and a tube goes "
-                f"through the bottom or the top film; give {list(pairs[0])} or {list(pairs[-1])}, "
-                "or join them by a hole in each film between"
-            )
-
-
-def _check_nets(design: DrawnDesign) -> None:
-    """Raises DesignError for members of nets that do not exist, or are in two nets."""
-    names = [chamber.name for chamber in design.chambers]
-    names += [port.name for port in design.ports or ()]
+def _faults_of_nets(design: DrawnDesign) -> Iterator[str]:
+    """Yield members of nets that do not exist, or are in two nets."""
+    names = [row.name for row in (*design.chambers, *(design.ports or ()))]
     home: dict[str, str] = {}
     for net, members in _nets(design).items():
         if not re.fullmatch(NAME_PATTERN, net):
-            raise DesignError(
-                f"nets.{net} is no name; take letters, digits, dots, - and _, 64 at most"
-            )
+            yield f"nets.{net} is no name; take letters, digits, dots, - and _, 64 at most"
         for member in members:
             if member not in names:
                 near = difflib.get_close_matches(member, names, 1)
                 hint = f"did you mean {near[0]}?" if near else f"there are {listed(names)}"
-                raise DesignError(
-                    f"nets.{net} names {shown(member)}, which is no port or chamber; {hint}"
-                )
+                yield f"nets.{net} names {shown(member)}, which is no port or chamber; {hint}"
             if member in home:
                 where = "twice" if home[member] == net else f"and so does nets.{home[member]}"
-                raise DesignError(
-                    f"nets.{net} names {shown(member)} {where}; a port belongs to one net, once"
-                )
+                yield f"nets.{net} names {shown(member)} {where}; a port belongs to one net, once"
             home[member] = net
 
 
@@ -599,44 +565,50 @@ def _turned(stack: tuple[Layer, ...], design: DrawnDesign) -> tuple[Layer, ...]:
     return tuple(placed)
 
 
-def _check_folds(laminate: Laminate, design: DrawnDesign) -> None:
-    """Raises DesignError for folds at which no film can be folded."""
-    halves = [index for fold in laminate.folds for index in (fold.lower, fold.upper)]
+def _refuse(faults: Iterator[str]) -> None:
+    """Raise DesignError for the first of the faults."""
+    fault = next(faults, None)
+    if fault is not None:
+        raise DesignError(fault)
+
+
+def _faults_of_folds(laminate: Laminate, design: DrawnDesign) -> Iterator[str]:
+    """Yield folds at which no film can be folded."""
+    uppers = [fold.upper for fold in laminate.folds]
     for fold, stated in zip(laminate.folds, design.stated_folds, strict=True):
         lower, upper = laminate.layer(fold.lower), laminate.layer(fold.upper)
         name = f"fold of layers {fold.lower} and {fold.upper}"
         if lower.film != upper.film:
-            raise DesignError(
+            yield (
                 f"{name}: they are of {lower.film.material} and {upper.film.material}, and halves "
                 "of one film are of one; give both the same film"
             )
-        if halves.count(fold.upper) - sum(f.lower == fold.upper for f in laminate.folds) > 1:
-            raise DesignError(f"{name}: layer {fold.upper} is folded over twice; remove one fold")
+        if uppers.count(fold.upper) > 1:
+            yield f"{name}: layer {fold.upper} is folded over twice; remove one fold"
         way = design.layers[fold.upper - 1].turned
         if way is not None and way != upper.turned:
-            raise DesignError(
-                f"{name}: layer {fold.upper} has turned = {str(way).lower()}, and folding turns "
-                "it the other way up; leave it out"
+            yield (
+                f"{name}: layer {fold.upper} has turned = {str(way).lower()}, and folding turns it "
+                "the other way up; leave it out"
             )
         for layer in (lower, upper):
             if not any(lies_on(edge, [fold.line]) for edge in layer.profile.edges):
                 (x, y), (u, v) = stated.line
-                raise DesignError(
+                yield (
                     f"{name}: layer {layer.index} has no edge on the line from x {x:g}, y {y:g} to "
                     f"x {u:g}, y {v:g}; both halves end at the line with a straight edge"
                 )
         over = lower.profile & unfolded(upper.profile, [fold.line])
         if over.area > LEAST_OVERLAP:
             x, y = over.edges[0].at(0.5)
-            raise DesignError(
+            yield (
                 f"{name}: laid flat the halves lie over each other on {over.area:.3f} mm2, at "
                 f"x {x:.3f}, y {y:.3f}; both must lie on one side of the line"
             )
-    for root in {fold.lower for fold in laminate.folds} - {fold.upper for fold in laminate.folds}:
+    for root in {fold.lower for fold in laminate.folds}.difference(uppers):
         flat = laminate.as_cut(laminate.layer(root))
-        parts = len(laminate.layer(root).profile.pieces)
-        if len(flat.pieces) > parts:
-            raise DesignError(
+        if len(flat.pieces) > len(laminate.layer(root).profile.pieces):
+            yield (
                 f"fold of layer {root}: laid flat its halves fall into {len(flat.pieces)} parts, "
                 "for they do not meet on the line; let their edges there overlap"
             )
@@ -650,15 +622,6 @@ def _seam_path(seam: DrawnSeam, shapes: ShapeRegions) -> tuple[tuple[Edge, ...],
     return (polyline(marks, closed=seam.closed and marks[0][:2] != marks[-1][:2]),)
 
 
-def _cuts(design: DrawnDesign, shapes: ShapeRegions) -> list[CutFilm]:
-    """The layers, each with the number of its balloon."""
-    balloons = balloon_numbers(design.layer_roles, design.seamed_layers)
-    return [
-        CutFilm(row.role, shapes.of(row.shape, f"layer {number}"), balloon, row.pieces)
-        for number, (row, balloon) in enumerate(zip(design.layers, balloons, strict=True), start=1)
-    ]
-
-
 def _pins(design: DrawnDesign, bores: Sequence[Bore]) -> tuple[Pin, ...]:
     if design.pins is not None:
         return tuple(Pin(pin.name, pin.at, pin.diameter, pin.clearance) for pin in design.pins)
@@ -669,16 +632,10 @@ def _pins(design: DrawnDesign, bores: Sequence[Bore]) -> tuple[Pin, ...]:
 
 
 def _inlet(chamber: DrawnChamber, design: DrawnDesign) -> Inlet:
-    settings = design.inlet
     width = design.strip_width if chamber.width is None else chamber.width
-    return Inlet(
-        chamber.name,
-        chamber.mouth,
-        unit(chamber.angle),
-        width,
-        settings.tab_length if chamber.length is None else chamber.length,
-        settings.tube_outer_diameter,
-    )
+    length = design.inlet.tab_length if chamber.length is None else chamber.length
+    tube = design.inlet.tube_outer_diameter
+    return Inlet(chamber.name, chamber.mouth, unit(chamber.angle), width, length, tube)
 
 
 FAMILY = Family(DrawnDesign, build)

@@ -241,7 +241,7 @@ def read_laminate(path: Path) -> Laminate:
 
 def _laminate(document: LaminateDocument) -> Laminate:
     shapes = [Region(tuple(map(_contour, shape))) for shape in document.shapes]
-    converted = {
+    converted: dict[str, Any] = {
         "layers": tuple(
             Layer(
                 film=document.films[row.film],
