@@ -466,10 +466,11 @@ def _faults_of_names(design: DrawnDesign) -> Iterator[str]:
     for chamber in chambers:
         for centre in _twice(chamber.centres):
             yield f"chambers has the centre {list(centre)} of {chamber.name} twice; remove one"
-    for key, rows in (("chamber", chambers), ("seam", design.seams or ())):
-        for name in _twice([row.name for row in rows]):
+    names = [chamber.name for chamber in chambers]
+    for key, rows in (("chamber", names), ("seam", [seam.name for seam in design.seams or ()])):
+        for name in _twice(rows):
             yield f"{key}s has {shown(name)} twice; give each {key} its name"
-    for name in _twice([row.name for row in (*chambers, *ports)]):
+    for name in _twice([*names, *(port.name for port in ports)]):
         yield (
             f"ports has {shown(name)}, which is the name of another port or chamber; give each its "
             "own"
@@ -526,7 +527,8 @@ def _faults_of_order(roles: Sequence[str]) -> Iterator[str]:
 
 def _faults_of_nets(design: DrawnDesign) -> Iterator[str]:
     """Yield members of nets that do not exist, or are in two nets."""
-    names = [row.name for row in (*design.chambers, *(design.ports or ()))]
+    names = [chamber.name for chamber in design.chambers]
+    names += [port.name for port in design.ports or ()]
     home: dict[str, str] = {}
     for net, members in _nets(design).items():
         if not re.fullmatch(NAME_PATTERN, net):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from typing import Annotated, Any, Literal, Self, get_args
@@ -144,17 +145,10 @@ def probability_of(good: int, builds: int, rate: float) -> float:
 
 def builds_for(good: int, rate: float, certainty: float) -> int | None:
     """Least number of builds such that ``good`` succeed with this certainty; None beyond MOST."""
-    low, high = good, MOST
-    if probability_of(good, high, rate) < certainty:
-        return None
+    counts = range(good, MOST + 1)
     # The probability grows with the number of builds.
-    while low < high:
-        middle = (low + high) // 2
-        if probability_of(good, middle, rate) >= certainty:
-            high = middle
-        else:
-            low = middle + 1
-    return low
+    place = bisect_left(counts, certainty, key=lambda builds: probability_of(good, builds, rate))
+    return counts[place] if place < len(counts) else None
 
 
 PAPER_FILM = film_name(PAPER_PRODUCT, PAPER_THICKNESS)

@@ -145,17 +145,6 @@ def _grid(room: tuple[float, float], size: tuple[float, float]) -> tuple[int, in
     return columns, rows
 
 
-def are_apart(places: tuple[Point, ...], bounds: Bounds, room: float) -> bool:
-    """Return True if copies at these places keep APART, within a tolerance ``room`` in mm."""
-    wide = bounds[2] - bounds[0] + APART - room
-    high = bounds[3] - bounds[1] + APART - room
-    return all(
-        abs(x - u) >= wide or abs(y - v) >= high
-        for n, (x, y) in enumerate(places)
-        for u, v in places[:n]
-    )
-
-
 @dataclass(frozen=True)
 class BatchTimes:
     """Minutes of a batch: in the press, by hand, and both in sequence; None if not stated."""

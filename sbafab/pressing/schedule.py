@@ -5,7 +5,7 @@ the technician.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
@@ -144,21 +144,27 @@ def _is_the_papers(laminate: Laminate) -> bool:
 # Temperatures are C, pressures kPa, forces N, times minutes, lengths mm.
 
 
-TITLES: dict[StepName, str] = {
-    "flash_bottom": "Bottom balloon, upper two layers",
-    "tack_bottom": "Bottom balloon, its base tacked on",
-    "bond_bottom": "Bottom balloon, with its base",
-    "flash_middle": "Middle layers",
-    "tack_all": "Whole laminate, tacked",
-    "bond_all": "Whole laminate",
+STEPS: Mapping[StepName, tuple[str, str, str]] = {
+    "flash_bottom": (
+        "Bottom balloon, upper two layers",
+        "Bottom balloons, upper two layers of each",
+        "flash_bottom_minutes",
+    ),
+    "tack_bottom": (
+        "Bottom balloon, its base tacked on",
+        "Bottom balloons, their bases tacked on",
+        "flash_bottom_minutes",
+    ),
+    "bond_bottom": (
+        "Bottom balloon, with its base",
+        "Bottom balloons, each with its base",
+        "bond_bottom_minutes",
+    ),
+    "flash_middle": ("Middle layers", "Middle layers", "flash_middle_minutes"),
+    "tack_all": ("Whole laminate, tacked", "Whole laminate, tacked", "flash_middle_minutes"),
+    "bond_all": ("Whole laminate", "Whole laminate", "bond_all_minutes"),
 }
-TITLES_OF_SEVERAL = {
-    **TITLES,
-    "flash_bottom": "Bottom balloons, upper two layers of each",
-    "tack_bottom": "Bottom balloons, their bases tacked on",
-    "bond_bottom": "Bottom balloons, each with its base",
-}
-"""Titles for stacks that are pressed beside each other."""
+"""Title of a step of one stack, and of several beside each other, and the key of its minutes."""
 
 SNIP = (
     "Snip off the ears along the outline, and the tails of the inlet strips at the tab's end; the "
@@ -172,14 +178,8 @@ HANDLING_MINUTES = 60.0
 
 def minutes_closed(press: Press, step: StepName) -> float:
     """Return the minutes that the press stays closed in a step; tacking is a flash bond."""
-    return {
-        "flash_bottom": press.flash_bottom_minutes,
-        "tack_bottom": press.flash_bottom_minutes,
-        "bond_bottom": press.bond_bottom_minutes,
-        "flash_middle": press.flash_middle_minutes,
-        "tack_all": press.flash_middle_minutes,
-        "bond_all": press.bond_all_minutes,
-    }[step]
+    minutes: float = getattr(press, STEPS[step][2])
+    return minutes
 
 
 @dataclass(frozen=True)
@@ -408,7 +408,7 @@ def _step(
 ) -> Step:
     count = stack_count(laminate, part.layers)
     estimate = build_up.pressures(press, setting.pad, setting.under)
-    title = TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name]
+    title = STEPS[part.name][count > 1]
     if part.name == "flash_bottom" and len(part.layers) > 2:
         title = f"Bottom balloon{'s' * (count > 1)}, {layers_in_words(part.layers)}"
     words = _instructions(part, count) + after

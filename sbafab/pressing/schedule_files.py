@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from sbafab.documents import Document, PlainNumber
@@ -20,29 +20,6 @@ from sbafab.pressing.schedule import (
 from sbafab.spreadsheet import csv_text
 
 JOINTS = ("seams", "folds", "batch")
-COLUMNS = (
-    "step",
-    "title",
-    "bond",
-    "layers",
-    "adds",
-    "pins",
-    "temperature_c",
-    "pressure_kpa",
-    "force_n",
-    "platen_width_mm",
-    "platen_length_mm",
-    "minutes",
-    "film_kpa",
-    "edge_kpa",
-    "bond_kpa",
-    "plate_kpa",
-    "pressure_basis",
-    "build_up",
-    "pin_settings",
-    "instructions",
-    "time_temperature",
-)
 
 
 class PressDocument(Document, schema="sbafab/press@1"):
@@ -70,37 +47,6 @@ def press_json(plan: Schedule, **more: object) -> dict[str, Any]:
     return {key: value for key, value in document.items() if value or key not in JOINTS}
 
 
-def press_csv(plan: Schedule) -> str:
-    """Return the steps as a table, one row each, with units in the column names."""
-    rows: list[Sequence[object]] = [COLUMNS]
-    for step in plan.steps:
-        rows.append(
-            [
-                step.step,
-                step.title,
-                step.bond,
-                layers_in_words(step.layers),
-                layers_in_words(step.adds),
-                ", ".join(step.pins),
-                f"{step.temperature_c:g}",
-                f"{step.pressure_kpa:g}",
-                f"{step.force_n:.1f}",
-                *(f"{size:g}" for size in step.platen_mm),
-                "" if step.minutes is None else f"{step.minutes:g}",
-                f"{step.film_kpa:g}",
-                f"{step.edge_kpa:g}",
-                f"{step.bond_kpa:g}",
-                f"{step.plate_kpa:g}",
-                step.pressure_basis,
-                "; ".join(f"{i.part} {i.thickness_mm:g} mm ({i.material})" for i in step.build_up),
-                "; ".join(map(pin_words, step.pin_settings)),
-                step.instructions,
-                "; ".join(map(heat_words, step.time_temperature)),
-            ]
-        )
-    return csv_text(rows)
-
-
 def heat_words(point: HeatPoint) -> str:
     """Return one point of the time-temperature line as in the table."""
     edge = "" if point.edge_c is None else f", {point.edge_c:g} C"
@@ -114,4 +60,39 @@ def pin_words(pin: PinSetting) -> str:
     return (
         f"{pin.pin}: {pin.diameter_mm:g} x {pin.length_mm:g} mm, {pin.seat_mm:g} in the plate, "
         f"stands {pin.stands_mm:g} +- {pin.tolerance_mm:g}"
+    )
+
+
+COLUMNS: Mapping[str, Callable[[Step], object]] = {
+    "step": lambda step: step.step,
+    "title": lambda step: step.title,
+    "bond": lambda step: step.bond,
+    "layers": lambda step: layers_in_words(step.layers),
+    "adds": lambda step: layers_in_words(step.adds),
+    "pins": lambda step: ", ".join(step.pins),
+    "temperature_c": lambda step: f"{step.temperature_c:g}",
+    "pressure_kpa": lambda step: f"{step.pressure_kpa:g}",
+    "force_n": lambda step: f"{step.force_n:.1f}",
+    "platen_width_mm": lambda step: f"{step.platen_mm[0]:g}",
+    "platen_length_mm": lambda step: f"{step.platen_mm[1]:g}",
+    "minutes": lambda step: "" if step.minutes is None else f"{step.minutes:g}",
+    "film_kpa": lambda step: f"{step.film_kpa:g}",
+    "edge_kpa": lambda step: f"{step.edge_kpa:g}",
+    "bond_kpa": lambda step: f"{step.bond_kpa:g}",
+    "plate_kpa": lambda step: f"{step.plate_kpa:g}",
+    "pressure_basis": lambda step: step.pressure_basis,
+    "build_up": lambda step: "; ".join(
+        f"{item.part} {item.thickness_mm:g} mm ({item.material})" for item in step.build_up
+    ),
+    "pin_settings": lambda step: "; ".join(map(pin_words, step.pin_settings)),
+    "instructions": lambda step: step.instructions,
+    "time_temperature": lambda step: "; ".join(map(heat_words, step.time_temperature)),
+}
+"""The columns of ``press.csv``."""
+
+
+def press_csv(plan: Schedule) -> str:
+    """Return the steps as a table, one row each, with units in the column names."""
+    return csv_text(
+        [[*COLUMNS], *([cell(step) for cell in COLUMNS.values()] for step in plan.steps)]
     )

@@ -138,15 +138,6 @@ def test_its_predictions_are_those_of_its_form(site: Path, folder: Path) -> None
     assert len(added) > 30
 
 
-def test_it_has_the_symmetries_of_its_shape(site: Path, folder: Path) -> None:
-    options = ("--symmetry", "quarter", "--h", "0.7", "-o")
-    commands = [("mesh", f"{family}.toml", *options, family) for family in TWINS]
-    runs = sbafab_runs(site, folder, *commands)
-    assert [run.returncode for run in runs] == [0, 0], [run.stderr for run in runs]
-    meshes = [(folder / family / "small" / "mesh" / "volume.vtu").read_bytes() for family in TWINS]
-    assert meshes[0] == meshes[1]
-
-
 def test_it_gets_files_pages_and_decks_and_passes_as_built(site: Path, folder: Path) -> None:
     *runs, checked = sbafab_runs(
         site,

@@ -90,15 +90,6 @@ def test_1dof_5mm_drawn_is_the_familys_own_laminate(tmp_path: Path) -> None:
     assert failing(ours) == set()
 
 
-def test_a_bond_drawn_too_narrow_fails_the_rule_of_bonds(tmp_path: Path) -> None:
-    data = as_1dof(2, 1.95)
-    data["shapes"]["plate"]["by"] = 0.7
-    laminate = drawn(tmp_path, data)
-    assert "bond-width" in failing(laminate)
-    (bond,) = (f for f in run_deck(laminate, FEW) if f.rule == "bond-width")
-    assert bond.measured == pytest.approx(0.7, abs=1e-6)
-
-
 def test_shapes_have_the_areas_of_closed_formulas(tmp_path: Path) -> None:
     def area(shape: dict[str, Any], **others: dict[str, Any]) -> float:
         data = tables()
@@ -204,13 +195,6 @@ def test_a_bad_key_is_refused_in_a_sentence(
     assert "\n" not in str(caught.value)
 
 
-def test_two_chambers_of_one_name_are_refused(tmp_path: Path) -> None:
-    data = tables()
-    data["chambers"] *= 2
-    with pytest.raises(DesignError, match="chambers has 'pouch' twice"):
-        drawn(tmp_path, data)
-
-
 def test_a_drawing_and_a_film_of_its_own_go_into_the_folder_and_back(tmp_path: Path) -> None:
     import ezdxf
 
@@ -270,12 +254,6 @@ def test_a_pouch_motor_pulls_by_the_closed_form_of_its_pocket_as_drawn() -> None
     assert {"stroke", "force"} <= set(quantities)
 
 
-def test_a_pouch_motor_turned_by_90_degrees_pulls_along_the_other_side() -> None:
-    design = load_design("pouch").with_({"mechanism.direction": 90})
-    prediction = predict(design, PredictionRequest((0.5,)))
-    assert prediction.value("contraction") == pytest.approx(30 * (1 - 2 / math.pi))
-
-
 def test_a_film_that_would_stretch_leaves_the_pull_out_and_says_how_far_it_holds() -> None:
     """T = p L / 2 t, stretched by 5 % at E h / 20 = 0.019 N/mm."""
     prediction = predict(load_design("pouch"), PredictionRequest((10.0,)))
@@ -284,14 +262,3 @@ def test_a_film_that_would_stretch_leaves_the_pull_out_and_says_how_far_it_holds
     (reason,) = {o.reason for o in prediction.left_out if "10 kPa, 10 % shorter" in o.name}
     assert f"holds to {most:.3g} kPa" in reason
     assert any(f.name.startswith("pull at 0.7") for f in prediction.figures)
-
-
-def test_a_mechanism_of_straight_seams_leaves_a_round_pocket_out() -> None:
-    data = tables()
-    data["shapes"]["pocket"] = {"disc": 30}
-    design = validated(data, {"drawn": FAMILIES["drawn"].record}, Path())
-    prediction = predict(design, PredictionRequest((1.0,)))
-    assert any(
-        " % of the rectangle round it, less than 90 %" in item.reason
-        for item in prediction.left_out
-    )

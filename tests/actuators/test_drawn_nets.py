@@ -209,18 +209,6 @@ SCALED = pytest.mark.parametrize(("scale", "by"), [(1.0, (0, 0)), (2.5, (7, -3))
 
 
 @SCALED
-def test_a_chamber_of_two_balloons_passes_with_nets(
-    tmp_path: Path, scale: float, by: Point
-) -> None:
-    laminate = drawn(tmp_path, two_balloons(scale, by))
-    (bore,) = laminate.bores
-    assert (bore.chamber, bore.centre, bore.diameter) == ("a", by, 2 * scale)
-    # Masks go on over it, so that no pin stands in it.
-    assert laminate.pins == ()
-    assert failures(laminate) == []
-
-
-@SCALED
 def test_a_chamber_lies_in_its_net_in_each_of_its_balloons(
     tmp_path: Path, scale: float, by: Point
 ) -> None:
@@ -249,22 +237,6 @@ def test_a_bore_counts_with_nets_too(tmp_path: Path, scale: float, by: Point) ->
     assert clear.measured == pytest.approx(0.6 * scale)
     # Off the chamber's place it is a hole like others.
     data["shapes"]["bore"]["at"][1] += 2 * scale
-    assert failures(drawn(tmp_path, data)) == []
-
-
-def test_a_bore_goes_through_the_balloons_of_its_chamber_alone(tmp_path: Path) -> None:
-    data = two_balloons(1.0, (0, 0))
-    del data["nets"]
-    for number in (1, 3):
-        name = data["layers"][number]["shape"]
-        data["layers"][number]["shape"] = f"{name}-bored"
-        data["shapes"][f"{name}-bored"] = {"difference": [name, "bore"]}
-    data["layers"][4:] = [
-        {"role": "wall", "shape": "film"},
-        {"role": "chamber-mask", "shape": "to-right"},
-        {"role": "cap", "shape": "film"},
-    ]
-    data["chambers"].append(data["chambers"][1] | {"name": "c", "balloons": [3]})
     assert failures(drawn(tmp_path, data)) == []
 
 

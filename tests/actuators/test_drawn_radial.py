@@ -13,13 +13,11 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import pin_holes
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.measures import Measures
-from sbafab.runs.run import RunRequest, generate
 from tests.designs import PAPER
 
 COUNT = int(os.environ.get("SBAFAB_EAR_OUTLINES", "4"))
@@ -95,19 +93,3 @@ def test_an_outline_without_room_is_refused_with_the_reason(tmp_path: Path) -> N
     slot = '<rect x="-1.2" y="-8" width="2.4" height="16"/>'
     with pytest.raises(DesignError, match=r"no room for ears, which take 6\.250 mm of its width"):
         made(drawn(tmp_path, slot))
-
-
-def test_an_undrawn_outline_keeps_its_ears() -> None:
-    """A quarter of the width beside the middle, and beside the head of the tail."""
-    laminate = build(load_design("radial-15mm", ['registration.method="ears"']))
-    places = {pin.name: pin.centre for pin in laminate.pins}
-    assert [places[f"film2.{end}"][0] for end in (1, 2)] == pytest.approx([-2.875, 2.875])
-    assert [places[f"mask2.{end}"][0] for end in (1, 2)] == pytest.approx([-4.45, 4.45])
-
-
-def test_what_is_written_for_a_drawn_outline_is_held_on_its_pins(tmp_path: Path) -> None:
-    settings = drawn(tmp_path, SHAPES["slot"], "chamber.count=1", "rules.yield_builds=100")
-    generate(RunRequest(load_design("radial-15mm", settings), tmp_path / "out", ("cut",)))
-    findings = check_folder(tmp_path / "out" / "radial-15mm")
-    assert {f.rule: f.verdict for f in findings}["pin-holes"] == "pass"
-    assert not has_failed(findings)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from pathlib import Path
 
 import pytest
 
@@ -17,7 +16,6 @@ from sbafab.meshing.solid import MASKLESS_GAP, cavity, solid
 from sbafab.models.figures import PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.rules.deck import run_deck
-from sbafab.runs.run import RunRequest, generate
 from tests.designs import PAPER
 from tests.quick import few
 
@@ -28,10 +26,6 @@ DRAWN = [
     if read_toml(templates_folder() / f"{name}.toml")["family"] == "drawn"
 ]
 SOURCE = re.compile(r"arXiv \d{4}\.\d{4,5}|\(\d{4}\) \d+|US \d{4}/\d{7}|doi 10\.")
-
-
-def test_there_are_eight() -> None:
-    assert len(DRAWN) == 8
 
 
 @pytest.mark.parametrize("name", DRAWN)
@@ -47,18 +41,6 @@ def test_each_passes_its_rules(name: str) -> None:
     assert design.rules.waive == ()
     findings = run_deck(build(design), FEW)
     assert "fail" not in {finding.verdict for finding in findings}
-
-
-@pytest.mark.parametrize("name", DRAWN)
-def test_each_prediction_says_that_it_is_not_calibrated(name: str) -> None:
-    design = load_design(name)
-    sign = -1.0 if design.form.works_under_vacuum else 1.0
-    prediction = predict(design, PredictionRequest((sign * 0.5, sign * 10.0)))
-    of_mechanism = {"stroke", "force", "bending", "stiffness", "actuation"}
-    figures = [figure for figure in prediction.figures if figure.group in of_mechanism]
-    assert bool(figures) is (load_design(name).form.mechanism is not None)
-    assert all("not calibrated" in figure.model.trust for figure in figures)
-    assert all(figure.interval is None for figure in figures)
 
 
 @pytest.mark.parametrize("name", few(DRAWN, 3))
@@ -102,13 +84,6 @@ def test_the_finger_bends_by_the_moment_of_its_pouch() -> None:
     assert prediction.value("free_bend") == pytest.approx(3 * 95.3, abs=0.2)
 
 
-def test_a_beam_of_the_truss_wrinkles_by_comer_and_levy() -> None:
-    """A moment of pi p r^3 / 2, and a load of that over 100 mm; r = 15 / pi."""
-    prediction = predict(load_design("truss"), PredictionRequest((10.0,)))
-    by_hand = math.pi * 0.01 * (15 / math.pi) ** 3 / 2 / 100
-    assert prediction.value("wrinkling_load", kpa=10) == pytest.approx(by_hand, rel=0.01)
-
-
 def test_the_array_is_bounded_by_pressure_times_pocket_and_says_what_was_measured() -> None:
     prediction = predict(load_design("array"), PredictionRequest((230.0,)))
     by_hand = 0.230 * math.pi * 4**2
@@ -122,13 +97,6 @@ def test_the_vacuum_stack_slips_by_its_friction_and_jams_n_squared_times_as_stif
     prediction = predict(load_design("vacuum"), PredictionRequest((-80.0,)))
     assert prediction.value("slip_load", kpa=-80) == pytest.approx(0.128)
     assert prediction.value("jamming_ratio") == 64
-
-
-def test_the_traveller_says_which_face_of_a_coated_film_is_up(tmp_path: Path) -> None:
-    generate(RunRequest(load_design("finger"), tmp_path))
-    page = (tmp_path / "finger" / "traveller.html").read_text("utf-8")
-    assert "Its pe face is up, its pet face down" in page
-    assert "Lay the PET sheet with its coated side up" in page
 
 
 def test_the_grippers_right_cavity_goes_through_its_via() -> None:

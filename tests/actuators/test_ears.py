@@ -16,7 +16,6 @@ from sbafab.geometry.region import Region, disc
 from sbafab.laminate.assembly import assembly
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.orders.build import make_build
-from sbafab.pressing.schedule import schedule
 
 DESIGNS = [
     ("1dof-5mm", []),
@@ -144,17 +143,6 @@ def test_tails_hold_their_pins_clear_of_every_other_layer(
         assert (ring - mask.profile).is_empty
 
 
-@pytest.mark.parametrize(("name", "assignments"), DESIGNS)
-def test_the_two_ears_of_a_part_stand_at_unequal_distances(
-    name: str, assignments: list[str]
-) -> None:
-    laminate = eared(name, assignments)
-    for first, second in (("film1", "film2"), ("mask1", "mask2"), ("sheet1", "sheet2")):
-        ends = [pin.centre for pin in laminate.pins if pin.name in (first, second)]
-        if len(ends) == 2:
-            assert abs(math.hypot(*ends[0]) - math.hypot(*ends[1])) > 0.5
-
-
 def alike(one: Region, other: Region) -> bool:
     return (one - other).area + (other - one).area < 1e-6
 
@@ -200,37 +188,6 @@ def test_a_drawn_mask_does_not_go_on_the_pins_flipped(tmp_path: Path) -> None:
     axis, tail = holes
     assert axis == (0.0, 0.0)
     assert 2 * abs(tail[1]) > 0.5 * 1.5
-
-
-@pytest.mark.parametrize(("name", "assignments"), DESIGNS)
-def test_two_pins_hold_base_and_cap_whenever_they_are_laid(
-    name: str, assignments: list[str]
-) -> None:
-    design = load_design(name, [*assignments, 'registration.method="ears"'])
-    laminate = build(design)
-    for step in schedule(laminate, design).steps:
-        assert bool(step.pins) == (step.bond == "flash")
-        for index in step.layers if step.pins else ():
-            layer = laminate.layer(index)
-            if layer.role in ("base", "cap", "wall", "separator-mask", "sheet"):
-                held = [pin.name for pin in laminate.pins_holding(layer) if pin.name in step.pins]
-                assert len(held) >= 2, (step.title, layer.name)
-
-
-def test_lumen_still_clears_2_and_chambers_keep_one_bond() -> None:
-    laminate = eared("3dof-15mm", [])
-    separator = next(layer for layer in laminate.layers if layer.role == "separator-mask")
-    wall = laminate.layer(7)
-    radii = {
-        layer.role: next(
-            hole.circle[1]
-            for hole in layer.profile.holes
-            if hole.circle is not None and math.hypot(*hole.circle[0]) < 1e-6
-        )
-        for layer in (separator, wall)
-    }
-    assert radii == pytest.approx({"separator-mask": 1.0, "wall": 1.5})
-    assert math.hypot(*laminate.bores[0].centre) == pytest.approx(1.0 + 0.5 + 0.75 + 2.5)
 
 
 def test_a_bore_that_needs_more_room_is_refused() -> None:

@@ -34,14 +34,6 @@ def test_n_balloons_are_2n_tpe_n_chamber_masks_and_n_minus_1_separators(
 
 
 @pytest.mark.parametrize("name", TEMPLATES)
-def test_layers_rest_on_each_other(name: str) -> None:
-    layers = laminate(name, "stack.balloons=4").layers
-    assert layers[0].z == 0
-    for below, above in zip(layers, layers[1:], strict=False):
-        assert above.z == pytest.approx(below.z + below.film.thickness)
-
-
-@pytest.mark.parametrize("name", TEMPLATES)
 @pytest.mark.parametrize("balloons", [1, 3])
 def test_every_layer_has_the_pieces_its_role_asks_for(name: str, balloons: int) -> None:
     for layer in laminate(name, f"stack.balloons={balloons}").layers:
@@ -56,14 +48,6 @@ def test_1dof_interfaces_by_closed_formulas() -> None:
     assert chamber.bond.area == pytest.approx(math.pi * (3.25**2 - 2.5**2))
     assert chamber.unbonded.area == pytest.approx(math.pi * (2.5**2 - 0.52**2))
     assert separator.bond.area == pytest.approx(math.pi * (1.27**2 - 0.52**2))
-
-
-def test_inlet_strip_reaches_one_overhang_past_the_tab() -> None:
-    lam = laminate("1dof-5mm")
-    base, mask = lam.layers[0].profile, lam.layers[1].profile
-    assert base.bounds[2] == pytest.approx(3.25 + 5.0)
-    assert mask.bounds[2] == pytest.approx(3.25 + 5.0 + 0.5)
-    assert lam.inlets[0].mouth == pytest.approx((8.25, 0.0))
 
 
 def test_channel_pins_hold_walls_and_chamber_masks_only() -> None:
@@ -89,12 +73,6 @@ def test_lobes_keep_one_bond_from_lumen_and_from_each_other(count: int) -> None:
     # The axes leave 4.25 once neighbouring pockets would come nearer than one bond: N >= 5.
     raised = (2.5 + 0.375) / math.sin(math.pi / count) > 4.25
     assert bool(lam.notes) is raised
-
-
-def test_one_plate_from_two_to_eight_lobes_far_from_the_lumen() -> None:
-    for count in range(2, 9):
-        lam = laminate("3dof-15mm", f"chamber.count={count}", "chamber.axis_radius=12")
-        assert all(len(layer.profile.pieces) == 1 for layer in lam.tpe_layers)
 
 
 @pytest.mark.parametrize(
@@ -124,11 +102,6 @@ def test_manifold_joins_the_bottom_pockets_and_has_one_inlet() -> None:
     bottom, top = [layer.profile for layer in lam.layers if layer.role == "chamber-mask"]
     assert len(bottom.pieces) == 1
     assert len(top.pieces) == 3
-
-
-def test_sheet_overlap_lengthens_one_end() -> None:
-    sheet = laminate("radial-15mm", "sheet.overlap=4").layer(1).profile
-    assert sheet.bounds[2] + sheet.bounds[0] == pytest.approx(4.0)
 
 
 def test_equal_profiles_share_a_pattern() -> None:

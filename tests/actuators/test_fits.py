@@ -42,12 +42,6 @@ def test_lobes_within_a_circle_tabs_not_counted(count: int, lumen: float) -> Non
     assert design.chamber.diameter == pytest.approx(_down(min(by_lumen, by_neighbour)), abs=1e-9)
 
 
-def test_a_last_digit_too_wide_fits() -> None:
-    # Sines and cosines end in another digit on other machines; where it starts, too.
-    design = sbafab.load("3dof-15mm", "fits.outline=14.999999999999")
-    assert design.chamber.diameter == 5.0
-
-
 def test_what_is_solved_is_solved_again_and_what_is_given_is_held_to(tmp_path: Path) -> None:
     design = sbafab.load("3dof-15mm", "fits.outline=20")
     assert design.chamber.diameter == 7.5
@@ -86,7 +80,3 @@ def test_where_nothing_fits_the_smallest_is_said() -> None:
         sbafab.load("3dof-15mm", {"fits.diameter": 14, "fits.outline": 12})
     with pytest.raises(DesignError, match='belongs to "1dof", "lobed"'):
         sbafab.load("radial-15mm", "fits.diameter=20")
-
-
-def test_a_design_that_asks_for_nothing_is_as_it_was() -> None:
-    assert "fits" not in design_toml(sbafab.load("1dof-5mm"))

@@ -17,7 +17,6 @@ from sbafab.errors import DesignError
 from sbafab.laminate.assembly import assembly
 from sbafab.laminate.joints import balloon_numbers
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.schedule import seam_steps
 from sbafab.rules.deck import run_deck
 from tests.designs import PAPER
 
@@ -87,37 +86,6 @@ def test_a_welded_pouch_passes_and_a_gap_in_its_seam_leaks(tmp_path: Path) -> No
     assert findings["sealing"].verdict == "fail"
     assert "close the path of the seam there, make it wider" in findings["sealing"].message
     assert "mask" not in findings["sealing"].message + findings["tube-fit"].message
-
-
-def test_a_seam_too_narrow_is_measured_by_its_width(tmp_path: Path) -> None:
-    data = deepcopy(WELDED)
-    data["seams"][0]["width"] = 0.7
-    (bond,) = (f for f in run_deck(drawn(tmp_path, data), FEW) if f.rule == "bond-width")
-    assert bond.verdict == "fail"
-    assert bond.measured == pytest.approx(0.7, abs=1e-9)
-    assert "make the seam there wider, or move its path inward" in bond.message
-
-
-@pytest.mark.parametrize("kind", ["lap", "fin"])
-def test_the_step_of_a_fin_seam_alone_says_that_edges_stand_out(tmp_path: Path, kind: str) -> None:
-    data = deepcopy(WELDED)
-    data["seams"][0]["kind"] = kind
-    (step,) = seam_steps(drawn(tmp_path, data))
-    assert ("stand out together, face to face" in step.instructions) == (kind == "fin")
-
-
-def test_a_closed_seam_parts_a_pouch_from_the_flap_round_it(tmp_path: Path) -> None:
-    data = deepcopy(WELDED)
-    data["shapes"]["rim"] = {"disc": SIDE}
-    data["seams"] = [{"name": "rim", "layers": [1, 2], "shape": "rim", "width": 1, "tool": "laser"}]
-    laminate = drawn(tmp_path, data)
-    (gap,) = laminate.interfaces
-    assert gap.bond.area == pytest.approx(math.pi * SIDE * 1)
-    (finding,) = (f for f in run_deck(laminate, FEW) if f.rule == "sealing")
-    # Only the pocket without a way in is a fault, not the flap.
-    assert finding.verdict == "fail"
-    assert finding.measured == 1
-    assert "reached from no inlet" in finding.message
 
 
 def test_a_roller_ends_square_and_a_hot_tip_round(tmp_path: Path) -> None:

@@ -105,10 +105,6 @@ def test_films_of_a_random_taper_do_not_meet(template: str, number: int) -> None
     assert verdicts == {"pass"}
 
 
-def test_some_random_tapers_have_films_that_face_each_other() -> None:
-    assert any(case(*drawn)[1] for drawn in CASES)
-
-
 @pytest.mark.parametrize(
     ("sizes", "area"),
     [

@@ -10,13 +10,11 @@ from typing import Any
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.cutting.dxf_write import dxf_text
 from sbafab.design.drawing import read_drawing
 from sbafab.design.laminate_file import FILE, laminate_json
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc
 from tests.design.drawing import dxf, svg
-from tests.design.test_outline import same_shape
 
 PLATE = [(-20, -10), (20, -10), (20, 10), (-20, 10)]
 
@@ -56,14 +54,6 @@ def test_what_is_not_plotted_counts_only_by_name(tmp_path: Path) -> None:
     assert read_drawing(path).area == pytest.approx(4 * math.pi)
     with pytest.raises(DesignError, match="is open: a gap of 2"):
         read_drawing(path, "REFERENCE")
-
-
-def test_a_cut_file_of_ours_is_read_back(tmp_path: Path) -> None:
-    laminate = build(load_design("3dof-15mm"))
-    for layer in laminate.layers[:4]:
-        path = tmp_path / "layer.dxf"
-        path.write_text(dxf_text(layer.profile.contours, {}), encoding="utf-8")
-        assert same_shape(read_drawing(path), layer.profile)
 
 
 GROUPS = """
@@ -133,8 +123,3 @@ def test_what_cannot_be_a_layer_is_refused_at_its_place(name: str, tmp_path: Pat
         read_drawing(dxf(tmp_path, draw), layer)
     assert "outline.dxf" in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_a_group_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:
-    with pytest.raises(DesignError, match="no paths on a layer 'foil'; paths lie on Film 1, mask"):
-        read_drawing(svg(tmp_path, GROUPS), "foil")

@@ -26,13 +26,6 @@ UNUSED = [
 ]
 
 
-def test_drawn_layers_use_no_key_that_shapes_others() -> None:
-    keys = {key for family, key in UNUSED if family == "drawn"}
-    assert {"bond.width", "mask.overhang", "fillet.radius"} <= keys
-    assert not {"bore.diameter", "inlet.width", "rules.bond_width"} & keys
-    assert {family for family, _ in UNUSED} == {"drawn"}
-
-
 @pytest.mark.parametrize(("family", "key"), UNUSED)
 def test_each_is_refused_by_name(family: str, key: str, tmp_path: Path) -> None:
     """Whatever it says, its default too."""
@@ -72,22 +65,3 @@ def test_what_is_written_has_none_and_loads(family: str, tmp_path: Path) -> None
     assert plain_tables(load_design(file)).keys() == plain_tables(design).keys()
     sections = schema()["$defs"][record.__name__]["properties"]
     assert all(record.uses(key) for key in sections)
-
-
-def test_a_kit_may_give_what_other_families_use(tmp_path: Path) -> None:
-    """A lab's clearance of ears is no fault of a design that has none."""
-    kit = tmp_path / "lab.toml"
-    kit.write_text(
-        'schema = "sbafab/kit@1"\nname = "lab"\nversion = "1"\n'
-        '[registration]\npin_clearance = {value = 0.05, source = "measured"}\n',
-        encoding="utf-8",
-    )
-    text = (templates_folder() / "pouch.toml").read_text(encoding="utf-8")
-    file = tmp_path / "d.toml"
-    file.write_text(f'kit = "lab.toml"\n{text}', encoding="utf-8")
-    assert load_design(file).with_({"name": "other"}).kit == "lab.toml"
-
-
-def test_a_waiver_of_a_removed_rule_waives_nothing() -> None:
-    design = load_design("1dof-5mm", ['rules.waive=["bridges", "bond-width", "scrap"]'])
-    assert design.rules.waive == ("bond-width",)

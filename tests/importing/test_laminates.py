@@ -16,9 +16,7 @@ from sbafab.actuators import build, load_design
 from sbafab.design.files import template_names
 from sbafab.design.identity import design_sha256
 from sbafab.design.laminate_file import FILE, laminate_json
-from sbafab.errors import DesignError, OutputError
 from sbafab.importing.laminates import import_folder, import_laminate
-from sbafab.importing.sources import import_source
 from sbafab.importing.write import Written, write_imported
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.deck import run_deck
@@ -205,22 +203,6 @@ def test_a_chamber_without_an_inlet_is_named(importing: Importing, tmp_path: Pat
     assert "chamber chamber1 has 0 inlets" in importing(path).output
 
 
-def test_a_damaged_laminate_is_refused(importing: Importing, tmp_path: Path) -> None:
-    path = broken(tmp_path, lambda document: document["layers"][1].update(film=9))
-    assert "layers[1].film: there is no film 9" in importing(path).output
-
-
-@pytest.mark.parametrize("name", ["none", "empty", "text.txt"])
-def test_what_is_of_no_format_is_refused(name: str, importing: Importing, tmp_path: Path) -> None:
-    path = tmp_path / name
-    if name == "empty":
-        path.mkdir()
-    elif name == "text.txt":
-        path.write_text("layers")
-    sentence = "does not exist" if name == "none" else "of no format that is imported: a folder of"
-    assert sentence in importing(path).output
-
-
 def test_an_assembly_is_refused_with_its_designs(importing: Importing, tmp_path: Path) -> None:
     folder = tmp_path / "pair"
     part = folder / "1dof-5mm"
@@ -230,37 +212,3 @@ def test_an_assembly_is_refused_with_its_designs(importing: Importing, tmp_path:
     said = importing(folder).output
     assert "holds an assembly" in said
     assert f'import one of its designs: "1dof-5mm" in {folder}' in said
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "words"),
-    [
-        ("limit", 500, r"films\.ptfe\.temperature_limit = 500\.0 must be at most 400"),
-        ("limit", -5, r"films\.ptfe\.temperature_limit = -5\.0 must be greater than 0"),
-        ("density", 1e8, r"films\.tpe\.density = 100000000\.0 must be at most 20000"),
-        ("softens_above", -40, r"films\.tpe\.melting_point = -40\.0 must be greater than 0"),
-    ],
-)
-def test_a_film_that_no_design_takes_is_named(
-    key: str, value: float, words: str, tmp_path: Path
-) -> None:
-    data = json.loads(laminate_json(build(load_design("1dof-5mm"))))
-    for film in data["films"]:
-        film[key] = value
-    path = tmp_path / FILE
-    path.write_text(json.dumps(data), encoding="utf-8")
-    with pytest.raises(DesignError, match=f"^{FILE} holds a film that no design takes: {words}"):
-        import_laminate(path)
-
-
-def test_a_design_that_cannot_be_built_leaves_nothing(tmp_path: Path) -> None:
-    path = tmp_path / FILE
-    path.write_text(laminate_json(build(load_design("1dof-5mm"))), encoding="utf-8")
-    _, read = import_source(path)
-    bad = replace(read, tables={**read.tables, "chambers": []})
-    with pytest.raises(DesignError, match="chambers"):
-        write_imported(bad, tmp_path / "again.toml", FILE)
-    assert sorted(p.name for p in tmp_path.iterdir()) == [FILE]
-    (tmp_path / "again-drawings").mkdir()
-    with pytest.raises(OutputError, match="again-drawings is there already"):
-        write_imported(read, tmp_path / "again.toml", FILE)

@@ -9,7 +9,6 @@ import json
 import math
 import random
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -388,15 +387,6 @@ def test_a_table_of_its_layers_makes_it_a_laminate(importing: Importing, tmp_pat
     )
 
 
-def test_lines_without_area_are_named(tmp_path: Path) -> None:
-    union = combined(3, "union", [1, 2], [])
-    path = saved(tmp_path, design([drawn(1, 1), drawn(2, 3), union], SKETCHES))
-    _, remarks = cad_layer(path, "3/2")
-    # One line reaches past the plate at both sides; the bent one and the point lie in it.
-    where = "hinge.cad, operation 3 (LaminateOperation2), layer 2"
-    assert f"{where}: 2 lines and 0 points have no area, and no cut" in remarks
-
-
 def test_a_design_alone_says_what_is_missing_and_what_is_not_read(
     importing: Importing, tmp_path: Path
 ) -> None:
@@ -544,20 +534,3 @@ def test_a_layer_that_is_not_there_is_refused(
     layer: str, sentence: str, importing: Importing, tmp_path: Path
 ) -> None:
     assert sentence in importing(pouch(tmp_path, rows=ROWS.replace("film/1", layer))).output
-
-
-def test_without_pyyaml_its_extra_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, importing: Importing
-) -> None:
-    source = pouch(tmp_path, POUCH + " ")
-    monkeypatch.setitem(sys.modules, "yaml", None)
-    assert 'pip install "sbafab[yaml]"' in importing(source).output
-
-
-def test_vertices_of_the_first_form_are_thousandths(tmp_path: Path) -> None:
-    old = f"{OBJECT}geometry.vertex.ShapeVertex {{_pos: !!python/tuple [21000.0, 16000.0]}}"
-    text = POUCH.replace(vertex(21.0, 16.0), old)
-    text = text.replace(vertex(-21.0, -16.0), "!ShapeVertex [7, -21000.0, -16000.0]")
-    assert text != POUCH
-    region, _ = cad_layer(saved(tmp_path, text), "film/1")
-    assert region.area == pytest.approx(42 * 32 + 4 * 8)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable
-from dataclasses import replace
 
 import pytest
 
@@ -20,7 +19,6 @@ from sbafab.laminate.base_plate import (
 )
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.dowels import (
-    PinHole,
     Standard,
     chamfer,
     hole_notes,
@@ -63,16 +61,6 @@ def under(step: Step) -> float:
     names = [item.part for item in step.build_up]
     lying = step.build_up[1 : names.index("laminate") + 1]
     return sum(item.thickness_mm for item in lying)
-
-
-def test_lengths_are_the_standards() -> None:
-    for diameter, lengths in ISO_8734.items():
-        assert lengths_sold(diameter, "ISO 8734") == lengths
-    assert {diameter: chamfer(diameter) for diameter in CHAMFERS} == CHAMFERS
-    assert lengths_sold(1.0, "ISO 2338")[0] == 4
-    long = (14, 16, 18, 20, 22, 24, 26, 28, 30, 32, 35, 40, 45, 50, 55, 60)
-    assert lengths_sold(6.0, "ISO 8734") == long
-    assert lengths_sold(1.0, "ISO 8734", (7.0, 5.5)) == (5.5, 7.0)
 
 
 @pytest.mark.parametrize("standard", ["ISO 8734", "ISO 2338"])
@@ -142,20 +130,6 @@ def test_no_pin_falls_through_or_stands_off_its_height() -> None:
     assert 0.4 < loose / (loose + tight) < 0.6
 
 
-def test_the_underlay_lifts_the_stack(stack: Stack) -> None:
-    """In step 3 of a 1-DoF the separator masks are laid by hand: paper lies below the stack."""
-    design = load_design("1dof-5mm")
-    laminate = build(design)
-    for thick in (0.1, 0.3):
-        paper = design.with_(press={"underlay_thickness": thick})
-        third = schedule(laminate, paper).steps[2]
-        films = sum(laminate.layer(index).film.thickness for index in third.layers)
-        assert under(third) == pytest.approx(films + 0.05 + thick)
-        assert third.top_mm == pytest.approx(films + 0.05 + thick)
-        [pin] = third.pin_settings
-        assert pin.stands_mm - pin.tolerance_mm - 0.2 >= films + 0.05 + thick - 1e-9
-
-
 def test_fits_are_those_of_iso_286() -> None:
     for diameter, (low, high, reamed) in ISO_286.items():
         assert pin_deviations(diameter) == (low / 1000, high / 1000)
@@ -194,42 +168,11 @@ def test_the_shop_is_told_of_its_holes() -> None:
     assert "not used" in hole_notes(laminate.pins[:1], {}, "jig-borer")[0]
 
 
-def test_the_push_out_hole_lets_a_punch_through_and_no_pin() -> None:
-    for diameter, narrowed in CHAMFERS.items():
-        hole = PinHole("any", diameter, 3.0, 0.05, round(0.6 * diameter, 1), (5.0,))
-        assert hole.push_out - 0.1 >= 0.5
-        assert hole.push_out < diameter - 2 * narrowed * POINT[1] / POINT[0] - 0.1
-
-
-def test_own_lengths_and_the_other_standard(stack: Stack) -> None:
-    own = schedule(stack(15), PAPER.with_("registration.pin_lengths=[4.5, 7]"))
-    assert {pin.length_mm for step in own.steps for pin in step.pin_settings} <= {4.5, 7.0}
-    other = schedule(stack(2), PAPER.with_("registration.pin_standard=ISO 2338"))
-    assert {pin.length_mm for step in other.steps for pin in step.pin_settings} == {4.0}
-
-
 def test_pins_or_plate_that_do_not_do_are_refused(stack: Stack) -> None:
     with pytest.raises(DesignError, match=r"at least \d\.\d+ mm long .* longest there is has 3"):
         schedule(stack(15), PAPER.with_("registration.pin_lengths=[3]"))
     with pytest.raises(DesignError, match=r"press.plate_thickness = 2 is thinner than the 3\.\d+"):
         schedule(stack(15), PAPER.with_("press.plate_thickness=2"))
-
-
-def test_a_plate_as_thin_as_the_shallowest_shoulder_is_taken(stack: Stack) -> None:
-    """Films of 0.025 and 0.038 mm, a release film of 0.05, paper of 0.1, a chamfer of 0.2.
-
-    The highest stack on the pin is that of step 3: 0.025 + 0.038 + 0.025 + 0.05 + 0.1 + 0.2 =
-    0.438. A pin of 4 mm, give or take 0.25, leaves a shoulder 4 - 0.25 - 0.05 - 0.438 = 3.262 deep
-    at most: 3.25 in steps of 0.05. 1 mm stays under it. The pin of 6 mm would take 5.25.
-    """
-    own = PAPER.with_("registration.pin_lengths=[4, 6]")
-    plan = schedule(stack(2), own.with_("press.plate_thickness=4.25"))
-    assert plate(plan) == 4.25
-    assert {pin.seat_mm for step in plan.steps for pin in step.pin_settings} == {3.25}
-    with pytest.raises(DesignError, match=r"plate_thickness = 4.24 is thinner than the 4.25 mm"):
-        schedule(stack(2), own.with_("press.plate_thickness=4.24"))
-    # 6 mm is the thinnest plate sold.
-    assert plate(schedule(stack(2), own)) == 6.0
 
 
 def test_the_depth_with_which_pins_stand_out_least_is_taken(stack: Stack) -> None:
@@ -240,10 +183,3 @@ def test_the_depth_with_which_pins_stand_out_least_is_taken(stack: Stack) -> Non
     plan = schedule(stack(2), own)
     pins = {(pin.length_mm, pin.seat_mm) for step in plan.steps for pin in step.pin_settings}
     assert pins == {(5.04, 4.3)}
-
-
-def test_a_diameter_that_nobody_sells_draws_a_warning(stack: Stack) -> None:
-    laminate = stack(2)
-    odd = replace(laminate, pins=tuple(replace(pin, diameter=0.9) for pin in laminate.pins))
-    said = schedule(odd, PAPER).warnings
-    assert any("ISO 8734 has no dowel pin of diameter 0.9" in words for words in said)

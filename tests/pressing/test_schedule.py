@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -66,27 +65,6 @@ def test_pins_are_in_for_flash_bonds_and_out_for_full_bonds(stack: Stack) -> Non
     assert "with no pin" in plan.steps[1].instructions
 
 
-def test_a_pin_that_would_meet_film_stays_out(stack: Stack) -> None:
-    laminate = stack(2)
-    covered = replace(
-        laminate,
-        layers=tuple(
-            replace(layer, profile=laminate.layer(1).profile, pattern="covered")
-            if layer.index == 5
-            else layer
-            for layer in laminate.layers
-        ),
-    )
-    plan = schedule(covered, PAPER)
-    assert [step.pins for step in plan.steps] == [("chamber_1",), (), (), ()]
-    assert plan.warnings == ("step 3: no pin holds layers 4 to 6; align by hand",)
-
-
-def test_two_balloons_have_a_middle_of_three_layers(stack: Stack) -> None:
-    plan = schedule(stack(2), PAPER)
-    assert [step.adds for step in plan.steps] == [(2, 3), (1,), (4, 5, 6), (7,)]
-
-
 def test_one_balloon_is_done_after_its_base(stack: Stack) -> None:
     plan = schedule(stack(1), PAPER)
     assert [(step.adds, step.bond, step.pins) for step in plan.steps] == [
@@ -97,24 +75,12 @@ def test_one_balloon_is_done_after_its_base(stack: Stack) -> None:
     assert plan.warnings == ("step 1: no pin holds layers 2 and 3; align by hand",)
 
 
-def test_one_balloon_with_a_lumen_leaves_its_mask_to_the_hand(stack: Stack) -> None:
-    plan = schedule(stack(1, lumen=True), PAPER)
-    assert plan.steps[0].pins == ("lumen",)
-    assert plan.warnings == ("step 1: no pin holds layer 2; align by hand",)
-
-
 def test_radial_with_one_balloon_ends_on_its_sheet(stack: Stack) -> None:
     plan = schedule(stack(1, sheet=True), PAPER)
     assert [step.adds for step in plan.steps] == [(4, 5), (3,), (1, 2)]
     assert [step.bond for step in plan.steps] == ["flash", "full", "full"]
     assert plan.steps[-1].layers == (1, 2, 3, 4, 5)
     assert plan.total_press_minutes == 3 + 12 + 20
-
-
-def test_radial_with_more_balloons_adds_sheet_and_cap_last(stack: Stack) -> None:
-    plan = schedule(stack(3, sheet=True), PAPER)
-    assert [step.adds for step in plan.steps] == [(4, 5), (3,), tuple(range(6, 13)), (1, 2, 13)]
-    assert plan.total_press_minutes == 45
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -142,14 +108,6 @@ def test_what_no_pin_holds_is_named(stack: Stack) -> None:
     assert schedule(stack(15), PAPER).warnings == (
         "step 3: no pin holds the 14 separator-masks; align by hand",
     )
-
-
-def test_masks_in_a_bonded_stack_are_held_by_its_films() -> None:
-    design = load_design("3dof-15mm", ["registration.method=ears"])
-    plan = schedule(build(design), PAPER)
-    assert [step.bond for step in plan.steps].count("flash") == 4
-    # No mask has the hole of an ear's pin, and no one lays what the step before has bonded.
-    assert not [warning for warning in plan.warnings if BY_HAND in warning]
 
 
 def test_the_tpe_must_melt(stack: Stack) -> None:
@@ -182,33 +140,6 @@ def test_what_was_never_tried_is_warned_about(stack: Stack, change: str, warning
     assert found.startswith(warning)
 
 
-def test_twenty_balloons_are_validated_and_one_more_is_not(stack: Stack) -> None:
-    assert beside_hand_placing(schedule(stack(20), PAPER).warnings) == ()
-    assert "21 balloons" in schedule(stack(21), PAPER).warnings[0]
-
-
-def test_json_holds_the_whole_schedule(stack: Stack) -> None:
-    plan = schedule(stack(15), PAPER)
-    held = press_json(plan)
-    assert json.loads(json.dumps(held)) == held
-    assert held["steps"][3]["adds"] == [59]
-    assert held["steps"][0]["platen_mm"] == [152.4, 152.4]
-    assert set(held["steps"][0]) >= {
-        "step",
-        "title",
-        "bond",
-        "layers",
-        "adds",
-        "pins",
-        "temperature_c",
-        "pressure_kpa",
-        "force_n",
-        "platen_mm",
-        "minutes",
-    }
-    assert (held["total_press_minutes"], held["estimated_build_minutes"]) == (45, 105)
-
-
 def test_csv_reads_back(stack: Stack) -> None:
     rows = list(csv.DictReader(io.StringIO(press_csv(schedule(stack(15, lumen=True), PAPER)))))
     assert [float(row["minutes"]) for row in rows] == [3, 12, 10, 20]
@@ -221,11 +152,6 @@ def test_csv_reads_back(stack: Stack) -> None:
     assert rows[0]["pins"] == "chamber_1, lumen"
     assert float(rows[0]["force_n"]) == pytest.approx(2554.8, abs=0.05)
     assert all(None not in row and "" not in row for row in rows)
-
-
-def test_instructions_name_the_stacks_in_their_order(stack: Stack) -> None:
-    last = schedule(stack(3, sheet=True), PAPER).steps[-1].instructions
-    assert "layers 1 and 2, then layers 3 to 5, then layers 6 to 12, then layer 13," in last
 
 
 def test_ears_and_tails_are_snipped_off_at_the_end(stack: Stack) -> None:

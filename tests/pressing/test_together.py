@@ -10,8 +10,6 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.build_up import footprint
 from sbafab.pressing.cycles import (
     Runs,
-    are_apart,
-    batch_entry,
     batch_times,
     design_runs,
     press_runs,
@@ -51,15 +49,6 @@ def test_a_batch_fills_the_plate_in_rows_and_ends_in_a_smaller_cycle() -> None:
     assert runs.cycles == (12, 12, 6)
     assert runs.places[:5] == ((0, 0), (25, 0), (50, 0), (75, 0), (0, 35))
     assert press_runs(30, (-10.0, -5.0, 10.0, 25.0), (106.99, 112.0), 6.0).together == 9
-    assert are_apart(runs.places, (-10.0, -5.0, 10.0, 25.0), 1e-9)
-    assert not are_apart(runs.places, (-10.0, -5.0, 10.01, 25.0), 1e-9)
-
-
-def test_the_plate_is_turned_where_more_lie_on_it() -> None:
-    # 50 x 10 in 100 x 60: a column of four; turned, in 60 x 100, one of seven.
-    assert press_runs(99, (0.0, 0.0, 50.0, 10.0), (100.0, 60.0)).together == 7
-    assert press_runs(99, (0.0, 0.0, 10.0, 50.0), (100.0, 60.0)).together == 7
-    assert press_runs(99, (0.0, 0.0, 90.0, 10.0), (60.0, 100.0)).together == 4
 
 
 def test_times_of_a_batch_are_those_of_the_paper_a_copy_and_a_cycle() -> None:
@@ -89,16 +78,6 @@ def test_one_plate_has_every_hole_of_every_place() -> None:
     assert fixture(column, platen, ((0.0, 0.0),)) == fixture(column, platen)
 
 
-def test_the_plate_lies_turned_where_the_places_do() -> None:
-    column = laminate("stack.balloons=2")
-    low_x, _, high_x, _ = column.bounds
-    row = tuple((n * (high_x - low_x + 5), 0.0) for n in range(4))
-    plate = fixture(column, (60.0, 200.0), row)
-    assert plate is not None
-    x0, y0, x1, y1 = plate.bounds
-    assert (x1 - x0, y1 - y0) == pytest.approx((200.0, 60.0))
-
-
 def test_all_laminates_of_a_cycle_share_the_force() -> None:
     column = laminate("stack.balloons=6")
     design = load_design("1dof-5mm")
@@ -125,13 +104,3 @@ def test_a_cycle_takes_what_one_person_makes_in_eight_hours_or_what_is_ordered()
         changes = [*filter(None, [most]), "stack.balloons=2", "order.copies=20"]
         design = load_design("1dof-5mm", changes)
         assert design_runs(design, build(design)).cycles == cycles
-
-
-def test_patterns_are_counted_a_cycle() -> None:
-    design = load_design("1dof-5mm", ["stack.balloons=2", "order.copies=5", "order.at_once=3"])
-    column = build(design)
-    said = batch_entry(design, column, schedule(column, design))
-    assert said.cycles == [3, 2]
-    for row in said.patterns:
-        assert row.each == len(column.patterns[row.pattern])
-        assert row.cycles == [3 * row.each, 2 * row.each]
