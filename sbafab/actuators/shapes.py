@@ -15,10 +15,8 @@ from typing import Annotated, Any, Self
 
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
-from sbafab.design.drawing import read_drawing
 from sbafab.design.files import listed, shown
-from sbafab.design.outline import refuse_crossings
-from sbafab.design.strands import Strand, polyline
+from sbafab.design.outline import Strand, polyline, read_drawing, refuse_crossings
 from sbafab.design.toml_table import Section
 from sbafab.design.units import LONGEST, Length, Millimetres
 from sbafab.errors import DesignError

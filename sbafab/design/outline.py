@@ -1,33 +1,25 @@
-"""Pocket outlines drawn by the user: one closed path of a DXF or SVG file."""
+"""Drawings of the user: the outline of a pocket, or the contours of whole layers.
+
+A DXF or SVG file holds strands, chains of edges, whose ends make loops. All coordinates are mm.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from sbafab.design.strands import (
-    JOIN,
-    Strand,
-    Traced,
-    counted,
-    joined,
-    nothing_on,
-    place,
-    polyline,
-    refuse_more_than_limit,
-    sealed,
-    widest_gap,
-)
+from sbafab.design.files import listed, shown
+from sbafab.design.laminate_file import read_laminate
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import FitError, elliptical_arc, fit_arcs
 from sbafab.geometry.arrangement import split_edges
-from sbafab.geometry.contour import Contour, tidy
-from sbafab.geometry.edges import EPSILON, Edge, Line, Point, meeting_points
+from sbafab.geometry.contour import Contour, in_reading_order, tidy
+from sbafab.geometry.edges import EPSILON, Edge, Line, Point, edge_from_bulge, meeting_points
 from sbafab.geometry.nearby import close_pairs
 from sbafab.geometry.region import Region, centroid
 
@@ -35,6 +27,155 @@ if TYPE_CHECKING:
     from ezdxf.document import Drawing
     from ezdxf.layouts.layout import Modelspace
     from ezdxf.math import BSpline
+
+Strand = tuple[Edge, ...]
+
+JOIN = 0.001
+"""Largest gap between joined ends, mm."""
+MOST_EDGES = 500
+"""Most edges of an outline."""
+MOST_OF_ENTITY = 5000
+"""Most edges of a whole drawing."""
+FARTHEST = 10_000.0
+"""No coordinate of a drawing may be larger, in mm."""
+
+
+class Traced(NamedTuple):
+    """Strands of a drawing in mm, and the size of its unit as text."""
+
+    strands: Iterator[Strand]
+    scale: str
+
+
+def place(x: float, y: float) -> Point:
+    """A point of a drawing. Raises DesignError unless it is finite and of a sensible size."""
+    if not abs(x) <= FARTHEST or not abs(y) <= FARTHEST:
+        raise DesignError(
+            f"has a coordinate of x {x:g}, y {y:g} mm, where at most {FARTHEST:g} is allowed; "
+            "check its units"
+        )
+    return float(x), float(y)
+
+
+def nothing_on(layer: str, others: Sequence[str]) -> DesignError:
+    """Return the error for an empty layer, with the names of ``others`` that are not."""
+    hint = f"paths lie on {', '.join(others)}" if others else "no layer has any"
+    return DesignError(f"has no paths on a layer {layer!r}; {hint}")
+
+
+def counted(strands: Iterable[Strand], most: int = MOST_EDGES) -> Iterator[Strand]:
+    """Yield the strands; raises DesignError once they have more than ``most`` edges."""
+    total = 0
+    for strand in strands:
+        total += len(strand)
+        refuse_more_than_limit(total, most)
+        yield strand
+
+
+def refuse_more_than_limit(edges: int, most: int = MOST_OF_ENTITY) -> None:
+    if edges > most:
+        raise DesignError(f"has more than {most} edges; draw the outline with fewer, longer curves")
+
+
+def polyline(vertices: Sequence[tuple[float, float, float]], closed: bool) -> Strand:
+    """Lines and arcs through vertices of x, y and bulge."""
+    points = [(x, y) for x, y, _ in vertices]
+    ends = [*points[1:], *points[:1]] if closed else points[1:]
+    edges: list[Edge] = []
+    for start, end, (_, _, bulge) in zip(points, ends, vertices, strict=False):
+        if math.dist(start, end) > EPSILON:
+            edges += _bulged(start, end, bulge)
+    return tuple(edges)
+
+
+def _bulged(start: Point, end: Point, bulge: float) -> list[Edge]:
+    """One edge, or two where the arc turns by more than half a turn."""
+    if abs(bulge) <= 1:
+        return [edge_from_bulge(start, end, bulge)]
+    half = math.tan(math.atan(bulge) / 2)
+    # The apex stands off the chord's middle, to the right of an arc that runs counter-clockwise.
+    apex = (
+        (start[0] + end[0] + bulge * (end[1] - start[1])) / 2,
+        (start[1] + end[1] - bulge * (end[0] - start[0])) / 2,
+    )
+    return [edge_from_bulge(start, apex, half), edge_from_bulge(apex, end, half)]
+
+
+def reverse(strand: Strand) -> Strand:
+    return tuple(edge.reversed() for edge in reversed(strand))
+
+
+def is_closed(strand: Strand) -> bool:
+    return _near(strand[0].start, strand[-1].end)
+
+
+def joined(strands: Iterable[Strand]) -> tuple[list[Strand], list[Strand]]:
+    """Closed loops, and the remaining open strands, after joining ends that meet."""
+    whole = [strand for strand in strands if sum(edge.length for edge in strand) > JOIN]
+    loops = [strand for strand in whole if is_closed(strand)]
+    rest = [strand for strand in whole if not is_closed(strand)]
+    opens: list[Strand] = []
+    while rest:
+        strand = _extended(rest.pop(0), rest)
+        if not is_closed(strand):
+            strand = _extended(reverse(strand), rest)
+        (loops if is_closed(strand) else opens).append(strand)
+    return loops, opens
+
+
+def _extended(strand: Strand, rest: list[Strand]) -> Strand:
+    """The strand extended by every continuing strand of ``rest``; these are removed from it."""
+    while not is_closed(strand):
+        for candidate in rest:
+            if _near(strand[-1].end, candidate[0].start):
+                follower = candidate
+            elif _near(strand[-1].end, candidate[-1].end):
+                follower = reverse(candidate)
+            else:
+                continue
+            rest.remove(candidate)
+            strand += follower
+            break
+        else:
+            return strand
+    return strand
+
+
+def _near(a: Point, b: Point) -> bool:
+    return math.dist(a, b) <= JOIN
+
+
+def sealed(loop: Strand) -> Strand:
+    """The loop with exactly matching ends and no edge shorter than JOIN."""
+    edges: list[Edge] = []
+    here = loop[-1].end
+    for edge in loop:
+        if edge.length > 2 * JOIN or not _near(here, edge.end):
+            edges.append(_from(here, edge))
+            here = edge.end
+    if edges:
+        edges[0] = _from(here, edges[0])
+    return tuple(edges)
+
+
+def _from(start: Point, edge: Edge) -> Edge:
+    if edge.start == start:
+        return edge
+    if isinstance(edge, Line):
+        return Line(start, edge.end)
+    return edge_from_bulge(start, edge.end, edge.bulge)
+
+
+def widest_gap(opens: Sequence[Strand]) -> tuple[float, Point]:
+    """The least distance from the first strand's last end to another loose end, and that end."""
+    here = opens[0][-1].end
+    ends = [opens[0][0].start]
+    ends += [end for strand in opens[1:] for end in (strand[0].start, strand[-1].end)]
+    return min(math.dist(here, other_end) for other_end in ends), here
+
+
+# The outline of a pocket.
+
 
 MOST_BYTES = 2_000_000
 LARGEST = 150.0
@@ -211,6 +352,112 @@ def crossing(loop: Strand) -> Point | None:
             return pieces[0].end if len(pieces) > 1 else edge.start
         corners.add(start)
     return None
+
+
+# Whole layers: all closed contours of a file, or a profile of a ``laminate.json``.
+
+
+LARGEST_DRAWING = 2000.0
+"""Bound of a drawing's extent, mm."""
+OUTLINE = "outline"
+"""Name of the outline of a ``laminate.json``, beside its patterns."""
+
+
+def read_drawing(path: Path, layer: str | None = None) -> Region:
+    """Return the region enclosed by the closed contours of a drawing, at their place in it, mm.
+
+    Contours are nested by the even-odd rule: one inside another is a hole. Layers of a DXF file
+    that are not plotted are ignored unless named. ``layer`` names a layer of a DXF file, a group of
+    an SVG file by its label or id, or a pattern, ``outline`` or ``seam NAME`` of a
+    ``laminate.json``. Units are read as for an outline. Raises DesignError with the file and the
+    place.
+    """
+    try:
+        if path.suffix.lower() == ".json":
+            return _profile(path, content(path), layer)
+        return _drawn(path, content(path), layer)
+    except FitError as error:
+        raise DesignError(f"drawing {path} has a {error}; round it off") from None
+    except DesignError as error:
+        raise DesignError(f"drawing {path} {error}") from None
+
+
+@lru_cache(maxsize=64)
+def _drawn(path: Path, content: bytes, layer: str | None) -> Region:
+    """The region of a file with this content; cached, as a run needs it more than once."""
+    strands = list(counted(traced(path, layer, is_plot=True).strands, MOST_OF_ENTITY))
+    loops = [sealed(loop) for loop in closed_loops(strands)]
+    for loop in loops:
+        refuse_crossings(loop)
+    if len(loops) > 1:
+        _refuse_meetings(loops)
+    contours = []
+    for loop in loops:
+        contour = tidy(loop)
+        if contour is None:
+            x, y = loop[0].start if loop else (0.0, 0.0)
+            raise DesignError(
+                f"has a contour without area at x {x:.4f}, y {y:.4f}; delete it, or check the units"
+            )
+        contours.append(contour)
+    _refuse_extent(contours)
+    return nested(contours)
+
+
+def _refuse_meetings(loops: list[Strand]) -> None:
+    p = crossing(tuple(edge for loop in loops for edge in loop))
+    if p is not None:
+        raise DesignError(
+            f"has contours that cross or touch each other at x {p[0]:.4f}, y {p[1]:.4f}; draw them "
+            "apart, or join them"
+        )
+
+
+def _refuse_extent(contours: list[Contour]) -> None:
+    low_x, low_y, high_x, high_y = Region(tuple(contours)).bounds
+    if max(high_x - low_x, high_y - low_y) > LARGEST_DRAWING:
+        raise DesignError(
+            f"measures {high_x - low_x:.4g} x {high_y - low_y:.4g} mm, where at most "
+            f"{LARGEST_DRAWING:g} is allowed; check its units"
+        )
+
+
+def nested(contours: list[Contour]) -> Region:
+    """Return the region enclosed by disjoint contours: each inside an odd number is a hole."""
+    oriented = []
+    for contour in contours:
+        place = contour.edges[0].at(0.5)
+        around = sum(other is not contour and other.winding(place) != 0 for other in contours)
+        is_hole = around % 2 == 1
+        oriented.append(contour if contour.is_hole == is_hole else contour.reversed())
+    return Region(in_reading_order(oriented))
+
+
+@lru_cache(maxsize=4)
+def _profiles(path: Path, content: bytes) -> dict[str, Region]:
+    try:
+        laminate = read_laminate(path)
+    except DesignError as error:
+        raise DesignError(str(error).removeprefix(f"{path} ")) from None
+    profiles = {layer.pattern: layer.profile for layer in laminate.layers}
+    for seam in laminate.seams:
+        if all(is_closed(chain) for chain in seam.path):
+            profiles[seam_layer(seam.name)] = Region(tuple(map(Contour, seam.path)))
+    return profiles | ({} if laminate.outline.is_empty else {OUTLINE: laminate.outline})
+
+
+def seam_layer(name: str) -> str:
+    """Return the name of a seam's closed path among a laminate's patterns."""
+    return f"seam {name}"
+
+
+def _profile(path: Path, content: bytes, layer: str | None) -> Region:
+    profiles = _profiles(path, content)
+    if layer is None:
+        raise DesignError(f"is a laminate; name one of its patterns as layer: {listed(profiles)}")
+    if layer not in profiles:
+        raise DesignError(f"has no pattern {shown(layer)}; there are {listed(profiles)}")
+    return profiles[layer]
 
 
 # The strands of a DXF drawing: what its model space holds, in mm.

@@ -15,8 +15,8 @@ from pydantic import Field
 from sbafab.actuators.drawn import DRAWN
 from sbafab.actuators.shapes import Coordinate
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.design.drawing import read_drawing
 from sbafab.design.files import checked, shown
+from sbafab.design.outline import read_drawing
 from sbafab.design.records import without_none
 from sbafab.design.toml_table import Section
 from sbafab.design.units import Length

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.design.drawing import read_drawing
 from sbafab.design.laminate_file import FILE, laminate_json
+from sbafab.design.outline import read_drawing
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc
 from tests.design.drawing import dxf, svg
