@@ -32,22 +32,22 @@ MOUTH = ("mouth_x", "mouth_y", "angle", "width")
 DRAWINGS = (".dxf", ".svg")
 MOST_ROWS = 1000
 MOST_BYTES = 1_000_000
-Count = Annotated[int, Field(ge=1, strict=False)]
-Degrees = Annotated[float, Field(strict=False)]
+Pieces = Annotated[int, Field(ge=1, strict=False)]
+MouthAngle = Annotated[float, Field(strict=False)]
 AnyRow = TypeVar("AnyRow", bound=Section)
 
 
-class LayerRow(Section):
+class LayerEntry(Section):
     """A row of ``layers.csv``."""
 
     file: str
     role: Role
     film: str | None = None
     layer: str | None = None
-    pieces: Count | None = None
+    pieces: Pieces | None = None
 
 
-class ChamberRow(Section):
+class ChamberEntry(Section):
     """A row of ``chambers.csv``."""
 
     name: str
@@ -55,7 +55,7 @@ class ChamberRow(Section):
     y: Coordinate
     mouth_x: Coordinate | None = None
     mouth_y: Coordinate | None = None
-    angle: Degrees | None = None
+    angle: MouthAngle | None = None
     width: Length | None = None
 
 
@@ -70,7 +70,7 @@ def import_table(folder: Path) -> Imported:
     names: dict[tuple[str, str | None], str] = {}
     drawings: dict[str, bytes] = {}
     layers, remarks = [], []
-    for place, row in read_table(folder / LAYERS, LayerRow):
+    for place, row in read_table(folder / LAYERS, LayerEntry):
         drawing = row.file, row.layer
         if drawing not in names:
             names[drawing] = key_name(drawing[1] or Path(drawing[0]).stem, shapes, "layer-")
@@ -85,7 +85,7 @@ def import_table(folder: Path) -> Imported:
         table = {"role": row.role, "shape": names[drawing], "film": film, "pieces": row.pieces}
         layers.append(without_none(table))
     if not (folder / CHAMBERS).is_file():
-        columns = ", ".join(ChamberRow.model_fields)
+        columns = ", ".join(ChamberEntry.model_fields)
         raise DesignError(f"{folder} has no {CHAMBERS} (columns {columns}); add it")
     tables: dict[str, Any] = {
         "name": file_name(folder.resolve().name),
@@ -137,7 +137,7 @@ def read_table(path: Path, record: type[AnyRow]) -> Iterator[tuple[str, AnyRow]]
         yield place, checked(record, filled, {}, f"{place}: ", "table")
 
 
-def _drawing(folder: Path, row: LayerRow, place: str) -> tuple[str, bytes, list[str]]:
+def _drawing(folder: Path, row: LayerEntry, place: str) -> tuple[str, bytes, list[str]]:
     """The name and content of a row's only drawing, and remarks on it."""
     path, layer = folder / row.file, row.layer or ""
     suffix = path.suffix.lower()
@@ -161,7 +161,7 @@ def _drawing(folder: Path, row: LayerRow, place: str) -> tuple[str, bytes, list[
 def _chambers(path: Path) -> list[dict[str, Any]]:
     """The chambers of a table; rows with the same name add centres to one chamber."""
     chambers: dict[str, dict[str, Any]] = {}
-    for place, row in read_table(path, ChamberRow):
+    for place, row in read_table(path, ChamberEntry):
         if row.name in chambers:
             second = next((key for key in MOUTH if getattr(row, key) is not None), None)
             if second is not None:
