@@ -18,7 +18,6 @@ from sbafab.meshing.conforming.meshes import (
     conforming_meshes,
     write_conforming,
 )
-from sbafab.meshing.formats import CONFORMING_ENDINGS
 from sbafab.meshing.mesh_files import MeshFile
 
 Written = tuple[ConformingMeshes, list[MeshFile], Path]
@@ -40,15 +39,6 @@ def written(
 def _wedges_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """The reader knows the wedge of second order, but has no dimension for it."""
     monkeypatch.setitem(meshio._mesh.topological_dimension, "wedge15", 3)
-
-
-def test_each_format_is_listed_and_there(written: Written) -> None:
-    _, files, folder = written
-    names = [Path(file.file).name for file in files]
-    assert sorted(names) == sorted(path.name for path in folder.iterdir())
-    assert {Path(name).suffix[1:] for name in names} == set(CONFORMING_ENDINGS)
-    assert {file.kind for file in files} == {"volume", "shell", "cavity", "skin"}
-    assert all(file.fill_ul == 2.0 and file.elements > 0 for file in files)
 
 
 @pytest.mark.parametrize("name", ["volume", "shell"])
@@ -176,14 +166,6 @@ def test_standalone_cavities_are_closed_and_look_outward(written: Written, suffi
     assert read.volume == pytest.approx(meshes.volume.cavity("A")[0].volume, rel=1e-6)
     (listed,) = (file for file in files if file.file.endswith(f"_conforming.{suffix}"))
     assert listed.volume_mm3 == pytest.approx(read.volume, rel=1e-6)
-
-
-def test_cavities_name_the_nodes_of_the_volume(written: Written) -> None:
-    meshes, _, folder = written
-    read = meshio.read(folder / "cavity_A_conforming.vtu")
-    nodes = read.point_data["node"]
-    assert np.array_equal(read.points, meshes.volume.points[nodes])
-    assert np.array_equal(nodes[read.cells[0].data], meshes.volume.cavities["A"])
 
 
 def test_faces_of_every_element_look_out() -> None:

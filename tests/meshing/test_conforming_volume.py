@@ -81,17 +81,6 @@ def test_cavities_hold_pockets_and_bores(
     assert np.array_equal(with_gaps.volume.points[nodes], surface.points)
 
 
-def test_cavity_faces_look_into_the_pocket(with_gaps: ConformingMeshes) -> None:
-    mesh = with_gaps.volume
-    faces = mesh.face_sets["cavity_A"]
-    cap = faces[np.isin(faces[:, 0], mesh.cell_sets["film_007_TPE_cap"])]
-    base = faces[np.isin(faces[:, 0], mesh.cell_sets["film_001_TPE_base"])]
-    assert set(cap[:, 1].tolist()) == {0}
-    assert set(base[:, 1].tolist()) == {1}
-    areas = volumes("triangle6", mesh.points, mesh.cells[cap[:, 0]][:, [0, 1, 2, 6, 7, 8]])
-    assert areas.sum() == pytest.approx(math.pi * 2.5**2, rel=1e-3)
-
-
 def test_shells_carry_the_films_that_are_bonded(meshes: ConformingMeshes) -> None:
     shell = meshes.shell
     assert shell.thickness == {"section_38um": 0.038, "section_76um": 0.076}

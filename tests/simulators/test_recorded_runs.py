@@ -21,13 +21,11 @@ from sbafab.simulators.simulator import (
     Result,
     SimulationRequest,
     State,
-    drift,
     impossible,
     limits,
     overlap,
     read_nodes,
     run_program,
-    tilt_of,
 )
 from sbafab.simulators.sofa.run import read_log, run
 from sbafab.simulators.sofa.scenes import scenes_of
@@ -184,10 +182,6 @@ def test_a_record_cut_short_keeps_what_is_whole(tmp_path: Path) -> None:
     assert read_nodes(path) == []
 
 
-def test_a_tilt_is_that_of_the_points_plane() -> None:
-    assert tilt_of(np.array([(0, 0, 5), (0, 1, 5), (0, 0, 6)])) == pytest.approx(90)
-
-
 def test_air_is_that_of_the_recorded_films() -> None:
     """At the start a balloon is the paper's parabola; rings of 12 have the area of its circles."""
     films = scenes_of(laminate(), {"chamber1": 5.0})["shell"].films
@@ -236,8 +230,3 @@ def test_films_in_each_other_are_measured_along_their_normal() -> None:
     for apart, volume in ((0.4, 0.0), (-0.3, 4 * 0.3)):
         end = (flat + np.repeat([[0, 0, 0], [0, 0, apart]], 4, axis=0)) @ turn.T
         assert overlap(end, flat, start, films) == pytest.approx(volume)
-
-
-def test_drift_is_over_the_last_half_second() -> None:
-    states = [State(t, {}, None, (0.0, 0.0, z), None, {}) for t, z in ((0, 0), (0.5, 3), (1, 4))]
-    assert drift(states) == pytest.approx(1.0)

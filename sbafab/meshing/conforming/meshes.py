@@ -25,6 +25,7 @@ from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshSettings, Sym
 from sbafab.meshing.conforming.mesh import Mesh, aspects, jacobians, scaled_jacobians, volumes
 from sbafab.meshing.formats import CONFORMING_ENDINGS, MESH_FORMATS
 from sbafab.meshing.mesh_files import MeshFile, MeshKind
+from sbafab.meshing.surface import Surface
 
 HEIGHTS = {
     False: "Films lie on each other: heights are sums of the TPE films, without the masks.",
@@ -194,29 +195,25 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
         size = meshes.statistics[mesh.name]["volume_mm3"]
         for row in MESH_FORMATS:
             if row.elements:
-                name = f"mesh/{kind}.{row.ending}"
-                file = MeshFile(name, kind, None, fill, size, len(mesh.cells))
-                yield file, partial(row.elements, mesh)
+                file = f"mesh/{kind}.{row.ending}"
+                made = MeshFile(file, kind, None, fill, size, len(mesh.cells))
+                yield made, partial(row.elements, mesh)
     mesh = meshes.volume
+    surfaces: list[tuple[MeshKind, str | None, Surface]] = []
     if meshes.has_air and mesh.cavities:
-        outer = skin_surface(mesh)
+        surfaces.append(("skin", None, skin_surface(mesh)))
+    # Films that lie on each other enclose nothing: the surface would have no inside.
+    air = [chamber for chamber in mesh.cavities if meshes.holds_air(chamber)]
+    surfaces += [("cavity", chamber, mesh.cavity(chamber)[0]) for chamber in air]
+    for kind, chamber, surface in surfaces:
+        stem = kind if chamber is None else f"{kind}_{chamber}_conforming"
         for row in MESH_FORMATS:
-            if row.surface:
-                name = f"mesh/skin.{row.ending}"
-                file = MeshFile(name, "skin", None, fill, outer.volume, len(outer.faces))
-                yield file, partial(row.surface, outer)
-    for chamber in mesh.cavities:
-        # Films that lie on each other enclose nothing: the surface would have no inside.
-        if not meshes.holds_air(chamber):
-            continue
-        surface, _ = mesh.cavity(chamber)
-        for row in MESH_FORMATS:
-            name = f"mesh/cavity_{chamber}_conforming.{row.ending}"
-            file = MeshFile(name, "cavity", chamber, fill, surface.volume, len(surface.faces))
-            if row.cavity:
-                yield file, partial(row.cavity, mesh, chamber)
+            file = f"mesh/{stem}.{row.ending}"
+            made = MeshFile(file, kind, chamber, fill, surface.volume, len(surface.faces))
+            if row.cavity and chamber is not None:
+                yield made, partial(row.cavity, mesh, chamber)
             elif row.surface:
-                yield file, partial(row.surface, surface)
+                yield made, partial(row.surface, surface)
 
 
 # Size and quality of a mesh.

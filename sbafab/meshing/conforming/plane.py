@@ -42,7 +42,13 @@ class Border:
     left: Label
     right: Label
 
-    def reversed(self) -> Border:
+    def ends_at(self, corner: Point) -> bool:
+        return corner in (self.edge.start, self.edge.end)
+
+    def leaving(self, corner: Point) -> Border:
+        """Return the border from the corner that it ends at."""
+        if self.edge.start == corner:
+            return self
         return Border(self.edge.reversed(), self.right, self.left)
 
 
@@ -54,7 +60,8 @@ def arrangement(regions: Sequence[Region], h: float) -> list[Border]:
     """
 
     def labelled(plan: Arrangement) -> list[Border]:
-        sides = [_label(turns, len(regions)) for turns in plan.left]
+        count = len(regions)
+        sides = [tuple(n > 0 for n in by_owner(turns, count)) for turns in plan.left]
         return [
             Border(piece.edge, left, right)
             for piece, left, right in zip(plan.pieces, sides[::2], sides[1::2], strict=True)
@@ -63,10 +70,6 @@ def arrangement(regions: Sequence[Region], h: float) -> list[Border]:
 
     borders = arranged([region.edges for region in regions], labelled)
     return _without_cusps(borders, min(h, COARSE))
-
-
-def _label(turns: int, regions: int) -> Label:
-    return tuple(count > 0 for count in by_owner(turns, regions))
 
 
 def _without_cusps(borders: list[Border], h: float) -> list[Border]:
@@ -83,22 +86,14 @@ def _without_cusps(borders: list[Border], h: float) -> list[Border]:
                 a, b = shortened[first], shortened[second]
                 if a is None or b is None or first == second:
                     continue
-                if not (_ends_at(a, corner) and _ends_at(b, corner)):
+                if not (a.ends_at(corner) and b.ends_at(corner)):
                     continue  # cut short by another cusp at this corner
-                joined = _joined(_from(a, corner), _from(b, corner), h)
+                joined = _joined(a.leaving(corner), b.leaving(corner), h)
                 if joined is not None:
                     common, shortened[first], bent, shortened[second] = joined
                     added += [common] if common.left != common.right else []
                     added.append(bent)
     return [border for border in shortened if border is not None] + added
-
-
-def _ends_at(border: Border, corner: Point) -> bool:
-    return corner in (border.edge.start, border.edge.end)
-
-
-def _from(border: Border, corner: Point) -> Border:
-    return border if border.edge.start == corner else border.reversed()
 
 
 def _joined(a: Border, b: Border, h: float) -> tuple[Border, Border, Border, Border | None] | None:
@@ -169,7 +164,10 @@ def narrows(borders: Sequence[Border], h: float) -> list[float]:
     import shapely
 
     tails, heads, owner = _chords(borders, h / 2)
-    ends = _end_numbers(borders)
+    numbers: dict[Point, int] = {}
+    ends = np.array(
+        [[numbers.setdefault(p, len(numbers)) for p in (b.edge.start, b.edge.end)] for b in borders]
+    )
     middles = (tails + heads) / 2
     along = heads - tails
     normals = np.column_stack([-along[:, 1], along[:, 0]])
@@ -181,16 +179,21 @@ def narrows(borders: Sequence[Border], h: float) -> list[float]:
     mine, theirs = ends[owner[ray]], ends[owner[chord]]
     apart = ~(mine[:, :, None] == theirs[:, None, :]).any(axis=(1, 2))
     ray, chord = ray[apart], chord[apart]
+    # Distance to the chord along the ray; shapely's points differ in the last digits, and with them
+    # the mesh.
+    a, b = tails[chord] - middles[ray], heads[chord] - middles[ray]
+    (x, y), across = normals[ray].T, normals[ray]
+    side_a, side_b = (p[:, 0] * y - p[:, 1] * x for p in (a, b))
+    run = side_a - side_b
+    share = np.divide(side_a, run, out=np.full_like(run, 0.5), where=np.abs(run) > 1e-12)
+    reach = np.abs(np.einsum("ij,ij->i", a + share[:, None] * (b - a), across))
     widths = np.full(len(middles), math.inf)
-    reach = _ray_lengths(middles[ray], normals[ray], tails[chord], heads[chord])
     np.minimum.at(widths, ray, reach)
-    sizes = np.array([_by_bend(border.edge, h) for border in borders])
+    sizes = np.array(
+        [min(h, TURN * e.radius) if isinstance(e, Arc) else h for e in (b.edge for b in borders)]
+    )
     np.minimum.at(sizes, owner, np.maximum(widths / ACROSS, LEAST * h))
-    return [float(size) for size in sizes]
-
-
-def _by_bend(edge: Edge, h: float) -> float:
-    return min(h, TURN * edge.radius) if isinstance(edge, Arc) else h
+    return sizes.tolist()
 
 
 def _chords(
@@ -206,33 +209,6 @@ def _chords(
         heads += stops[1:]
         owner += [number] * count
     return np.array(tails), np.array(heads), np.array(owner, dtype=np.int64)
-
-
-def _end_numbers(borders: Sequence[Border]) -> NDArray[np.int64]:
-    numbers: dict[tuple[float, float], int] = {}
-    rows = [
-        [numbers.setdefault(end, len(numbers)) for end in (border.edge.start, border.edge.end)]
-        for border in borders
-    ]
-    return np.array(rows, dtype=np.int64)
-
-
-def _ray_lengths(
-    origins: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    tails: NDArray[np.float64],
-    heads: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Distance in mm from each origin along its normal, to either side, to its chord."""
-    a, b = tails - origins, heads - origins
-    side_a = a[:, 0] * normals[:, 1] - a[:, 1] * normals[:, 0]
-    side_b = b[:, 0] * normals[:, 1] - b[:, 1] * normals[:, 0]
-    run = side_a - side_b
-    share = np.divide(side_a, run, out=np.full_like(run, 0.5), where=np.abs(run) > 1e-12)
-    lengths: NDArray[np.float64] = np.abs(
-        np.einsum("ij,ij->i", a + share[:, None] * (b - a), normals)
-    )
-    return lengths
 
 
 # One triangulation of the plane for all layers, arcs as arcs.
