@@ -18,8 +18,7 @@ import numpy as np
 
 from sbafab.errors import OutputError
 from sbafab.simulators.calculix.deck import TPE, Elastic
-from sbafab.simulators.calculix.results import read_frd
-from sbafab.simulators.calculix.run import run_ccx
+from sbafab.simulators.calculix.run import read_frd, run_ccx
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -20,8 +20,7 @@ from docs.scripts.tables import Table
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
 from sbafab.simulators.calculix.deck import deck_settings
-from sbafab.simulators.calculix.results import State
-from sbafab.simulators.calculix.run import simulate
+from sbafab.simulators.calculix.run import State, simulate
 
 COMMAND = "python -m docs.scripts.calculix_runs"
 PICTURE = Path(__file__).parents[1] / "images" / "calculix.svg"

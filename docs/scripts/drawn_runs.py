@@ -29,8 +29,7 @@ from sbafab.errors import OutputError
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
 from sbafab.process import Progress
 from sbafab.simulators.calculix.deck import JOB, RING, DeckSettings, Procedure, deck_settings
-from sbafab.simulators.calculix.results import SAME_TIME, read_frd
-from sbafab.simulators.calculix.run import DIVERGED, deck_mesh, simulate
+from sbafab.simulators.calculix.run import DIVERGED, SAME_TIME, deck_mesh, read_frd, simulate
 from sbafab.simulators.simulator import Result, SimulationRequest
 
 COMMAND = "python -m docs.scripts.drawn_runs"

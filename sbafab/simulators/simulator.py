@@ -396,7 +396,7 @@ def impossible(state: State, can_be: PhysicalLimits, passed: float = 0.0) -> str
 def _wrong(state: State, can_be: PhysicalLimits, passed: float) -> Iterator[str]:
     tip, tilt = state.tip, state.tilt
     if not all(map(math.isfinite, (*state.volumes.values(), *(tip or ()), tilt or 0.0))):
-        yield "a place or a volume is no finite number"
+        yield "a place or a volume is not finite"
     for name, air in state.volumes.items():
         if air < can_be.least_air:
             yield (
@@ -635,7 +635,7 @@ def read_nodes(path: Path) -> list[tuple[float, NDArray[np.float64]]]:
 
 
 class ModelRun(NamedTuple):
-    """A model to run for ``seconds`` of simulated time: its file and what is read from it.
+    """A model to run for ``seconds`` of simulated time: its file and its films.
 
     ``command`` runs it in its folder and records its nodes in ``NODES_FILE`` every ``PERIOD``.
     ``read_log`` returns the first trouble in the text of its log, if any, and the steps per s.
@@ -708,7 +708,7 @@ def _why_void(
     if not times:
         return f"it wrote no place of a node into {NODES_FILE}"
     if times[-1] < seconds - 1.5 * PERIOD:
-        return f"its record ends before {seconds:g} s or is no finite number from there on"
+        return f"its record ends before {seconds:g} s or is not finite from there on"
     return None
 
 

@@ -133,7 +133,7 @@ def test_every_family_meshes(template: str, changes: tuple[str, ...]) -> None:
     ("settings", "message"),
     [
         (MeshSettings(h=0.8), "ask for 0.750 mm at most"),
-        (MeshSettings(h=0.0), "no size for a mesh"),
+        (MeshSettings(h=0.0), "not a size for a mesh"),
         (MeshSettings(h=0.002), "more than 3,000,000"),
         (MeshSettings(h=0.5, symmetry="sector"), "symmetry sector is not"),
     ],

@@ -18,8 +18,16 @@ from sbafab.errors import DesignError
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.simulators.calculix.deck import DeckSettings, deck_settings, started, write_deck
-from sbafab.simulators.calculix.results import Frame, films_meet, history, read_frd
-from sbafab.simulators.calculix.run import deck_mesh, find_ccx, run_ccx, simulate
+from sbafab.simulators.calculix.run import (
+    Frame,
+    deck_mesh,
+    films_meet,
+    find_ccx,
+    history,
+    read_frd,
+    run_ccx,
+    simulate,
+)
 from sbafab.simulators.simulator import SimulationRequest
 
 pytest.importorskip("netgen")

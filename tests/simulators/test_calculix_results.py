@@ -16,11 +16,15 @@ from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
 from sbafab.meshing.conforming.mesh import Mesh
-from sbafab.simulators.calculix import results
+from sbafab.simulators.calculix import run as results
 from sbafab.simulators.calculix.deck import DeckSettings
-from sbafab.simulators.calculix.results import (
+from sbafab.simulators.calculix.run import (
+    DIVERGED,
+    Ending,
     Frame,
     LoadedState,
+    converged_frames,
+    deck_mesh,
     deformed_png,
     history,
     history_csv,
@@ -29,7 +33,6 @@ from sbafab.simulators.calculix.results import (
     read_sta,
     write_deformed,
 )
-from sbafab.simulators.calculix.run import DIVERGED, Ending, converged_frames, deck_mesh
 
 pytest.importorskip("netgen")
 
@@ -84,7 +87,7 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="a mesh of 2 nodes, not of this one of 3"):
         read_frd(path, 3)
     path.write_text(frd(0.25).replace(" 2.50000E+00", "      wrong "))
-    with pytest.raises(OutputError, match=r"no number at time 0\.25 s"):
+    with pytest.raises(OutputError, match=r"not a number at time 0\.25 s"):
         read_frd(path, 2)
 
 

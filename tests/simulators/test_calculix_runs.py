@@ -18,7 +18,7 @@ from sbafab.actuators import build, load_design
 from sbafab.cli import app
 from sbafab.errors import OutputError, VoidError
 from sbafab.meshing.conforming.layup import MeshSettings
-from sbafab.simulators.calculix import results
+from sbafab.simulators.calculix import run as results
 from sbafab.simulators.calculix.deck import DeckSettings
 from sbafab.simulators.calculix.run import (
     deck_mesh,

@@ -105,7 +105,7 @@ def test_other_words_of_a_log_and_other_plugins_void_nothing() -> None:
         ("write(0.2, 0.005)", "its result cannot be: .*the tip has not risen"),
         ("write(0.2, 7)", r"7\.000 mm high, and the films reach 6\.5 mm at most"),
         ("write(0.2, 2, 0.05)", r"the tip leans by 2\.9 degrees \(more than 1\)"),
-        ("write(0.2, math.nan)", "no finite number from there on; the tip is known to 0.1 s"),
+        ("write(0.2, math.nan)", "not finite from there on; the tip is known to 0.1 s"),
         ("write(0.2, 2, whole=False)", "its record ends before 0.3 s"),
         ("sys.exit(3)", "exit code 3"),
         ("os.kill(os.getpid(), 9)", r"signal 9 \(SIGKILL\); the tip is known to 0\.1 s"),
@@ -215,7 +215,7 @@ def test_negative_air_and_films_through_films_cannot_be() -> None:
     whole = replace(state, volumes={"chamber3": 1.0})
     assert impossible(whole, limit, passed=0.19) is None
     assert "passed through each other in 0.21 ul" in str(impossible(whole, limit, passed=0.21))
-    assert "no finite number" in str(impossible(replace(whole, tilt=math.nan), limit))
+    assert "not finite" in str(impossible(replace(whole, tilt=math.nan), limit))
 
 
 def test_films_in_each_other_are_measured_along_their_normal() -> None:

@@ -101,7 +101,7 @@ def sector(laminate: Laminate, symmetry: Symmetry) -> Sector | None:
             return _lobe(count, far)
     raise DesignError(
         f"mesh symmetry {symmetry} is not this laminate's: a profile differs from its image; "
-        "use full, or leave out what is on one side only, such as ears and inlet tabs"
+        "use full, or leave out parts on one side only, such as ears and inlet tabs"
     )
 
 
@@ -288,7 +288,7 @@ def _check_size(laminate: Laminate, settings: MeshSettings) -> None:
             f"h = {h:g} mm is larger than {place}, which is {width:.3f} mm wide; "
             f"ask for {width:.3f} mm at most"
             if h > 0
-            else f"h = {h:g} mm is no size for a mesh; ask for 0.35 mm"
+            else f"h = {h:g} mm is not a size for a mesh; ask for 0.35 mm"
         )
     covered = sum(layer.profile.area for layer in laminate.tpe_layers)
     elements = 2.31 * covered / h**2 * (3 if settings.element == "tet" else 1)

@@ -193,7 +193,7 @@ def narrows(borders: Sequence[Border], h: float) -> list[float]:
         [min(h, TURN * e.radius) if isinstance(e, Arc) else h for e in (b.edge for b in borders)]
     )
     np.minimum.at(sizes, owner, np.maximum(widths / ACROSS, LEAST * h))
-    return sizes.tolist()
+    return [float(size) for size in sizes]
 
 
 def _chords(
