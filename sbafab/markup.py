@@ -1,8 +1,13 @@
-"""Escaping of text in XML as in ``xml.sax.saxutils``, whose import loads all of HTTP."""
+"""Escaping of text in XML as in ``xml.sax.saxutils``, whose import loads all of HTTP; templates."""
 
 from __future__ import annotations
 
 from html import escape as html_escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 SPACES = {"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
 
@@ -21,3 +26,17 @@ def quoteattr(text: str) -> str:
     if "'" not in text:
         return f"'{text}'"
     return '"{}"'.format(text.replace('"', "&quot;"))
+
+
+def environment(folder: Path) -> Environment:
+    """Return the environment of a folder's templates; an undefined name is an error."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    return Environment(
+        loader=FileSystemLoader(folder),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )

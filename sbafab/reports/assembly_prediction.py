@@ -152,14 +152,12 @@ def predict_assembly(
     scene = _Scene(assembled, pressure_kpa)
     for placed in actuators:
         pause()
-        pockets = placed.made.design.form.pockets
-        if isinstance(pockets, Slots):
-            hold = grip(assembled, placed)
-            assert hold is not None
+        hold = grip(assembled, placed)
+        if hold is not None:
             figures += _grip_figures(hold, placed.made.design.form.stacks, pressure_kpa, load_g)
             if hold.push is None:
                 left_out.append(f"{placed.name}, {', '.join(IN_THE_LUMEN)}: {hold.why_none}")
-        elif isinstance(pockets, Discs):
+        elif placed.name in scene.stacks:
             figures += _arm_figures(placed, scene.stacks[placed.name], pressure_kpa, load_g)
             touches += scene.touches(placed)
             pause()
@@ -292,29 +290,24 @@ def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
     return free_grip._replace(room=room, push=push)
 
 
-def _grip_figures(
-    hold: Grip, stacks: int, pressure: float, load_g: float
-) -> Iterator[AssemblyFigure]:
+def _grip_figures(hold: Grip, stacks: int, pressure: float, load_g: float) -> list[AssemblyFigure]:
     """Diameter of a radial actuator, and the hold of its stacks in the assembly's lumen."""
-
-    def figure(
-        name: str, value: float, unit: str, model: str = STATIC, paper: str = ""
-    ) -> AssemblyFigure:
-        return AssemblyFigure(hold.part, name, value, unit, model, paper)
-
     widest = "about 28 (Sec. 2.1)"
-    yield figure("diameter, deflated", hold.deflated, "mm", "tube and films", "15.33 (Sec. 2.1)")
-    yield figure("diameter, inflated free", hold.free, "mm", ModelId.LENS.words, widest)
-    yield figure("diameter, inflated at most", hold.most, "mm", ModelId.CYLINDER.words, widest)
-    if hold.room is None or hold.push is None:
-        return
-    force = pressure * hold.push
-    height, push, friction = IN_THE_LUMEN
-    yield figure(f"{height} of {hold.lumen:g} mm", hold.room, "mm")
-    yield figure(push, force, "N", LENS, "holds (Sec. 5)")
-    if load_g > 0:
-        needed = load_g * 1e-3 * GRAVITY / (stacks * force)
-        yield figure(f"{friction} that holds {load_g:g} g along the lumen", needed, "")
+    rows = [
+        ("diameter, deflated", hold.deflated, "mm", "tube and films", "15.33 (Sec. 2.1)"),
+        ("diameter, inflated free", hold.free, "mm", ModelId.LENS.words, widest),
+        ("diameter, inflated at most", hold.most, "mm", ModelId.CYLINDER.words, widest),
+    ]
+    if hold.room is not None and hold.push is not None:
+        force = pressure * hold.push
+        height, push, friction = IN_THE_LUMEN
+        rows.append((f"{height} of {hold.lumen:g} mm", hold.room, "mm", STATIC, ""))
+        rows.append((push, force, "N", LENS, "holds (Sec. 5)"))
+        if load_g > 0:
+            needed = load_g * 1e-3 * GRAVITY / (stacks * force)
+            words = f"{friction} that holds {load_g:g} g along the lumen"
+            rows.append((words, needed, "", STATIC, ""))
+    return [AssemblyFigure(hold.part, *row) for row in rows]
 
 
 # Contacts and clearances between parts, of arms upright and bent by some of their chambers.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
@@ -529,19 +529,19 @@ def _layer_labels(section: StackSection) -> Iterator[StackLabel]:
             yield label._replace(colour=ink(slab.layer.film).line)
 
 
-def _feature_labels(section: StackSection) -> list[StackLabel]:
-    """Bond, neck ring, overhang, bore, pocket and lumen, where the section has them."""
-    cap, films = section.slabs[-1], [s for s in section.slabs if not s.layer.is_mask]
+def _feature_labels(section: StackSection) -> Iterator[StackLabel]:
+    """Yield bond, pocket, neck ring, overhang, bore and lumen, where the section has them."""
+    films = [slab for slab in section.slabs if not slab.layer.is_mask]
     bore = "bore ⌀" if section.laminate.bores else "opening "
-    features = [
+    for labels in (
         _bond_beside(section),
         _pocket(section),
         _neck_ring(section),
         _overhang(section),
-        next(filter(None, (_through(bore, 0.0, slab) for slab in films)), None),
-        None if section.lumen is None else _through("lumen ⌀", section.lumen, cap),
-    ]
-    return [label for label in features if label is not None]
+        _openings(bore, 0.0, films),
+        () if section.lumen is None else _openings("lumen ⌀", section.lumen, section.slabs[-1:]),
+    ):
+        yield from islice(labels, 1)
 
 
 def _in_gap(words: str, s: float, joint: Joint) -> StackLabel:
@@ -554,52 +554,46 @@ def _in_slab(words: str, s: float, slab: SectionSlab) -> StackLabel:
     return StackLabel(words, s, layer.z + layer.film.thickness / 2, layer.index)
 
 
-def _bond_beside(section: StackSection) -> StackLabel | None:
-    """The bonded ring beside the bottom pocket, on the side away from the inlet."""
+def _bond_beside(section: StackSection) -> Iterator[StackLabel]:
+    """Yield the bonded rings beside pockets, on the side away from the inlet."""
     for joint in section.bonds("chamber"):
-        beside = [span for span in joint.spans if span[1] < 0]
-        if beside:
-            return _in_gap(_words("bond", beside[-1]), sum(beside[-1]) / 2, joint)
-    return None
+        for span in [span for span in joint.spans if span[1] < 0][-1:]:
+            yield _in_gap(_words("bond", span), sum(span) / 2, joint)
 
 
-def _pocket(section: StackSection) -> StackLabel | None:
-    """The pocket of the second balloon, or of the only one (open toward its inlet)."""
+def _pocket(section: StackSection) -> Iterator[StackLabel]:
+    """Yield the pocket of the second balloon, or of the only one (open toward its inlet)."""
     for joint in reversed(section.bonds("chamber")[:2]):
         pocket = opening(joint.spans, 0.0)
         if pocket is not None:
-            return _in_gap(_words("chamber pocket", pocket), 0.6 * pocket[0], joint)
-        before = [end for _, end in joint.spans if end < 0]
-        if before:
-            return _in_gap("chamber pocket", 0.6 * max(before), joint)
-    return None
+            yield _in_gap(_words("chamber pocket", pocket), 0.6 * pocket[0], joint)
+        for end in [end for _, end in joint.spans if end < 0][-1:]:
+            yield _in_gap("chamber pocket", 0.6 * end, joint)
 
 
-def _neck_ring(section: StackSection) -> StackLabel | None:
-    """The bond beside the bore that carries one balloon on the next, or a sheet's window."""
+def _neck_ring(section: StackSection) -> Iterator[StackLabel]:
+    """Yield bonds beside the bore that carry one balloon on the next, or a sheet's windows."""
     for joint in section.bonds("separator"):
         for span in joint.spans:
             if span[0] < 0 < span[1]:
-                return _in_gap(_words("window, bond", span), sum(span) / 2, joint)
-        beside = [span for span in joint.spans if span[1] <= 0]
-        if beside:
-            return _in_gap(_words("neck ring, bond", max(beside)), sum(max(beside)) / 2, joint)
-    return None
+                yield _in_gap(_words("window, bond", span), sum(span) / 2, joint)
+        for span in [span for span in joint.spans if span[1] <= 0][-1:]:
+            yield _in_gap(_words("neck ring, bond", span), sum(span) / 2, joint)
 
 
-def _overhang(section: StackSection) -> StackLabel | None:
-    """The lowest separator mask past the wall above it, away from the inlet if that shows."""
+def _overhang(section: StackSection) -> Iterator[StackLabel]:
+    """Yield separator masks past the wall above them, away from the inlet if that shows."""
     for mask, wall in pairwise(section.slabs):
-        if mask.layer.role != "separator-mask" or not mask.spans or not wall.spans:
-            continue
-        span = mask.spans[0][0], wall.spans[0][0]
-        if section.cropped:
-            span = wall.spans[-1][1], mask.spans[-1][1]
-        if span[1] - span[0] > 1e-3:
-            return _in_slab(_words("overhang", span), sum(span) / 2, mask)
-    return None
+        if mask.layer.role == "separator-mask" and mask.spans and wall.spans:
+            span = mask.spans[0][0], wall.spans[0][0]
+            if section.cropped:
+                span = wall.spans[-1][1], mask.spans[-1][1]
+            if span[1] - span[0] > 1e-3:
+                yield _in_slab(_words("overhang", span), sum(span) / 2, mask)
 
 
-def _through(name: str, at: float, slab: SectionSlab) -> StackLabel | None:
-    through = opening(slab.spans, at)
-    return through and _in_slab(f"{name}{length(through[1] - through[0])}", at, slab)
+def _openings(name: str, at: float, slabs: Sequence[SectionSlab]) -> Iterator[StackLabel]:
+    for slab in slabs:
+        through = opening(slab.spans, at)
+        if through is not None:
+            yield _in_slab(f"{name}{length(through[1] - through[0])}", at, slab)

@@ -21,6 +21,7 @@ from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, validated
 from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError, OutputError
+from sbafab.markup import environment
 from sbafab.models.balloons import has_balloons
 from sbafab.models.calibrated import Ends
 from sbafab.models.drawn_pockets import model_form
@@ -35,7 +36,6 @@ from sbafab.output import advice
 from sbafab.output.advice import YieldDesign, value_of
 from sbafab.output.swap import replace_text
 from sbafab.process import Progress, ignore_progress
-from sbafab.reports.html_templates import environment
 from sbafab.reports.inflated_picture import WHY, PictureRequest, pictures_at_one_scale
 from sbafab.reports.solid_png import solid_png
 from sbafab.search.sweep_report import CSV, JOURNAL

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sbafab.reports.html_templates import environment
+from sbafab.markup import environment
 
 if TYPE_CHECKING:
     from jinja2 import Environment

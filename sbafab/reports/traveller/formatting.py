@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from sbafab.design.units import KILOPASCALS
 from sbafab.laminate.laminate import Inlet
+from sbafab.markup import environment
 from sbafab.pressing.schedule import HANDLING_MINUTES, joined_words, layers_in_words
 from sbafab.reports.drawing import TIMES, layer_numbers
-from sbafab.reports.html_templates import environment
 from sbafab.reports.traveller.lay_up import face_down, layer_words
 from sbafab.version import GENERATOR
 
