@@ -67,13 +67,9 @@ def lift(
     weights = np.bincount(triangles.ravel(), load.ravel(), count)
 
     # Each unknown moves one node, or all nodes of one neck disc.
+    moving = np.setdiff1d(triangles, fixed)
+    free = np.setdiff1d(moving, np.concatenate([moving[:0], *(nodes for nodes, _ in discs)]))
     unknown = np.full(count, -1)
-    active = np.unique(triangles)
-    unknown[active] = 0
-    unknown[fixed] = -1
-    for nodes, _ in discs:
-        unknown[nodes] = -1
-    free = np.flatnonzero(unknown == 0)
     unknown[free] = np.arange(len(free))
     lean = np.zeros((2, count))
     for number, (nodes, middle) in enumerate(discs):
@@ -320,15 +316,9 @@ def set_on(
 def _frame(slopes: NDArray[np.float64]) -> NDArray[np.float64]:
     """The smallest rotation (3, 3) of the upright axis onto the normal of a plane."""
     normal = np.array([-slopes[0], -slopes[1], 1.0])
-    normal /= np.linalg.norm(normal)
-    x, y, z = normal.tolist()
-    return np.array(
-        [
-            [1 - x * x / (1 + z), -x * y / (1 + z), x],
-            [-x * y / (1 + z), 1 - y * y / (1 + z), y],
-            [-x, -y, z],
-        ]
-    )
+    x, y, z = (normal / np.linalg.norm(normal)).tolist()
+    xx, xy, yy = x * x / (1 + z), x * y / (1 + z), y * y / (1 + z)
+    return np.array([[1 - xx, -xy, x], [-xy, 1 - yy, y], [-x, -y, z]])
 
 
 # The fill of a whole actuator.
@@ -382,24 +372,18 @@ def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, li
 
 def _least(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> Fill:
     """The fill raised just enough towards an even one, in steps of 0.1 ul, to keep films apart."""
+    most = fill.largest
 
     def raised(share: float) -> Fill:
-        return Fill(
-            {
-                name: min(
-                    math.ceil(10 * (ul + share * (fill.largest - ul)) - 1e-6) / 10, fill.largest
-                )
-                if ul < fill.largest
-                else ul
-                for name, ul in fill.ul.items()
-            }
-        )
+        def amount(ul: float) -> float:
+            return min(math.ceil(10 * (ul + share * (most - ul)) - 1e-6) / 10, most)
+
+        return Fill({name: ul if ul == most else amount(ul) for name, ul in fill.ul.items()})
 
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         share = (low + high) / 2
-        tried = raised(share)
-        crosses = crossing(stack, formed(stack, tried, all_pockets)) is not None
+        crosses = crossing(stack, formed(stack, raised(share), all_pockets)) is not None
         low, high = (share, high) if crosses else (low, share)
     return raised(high)
 
@@ -429,8 +413,8 @@ def _raised(
     for k in sorted({pocket.ply for pocket in of_body}):
         there = [pocket for pocket in of_body if pocket.ply == k]
         _lift(there, fill, centres, places, lifts, necks)
-    poses = _poses(stack, places, necks[:, centres])
     forms = {}
+    poses = _poses(stack, places, necks[:, centres])
     for k, (ply, rise, pose) in enumerate(zip(stack.plies, lifts, poses, strict=True)):
         if ply.layer.role != "sheet":
             local = np.column_stack([stack.plane.points, ply.z + rise])
@@ -441,21 +425,18 @@ def _raised(
 
 def _fill(stack: Layup, fill_ul: float | Mapping[str, float]) -> Fill:
     names = [chamber.name for chamber in stack.laminate.chambers]
-    if not isinstance(fill_ul, Mapping):
-        amounts = dict.fromkeys(names, float(fill_ul))
-    else:
-        unknown = [name for name in fill_ul if name not in names]
-        if unknown:
-            raise DesignError(
-                f"fill names chamber {unknown[0]}, which is not there; "
-                f"the chambers are {', '.join(names)}"
-            )
-        amounts = {name: float(fill_ul.get(name, 0.0)) for name in names}
-        if stack.sector is not None and len(set(amounts.values())) > 1:
-            raise DesignError(
-                "a mesh of a part by symmetry has the same fill in every chamber; "
-                "ask for symmetry full"
-            )
+    given = fill_ul if isinstance(fill_ul, Mapping) else dict.fromkeys(names, fill_ul)
+    unknown = [name for name in given if name not in names]
+    if unknown:
+        raise DesignError(
+            f"fill names chamber {unknown[0]}, which is not there; "
+            f"the chambers are {', '.join(names)}"
+        )
+    amounts = {name: float(given.get(name, 0.0)) for name in names}
+    if stack.sector is not None and len(set(amounts.values())) > 1:
+        raise DesignError(
+            "a mesh of a part by symmetry has the same fill in every chamber; ask for symmetry full"
+        )
     for name, value in amounts.items():
         if not (math.isfinite(value) and value >= 0):
             raise DesignError(f"fill of {name} = {value:g} ul must be 0 ul or more")
