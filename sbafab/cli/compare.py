@@ -23,10 +23,10 @@ from sbafab.search.compare import (
     load_compared,
     margin_text,
     reached_text,
-    value_text,
     write_page,
 )
 from sbafab.search.compare import compare as compared
+from sbafab.search.vary import format_value
 
 
 @click.command()
@@ -59,7 +59,7 @@ def compare(
         print_json({**comparison.as_dict(), "folder": str(folder)})
         return
     names = ("", *comparison.names)
-    print_table("Keys", names, [(r.key, *map(value_text, r.values)) for r in comparison.keys])
+    print_table("Keys", names, [(r.key, *map(format_value, r.values)) for r in comparison.keys])
     print_table("Rules", names, [(r.rule, *map(margin_text, r.margins)) for r in comparison.rules])
     print_figures(comparison, names)
     keys, rules = several(len(comparison.keys), "key"), several(len(comparison.rules), "rule")

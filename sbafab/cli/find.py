@@ -114,7 +114,7 @@ def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float
     "--free",
     metavar="KEY=LOW:HIGH:STEP",
     multiple=True,
-    help="Vary this key as well as those of the family, or set its range; of a key that is a word "
+    help="Vary this key too, beside keys of the family, or set its range; of a key that is a word "
     "KEY=WORD,WORD. Repeatable.",
 )
 @click.option(

@@ -224,7 +224,8 @@ def _generate_for_yield(
     """Write the folder of a design changed for a yield; exits with 1 if none reaches it."""
     # Both designs are predicted, which a plain run does not do: models load slowly.
     from sbafab.cli.compare import print_figures
-    from sbafab.search.compare import DESIGNS, reach_yield, value_text
+    from sbafab.search.compare import DESIGNS, reach_yield
+    from sbafab.search.vary import format_value
 
     with shown_progress(request.as_json) as progress:
         fixed = frozenset(changed_keys(request.assignments))
@@ -235,7 +236,7 @@ def _generate_for_yield(
     def show(run: Run) -> None:
         if reached.comparison is not None:
             names = ("", *DESIGNS)
-            rows = [(row.key, *map(value_text, row.values)) for row in reached.changes]
+            rows = [(row.key, *map(format_value, row.values)) for row in reached.changes]
             print_table("Changed for the yield", names, rows)
             print_figures(reached.comparison, names)
         print_wrapped(reached.sentence)

@@ -40,7 +40,7 @@ from sbafab.reports.inflated_picture import WHY, PictureRequest, pictures_at_one
 from sbafab.reports.solid_png import solid_png
 from sbafab.search.sweep_report import CSV, JOURNAL
 from sbafab.search.trials import RuleMargin, margins
-from sbafab.search.vary import key_values
+from sbafab.search.vary import NOTHING, format_value, key_values
 from sbafab.version import GENERATOR
 
 FOLDER, PAGE = "compare", "compare.html"
@@ -342,16 +342,6 @@ def _is_main(quantity: Quantity, at: Conditions) -> bool:
 # Words of the table and the page.
 
 
-NOTHING = "-"
-
-
-def value_text(value: object) -> str:
-    """Return the value of a key for display."""
-    if value is None:
-        return NOTHING
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
 def margin_text(margin: RuleMargin | None) -> str:
     """Return verdict and margin of a rule; the measured value if the rule has no limit."""
     if margin is None:
@@ -406,7 +396,7 @@ def compare_html(comparison: DesignComparison) -> str:
             names=comparison.names,
             designs=comparison.designs,
             hashes=[design_sha256(each.design)[:12] for each in comparison.designs],
-            keys=[(row.key, *map(value_text, row.values)) for row in comparison.keys],
+            keys=[(row.key, *map(format_value, row.values)) for row in comparison.keys],
             rules=[(row.rule, *map(margin_text, row.margins)) for row in comparison.rules],
             figures=[
                 (f"{pair.name}, {pair.unit}", *map(reached_text, pair.figures), pair.differs)

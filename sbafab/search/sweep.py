@@ -163,9 +163,14 @@ def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress
         settings = (values, request.pressures_kpa, request.all_columns, is_calibrated)
         table = Table(lambda: journal.rows(iter(keys)), *settings)
         gone = stale_designs(folder / CSV, table)
-        files = _write(folder, request, table)
+        files = write_tables(table, folder)
+        page = sweep_html(request.design, request.varied, table)
+        with replacing(folder / PAGE) as opened:
+            opened.write(page)
     outcomes = Counter(row["outcome"] for row in table.rows())
-    return SweptDesigns(folder, len(values), len(missing), dict(outcomes), files, table, gone)
+    return SweptDesigns(
+        folder, len(values), len(missing), dict(outcomes), (*files, PAGE, JOURNAL), table, gone
+    )
 
 
 def _measure(
@@ -230,14 +235,6 @@ def _from_here(varied: Varied) -> Varied:
         for path in varied.values
     )
     return Varied(varied.key, paths)
-
-
-def _write(folder: Path, request: SweepRequest, table: Table) -> tuple[str, ...]:
-    files = write_tables(table, folder)
-    page = sweep_html(request.design, request.varied, table)
-    with replacing(folder / PAGE) as opened:
-        opened.write(page)
-    return (*files, PAGE, JOURNAL)
 
 
 @contextmanager

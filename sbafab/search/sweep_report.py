@@ -28,7 +28,7 @@ from sbafab.models.quantity import ANYWHERE, Conditions, FigureKey, Quantity
 from sbafab.reports.charts import ChartBars, ChartCurve, ChartSpecks, Panel, chart_svg
 from sbafab.rules.deck import rule_names
 from sbafab.search.trials import SweepRow
-from sbafab.search.vary import Values, Varied
+from sbafab.search.vary import Values, Varied, format_value
 from sbafab.spreadsheet import write_rows
 from sbafab.version import GENERATOR
 
@@ -422,7 +422,7 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
             causes=causes[:MOST_REASONS],
             more_causes=max(0, len(causes) - MOST_REASONS),
             head=[*keys, *(objective.label for objective in objectives)],
-            best=[(n + 1, [_shown_value(dots.columns[name][n]) for name in names]) for n in listed],
+            best=[(n + 1, [format_value(dots.columns[name][n]) for name in names]) for n in listed],
             unlisted=len(best) - len(listed),
             measured=list(_measured(design, table, objectives)),
         )
@@ -445,13 +445,9 @@ def _values_text(swept: Varied) -> str:
     if swept.is_continuous:
         return f"{swept.low:g} to {swept.high:g}"
     if len(swept.values) > 6:
-        ends = f"{_shown_value(swept.values[0])} to {_shown_value(swept.values[-1])}"
+        ends = f"{format_value(swept.values[0])} to {format_value(swept.values[-1])}"
         return f"{ends}, {len(swept.values)} values"
-    return ", ".join(map(_shown_value, swept.values))
-
-
-def _shown_value(value: Any) -> str:
-    return "" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)
+    return ", ".join(map(format_value, swept.values))
 
 
 def _objectives(table: Table) -> list[Objective]:

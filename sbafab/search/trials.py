@@ -233,7 +233,7 @@ class Pool(NamedTuple):
 def local_pool(workers: int | None = None) -> Iterator[Pool]:
     """One thread per worker, each with its own process; none outlives the block."""
     size = workers or processors()
-    open_all()
+    _may_start.set()
     executor = ThreadPoolExecutor(size)
     try:
         yield Pool(executor, size)
@@ -333,16 +333,11 @@ MeasureJob = dict[str, Any]
 _thread = threading.local()
 
 
-class _Started:
-    """The running processes, and whether more may be started."""
-
-    def __init__(self) -> None:
-        self.lock = threading.Lock()
-        self.children: set[Child] = set()
-        self.may_start = True
-
-
-_started = _Started()
+_children: set[Child] = set()
+"""The running processes; changed with ``_lock`` held."""
+_lock = threading.Lock()
+_may_start = threading.Event()
+_may_start.set()
 
 
 class Child:
@@ -350,8 +345,8 @@ class Child:
 
     def __init__(self) -> None:
         alone = {name: os.environ.get(name, "1") for name in ONE_THREAD}
-        with _started.lock:
-            if not _started.may_start:
+        with _lock:
+            if not _may_start.is_set():
                 raise RuntimeError("no process is started any more")
             self._process = subprocess.Popen(
                 COMMAND,
@@ -361,7 +356,7 @@ class Child:
                 encoding="utf-8",
                 env={**os.environ, **alone, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             )
-            _started.children.add(self)
+            _children.add(self)
 
     def answer(self, job: MeasureJob, seconds: float) -> SweepRow:
         """The row of a job; a row with the reason if the process dies or takes too long."""
@@ -406,7 +401,7 @@ class Child:
         """Kills the process and waits until it is gone."""
         self._process.kill()
         self._process.wait()
-        _started.children.discard(self)
+        _children.discard(self)
         for stream in (self._process.stdin, self._process.stdout):
             with suppress(OSError):
                 if stream is not None:
@@ -429,17 +424,11 @@ def guarded(job: MeasureJob, seconds: float) -> SweepRow:
     return row
 
 
-def open_all() -> None:
-    """Lets threads of this process start processes again."""
-    with _started.lock:
-        _started.may_start = True
-
-
 def close_all() -> None:
     """Kills the processes started by threads of this process, and prevents new ones."""
-    with _started.lock:
-        _started.may_start = False
-        children = list(_started.children)
+    with _lock:
+        _may_start.clear()
+        children = list(_children)
     for child in children:
         child.close()
 

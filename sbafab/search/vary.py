@@ -17,6 +17,8 @@ from sbafab.errors import DesignError
 MOST_DESIGNS = 100_000
 MOST_VALUES = 10_000
 DIGITS = 6
+NOTHING = "-"
+"""Text of a value that is not there."""
 
 Values = Mapping[str, Any]
 """A value for each varied key, by dotted key."""
@@ -43,9 +45,11 @@ def key_values(design: Design) -> dict[str, Any]:
 
 def format_value(value: Any) -> str:
     """Return the value of a key for display, a list in brackets."""
-    if isinstance(value, str):
-        return value
-    return f"[{', '.join(map(format_value, value))}]" if isinstance(value, list) else f"{value:g}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(format_value, value))}]"
+    if value is None:
+        return NOTHING
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def format_keys(values: Values) -> str:

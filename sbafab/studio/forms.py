@@ -219,7 +219,7 @@ def table(body: bytes) -> dict[str, Any]:
 
 
 class PageRequest(BaseModel):
-    """What a page sends with a job: its ``tab``, text and edits of the design, the name of its
+    """A request of a page for a job: its ``tab``, text and edits of the design, the name of its
     file, keys of the shapes that it has, and the pose that it asks for.
     """
 

@@ -24,6 +24,7 @@ from sbafab.studio.model import (
     laminate_model,
     nets_model,
     parts_model,
+    remembered,
     shapes_model,
 )
 from sbafab.studio.moving import (
@@ -165,9 +166,7 @@ def motion(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
         yield stack_model(design.name, stack)
         return
     if pose.get("tube"):
-        filling = _FILLINGS.setdefault(job["tab"], Filling())
-        while len(_FILLINGS) > MOST_FILLINGS:
-            del _FILLINGS[next(iter(_FILLINGS))]
+        filling = remembered(_FILLINGS, job["tab"], Filling, MOST_FILLINGS)
         yield filling.step(stack, pose)
         return
     for answer in poses(stack, pose):

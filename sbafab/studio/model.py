@@ -1,7 +1,7 @@
 """Laminates, findings and assemblies as data for the page: numbers and text, no pictures.
 
 A contour is a flat list of x, y and bulge (mm; the DXF convention), so arcs stay arcs on screen. A
-shape is sent once under its key, and not again to a page that already has it.
+shape is sent once under its key, and never to a page that names it as present.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ import base64
 import hashlib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from sbafab import api
 from sbafab.output.checks import FindingEntry
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from sbafab.reports.nets_svg import NetMap
     from sbafab.rules.finding import Finding
 
+Kept = TypeVar("Kept")
 CancelCheck = Callable[[], None]
 """Called between steps of work; raises if the answer is not needed any longer."""
 
@@ -164,7 +166,7 @@ def finding_model(finding: Finding) -> dict[str, Any]:
 # Assemblies: the surface of each part once, and its place.
 #
 # A surface is sent once under its key, in the part's own frame, and not again to a page that
-# already has it: for a moved part only its place is sent.
+# names it as present: for a moved part only its place is sent.
 
 
 PLACED_BY = {"on", "at", "angle", "along", "offset", "glue", "note", "design", "set"}
@@ -178,7 +180,8 @@ def parts_model(assembled: Assembled, has: Collection[str]) -> dict[str, Any]:
     for placed in assembled.parts:
         key = _key(placed)
         if key not in has and key not in surfaces:
-            surfaces[key] = _surface(placed, key)
+            make = partial(_solid, placed)
+            surfaces[key] = remembered(_SURFACES, key, make, MOST_SURFACES)
         parts.append({**_part(placed), "surface": key})
     return {"kind": "parts", "parts": parts, "surfaces": surfaces}
 
@@ -216,13 +219,17 @@ def _key(placed: PlacedPart) -> str:
     return hashlib.sha256(repr(decisive).encode()).hexdigest()[:24]
 
 
-def _surface(placed: PlacedPart, key: str) -> dict[str, str]:
-    surface = _SURFACES.get(key)
-    if surface is None:
-        surface = _SURFACES[key] = packed(api.solid(placed))
-        while len(_SURFACES) > MOST_SURFACES:
-            del _SURFACES[next(iter(_SURFACES))]
-    return surface
+def _solid(placed: PlacedPart) -> dict[str, str]:
+    return packed(api.solid(placed))
+
+
+def remembered(kept: dict[str, Kept], key: str, make: Callable[[], Kept], most: int) -> Kept:
+    """Return the value of a key, made if it is missing; the oldest of over ``most`` is dropped."""
+    if key not in kept:
+        kept[key] = make()
+        while len(kept) > most:
+            del kept[next(iter(kept))]
+    return kept[key]
 
 
 def packed(surface: Surface) -> dict[str, str]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from sbafab import api
 from sbafab.errors import DesignError
-from sbafab.studio.model import flat, packed
+from sbafab.studio.model import flat, packed, remembered
 
 if TYPE_CHECKING:
     from sbafab.assemblies.build import Assembled, PlacedPart
@@ -32,11 +32,7 @@ def stack_of(design: Design) -> Stack:
     """The stack of a design, cached for the next pose. Raises DesignError if there is none."""
     resolved = {**api.resolved(design), "name": None, "order": None}
     key = json.dumps(resolved, sort_keys=True, default=str)
-    if key not in _STACKS:
-        _STACKS[key] = api.stack(design)
-        while len(_STACKS) > MOST_STACKS:
-            del _STACKS[next(iter(_STACKS))]
-    return _STACKS[key]
+    return remembered(_STACKS, key, lambda: api.stack(design), MOST_STACKS)
 
 
 def stack_model(name: str, stack: Stack) -> dict[str, Any]:

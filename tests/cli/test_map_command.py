@@ -129,7 +129,7 @@ def test_reproduce_writes_every_figure_with_the_papers_error_bars(tmp_path: Path
     calibrated = json.loads(out)["calibrated"]
     assert (calibrated["held_out"]["points"], calibrated["held_out"]["inside"]) == (29, 28)
     curves = {curve["curve"]: curve["points"] for curve in calibrated["curves"]}
-    _, out, _ = run("predict", "3dof-15mm", "--json", "-o", str(tmp_path))
+    _, out, _ = run("predict", "3dof-15mm", "--pressure", "100", "--json", "-o", str(tmp_path))
     told = {
         figure["name"]: figure["value"]
         for figure in json.loads(out)["figures"]

@@ -11,7 +11,7 @@ import pytest
 
 from sbafab.errors import OutputError
 from sbafab.search import trials as pool_module
-from sbafab.search.trials import MeasureJob, close_all, guarded, local_pool, open_all, run_jobs
+from sbafab.search.trials import MeasureJob, close_all, guarded, local_pool, run_jobs
 
 PUPPET = """
 import json, os, signal, sys, time
@@ -35,10 +35,10 @@ def puppet(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A process that does what its job says, in place of the one that measures."""
     monkeypatch.setattr(pool_module, "COMMAND", (sys.executable, "-S", "-c", PUPPET))
     monkeypatch.setattr(pool_module, "_thread", threading.local())
-    open_all()
+    pool_module._may_start.set()
     yield
     close_all()
-    open_all()
+    pool_module._may_start.set()
 
 
 def test_one_process_does_job_after_job() -> None:
@@ -76,7 +76,7 @@ def test_a_pool_does_every_job_once_and_leaves_no_process(tmp_path: Path) -> Non
         )
     assert sorted(key for key, _ in found) == sorted(jobs)
     assert [outcome for key, outcome in found if key == "7"] == ["crashed"]
-    assert not pool_module._started.children
+    assert not pool_module._children
 
 
 def test_stopped_half_way_it_leaves_no_process() -> None:
@@ -89,7 +89,7 @@ def test_stopped_half_way_it_leaves_no_process() -> None:
     ]
     with pytest.raises(KeyboardInterrupt), local_pool(2) as pool:
         run_jobs(pool, jobs, 60, stop, lambda: None)
-    assert not pool_module._started.children
+    assert not pool_module._children
 
 
 def test_another_program_is_told_apart() -> None:

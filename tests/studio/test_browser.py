@@ -242,16 +242,6 @@ def test_a_finding_leads_to_its_place_in_every_view(seen: Watched) -> None:
     assert seen.page.locator("#view-layers circle.place").count() == 1
 
 
-def test_undo_and_redo(seen: Watched) -> None:
-    seen.say("studio.edit([['stack.balloons', '6']])")
-    seen.until("studio.laminate.balloons === 6 && studio.history.length === 2")
-    seen.page.get_by_role("button", name="Undo").click()
-    seen.until("studio.laminate.balloons === 15")
-    assert seen.say("studio.text") == DESIGN
-    seen.page.keyboard.press("Control+Shift+z")
-    seen.until("studio.laminate.balloons === 6")
-
-
 def test_each_quantity_is_predicted_once_and_other_models_unfold(seen: Watched) -> None:
     seen.until("studio.prediction && !studio.prediction.quick")
     figures = api.predict(api.loads(DESIGN)).as_dict()["figures"]

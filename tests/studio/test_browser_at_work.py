@@ -205,18 +205,6 @@ def test_unsaved_work_survives_a_reload(seen: Watched) -> None:
     assert seen.say("studio.unsaved") is True
 
 
-def test_two_tabs_do_not_disturb_each_other(seen: Watched, chrome: Any, link: str) -> None:
-    other = Watched(chrome, link)
-    other.ready()
-    other.say("studio.edit([['stack.balloons', '4']])")
-    seen.say("studio.edit([['stack.balloons', '11']])")
-    other.ready()
-    seen.ready()
-    assert (seen.say("studio.laminate.balloons"), other.say("studio.laminate.balloons")) == (11, 4)
-    assert other.complaints == []
-    other.close()
-
-
 def test_no_tab_saves_over_what_the_other_has_saved(
     seen: Watched, chrome: Any, link: str, folder: Path
 ) -> None:
