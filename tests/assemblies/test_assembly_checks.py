@@ -82,14 +82,6 @@ def only_finding(findings: tuple[Finding, ...], rule: str) -> Finding:
     return found
 
 
-def test_a_magnet_half_over_the_lumen_is_half_glued(tables: Tables, put_together: Together) -> None:
-    # A magnet as wide as the lumen, half a lumen off: what is open is the lens of two circles.
-    data = changed(tables("aperture"), {"magnet": {"diameter": 2, "offset": [1, 0]}})
-    lens = 2 * (math.pi / 3 - math.sqrt(3) / 4)
-    seat = only_finding(run_checks(put_together(data)), "seat")
-    assert seat.measured == pytest.approx(1 - lens / math.pi, abs=1e-6)
-
-
 def test_shared_space_is_measured(tables: Tables, put_together: Together) -> None:
     # A line 0.4 thicker than the cup's bore, as far as it runs into the cup's bottom.
     data = tables("brace")

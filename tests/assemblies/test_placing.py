@@ -27,10 +27,7 @@ from sbafab.assemblies.shapes import (
     own_surface,
     placed_surface,
 )
-from sbafab.geometry.region import rectangle
-from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import open_edges
-from sbafab.meshing.wrap import TubeWrap, wrapped
 
 
 @pytest.mark.parametrize(
@@ -65,17 +62,6 @@ def test_both_halves_of_a_mould_leave_room_for_the_cup_alone() -> None:
     bore = part.bore / 2
     play = turn * ((bore + DOWEL_PLAY) ** 2 - bore**2) * DOWEL
     assert lower.volume + upper.volume + cup.volume + play == pytest.approx(block, rel=1e-9)
-
-
-def test_a_bent_slab_is_closed_and_has_the_volume_of_its_ring_sector() -> None:
-    slab = Slab(rectangle((-6, -4), (8, 5)), 0.1, 0.6)
-    curved = wrapped(fuse([slab], 0.01, 0.17), TubeWrap(7.5))
-    assert len(open_edges(curved)) == 0
-    inner, outer = 7.6, 8.1
-    assert curved.volume == pytest.approx((14 / 7.5) / 2 * (outer**2 - inner**2) * 9, rel=1e-3)
-    radii = np.hypot(curved.points[:, 0], curved.points[:, 1])
-    assert radii.min() == pytest.approx(inner)
-    assert radii.max() == pytest.approx(outer)
 
 
 def test_parts_stand_where_the_file_says() -> None:

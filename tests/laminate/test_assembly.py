@@ -8,7 +8,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.geometry.region import disc
-from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
+from sbafab.laminate.assembly import AssemblyStep, assembly
 from sbafab.laminate.laminate import Laminate, Pin
 
 AXIS = (0.0, 0.0)
@@ -52,14 +52,6 @@ def test_middle_first_takes_two_steps(laminate: Laminate) -> None:
     assert [step.name for step in assembly(single)] == ["flash_bottom", "bond_bottom"]
 
 
-def test_a_balloon_alone_takes_two(laminate: Laminate) -> None:
-    single = replace(laminate, layers=laminate.layers[:3])
-    assert [told(step) for step in assembly(single)] == [
-        (1, "flash_bottom", "flash", ((2, 3),), (2, 3), ["chamber1"]),
-        (2, "bond_bottom", "full", ((1,), (2, 3)), (1,), []),
-    ]
-
-
 def test_what_lies_under_the_base_joins_last() -> None:
     radial = build(load_design("radial-15mm", ["stack.balloons=2"]))
     channels = ["channel1", "channel2", "channel3"]
@@ -80,26 +72,11 @@ def test_layers_without_a_base_start_from_the_lowest_film(laminate: Laminate) ->
     assert [step.stacks for step in assembly(walls)] == [((2, 3),), ((1,), (2, 3))]
 
 
-def test_a_steps_layers_are_those_of_its_stacks(laminate: Laminate) -> None:
-    assert [step.layers for step in assembly(laminate)] == [
-        (2, 3),
-        (1, 2, 3),
-        (4, 5, 6, 7, 8, 9, 10),
-        tuple(range(1, 12)),
-    ]
-
-
 def test_a_pin_that_a_film_covers_stays_out(laminate: Laminate) -> None:
     layers = list(laminate.layers)
     layers[2] = replace(layers[2], profile=disc(AXIS, 3.25), pattern="closed")
     closed = replace(laminate, layers=tuple(layers))
     assert [len(step.pins) for step in assembly(closed)] == [0, 0, 1, 0]
-
-
-def test_a_pin_that_holds_nothing_stays_out(laminate: Laminate) -> None:
-    # Beside all layers: no film is in its way, and none has a hole for it.
-    beside = replace(laminate, pins=(*laminate.pins, Pin("beside", (50.0, 0.0), 1.0)))
-    assert [len(step.pins) for step in assembly(beside)] == [1, 0, 1, 0]
 
 
 def on_ears(laminate: Laminate, pins_in: bool) -> Laminate:
@@ -132,8 +109,3 @@ def test_ears_are_tacked_on_their_pins_and_fully_bonded_without(laminate: Lamina
     assert sorted(added) == [layer.index for layer in eared.layers]
     for tack, full in ((steps[1], steps[2]), (steps[4], steps[5])):
         assert (full.adds, full.stacks) == ((), (tack.layers,))
-
-
-def test_one_layer_of_each_pattern(laminate: Laminate) -> None:
-    patterns = [layer.pattern for layer in distinct_layers(laminate, range(4, 11))]
-    assert patterns == list(dict.fromkeys(laminate.layer(i).pattern for i in range(4, 11)))

@@ -67,18 +67,6 @@ def test_the_flat_part_is_both_halves_side_by_side(tmp_path: Path) -> None:
     assert laminate.cut_with(upper) == 1
 
 
-def test_a_strip_beside_the_fold_needs_no_width(tmp_path: Path) -> None:
-    data = folded()
-    data["shapes"]["pocket"]["polygon"] = [[-19.7, -15], [20, -15], [20, 15], [-19.7, 15]]
-    laminate = drawn(tmp_path, data)
-    # 0.3 mm of film is bonded beside the fold, which has no edge: 0.6 mm of whole film.
-    (bond,) = (f for f in run_deck(laminate, FEW) if f.rule == "bond-width")
-    assert bond.measured == pytest.approx(0.6, abs=1e-6)
-    apart = replace(laminate, folds=())
-    (bond,) = (f for f in run_deck(apart, FEW) if f.rule == "bond-width")
-    assert bond.measured == pytest.approx(0.3, abs=1e-6)
-
-
 @pytest.mark.parametrize("degrees", [0.0, 17.0, 90.0, 213.0])
 def test_an_accordion_of_three_is_read_back_from_its_flat_part(degrees: float) -> None:
     # Widths 7, 7 and 5 mm, folded at x = 7 and back at x = 0, and each with a hole of its own.

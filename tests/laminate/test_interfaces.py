@@ -9,7 +9,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
-from sbafab.geometry.region import Region, disc
+from sbafab.geometry.region import disc
 from sbafab.laminate.laminate import LOOSE, Laminate, Pin, interface_regions
 
 AXIS = (0.0, 0.0)
@@ -42,12 +42,6 @@ def test_regions_between_two_films_and_two_masks() -> None:
     assert unbonded.area == pytest.approx(2 * math.pi)
 
 
-def test_without_masks_all_bonds() -> None:
-    mask, contact, bond, unbonded = interface_regions(disc(AXIS, 4.0), disc(AXIS, 3.0), [])
-    assert mask == unbonded == Region()
-    assert contact.area == bond.area == pytest.approx(9 * math.pi)
-
-
 def test_interfaces_of_three_balloons(laminate: Laminate) -> None:
     assert [interface.index for interface in laminate.interfaces] == [1, 2, 3, 4, 5]
     kinds = ["chamber", "separator", "chamber", "separator", "chamber"]
@@ -70,14 +64,6 @@ def test_heights_are_sums_of_films(laminate: Laminate) -> None:
         [0.038 + 0.063 * i for i in range(5)]
     )
     assert {gap.gap for gap in laminate.interfaces} == {0.025}
-
-
-def test_equal_profiles_make_equal_patterns(laminate: Laminate) -> None:
-    patterns = [interface.pattern for interface in laminate.interfaces]
-    wall, chamber, separator = (laminate.layer(i).pattern for i in (5, 6, 8))
-    assert patterns[2] == (wall, chamber, wall)
-    assert patterns[3] == (wall, separator, wall)
-    assert len(set(patterns)) == 5
 
 
 def test_films_that_touch_bond_all_over(laminate: Laminate) -> None:

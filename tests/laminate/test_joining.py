@@ -94,17 +94,6 @@ def test_no_order_is_named_by_its_conflict() -> None:
         joinings(stack)
 
 
-def test_a_mask_under_a_seam_shields_what_lies_below() -> None:
-    plain = laminate(COATED, COATED, COATED)
-    seams = crossing(seam("a", 1, 2, 8, 1), seam("b", 2, 3, 3, 2))
-    with pytest.raises(DesignError, match="seam b of layers 2 and 3 would weld layers 1 and 2 too"):
-        joinings(replace(plain, seams=seams))
-    masked = laminate(COATED, MASK, COATED, COATED)
-    # No seam bonds through the mask, which reaches over all: it shields, whatever the tool is.
-    seams = crossing(seam("a", 1, 3, 8, 1), seam("b", 3, 4, 3, 2))
-    assert order(replace(masked, seams=seams)) == ["a", "b"]
-
-
 def test_faces_that_nothing_bonds_are_named() -> None:
     stack = replace(laminate(COATED, COATED), bonds=(WELD,))
     with pytest.raises(

@@ -51,26 +51,6 @@ def test_every_pattern_is_drawn_with_its_exact_area(laminate: Laminate) -> None:
         assert "A" in data
 
 
-def test_the_longer_side_measures_eighty_millimetres(laminate: Laminate) -> None:
-    root = drawing(laminate.layer(1))
-    sides = [float(root.attrib[key].removesuffix("mm")) for key in ("width", "height")]
-    box = [float(part) for part in root.attrib["viewBox"].split()]
-    assert max(sides) == pytest.approx(80.0, abs=1e-5)
-    assert sides[0] / sides[1] == pytest.approx(box[2] / box[3], rel=1e-5)
-
-
-def test_the_profile_lies_inside_the_view(laminate: Laminate) -> None:
-    layer = laminate.layer(1)
-    low_x, low_y, high_x, high_y = layer.profile.bounds
-    root = drawing(layer)
-    x, y, width, height = (float(part) for part in root.attrib["viewBox"].split())
-    assert x < low_x
-    assert high_x < x + width
-    # The picture is flipped: y up becomes y down.
-    assert y < -high_y
-    assert -low_y < y + height
-
-
 def test_the_view_has_a_margin_of_three_hundredths(laminate: Laminate) -> None:
     # Its bounds are off the axis both ways: 20 x 10 mm, a margin of 0.6 all round.
     layer = replace(laminate.layer(1), profile=rectangle((5.0, 30.0), (25.0, 40.0)))
@@ -87,12 +67,6 @@ def test_only_the_laminate_is_see_through(laminate: Laminate) -> None:
     assert float(alone.attrib["fill-opacity"]) == 1.0
     for path in drawing(laminate).iter(f"{SVG}path"):
         assert 0.2 < float(path.attrib["fill-opacity"]) < 0.8
-
-
-def test_a_laminate_shows_each_pattern_once(laminate: Laminate) -> None:
-    root = drawing(laminate)
-    assert len(list(root.iter(f"{SVG}path"))) == len(laminate.patterns)
-    assert not any(node.tail for node in root.iter(f"{SVG}path"))
 
 
 def test_a_name_with_markup_is_escaped(laminate: Laminate) -> None:
@@ -112,10 +86,3 @@ def test_notebooks_get_a_scale_and_a_legend(laminate: Laminate) -> None:
     assert float(width) == pytest.approx(5 * 80 / (1.06 * longer), rel=1e-4)
     assert "5 mm</span>" in page
     assert "TPE, Stretchlon 200, 0.038 mm" in page
-
-
-def test_tpe_and_ptfe_have_different_fills(laminate: Laminate) -> None:
-    fills = [
-        re.findall(r'fill="(#\w+)"', laminate.layer(index)._repr_html_())[0] for index in (1, 2, 3)
-    ]
-    assert fills[0] == fills[2] != fills[1]

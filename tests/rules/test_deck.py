@@ -14,7 +14,7 @@ from sbafab.design.sections import RuleName
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, disc, rectangle, strip
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules import bond_width, film_limits, mask_overhang, measures, pin_holes
+from sbafab.rules import bond_width, film_limits, measures, pin_holes
 from sbafab.rules.deck import rule_names, run_deck
 from sbafab.rules.measures import Measures
 from tests.designs import PAPER, errors
@@ -329,17 +329,6 @@ def test_ears_that_vanished_from_all_films(good: Callable[..., Laminate]) -> Non
     assert found.measured >= 5
 
 
-@pytest.mark.parametrize("turn", [10.0, 25.0, 40.0])
-def test_a_strip_that_leaves_aslant_is_no_narrow_bond(
-    turn: float, good: Callable[..., Laminate], spoil: Callable[..., Laminate]
-) -> None:
-    # A square pocket turned under the strip: their edges meet at 90 degrees less ``turn``.
-    pocket = rectangle((-1.7, -1.7), (1.7, 1.7)).turned(turn)
-    mask = (pocket | strip(AXIS, (8.75, 0.0), 1.6)) - disc(AXIS, 0.5)
-    (found,) = bond_width.check(Measures(spoil(good(*ONE), 2, mask), PAPER))
-    assert (found.verdict, found.measured) == ("pass", pytest.approx(0.75, abs=1e-9))
-
-
 @pytest.mark.parametrize(("rule", "module"), [(bond_width, measures), (film_limits, film_limits)])
 def test_equal_profiles_are_measured_once(
     rule: object, module: object, good: Callable[..., Laminate], monkeypatch: pytest.MonkeyPatch
@@ -367,17 +356,3 @@ def test_what_is_measured_once_is_measured_of_that_laminate(good: Callable[..., 
     assert one.moves is one.moves
     wide = PAPER.with_("registration.hand_placement=0.4")
     assert Measures(one.laminate, wide).moves != one.moves
-
-
-def test_flush_masks_at_pins_are_waived_by_name(good: Callable[..., Laminate]) -> None:
-    laminate = good("3dof-15mm")
-    main, *waived = mask_overhang.check(Measures(laminate, PAPER))
-    assert main.verdict == "pass"
-    assert main.measured == pytest.approx(0.5, abs=1e-9)
-    # Each bore is in all 15 pockets; the lumen bounds the film in the 14 separator interfaces.
-    counts = [15 if pin.diameter == 1.0 else 14 for pin in laminate.pins]
-    assert sorted(counts) == [14, 15, 15, 15]
-    for finding, pin, count in zip(waived, laminate.pins, counts, strict=True):
-        assert finding.verdict == "waived"
-        assert finding.measured == pytest.approx(0.0, abs=1e-9)
-        assert dict(finding.says.facts).items() >= {"pin": pin.name, "count": count}.items()

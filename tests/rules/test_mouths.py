@@ -120,16 +120,6 @@ def test_an_opening_within_its_mouth_is_sealed(
     assert connectivity(with_nets(laminate), PAPER).faults == ()
 
 
-def test_a_mouth_may_be_written_to_two_digits() -> None:
-    """On an edge 33.33 degrees off, stated to 0.01 degree and 0.01 mm."""
-    place = Drawn(1.0, 33.333, (1.0047, -3.0032))
-    laminate = place.laminate(channel(-1.0, 1.0), {"a": (0.0, 2.0)})
-    (inlet,) = laminate.inlets
-    x, y = inlet.mouth
-    rounded = replace(inlet, mouth=(round(x, 2), round(y, 2)), direction=unit(33.33 + 180))
-    assert sealed(replace(laminate, inlets=(rounded,))).verdict == "pass"
-
-
 @PLACES
 def test_what_opens_into_one_mouth_is_joined(scale: float, turn: float, by: Point) -> None:
     """The mouth goes from -4 to 4, a port's channel opens from 2 to 3.5, another's from 5."""

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from random import Random
 
 import pytest
 
-from sbafab.geometry.region import Region, disc, rectangle, strip, union
-from sbafab.laminate.joints import Fold, Net, Port
+from sbafab.geometry.region import Region, rectangle, strip, union
+from sbafab.laminate.joints import Fold, Net
 from sbafab.laminate.laminate import Chamber, Laminate
 from sbafab.laminate.netlist import Netlist
 from sbafab.rules import sealing
@@ -74,29 +73,6 @@ def test_a_cut_channel_is_one_open() -> None:
     assert len(findings) == 2
 
 
-def test_the_good_laminate_passes_and_says_what_it_holds() -> None:
-    joined, opening = check(Measures(laminate_of(straight()), LIMITS))
-    assert joined.verdict == "pass"
-    assert joined.message == "2 nets of 4 ports joined as declared, and to nothing else"
-    assert opening.verdict == "pass"
-
-
-def test_an_opening_pressure_is_that_of_a_clamped_plate() -> None:
-    routes = straight()
-    laminate = laminate_of(routes)
-    film = laminate.layers[0].film
-    assert film.elastic is not None
-    modulus, poisson = film.elastic
-    # At interface 1 the base alone lifts. Timoshenko: d = p w^4 / 384 D, D = E t^3 / 12 (1 - nu^2);
-    # the membrane is longer by 8 d^2 / 3 w^2 and carries p = 8 T d / w^2. Here d = t and w = 1.
-    plane = 1000 * modulus / (1 - poisson**2)
-    bending = 384 * plane * film.thickness**4 / 12
-    membrane = 8 * plane * (8 / 3) * film.thickness**4
-    (_, opening) = check(Measures(laminate, LIMITS))
-    assert opening.measured == pytest.approx(bending + membrane, rel=1e-6)
-    assert opening.unit == "kPa"
-
-
 def test_a_channel_too_narrow_to_open_fails_at_its_neck() -> None:
     routes = straight()
     routes.less += [
@@ -142,14 +118,6 @@ def test_a_pocket_with_a_port_is_no_dead_end() -> None:
     assert fault.kind == "dead-end"
 
 
-def test_a_port_in_no_net_may_be_joined_to_none() -> None:
-    routes = straight()
-    del routes.nets["b"]
-    routes.nets["a"] = ["p", "q"]
-    found = connectivity(laminate_of(routes), LIMITS)
-    assert [(fault.kind, fault.nets) for fault in found.faults] == [("short", ("r", "s"))]
-
-
 def test_a_port_in_a_bond_is_open_at_its_place() -> None:
     laminate = laminate_of(straight())
     moved = tuple(
@@ -173,21 +141,6 @@ def test_a_familys_chambers_are_nets(design: tuple[str, ...]) -> None:
     found = connectivity(replace(laminate, nets=nets), LIMITS)
     assert found.faults == ()
     assert set(found.groups) == {frozenset({chamber.name}) for chamber in laminate.chambers}
-
-
-def test_two_chambers_of_a_family_that_are_joined_are_a_short() -> None:
-    laminate = built("3dof-15mm", "stack.balloons=3")
-    first, second = (chamber.centres[0] for chamber in laminate.chambers[:2])
-    mask = laminate.layer(6)
-    profile = mask.profile | (strip(first, second, 0.4) - disc(first, 0.5) - disc(second, 0.5))
-    layers = list(laminate.layers)
-    layers[5] = replace(mask, profile=profile, pattern="bridged")
-    nets = tuple(Net(chamber.name, (chamber.name,)) for chamber in laminate.chambers)
-    joined = replace(laminate, layers=tuple(layers), nets=nets)
-    (fault,) = connectivity(joined, LIMITS).faults
-    assert (fault.kind, fault.interface) == ("short", 3)
-    middle = (first[0] + second[0]) / 2, (first[1] + second[1]) / 2
-    assert math.dist(fault.at, middle) < NEAR
 
 
 def pouch_with(laminate: Laminate, mask: Region, **changes: object) -> Laminate:
@@ -313,10 +266,3 @@ def test_a_name_that_the_design_lacks_gets_the_nearest_or_what_to_give() -> None
         f"nets.json names ss, {where}; did you mean s?",
         f"nets.json names outlet, {where}; give its layers and its place, or correct it",
     ]
-
-
-def test_random_faults_are_the_same_in_every_run() -> None:
-    fault, again = planted("stub", 7), planted("stub", 7)
-    assert (fault.shape, fault.interfaces) == (again.shape, again.interfaces)
-    assert FAULTS["stub"](routed.routed(7), Random(7)) is not None
-    assert isinstance(laminate_of(fault.routes).ports[0], Port)

@@ -224,17 +224,3 @@ def assert_true(place: NarrowPlace, stack: Stack) -> None:
         loads.append(stack.section(place.interface - 1, p, q, 4000))
     assert place.pressure is not None
     assert 0.98 * min(loads) <= place.pressure <= 1.02 * max(loads)
-
-
-def test_films_behind_without_a_modulus_are_not_judged() -> None:
-    void = strip((0.0, 4.0), (32.0, 4.0), 0.5)
-    cover = rectangle((-1.0, 1.0), (12.0, 7.0))
-    laminate = stacked(cover, void, cover)
-    outer = {laminate.tpe_layers[0].index, laminate.tpe_layers[-1].index}
-    layers = tuple(
-        replace(layer, film=replace(layer.film, elastic=None)) if layer.index in outer else layer
-        for layer in laminate.layers
-    )
-    place = hardest(replace(laminate, layers=layers), (20.0, 4.0))
-    assert place.pressure is None
-    assert place.width.middle[0] >= 12.0

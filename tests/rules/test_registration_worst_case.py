@@ -95,22 +95,10 @@ def without_tails(laminate: Laminate) -> Laminate:
     return replace(laminate, pins=pins)
 
 
-def test_a_cap_laid_by_hand_lies_with_the_wall_below(good: Good) -> None:
-    # Cap and wall against the mask between them: the hand, the wall's pin and the mask's.
-    both = left(good(*ONE), 5, "bond", errors(pin=0.004, placement=0.2))
-    assert both == pytest.approx(0.75 - 0.2 - 2 * 0.004)
-
-
 def test_a_turned_strip_costs_its_lever_arm(good: Good) -> None:
     # Only the chamber masks can turn then, about the pin in their bore.
     bond, _ = measured(without_tails(good(*ONE, EARS)), errors(turn=1))
     assert bond == pytest.approx(0.75 - STRIP_END * DEGREE, abs=1e-6)
-
-
-def test_discs_that_turn_about_their_centres_lose_nothing(good: Good) -> None:
-    laminate = good(*ONE)
-    for interface in (3, 4, 5):
-        assert left(laminate, interface, "bond", errors(turn=3)) == pytest.approx(0.75)
 
 
 def test_a_mask_on_the_lumens_pin_turns_about_the_lumen(good: Good) -> None:
@@ -151,24 +139,8 @@ def test_shapely_finds_the_same_ring_left_of_moved_and_miscut_layers(good: Good)
     assert ring == pytest.approx(predicted, abs=1e-3)
 
 
-def test_shapely_finds_the_same_beside_a_turned_strip(good: Good) -> None:
-    laminate = without_tails(good(*ONE, EARS))
-    turned = affinity.rotate(shape(laminate.layer(2).profile), 1, origin=AXIS)
-    tab_side = shapely.LineString([(4.5, 1.55), (STRIP_END, 1.55)])
-    inside = turned.intersection(shapely.box(-5, -5, STRIP_END, 5))
-    predicted = left(laminate, 1, "bond", errors(turn=1))
-    # To first order in the turn: 0.8 (1 - cos 1) and 8.25 (1 - sinc) are left out.
-    assert tab_side.distance(inside) == pytest.approx(predicted, abs=3e-3)
-
-
 def by_rule(findings: tuple[Finding, ...], verdict: str) -> set[str]:
     return {finding.rule for finding in findings if finding.verdict == verdict}
-
-
-def test_a_coarse_laser_is_caught_by_this_rule_alone(good: Good) -> None:
-    coarse = PAPER.with_("registration.cutting_error=0.2", "registration.pin_stretch=1.0")
-    findings = run_deck(good(*ONE, "inlet.tube_outer_diameter=0.6"), coarse)
-    assert by_rule(findings, "fail") == {"registration-worst-case"}
 
 
 def test_a_neck_ring_that_just_holds_as_drawn_is_caught_by_this_rule_alone(
@@ -181,13 +153,6 @@ def test_a_neck_ring_that_just_holds_as_drawn_is_caught_by_this_rule_alone(
     # 0.7 - 0.2 - 0.008, and at least 0.08 less by hand.
     assert dict(facts(found)["firm"].facts)["value"] == pytest.approx(0.492, abs=1e-6)
     assert 8 in found.where.layers or found.measured < 0.412
-
-
-def test_what_is_short_as_drawn_only_warns_here(good: Good, spoil: Spoil) -> None:
-    narrow = spoil(good(*ONE), 4, disc(AXIS, 3.75) - disc(AXIS, 1.2))
-    findings = run_deck(narrow, PAPER)
-    assert by_rule(findings, "fail") == {"bond-width"}
-    assert "registration-worst-case" in by_rule(findings, "warn")
 
 
 @pytest.mark.parametrize("template", ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"])
@@ -232,21 +197,6 @@ def test_without_its_tails_pin_the_strip_turns(good: Good) -> None:
     assert cause(bond)[0] == f"{RULE}.turn"
     assert facts(bond)["count"] == 1
     assert facts(bond)["advice"].id == f"{RULE}.align"
-
-
-def test_an_oblong_mask_turns_about_its_only_pin(good: Good) -> None:
-    # Above the bottom balloon no strip leads out; the ends' centres stand 4.25 from the bore.
-    bond, _ = measured(good("radial-15mm", "stack.balloons=2", EARS), errors(turn=1))
-    assert bond == pytest.approx(0.75 - 4.25 * DEGREE, abs=1e-6)
-
-
-def test_a_place_is_where_the_worst_is(good: Good) -> None:
-    bond, _ = check(Measures(without_tails(good(*ONE, EARS)), PAPER))
-    assert bond.where.interface == 1
-    assert bond.where.layers == (1, 2, 3)
-    # Half way between the strip's edge and the tab's, at the tab's end.
-    assert bond.where.x == pytest.approx(STRIP_END)
-    assert abs(bond.where.y or 0) == pytest.approx((0.8 + 1.55) / 2)
 
 
 def test_pieces_of_a_layer_move_by_themselves(good: Good) -> None:

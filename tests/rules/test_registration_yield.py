@@ -54,14 +54,6 @@ def test_two_cut_edges_add_to_a_triangle(missing: float, good: Good, spoil: Spoi
     assert found.interfaces[5].value == pytest.approx(s + (1 - s * s) / 2, abs=ROOM + 0.005)
 
 
-@pytest.mark.parametrize("missing", [0.02, 0.06, 0.1, 0.15])
-def test_two_outlines_over_one_mask(missing: float, good: Good) -> None:
-    found = simulate(good(*ONE), limits(0.75 - missing, CUT_ONLY))
-    s = missing / 0.2
-    # The nearer of two uniform errors against a third.
-    assert found.interfaces[3].value == pytest.approx(s + (1 - s**3) / 3, abs=ROOM + 0.005)
-
-
 def test_a_disc_laid_by_hand_keeps_a_ring_within_a_smaller_disc(good: Good) -> None:
     by_hand = errors(placement=0.2)
     found = simulate(good(*ONE), limits(0.65, by_hand))
@@ -86,17 +78,6 @@ def test_a_disc_laid_by_hand_keeps_a_straight_bond_beyond_a_chord(
     # Bad where it lies more than 0.1 towards the pocket: a segment of the disc of 0.2.
     segment = (math.acos(0.5) - 0.5 * math.sqrt(0.75)) / math.pi
     assert found.interfaces[5].value == pytest.approx(1 - segment, abs=ROOM + 0.003)
-
-
-def test_the_whole_is_good_where_every_interface_is(good: Good) -> None:
-    by_hand = errors(placement=0.2)
-    found = simulate(good(*ONE), limits(0.65, by_hand))
-    # Cap, the separator in the middle, and the first separator are laid by hand, each by itself.
-    product = 1.0
-    for share in found.interfaces.values():
-        product *= share.value
-    assert found.whole.value < min(share.value for share in found.interfaces.values())
-    assert found.whole.value == pytest.approx(product, abs=ROOM)
 
 
 @pytest.mark.parametrize("cut", [0.0, 0.06, 0.15])
@@ -124,11 +105,6 @@ def test_middle_first_takes_a_placement_by_hand_less(good: Good) -> None:
     assert shares[1] == pytest.approx((0.15 / 0.2) ** 6, abs=0.02)
     # With the bottom balloon pressed first, the upper one is laid on it by hand as well.
     assert shares[0] < 0.6 * shares[1]
-
-
-def test_without_errors_every_build_is_good(good: Good) -> None:
-    found = simulate(good(*ONE), limits(0.75, errors()))
-    assert found.whole.value == 1.0
 
 
 def test_a_seed_gives_the_same_builds_again(good: Good) -> None:
@@ -189,11 +165,6 @@ def test_without_a_target_less_than_the_papers_success_warns(good: Good) -> None
     assert many.measured is not None
     assert few.measured is not None
     assert few.measured < 0.9 <= many.measured
-
-
-def test_with_ears_every_build_is_good(good: Good) -> None:
-    # No sum of the errors exceeds what bond and overhang have to spare.
-    assert simulate(good(*ONE, EARS), PAPER).whole.value == 1
 
 
 # Builds that come short, against plain sums of their errors.
@@ -287,26 +258,3 @@ def test_a_yields_verdict(count: int, target: float | None, verdict: str, good: 
     told = finding_of(shares(count), good(*ONE), PAPER.with_(rules={"target_yield": target}))
     assert (told.verdict, told.limit) == (verdict, target)
     assert told.id.endswith({"pass": "", "warn": ".low-ears", "fail": ".target-fail"}[verdict])
-
-
-@pytest.mark.parametrize(
-    ("balloons", "builds"), [(3, 10_000), (15, 10_000), (20, 300_000 // 39), (160, 1000)]
-)
-def test_tall_stacks_draw_fewer_builds(balloons: int, builds: int, good: Good) -> None:
-    laminate = good("1dof-5mm", f"stack.balloons={balloons}")
-    found = simulate(laminate, PAPER.with_(registration=errors()))
-    assert found.whole == Share(builds, builds)
-    assert set(found.interfaces.values()) == {found.whole}
-    assert list(found.interfaces) == [interface.index for interface in laminate.interfaces]
-
-
-def test_builds_are_drawn_in_batches_to_the_last(good: Good) -> None:
-    # Two whole batches and a part of one.
-    only_cut = errors(cutting=0.1)
-    limits = PAPER.with_(
-        registration=only_cut, rules={"yield_builds": 10_007, "worst_bond_width": 0.75}
-    )
-    found = simulate(good(*ONE), limits)
-    assert found.whole.builds == 10_007
-    # Each ring between a wall's outline and a neck ring's mask: half of the builds, or fewer.
-    assert found.whole.good <= min(share.good for share in found.interfaces.values())

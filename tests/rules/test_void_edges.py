@@ -164,17 +164,6 @@ def test_a_chamber_is_parted_where_seams_close_a_channel(gap: float, verdict: st
         assert (found.where.x, found.where.y) == pytest.approx((0, 0), abs=0.1)
 
 
-def test_a_narrow_end_of_a_pocket_parts_nothing() -> None:
-    """A slot between two seams that holds neither the chamber's centre nor its mouth."""
-    walls = {
-        "upper": ([[15, 0.0], [5, 0.0]], "hot-tip"),
-        "lower": ([[15, -2.0], [5, -2.0]], "hot-tip"),
-    }
-    design = welded(walls, nets=None, ports=None)
-    (found,) = run_rule(SEALING, Measures(build(design), design))
-    assert found.verdict == "pass"
-
-
 @pytest.mark.parametrize(("width", "verdict"), [(2.0, "warn"), (2.2, "pass"), (1.59, "fail")])
 def test_a_mouth_between_two_seams_is_narrower_by_their_errors(width: float, verdict: str) -> None:
     """Welded 0.6 mm narrower at worst; the tube needs 1.596."""
