@@ -60,6 +60,12 @@ def beside(edge: Edge, distance: float) -> Point:
     return middle[0] + nx * distance, middle[1] + ny * distance
 
 
+def middle(region: Region) -> Point:
+    """Return the middle of the box round a region."""
+    low_x, low_y, high_x, high_y = region.bounds
+    return (low_x + high_x) / 2, (low_y + high_y) / 2
+
+
 class Reach(NamedTuple):
     """Distance along an edge's right-hand normal to the first other edge, and the place there."""
 

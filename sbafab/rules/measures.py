@@ -164,9 +164,3 @@ def interface_name(interface: Interface) -> Clause:
 def place_in(interface: Interface, p: Point | None = None) -> Place:
     """Return a place in an interface, mm."""
     return Place(interface.index, interface.layer_indices, *(p or (None, None)))
-
-
-def middle(region: Region) -> Point:
-    """Return the middle of the box round a region."""
-    low_x, low_y, high_x, high_y = region.bounds
-    return (low_x + high_x) / 2, (low_y + high_y) / 2

@@ -20,9 +20,9 @@ from sbafab.geometry.width import Width, least_width
 from sbafab.laminate.joints import Net
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.laminate.netlist import Netlist, compare
-from sbafab.rules.boundary import without_slivers
+from sbafab.rules.boundary import middle, without_slivers
 from sbafab.rules.finding import Finding, Place, Verdict, judged
-from sbafab.rules.measures import Measures, middle, place_in
+from sbafab.rules.measures import Measures, place_in
 from sbafab.rules.opening_pressure import hardest_place
 from sbafab.rules.rule import Rule
 from sbafab.rules.sentences import Clause, explained, say, tell

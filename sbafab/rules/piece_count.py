@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from sbafab.rules.boundary import middle
 from sbafab.rules.finding import Finding, Place, judged
-from sbafab.rules.measures import Measures, middle
+from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Rule
 from sbafab.rules.sentences import explained, layer_name
 

@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import assembly, distinct_layers
 from sbafab.laminate.laminate import Laminate, Layer, Pin
+from sbafab.rules.boundary import middle
 from sbafab.rules.channel_clear import ON_ONE_PIN, tooling_pins
 from sbafab.rules.finding import Finding, Place, judged
 from sbafab.rules.limits import TOLERANCE
-from sbafab.rules.measures import Measures, middle
+from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Rule
 from sbafab.rules.sentences import explained, layer_name
 

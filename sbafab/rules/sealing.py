@@ -14,8 +14,9 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, strip
 from sbafab.geometry.width import Width
 from sbafab.laminate.laminate import Chamber, Interface, Laminate
+from sbafab.rules.boundary import middle
 from sbafab.rules.finding import Finding, Place, judged
-from sbafab.rules.measures import Measures, distinct_interfaces, middle, place_in
+from sbafab.rules.measures import Measures, distinct_interfaces, place_in
 from sbafab.rules.rule import Rule
 from sbafab.rules.sentences import Clause, explained, layer_name, say
 from sbafab.rules.void_edges import VoidEdges

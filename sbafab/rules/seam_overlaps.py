@@ -20,7 +20,7 @@ from sbafab.geometry.region import Region, rectangle, union
 from sbafab.laminate.folding import lies_on
 from sbafab.laminate.joints import Seam, SeamTool
 from sbafab.laminate.laminate import Interface, Laminate
-from sbafab.rules.boundary import edges_along
+from sbafab.rules.boundary import edges_along, middle
 from sbafab.rules.voids import OUTSIDE, Cavity, VoidGraph, cavities, void_graph
 
 NEAR: Final = 1e-5
@@ -125,7 +125,7 @@ class _Seams(NamedTuple):
             for piece in (seam.region & other.region & bare).pieces:
                 if self._is_needed(piece, (seam, other)):
                     body = other.region & _swath(_edges_near(piece, other, reach), other.width)
-                    yield Overlap(a, b, *_depth(seam, body, piece, reach), _middle(piece))
+                    yield Overlap(a, b, *_depth(seam, body, piece, reach), middle(piece))
 
     def edge_bonds(self) -> Iterator[EdgeBond]:
         inside = Region(self.gap.contact.outers)
@@ -146,7 +146,7 @@ class _Seams(NamedTuple):
                         for edge in edges_along(moved, inside)
                         if boxes_meet(edge.bounds, widened(piece.bounds, error + NEAR))
                     )
-                yield EdgeBond(self.gap, seam, width, _middle(piece))
+                yield EdgeBond(self.gap, seam, width, middle(piece))
 
     def _is_needed(self, overlap: Region, seams: Sequence[Seam]) -> bool:
         """Return True if two voids are joined when these seams no longer meet there.
@@ -216,8 +216,3 @@ def _swath(edges: Sequence[Edge], width: float) -> Region:
 
 def _is_on(p: Point, edges: Sequence[Edge]) -> bool:
     return any(distance_to(edge, p) <= NEAR for edge in edges)
-
-
-def _middle(piece: Region) -> Point:
-    left, low, right, high = piece.bounds
-    return (left + right) / 2, (low + high) / 2

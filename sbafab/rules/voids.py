@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
 from sbafab.geometry.cache import cached
-from sbafab.geometry.edges import Bounds, Edge, Line, Point, distance_to
+from sbafab.geometry.edges import Edge, Line, Point, distance_to
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region, rectangle, union
 from sbafab.laminate.folding import lies_on
 from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer
-from sbafab.rules.boundary import beside, edges_along
+from sbafab.rules.boundary import beside, edges_along, middle
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.sentences import Clause, say
 
@@ -29,13 +29,16 @@ PAST_MOUTH: Final = 0.025
 """mm by which an opening may reach past either end of its mouth, and lie off its line; ours."""
 
 
+VoidKind = Literal["outside", "pocket", "separator", "gap", "opening", "mouth"]
+
+
 class Void(NamedTuple):
     """A node: ``level`` is an interface's index, or a layer's for an opening.
 
     The ``level`` of a mouth is its inlet's place in ``laminate.inlets``.
     """
 
-    kind: Literal["outside", "pocket", "separator", "gap", "opening", "mouth"]
+    kind: VoidKind
     level: int = 0
     piece: int = 0
 
@@ -82,79 +85,83 @@ class VoidGraph:
 
 
 class _Gap(NamedTuple):
-    """Contribution of an interface, by its pattern: pieces by number, joins between them."""
+    """Contribution of an interface, by its shapes: pieces by number, joins between them."""
 
     unbonded: tuple[Region, ...]
     missing: tuple[Region, ...]
     touching: tuple[tuple[int, int, Edge], ...]
-    outside: int
 
 
 def void_graph(laminate: Laminate) -> VoidGraph:
     """The graph of all voids; equal interfaces and films are cut into pieces once."""
     graph = VoidGraph()
-    low_x, low_y, high_x, high_y = laminate.bounds
-    frame = rectangle((low_x - 10, low_y - 10), (high_x + 10, high_y + 10))
-    openings = {
-        pattern: (frame - layers[0].profile).pieces
-        for pattern, layers in laminate.patterns.items()
-        if not layers[0].is_mask
-    }
-    outside = {pattern: _outside(pieces, frame) for pattern, pieces in openings.items()}
-    gaps: dict[tuple[str, ...], _Gap] = {}
-    homes: dict[tuple[tuple[str, ...], str], list[tuple[int, Point]]] = {}
-    opened: dict[int, list[Void]] = {}
+    left, low, right, high = widened(laminate.bounds, 10)
+    frame = rectangle((left, low), (right, high))
     chambers = chambers_by_level(laminate)
     named = {chamber.name for chamber in laminate.chambers}
     for interface in laminate.interfaces:
-        gap = gaps.get(interface.pattern)
-        if gap is None:
-            gap = gaps[interface.pattern] = _gap(
-                interface.unbonded, interface.contact, frame, interface.fold_lines
-            )
-        missing = [_missing(interface, home, gap) for home in range(len(gap.missing))]
+        gap = _gap(interface.unbonded, interface.contact, frame, interface.fold_lines)
+        missing = _voids("gap", interface.index, gap.missing, frame)
+        held = chambers.get(interface.index)
         inlets = {
             number: inlet
             for number, inlet in enumerate(laminate.inlets)
-            if interface.kind == "chamber"
-            and (inlet.chamber in chambers[interface.index] or inlet.chamber not in named)
+            if held is not None and (inlet.chamber in held or inlet.chamber not in named)
         }
-        _add_gap(graph, interface, gap, missing, inlets, _folds_of(interface, laminate))
-        graph.gaps.update(
-            (void, piece)
-            for void, piece in zip(missing, gap.missing, strict=True)
-            if void is not OUTSIDE
-        )
+        layers = {interface.below.index, interface.above.index}
+        folds = [Line(*f.line) for f in laminate.folds if {f.lower, f.upper} == layers]
+        _add_gap(graph, interface, gap, missing, inlets, folds)
+        graph.gaps |= _known(missing, gap.missing)
         for layer in (interface.below, interface.above):
-            key = interface.pattern, layer.pattern
-            if key not in homes:
-                homes[key] = [_home(piece, gap.missing) for piece in openings[layer.pattern]]
-            if layer.index not in opened:
-                opened[layer.index] = [
-                    _opening(layer.index, number, outside[layer.pattern])
-                    for number in range(len(openings[layer.pattern]))
-                ]
-                graph.openings.update(
-                    (void, piece)
-                    for void, piece in zip(
-                        opened[layer.index], openings[layer.pattern], strict=True
-                    )
-                    if void is not OUTSIDE
-                )
-            for opening, (home, p) in zip(opened[layer.index], homes[key], strict=True):
-                if opening is not OUTSIDE or missing[home] is not OUTSIDE:
+            pieces = _openings(layer.profile, frame)
+            opened = _voids("opening", layer.index, pieces, frame)
+            graph.openings |= _known(opened, pieces)
+            homes = _homes(layer.profile, interface.contact, frame)
+            for opening, (home, p) in zip(opened, homes, strict=True):
+                if opening != missing[home]:
                     graph.join(opening, missing[home], p)
     for layer in (laminate.tpe_layers[0], laminate.tpe_layers[-1]):
-        for number, piece in enumerate(openings[layer.pattern]):
-            opening = _opening(layer.index, number, outside[layer.pattern])
-            if opening == OUTSIDE:
-                continue
+        pieces = _openings(layer.profile, frame)
+        for opening, piece in _known(_voids("opening", layer.index, pieces, frame), pieces).items():
             port = _tube_in(piece, layer, graph, laminate.ports)
             if port is not None:
                 graph.holes[port.name] = opening
             else:
-                graph.join(opening, OUTSIDE, _middle(piece.bounds))
+                graph.join(opening, OUTSIDE, middle(piece))
     return graph
+
+
+def _voids(
+    kind: VoidKind, level: int, pieces: Sequence[Region], frame: Region | None = None
+) -> list[Void]:
+    """The voids of pieces; the piece that reaches the frame is the outside."""
+    return [
+        OUTSIDE if frame and piece.bounds[0] == frame.bounds[0] else Void(kind, level, number)
+        for number, piece in enumerate(pieces)
+    ]
+
+
+def _known(voids: Sequence[Void], pieces: Sequence[Region]) -> dict[Void, Region]:
+    """Voids with their regions, without the outside."""
+    return {v: piece for v, piece in zip(voids, pieces, strict=True) if v != OUTSIDE}
+
+
+@cached
+def _openings(film: Region, frame: Region) -> tuple[Region, ...]:
+    """The places without a film in a frame."""
+    return (frame - film).pieces
+
+
+@cached
+def _homes(film: Region, contact: Region, frame: Region) -> tuple[tuple[int, Point], ...]:
+    """The piece of a gap that each opening of a film lies over: just one, as film is missing all
+    over it, and the middle of the opening.
+    """
+    missing, homes = _openings(contact, frame), []
+    for opening in _openings(film, frame):
+        edge = max(opening.edges, key=lambda edge: edge.length)
+        homes.append((_holding(missing, beside(edge, INSET)), middle(opening)))
+    return tuple(homes)
 
 
 def chambers_by_level(laminate: Laminate) -> dict[int, frozenset[str]]:
@@ -181,8 +188,7 @@ def _tube_in(
 def _gap(
     unbonded: Region, contact: Region, frame: Region, folds: tuple[tuple[Point, Point], ...]
 ) -> _Gap:
-    pieces = unbonded.pieces
-    missing = (frame - contact).pieces
+    pieces, missing = unbonded.pieces, _openings(contact, frame)
     touching: list[tuple[int, int, Edge]] = []
     for edge in edges_along(unbonded, contact):
         if lies_on(edge, folds):
@@ -191,12 +197,12 @@ def _gap(
         home = _holding(missing, beside(edge, -INSET))
         touching.append((_bounded(pieces, edge.at(0.5)), home, edge))
     touching.sort(key=lambda entry: entry[0])
-    outside = _outside(missing, frame)
     # Inlets open to the outside; of any other two voids it counts that they join, and first where.
+    outside = _voids("gap", 0, missing, frame).index(OUTSIDE)
     joins: dict[tuple[int, int, Edge | None], tuple[int, int, Edge]] = {}
     for number, home, edge in touching:
         joins.setdefault((number, home, edge if home == outside else None), (number, home, edge))
-    return _Gap(pieces, missing, tuple(joins.values()), outside)
+    return _Gap(pieces, missing, tuple(joins.values()))
 
 
 def _bounded(pieces: tuple[Region, ...], p: Point) -> int:
@@ -221,22 +227,17 @@ def _add_gap(
     inlets: Mapping[int, Inlet],
     folds: Sequence[Line],
 ) -> None:
-    voids = [_unbonded(interface, number) for number in range(len(gap.unbonded))]
-    graph.pieces.update(zip(voids, gap.unbonded, strict=True))
+    kind: VoidKind = "pocket" if interface.kind == "chamber" else "separator"
+    voids = _voids(kind, interface.index, gap.unbonded)
+    graph.pieces |= _known(voids, gap.unbonded)
     for number, home, edge in gap.touching:
         p = edge.at(0.5)
-        if home != gap.outside:
+        if missing[home] != OUTSIDE:
             graph.join(voids[number], missing[home], p)
         # Where a film is folded it goes on from one layer to the other.
         elif not any(distance_to(fold, p) <= TOLERANCE for fold in folds):
             for void, there in _outlets(edge, inlets):
                 graph.join(voids[number], void, there)
-
-
-def _folds_of(interface: Interface, laminate: Laminate) -> list[Line]:
-    """The lines along which the two layers of an interface are one film."""
-    layers = {interface.below.index, interface.above.index}
-    return [Line(*fold.line) for fold in laminate.folds if {fold.lower, fold.upper} == layers]
 
 
 # Mouths: the stretch of the films' outline, square to an inlet's direction, that its tube closes.
@@ -316,30 +317,6 @@ def past_mouth(laminate: Laminate, level: int, p: Point) -> Clause | None:
     return None
 
 
-def _unbonded(interface: Interface, number: int) -> Void:
-    kind: Literal["pocket", "separator"] = "pocket" if interface.kind == "chamber" else "separator"
-    return Void(kind, interface.index, number)
-
-
-def _missing(interface: Interface, number: int, gap: _Gap) -> Void:
-    return OUTSIDE if number == gap.outside else Void("gap", interface.index, number)
-
-
-def _opening(layer: int, number: int, outside: int) -> Void:
-    return OUTSIDE if number == outside else Void("opening", layer, number)
-
-
-def _outside(pieces: tuple[Region, ...], frame: Region) -> int:
-    """The number of the piece that reaches the frame."""
-    return next(n for n, piece in enumerate(pieces) if piece.bounds[0] == frame.bounds[0])
-
-
-def _home(opening: Region, missing: tuple[Region, ...]) -> tuple[int, Point]:
-    """The piece of a gap that an opening lies over: just one, as film is missing all over it."""
-    edge = max(opening.edges, key=lambda edge: edge.length)
-    return _holding(missing, beside(edge, INSET)), _middle(opening.bounds)
-
-
 def _holding(pieces: tuple[Region, ...], p: Point) -> int:
     x, y = p
     for number, piece in enumerate(pieces):
@@ -347,10 +324,6 @@ def _holding(pieces: tuple[Region, ...], p: Point) -> int:
         if left <= x <= right and low <= y <= high and piece.contains(p):
             return number
     return min(range(len(pieces)), key=lambda number: pieces[number].distance_to_edge(p))
-
-
-def _middle(box: Bounds) -> Point:
-    return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
 
 
 # Cavities: what a person sees of the voids in one interface, holes of the films included.
