@@ -265,67 +265,55 @@ def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
     pairs: list[Facing] = []
     visible: list[tuple[Layer, Region]] = []
     """The parts of films that no film covers yet."""
-    shapes = _Shapes(laminate)
-    films = laminate.tpe_layers
+    openings, films = pin_openings(laminate), laminate.tpe_layers
     for index, film in enumerate(films):
         remaining: list[tuple[Layer, Region]] = []
         for below, region in visible:
             if below is films[index - 1]:
-                rest = shapes.left_by_next(index, below, film)
-                if rest.contours:
-                    remaining.append((below, rest))
-                continue
-            shared, rest = _overlaid(region, film.profile)
+                shared, rest = Region(), _left_by_next(laminate.interfaces[index - 1])
+            else:
+                shared, rest = _laid(region, film.profile)
             if rest.contours:
                 remaining.append((below, rest))
             if shared.contours:
-                faced = shapes.kept_apart(shared, index, below, film)
-                if faced is not None:
-                    pairs.append(faced)
+                between = laminate.layers[below.index : film.index - 1]
+                facing = _minus(shared, openings)
+                pairs += _kept_apart(facing, index, below, between, film)
         visible = [*remaining, (film, film.profile)]
     return tuple(pairs)
 
 
-class _Shapes:
-    """Booleans of regions, each pair of shapes computed once."""
+def _left_by_next(gap: Interface) -> Region:
+    """Return the part of a film that the film next to it leaves uncovered."""
+    if gap.below.pattern == gap.above.pattern:
+        return Region()
+    if without_slivers(gap.contact).is_empty:
+        return gap.below.profile
+    return _minus(gap.below.profile, gap.above.profile)
 
-    def __init__(self, laminate: Laminate) -> None:
-        self.laminate = laminate
-        self.openings = pin_openings(laminate)
 
-    def left_by_next(self, index: int, below: Layer, above: Layer) -> Region:
-        """Return the part of a film that the film next to it leaves uncovered."""
-        if below.pattern == above.pattern:
-            return Region()
-        contact = without_slivers(self.laminate.interfaces[index - 1].contact)
-        if not contact.contours:
-            return below.profile
-        return without_slivers(below.profile - above.profile)
-
-    def kept_apart(self, region: Region, index: int, below: Layer, above: Layer) -> Facing | None:
-        """Two films that face each other over a region; None if pins' openings fill the region."""
-        facing = bare = _minus(region, self.openings)
-        masks: dict[Region, Layer] = {}
-        for layer in reversed(self.laminate.layers[below.index : above.index - 1]):
-            if bare.is_empty:
-                break
-            if layer.is_mask and layer.profile not in masks:
-                uncovered = _minus(bare, layer.profile)
-                if uncovered != bare:
-                    masks[layer.profile] = layer
-                bare = uncovered
-        if not masks and bare.is_empty:
-            return None
-        mask = union(masks)
+def _kept_apart(
+    facing: Region, index: int, below: Layer, between: Sequence[Layer], above: Layer
+) -> Iterator[Facing]:
+    """Yield two films that face each other over a region, unless pins' openings fill it."""
+    bare = facing
+    masks: dict[Region, Layer] = {}
+    for layer in reversed(between):
+        if layer.is_mask and not bare.is_empty and layer.profile not in masks:
+            uncovered = _minus(bare, layer.profile)
+            if uncovered != bare:
+                masks[layer.profile] = layer
+            bare = uncovered
+    if masks or not bare.is_empty:
         unbonded = _minus(facing, bare) if bare.contours else facing
-        contact = below.profile & above.profile
+        mask, contact = union(masks), below.profile & above.profile
         used = tuple(reversed(masks.values()))
         gap = Interface(index, "separator", below, above, used, mask, contact, Region(), unbonded)
-        return Facing(gap, bare)
+        yield Facing(gap, bare)
 
 
 @cached
-def _overlaid(region: Region, film: Region) -> tuple[Region, Region]:
+def _laid(region: Region, film: Region) -> tuple[Region, Region]:
     """Return the part of a region that a film covers, and the rest."""
     rest, shared = without_slivers(region - film), without_slivers(region & film)
     return shared, rest if shared.contours else region

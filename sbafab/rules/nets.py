@@ -426,7 +426,7 @@ class _Reading:
 
     def _far_from(self, number: int, start: Point) -> Point:
         axis = self.axis(number)
-        return axis.centre(int(np.argmax(np.hypot(*(axis.points - start).T))))
+        return axis.centre(int(np.abs(axis.points - complex(*start)).argmax()))
 
     def _of_part(self, part: int) -> list[int]:
         return [number for number, own in enumerate(self.parts) if own == part]
@@ -531,16 +531,14 @@ class _Cut(NamedTuple):
 
 
 def _nearest(a: VoidAxis, b: VoidAxis, interface: int) -> _Cut:
-    best, at_point = math.inf, (0.0, 0.0)
+    best, middle_point = math.inf, 0j
     for start in range(0, len(a.points), 256):
         rows = a.points[start : start + 256]
-        away = np.hypot(*(rows[:, None, :] - b.points[None, :, :]).transpose(2, 0, 1))
+        away = np.abs(rows[:, None] - b.points)
         i, j = np.unravel_index(away.argmin(), away.shape)
         if away[i, j] < best:
-            best = float(away[i, j])
-            x, y = (rows[i] + b.points[j]) / 2
-            at_point = float(x), float(y)
-    return _Cut(best, best, interface, at_point, False)
+            best, middle_point = float(away[i, j]), complex(rows[i] + b.points[j]) / 2
+    return _Cut(best, best, interface, (middle_point.real, middle_point.imag), False)
 
 
 def _overlaps(a: Cavity, b: Cavity) -> list[_Cut]:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.geometry.cache import cached
+from sbafab.geometry.cache import cached, cached_attribute
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point, left_normal
 from sbafab.geometry.offset import shrink
@@ -23,6 +24,7 @@ from sbafab.geometry.region import Region
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    Complex = NDArray[np.complex128]
     Floats = NDArray[np.float64]
     Counts = NDArray[np.int64]
 
@@ -45,14 +47,14 @@ NUDGE = 1e-3
 class VoidAxis:
     """Samples of a void's boundary in order, contour by contour, the void on their left.
 
-    ``points`` and ``centres`` of the tangent circles are (n, 2) in mm, ``radii`` (n,) in mm;
-    ``partners`` (n,) are the samples that the circles touch besides; ``contours`` (n,) number the
-    contour of each; ``starts`` are the first samples of the contours, and their end.
+    ``points`` and ``centres`` of the tangent circles are x + iy in mm, ``radii`` in mm;
+    ``partners`` are the samples that the circles touch besides; ``contours`` number the contour of
+    each; ``starts`` are the first samples of the contours, and their end.
     """
 
     region: Region
-    points: Floats
-    centres: Floats
+    points: Complex
+    centres: Complex
     radii: Floats
     partners: Counts
     contours: Counts
@@ -60,7 +62,7 @@ class VoidAxis:
 
     def nearest(self, p: Point) -> int:
         """Return the sample whose circle has its centre nearest to ``p``."""
-        return int(np.argmin(np.hypot(*(self.centres - p).T)))
+        return int(np.abs(self.centres - complex(*p)).argmin())
 
     def neighbours(self, sample: int) -> tuple[int, int, int]:
         """Return the samples before and after on the contour, and the partner."""
@@ -71,8 +73,32 @@ class VoidAxis:
         return before, after, int(self.partners[sample])
 
     def centre(self, sample: int) -> Point:
-        x, y = self.centres[sample]
-        return float(x), float(y)
+        return _point(self.centres[sample])
+
+    @cached_attribute
+    def following(self) -> Complex:
+        """The sample after each one on its contour."""
+        following = np.roll(self.points, -1)
+        for first, end in pairwise(self.starts):
+            following[end - 1] = self.points[first]
+        return following
+
+    def summed(self, steps: Floats, first: Counts, last: Counts) -> Floats:
+        """Return the sums of steps from ``first`` to ``last``, along their contour."""
+        before = np.concatenate([[0.0], np.cumsum(steps)])
+        starts, contour = np.array(self.starts), self.contours[first]
+        whole = before[starts[contour + 1]] - before[starts[contour]]
+        part: Floats = before[last] - before[first]
+        return np.where(last < first, part + whole, part)
+
+
+def _point(z: complex) -> Point:
+    return float(z.real), float(z.imag)
+
+
+def _cross(p: Complex, q: Complex) -> Floats:
+    crossed: Floats = (p.conj() * q).imag
+    return crossed
 
 
 @cached
@@ -80,41 +106,35 @@ def axis_of(region: Region, width: float) -> VoidAxis:
     """Return the axis of a connected region whose narrowest place is ``width`` mm wide."""
     length = sum(contour.length for contour in region.contours)
     step = max(width / STEPS_ACROSS, length / MOST_SAMPLES)
-    points: list[Point] = []
-    normals: list[Point] = []
-    starts = [0]
-    for contour in region.contours:
-        for p, normal in _samples(contour, step):
-            points.append(p)
-            normals.append(normal)
-        starts.append(len(points))
-    numbers = [starts[i + 1] - starts[i] for i in range(len(starts) - 1)]
-    contours = np.repeat(np.arange(len(numbers)), numbers)
-    places, inward = np.array(points), np.array(normals)
-    radii, partners = _circles(places, inward)
-    centres = places + radii[:, None] * inward
-    return VoidAxis(region, places, centres, radii, partners, contours, tuple(starts))
+    samples = [[*_samples(contour, step)] for contour in region.contours]
+    counts = [len(row) for row in samples]
+    starts = np.cumsum([0, *counts]).tolist()
+    points, inward = np.array([pair for row in samples for pair in row]).T
+    radii, partners = _circles(points, inward)
+    contours = np.repeat(np.arange(len(counts)), counts)
+    centres = points + radii * inward
+    return VoidAxis(region, points, centres, radii, partners, contours, tuple(starts))
 
 
-def _samples(contour: Contour, step: float) -> Iterable[tuple[Point, Point]]:
+def _samples(contour: Contour, step: float) -> Iterator[tuple[complex, complex]]:
     """Points inside the edges, at most a step apart, with their normals into the region."""
     for edge in contour.edges:
         count = max(1, math.ceil(edge.length / step))
         for i in range(count):
             p = edge.at((i + 0.5) / count)
-            yield p, left_normal(edge, p)
+            yield complex(*p), complex(*left_normal(edge, p))
 
 
-def _circles(points: Floats, normals: Floats) -> tuple[Floats, Counts]:
+def _circles(points: Complex, normals: Complex) -> tuple[Floats, Counts]:
     """Return radii of the largest inner circles tangent at the samples, and their partners."""
     radii = np.empty(len(points))
     partners = np.empty(len(points), dtype=np.int64)
     for first in range(0, len(points), ROWS):
         rows = slice(first, first + ROWS)
-        away = points[None, :, :] - points[rows, None, :]
-        inward = np.einsum("ijk,ik->ij", away, normals[rows])
-        squares = np.einsum("ijk,ijk->ij", away, away)
+        away = points - points[rows, None]
+        inward = (away * normals[rows, None].conj()).real
         with np.errstate(divide="ignore", invalid="ignore"):
+            squares = away.real**2 + away.imag**2
             candidates = np.where(inward > INWARD, squares / (2 * inward), np.inf)
         best = candidates.argmin(axis=1)
         partners[rows] = best
@@ -165,9 +185,9 @@ def blind_ends(axis: VoidAxis, terminals: Sequence[Terminal], ratio: float) -> l
         if any(_within(taken_arc, place, axis) for taken_arc in taken for place in covered):
             continue
         taken.append((contour, first - begin, count))
-        foot = (axis.points[first] + axis.points[last]) / 2
+        foot = _point((axis.points[first] + axis.points[last]) / 2)
         width = float(cuts.width[row])
-        if _is_excused(axis, (float(foot[0]), float(foot[1])), width, terminals):
+        if _is_excused(axis, foot, width, terminals):
             continue
         tip = begin + (first - begin + count // 2) % size
         ends.append(BlindEnd(axis.centre(tip), width, float(cuts.depth[row])))
@@ -189,67 +209,30 @@ def _cuts(axis: VoidAxis) -> _Cuts:
     is_whole = (axis.contours[axis.partners] == axis.contours) & (axis.radii > 0)
     there, back = samples[is_whole], axis.partners[is_whole]
     first, last = np.concatenate([there, back]), np.concatenate([back, there])
-    chord = axis.points[first] - axis.points[last]
-    width = np.hypot(*chord.T)
-    length, area = _along(axis)
-    way = _from_to(axis, length, first, last)
-    p, q = axis.points[last], axis.points[first]
-    enclosed = _from_to(axis, area, first, last) + _cross(p, q) / 2
+    width = np.abs(axis.points[first] - axis.points[last])
+    steps = _cross(axis.points, axis.following) / 2
+    way = axis.summed(np.abs(axis.following - axis.points), first, last)
+    closing = _cross(axis.points[last], axis.points[first]) / 2
+    enclosed = axis.summed(steps, first, last) + closing
     depth = np.where(enclosed > 0, (way - width) / 2, -1.0)
     return _Cuts(first, last, width, depth)
 
 
-def _cross(p: Floats, q: Floats) -> Floats:
-    crossed: Floats = p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]
-    return crossed
-
-
-def _following(axis: VoidAxis) -> Floats:
-    """Return the sample after each one on its contour."""
-    following = np.roll(axis.points, -1, axis=0)
-    for first, end in zip(axis.starts, axis.starts[1:], strict=False):
-        following[end - 1] = axis.points[first]
-    return following
-
-
-def _along(axis: VoidAxis) -> tuple[Floats, Floats]:
-    """Return way and area from the first sample of the contours to the end of each step."""
-    following = _following(axis)
-    way = np.hypot(*(following - axis.points).T)
-    return np.cumsum(way), np.cumsum(_cross(axis.points, following) / 2)
-
-
-def _from_to(axis: VoidAxis, sums: Floats, first: Counts, last: Counts) -> Floats:
-    """Return the sum of the steps from ``first`` to ``last``, along their contour."""
-    before = np.concatenate([[0.0], sums])
-    starts, ends = np.array(axis.starts[:-1]), np.array(axis.starts[1:])
-    contour = axis.contours[first]
-    whole = before[ends[contour]] - before[starts[contour]]
-    part: Floats = before[last] - before[first]
-    return np.where(last < first, part + whole, part)
-
-
 def _holds_any(axis: VoidAxis, cuts: _Cuts, places: Sequence[Point]) -> NDArray[np.bool_]:
     """Return True for the cuts that have one of the places behind them, or on their edge."""
-    following = _following(axis)
     holds = np.zeros(len(cuts.first), dtype=np.bool_)
-    for place in (_inward(axis, place) for place in places):
-        here, there = axis.points - place, following - place
-        turned = np.cumsum(np.arctan2(_cross(here, there), np.einsum("ij,ij->i", here, there)))
-        p, q = here[cuts.last], here[cuts.first]
-        closing = np.arctan2(_cross(p, q), np.einsum("ij,ij->i", p, q))
-        turns = (_from_to(axis, turned, cuts.first, cuts.last) + closing) / math.tau
-        holds |= np.abs(turns) > 0.25
+    for place in (_inward(axis, complex(*place)) for place in places):
+        here, there = axis.points - place, axis.following - place
+        turned = axis.summed(np.angle(here.conj() * there), cuts.first, cuts.last)
+        closing = np.angle(here[cuts.last].conj() * here[cuts.first])
+        holds |= np.abs(turned + closing) / math.tau > 0.25
     return holds
 
 
-def _inward(axis: VoidAxis, p: Point) -> Point:
+def _inward(axis: VoidAxis, p: complex) -> complex:
     """Return a point that may lie on the boundary a little inward."""
-    sample = int(np.argmin(np.hypot(*(axis.points - p).T)))
-    x, y = axis.centre(sample)
-    away = math.dist(p, (x, y))
-    share = min(1.0, NUDGE / away) if away > 0 else 0.0
-    return p[0] + share * (x - p[0]), p[1] + share * (y - p[1])
+    away = complex(axis.centres[np.abs(axis.points - p).argmin()]) - p
+    return p + away * min(1.0, NUDGE / abs(away)) if away else p
 
 
 def _within(arc: tuple[int, int, int], place: tuple[int, int], axis: VoidAxis) -> bool:
