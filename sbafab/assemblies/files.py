@@ -39,7 +39,13 @@ def load(
     data = override(read_toml(path), changes)
     if data.get("family") != ASSEMBLY:
         return load_design(source, changes, waivers)
-    return changed_assembly(data, path, changes, waivers)
+    # A design's path on the command line starts at the current folder.
+    for key in changed_keys(changes):
+        match key.split("."):
+            case ["parts", name, "design"] if source := data["parts"][name].get("design"):
+                if isinstance(design_source(str(source), Path()), Path):
+                    data["parts"][name]["design"] = str(Path(str(source)).absolute())
+    return assembly_of(add_waivers(data, waivers, get_args(CheckName)), path)
 
 
 def load_text(text: str, path: Path) -> Design | Assembly:
@@ -62,14 +68,6 @@ def load_assembly(
         f'{result.name} is no assembly; give a file with family = "{ASSEMBLY}" and [parts.NAME] '
         "tables"
     )
-
-
-def changed_assembly(
-    data: dict[str, Any], path: Path, changes: Sequence[Change], waivers: Sequence[str]
-) -> Assembly:
-    """Return the assembly of a file's tables with the changes made. Raises DesignError."""
-    _start_where_the_user_stands(data, changes)
-    return assembly_of(add_waivers(data, waivers, get_args(CheckName)), path)
 
 
 def assembly_of(data: Mapping[str, Any], path: Path) -> Assembly:
@@ -97,15 +95,6 @@ def _part(name: str, table: object) -> AnyPart:
         hint = f"; did you mean {near[0]}?" if near else ""
         raise DesignError(f"{where}.kind = {shown(kind)} must be one of {listed(KINDS)}{hint}")
     return checked(KINDS[kind], table, {}, f"{where}.")
-
-
-def _start_where_the_user_stands(data: dict[str, Any], changes: Sequence[Change]) -> None:
-    """Resolve a design's path on the command line against the current folder."""
-    for key in changed_keys(changes):
-        match key.split("."):
-            case ["parts", name, "design"] if source := data["parts"][name].get("design"):
-                if isinstance(design_source(str(source), Path()), Path):
-                    data["parts"][name]["design"] = str(Path(str(source)).absolute())
 
 
 DESIGN_FILE = "design.toml"

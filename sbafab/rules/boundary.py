@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 from sbafab.geometry.arrangement import DIGIT, Piece, by_owner, overlay
-from sbafab.geometry.boolean import ChainGroup, chains_of, grouped
+from sbafab.geometry.boolean import chains_of, grouped
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal, line_circle
 from sbafab.geometry.nearby import EdgeIndex, widened
@@ -39,18 +39,14 @@ def edges_along(region: Region, boundary: Region) -> tuple[Edge, ...]:
         ((c, 1 << DIGIT) for c in boundary.contours),
     )
     for group in grouped(chains_of([*contours, *boundary_contours])):
-        for edge, turns in _pieces(group):
+        pieces = [Piece(edge, turns) for edge, turns in group.edges]
+        if not group.is_alone:
+            pieces = overlay(group.edges, EPSILON, group.clear).pieces
+        for edge, turns in pieces:
             turn, boundary_turn = by_owner(turns, 2)
             if turn * boundary_turn > 0:
                 along.append(edge if turn > 0 else edge.reversed())
     return tuple(along)
-
-
-def _pieces(group: ChainGroup) -> Iterable[Piece]:
-    """Return the edges that the chains of a group are cut into."""
-    if group.is_alone:
-        return (Piece(edge, turns) for edge, turns in group.edges)
-    return overlay(group.edges, EPSILON, group.clear).pieces
 
 
 def beside(edge: Edge, distance: float) -> Point:
@@ -80,7 +76,7 @@ def outward_reach(edge: Edge, targets: EdgeIndex) -> Reach | None:
     """
     if edge.length < END_ROOM:
         return None
-    band = _line_band(edge) if isinstance(edge, Line) else _arc_band(edge)
+    band = _Band.of(edge)
     margin = 1.0
     while True:
         moved = edge.offset(margin)
@@ -146,7 +142,17 @@ class _Band(NamedTuple):
     """The band beside an edge: its two side rays, and the edge itself."""
 
     edge: Edge
-    rays: tuple[tuple[Point, Point], tuple[Point, Point]]
+    rays: tuple[tuple[Point, Point], ...]
+
+    @staticmethod
+    def of(edge: Edge) -> _Band:
+        room = END_ROOM / edge.length
+        ends = edge.at(room), edge.at(1 - room)
+        if isinstance(edge, Line):
+            ux, uy = edge.direction(edge.start)
+            return _Band(edge, tuple((p, (uy, -ux)) for p in ends))
+        (cx, cy), r = edge.centre, edge.radius
+        return _Band(edge, tuple((edge.centre, ((x - cx) / r, (y - cy) / r)) for x, y in ends))
 
     def holds(self, p: Point) -> bool:
         """Return True if ``p`` lies in the band or behind the edge, and not beside it."""
@@ -166,7 +172,8 @@ class _Band(NamedTuple):
         """True if ``target`` runs along the band's side at ``p``, and not across the band."""
         along = self.edge.parameter(p) * self.edge.length
         at_side = min(along, self.edge.length - along) < LEANING
-        return at_side and _runs_along(target, p, left_normal(self.edge, p))
+        (ux, uy), (nx, ny) = target.direction(p), left_normal(self.edge, p)
+        return at_side and abs(ux * ny - uy * nx) < STEEP
 
     def nearest_candidates(self, target: Edge) -> Iterator[Point]:
         """Candidate points of ``other``; the nearest point within the band is among them."""
@@ -175,30 +182,6 @@ class _Band(NamedTuple):
         yield from _extremes(self.edge, target)
         for origin, unit in self.rays:
             yield from _on_ray(origin, unit, target)
-
-
-def _runs_along(edge: Edge, p: Point, normal: Point) -> bool:
-    ux, uy = edge.direction(p)
-    return abs(ux * normal[1] - uy * normal[0]) < STEEP
-
-
-def _line_band(line: Line) -> _Band:
-    ux, uy = line.direction(line.start)
-    x0, y0 = line.start
-    x1, y1 = line.end
-    first = (x0 + ux * END_ROOM, y0 + uy * END_ROOM)
-    last = (x1 - ux * END_ROOM, y1 - uy * END_ROOM)
-    return _Band(line, ((first, (uy, -ux)), (last, (uy, -ux))))
-
-
-def _arc_band(arc: Arc) -> _Band:
-    room = END_ROOM / arc.length
-    cx, cy = arc.centre
-    first, last = (
-        ((p[0] - cx) / arc.radius, (p[1] - cy) / arc.radius)
-        for p in (arc.at(room), arc.at(1 - room))
-    )
-    return _Band(arc, ((arc.centre, first), (arc.centre, last)))
 
 
 def _extremes(edge: Edge, target: Edge) -> Sequence[Point]:

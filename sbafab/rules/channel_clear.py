@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Edge, Point, distance_to
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.rules.finding import Finding, Place, judged
@@ -121,7 +120,8 @@ def _clear(channel: Channel) -> _Clear:
     tightest = min(channel.layers, key=lambda layer: room[layer.index])
     radius = room[tightest.index]
     # A circle round the axis cannot be beaten from any other place.
-    if any(_is_round_about(hole, channel.centre, radius) for hole in tightest.profile.holes):
+    circles = [hole.circle for hole in tightest.profile.holes if hole.circle is not None]
+    if any(math.dist(c, channel.centre) < 1e-6 and abs(r - radius) < 1e-6 for c, r in circles):
         return _Clear(channel, 2 * radius, channel.centre, tightest)
     near = [layer for layer in channel.layers if room[layer.index] < 2 * channel.diameter]
     # The nearest edge to any place within reach is no further from the axis than this.
@@ -140,15 +140,6 @@ def _clear(channel: Channel) -> _Clear:
     best = _highest(clearance, channel.centre, channel.diameter / 2)
     tightest = min(near, key=lambda layer: _signed_room(layer, edges[layer.index], best))
     return _Clear(channel, max(0.0, 2 * clearance(best)), best, tightest)
-
-
-def _is_round_about(hole: Contour, centre: Point, radius: float) -> bool:
-    circle = hole.circle
-    return (
-        circle is not None
-        and math.dist(circle[0], centre) < 1e-6
-        and abs(circle[1] - radius) < 1e-6
-    )
 
 
 def _signed_room(layer: Layer, edges: Sequence[Edge], p: Point) -> float:

@@ -7,7 +7,7 @@ without it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import get_args
 
 from sbafab import plugins
@@ -26,15 +26,11 @@ from sbafab.rules.sentences import WORDS, Explanation, catalogue, explained
 OWN = {name: f"sbafab.rules.{name.replace('-', '_')}:RULE" for name in get_args(RuleName)}
 
 
-def _named_rules() -> Iterator[Rule]:
-    """Yield all rules. Raises DesignError for one of another name than its entry point's."""
-    for name, rule in Plugins(plugins.RULES, "rule", Rule, OWN).items():
-        if rule.name != name:
-            raise DesignError(f"rule {name} of an installed package calls itself {rule.name}")
-        yield rule
-
-
-RULES = tuple(_named_rules())
+RULES: tuple[Rule, ...] = ()
+for _name, _rule in Plugins(plugins.RULES, "rule", Rule, OWN).items():
+    if _rule.name != _name:
+        raise DesignError(f"rule {_name} of an installed package calls itself {_rule.name}")
+    RULES += (_rule,)
 
 AT_MOST = frozenset(rule.name for rule in RULES if rule.at_most)
 """Rules whose limit is the largest value allowed."""

@@ -40,7 +40,8 @@ def check(measures: Measures) -> list[Finding]:
     """Return the largest unintended weld; without any, the least overhang of masks there."""
     laminate, limit = measures.laminate, measures.design.rules.mask_overhang
     pairs = _distinct(measures.facing)
-    welds = [*_past_films(pairs), *_at_rims(laminate)]
+    welds = [_Weld(part, pair.gap, n) for pair, n in pairs for part in pair.bare.pieces]
+    welds += _at_rims(laminate)
     if welds:
         return [_welded(welds, laminate)]
     overhangs = [
@@ -70,12 +71,6 @@ def _distinct(pairs: Iterable[Facing]) -> list[tuple[Facing, int]]:
         key = pair.gap.pattern, pair.gap.unbonded, pair.bare
         groups.setdefault(key, []).append(pair)
     return [(group[0], len(group)) for group in groups.values()]
-
-
-def _past_films(pairs: Iterable[tuple[Facing, int]]) -> Iterator[_Weld]:
-    for pair, number in pairs:
-        for piece in pair.bare.pieces:
-            yield _Weld(piece, pair.gap, number)
 
 
 def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
