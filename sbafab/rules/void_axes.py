@@ -11,10 +11,11 @@ import heapq
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.geometry.cache import cached, cached_attribute
+from sbafab.geometry.cache import cached
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point, left_normal
 from sbafab.geometry.offset import shrink
@@ -75,7 +76,7 @@ class VoidAxis:
     def centre(self, sample: int) -> Point:
         return _point(self.centres[sample])
 
-    @cached_attribute
+    @cached_property
     def following(self) -> Complex:
         """The sample after each one on its contour."""
         following = np.roll(self.points, -1)
