@@ -264,21 +264,18 @@ class RoundChamber(ChamberSection):
     """Pocket diameter; a list gives one per balloon, bottom to top (a tapered stack)."""
 
 
-def free_diameter(chamber: RoundChamber) -> tuple[Free, ...]:
-    """Return the diameter as a search variable: of all balloons, or the largest of a list."""
-    if chamber.outline is not None:
-        return ()
-    return (Free("chamber.diameter", 2.6, 16.0, 0.1, widens=True),)
-
-
 def free_of_round(chamber: RoundChamber, further: tuple[Free, ...]) -> tuple[Free, ...]:
     """Return the search variables of a round chamber, followed by ``further`` ones.
 
-    A list of diameters fixes the number of balloons.
+    The diameter is that of all balloons, or the largest of a list, which fixes their number.
     """
-    is_list = chamber.outline is None and not isinstance(chamber.diameter, float)
-    settled = ("stack.balloons",) if is_list else ()
-    return (*free_diameter(chamber), *(free for free in further if free.key not in settled))
+    if chamber.outline is not None:
+        return further
+    is_list = not isinstance(chamber.diameter, float)
+    return (
+        Free("chamber.diameter", 2.6, 16.0, 0.1, widens=True),
+        *(free for free in further if not (is_list and free.key == "stack.balloons")),
+    )
 
 
 def diameters(design: Design, chamber: RoundChamber) -> tuple[float, ...]:

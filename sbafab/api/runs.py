@@ -12,8 +12,8 @@ from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.design.files import Change
 from sbafab.design.records import Design
+from sbafab.importing.records import default_file, write_imported
 from sbafab.importing.sources import import_source
-from sbafab.importing.write import default_file, write_imported
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
 from sbafab.process import Progress
 from sbafab.runs.run import Conforming, Run, RunRequest, Simulated

@@ -9,8 +9,8 @@ import click
 
 from sbafab.cli.options import design_file, file_option, folder_option, json_option
 from sbafab.cli.printing import print_json, print_note, print_verdict
+from sbafab.importing.records import default_file, write_imported
 from sbafab.importing.sources import import_source
-from sbafab.importing.write import default_file, write_imported
 
 
 @click.command("import")

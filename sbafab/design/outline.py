@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -533,14 +533,15 @@ def _strands(
                 f"holds an entity {kind}, which is not read; explode blocks and the like to lines, "
                 "arcs and curves, or delete it"
             )
-        for height in _heights(entity):
+        strand, heights = _read(entity, factor)
+        for height in heights:
             level = height if level is None else level
             if not abs(height - level) * factor <= LEVEL:
                 raise DesignError(
                     f"holds a {kind} at z {height:g} where another point is at z {level:g}; lay "
                     "the whole outline flat"
                 )
-        yield _read(entity, factor)
+        yield strand
 
 
 def _layer_of(entity: Any) -> str:
@@ -596,9 +597,12 @@ def _refuse_compensated(drawing: Drawing) -> None:
         )
 
 
-def _read(entity: Any, factor: float) -> Strand:
+def _read(entity: Any, factor: float) -> tuple[Strand, list[float]]:
+    """The strand of an entity, and the z of every point that defines it, in its own units."""
+    strand, heights = READERS[entity.dxftype()]
     try:
-        return READERS[entity.dxftype()](entity, factor)
+        levels = [float(z) for z in heights(entity)]
+        return strand(entity, factor), levels
     except (DesignError, FitError):
         raise
     except Exception:
@@ -606,23 +610,10 @@ def _read(entity: Any, factor: float) -> Strand:
         raise DesignError(f"holds a damaged {entity.dxftype()}; draw it again") from None
 
 
-def _heights(entity: Any) -> list[float]:
-    """The z of every point that defines an entity, in its own units."""
-    try:
-        return [float(z) for z in HEIGHTS[entity.dxftype()](entity)]
-    except Exception:
-        raise DesignError(f"holds a damaged {entity.dxftype()}; draw it again") from None
-
-
-def _facing(entity: Any) -> float:
-    """1, or -1 if an entity's own z points down."""
-    return -1.0 if entity.dxf.extrusion.z < 0 else 1.0
-
-
 def _polyline_heights(entity: Any) -> list[float]:
     if entity.is_2d_polyline:
         elevation = entity.dxf.get("elevation")
-        return [_facing(entity) * elevation.z if elevation is not None else 0.0]
+        return [_side(entity) * elevation.z if elevation is not None else 0.0]
     return [vertex.dxf.location.z for vertex in entity.vertices]
 
 
@@ -739,23 +730,14 @@ def _spline(entity: Any, factor: float) -> Strand:
     return tuple(edges)
 
 
-READERS = {
-    "LINE": _line,
-    "ARC": _arc,
-    "CIRCLE": _circle,
-    "LWPOLYLINE": _light_polyline,
-    "POLYLINE": _heavy_polyline,
-    "ELLIPSE": _ellipse,
-    "SPLINE": _spline,
-}
-HEIGHTS = {
-    "LINE": lambda e: [e.dxf.start.z, e.dxf.end.z],
-    "ARC": lambda e: [_facing(e) * e.dxf.center.z],
-    "CIRCLE": lambda e: [_facing(e) * e.dxf.center.z],
-    "LWPOLYLINE": lambda e: [_facing(e) * e.dxf.get("elevation", 0.0)],
-    "POLYLINE": _polyline_heights,
+READERS: Mapping[str, tuple[Callable[[Any, float], Strand], Callable[[Any], list[float]]]] = {
+    "LINE": (_line, lambda e: [e.dxf.start.z, e.dxf.end.z]),
+    "ARC": (_arc, lambda e: [_side(e) * e.dxf.center.z]),
+    "CIRCLE": (_circle, lambda e: [_side(e) * e.dxf.center.z]),
+    "LWPOLYLINE": (_light_polyline, lambda e: [_side(e) * e.dxf.get("elevation", 0.0)]),
+    "POLYLINE": (_heavy_polyline, _polyline_heights),
     # Both are in world coordinates; an axis that rises means a tilted ellipse.
-    "ELLIPSE": lambda e: [e.dxf.center.z, e.dxf.center.z + e.dxf.major_axis.z],
-    "SPLINE": _spline_heights,
+    "ELLIPSE": (_ellipse, lambda e: [e.dxf.center.z, e.dxf.center.z + e.dxf.major_axis.z]),
+    "SPLINE": (_spline, _spline_heights),
 }
-"""Attributes with an entity's points, by its type."""
+"""Strand of an entity, and heights of its points, by its type."""

@@ -16,13 +16,12 @@ from sbafab.design.files import ASSEMBLY, checked, kit_names, listed, read_toml
 from sbafab.design.films import FILM_NAME, HOTTEST, Films
 from sbafab.design.laminate_file import FILE, laminate_json, read_laminate
 from sbafab.design.outline import OUTLINE, is_closed, seam_layer
-from sbafab.design.records import Design, plain_tables, without_kit
+from sbafab.design.records import Design, plain_tables, without_kit, without_none
 from sbafab.design.sections import Inlet as Inlets
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Edge, Line, Point, unit
 from sbafab.importing.records import Imported, file_name, key_name
 from sbafab.laminate.films import Film
-from sbafab.laminate.joints import FaceBond
 from sbafab.laminate.laminate import Chamber, Inlet, Laminate
 
 DESIGN = "design.toml"
@@ -102,7 +101,11 @@ def import_laminate(path: Path) -> Imported:
         tube = {"outer_diameter": laminate.tube, "pitch": _pitch(laminate), "glue": NO_GLUE}
         remarks.append("tube.glue: a laminate.json does not say what holds the sheet; write it")
     if laminate.bonds:
-        tables["face_bonds"] = {bond.name: _bond_table(bond) for bond in laminate.bonds}
+        keys = ("faces", "by", "temperature_c", "after")
+        tables["face_bonds"] = {
+            bond.name: without_none({key: getattr(bond, key) for key in keys})
+            for bond in laminate.bonds
+        }
     tables["registration"] = {"method": laminate.registration}
     if laminate.pins_in_full_bonds:
         tables["registration"]["full_bond_pins"] = "in"
@@ -316,19 +319,10 @@ def _film_table(name: str, film: Film) -> dict[str, Any]:
     return {key: value for key, value in keys.items() if value not in (None, "")}
 
 
-def _bond_table(bond: FaceBond) -> dict[str, Any]:
-    keys: dict[str, Any] = {"faces": [*bond.faces], "by": bond.by}
-    keys |= {"temperature_c": bond.temperature_c, "after": bond.after}
-    return {key: value for key, value in keys.items() if value is not None}
-
-
 def _layup(laminate: Laminate, names: Mapping[str, str]) -> dict[str, str]:
     """The film of each role's first layer, unless it is the usual one."""
     layup: dict[str, str] = {}
     for layer in laminate.layers:
         layup.setdefault(layer.role.replace("-", "_"), names[layer.film.material])
-    return {role: film for role, film in layup.items() if film not in _usual(role)}
-
-
-def _usual(role: str) -> Sequence[str]:
-    return ("ptfe",) if role.endswith("mask") else ("tpe",)
+    usual = {role: "ptfe" if role.endswith("mask") else "tpe" for role in layup}
+    return {role: film for role, film in layup.items() if film != usual[role]}

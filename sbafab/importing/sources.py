@@ -10,9 +10,13 @@ from typing import NamedTuple
 from sbafab.design.laminate_file import SCHEMA
 from sbafab.errors import DesignError
 from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
-from sbafab.importing.layer_table import LAYERS, import_table
+from sbafab.importing.layer_table import (
+    LAYERS,
+    MOST_OF_POLYGONS,
+    import_table,
+    refuse_without_table,
+)
 from sbafab.importing.parchmint import import_parchmint
-from sbafab.importing.polygons import MOST_BYTES, refuse_without_table
 from sbafab.importing.popupcad import SUFFIX, refuse_alone
 from sbafab.importing.records import Imported, not_json, read_text
 
@@ -43,7 +47,7 @@ def import_source(source: Path) -> tuple[str, Imported]:
 def _refuse_broken_json(source: Path) -> None:
     """Raises DesignError if the file is not valid JSON."""
     try:
-        json.loads(read_text(source, MOST_BYTES))
+        json.loads(read_text(source, MOST_OF_POLYGONS))
     except (json.JSONDecodeError, RecursionError) as error:
         raise not_json(source, error) from None
 

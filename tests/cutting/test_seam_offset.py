@@ -22,7 +22,7 @@ from sbafab.design.kits import write_kit
 from sbafab.design.laminate_file import FILE
 from sbafab.errors import DesignError
 from sbafab.importing.laminates import import_folder
-from sbafab.importing.write import write_imported
+from sbafab.importing.records import write_imported
 from sbafab.rules.finding import Finding
 from tests.actuators.test_free_layers import WELDED
 

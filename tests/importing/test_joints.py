@@ -14,7 +14,7 @@ from sbafab.actuators import build, load_design
 from sbafab.design.laminate_file import FILE, laminate_json
 from sbafab.geometry.edges import Line
 from sbafab.importing.laminates import import_laminate
-from sbafab.importing.write import Written, write_imported
+from sbafab.importing.records import Written, write_imported
 from sbafab.laminate.laminate import Laminate
 from tests.actuators.test_free_layers import WELDED
 from tests.laminate.test_folding import folded

@@ -12,7 +12,7 @@ import ezdxf
 import pytest
 
 from sbafab.importing.layer_table import import_table
-from sbafab.importing.write import Written, write_imported
+from sbafab.importing.records import Written, write_imported
 from sbafab.rules.deck import run_deck
 from tests.designs import PAPER
 from tests.importing.conftest import Importing

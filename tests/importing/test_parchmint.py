@@ -19,7 +19,7 @@ from click.testing import CliRunner
 from sbafab.cli import app
 from sbafab.errors import SbafabError
 from sbafab.importing.parchmint import import_parchmint
-from sbafab.importing.write import Written, write_imported
+from sbafab.importing.records import Written, write_imported
 from sbafab.rules.nets import connectivity
 from tests.designs import PAPER
 from tests.importing.conftest import Importing

@@ -22,7 +22,7 @@ from sbafab.geometry.edges import Arc
 from sbafab.geometry.region import Region
 from sbafab.importing.layer_table import import_table
 from sbafab.importing.popupcad import cad_layer
-from sbafab.importing.write import write_imported
+from sbafab.importing.records import write_imported
 from tests.importing.conftest import Importing
 
 pytest.importorskip("yaml")
