@@ -50,15 +50,6 @@ def test_1dof_interfaces_by_closed_formulas() -> None:
     assert separator.bond.area == pytest.approx(math.pi * (1.27**2 - 0.52**2))
 
 
-def test_channel_pins_hold_walls_and_chamber_masks_only() -> None:
-    # Base and cap have no bore; a separator's opening is the neck ring, wider than the pin.
-    laminate_ = laminate("3dof-15mm", "stack.balloons=3")
-    for layer in laminate_.layers:
-        held = {pin.name for pin in laminate_.pins_holding(layer)} - {"lumen"}
-        bored = layer.role in ("wall", "chamber-mask")
-        assert len(held) == (3 if bored else 0), layer.name
-
-
 @pytest.mark.parametrize("count", range(2, 9))
 def test_lobes_keep_one_bond_from_lumen_and_from_each_other(count: int) -> None:
     lam = laminate("3dof-15mm", f"chamber.count={count}", "stack.balloons=2")
@@ -102,11 +93,6 @@ def test_manifold_joins_the_bottom_pockets_and_has_one_inlet() -> None:
     bottom, top = [layer.profile for layer in lam.layers if layer.role == "chamber-mask"]
     assert len(bottom.pieces) == 1
     assert len(top.pieces) == 3
-
-
-def test_equal_profiles_share_a_pattern() -> None:
-    short, tall = laminate("3dof-15mm"), laminate("3dof-15mm", "stack.balloons=150")
-    assert len(short.patterns) == len(tall.patterns) == 7
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,6 @@ from sbafab.actuators import build, load_design
 from sbafab.design.files import template_text
 from sbafab.errors import DesignError
 from sbafab.laminate.assembly import assembly
-from sbafab.laminate.joints import balloon_numbers
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.deck import run_deck
 from tests.designs import PAPER
@@ -116,32 +115,6 @@ def test_sheets_masks_and_films_stack_in_any_order(tmp_path: Path) -> None:
     steps = assembly(laminate)
     added = sorted(index for step in steps for index in step.adds)
     assert added == [layer.index for layer in laminate.layers]
-
-
-def test_chambers_in_two_gaps_do_not_ask_for_each_others_pockets(tmp_path: Path) -> None:
-    data = pouch()
-    rows = {row["role"]: row for row in data["layers"]}
-    base, mask, cap = rows["base"], rows["chamber-mask"], rows["cap"]
-    lower = data["chambers"][0]
-    wall = {"role": "wall", "shape": "film"}
-    data["layers"] = [base, mask, wall, mask, cap]
-    data["chambers"] = [
-        {**lower, "name": "lower", "balloons": [1]},
-        {**lower, "name": "upper", "balloons": [2]},
-    ]
-    laminate = drawn(tmp_path, data)
-    assert laminate.bores == ()
-    assert failing(laminate) == set()
-    data["chambers"] = [{**lower, "name": "lower"}, {**lower, "name": "upper"}]
-    assert "sealing" in failing(drawn(tmp_path, data))
-
-
-def test_balloons_are_numbered_by_roles() -> None:
-    classic = ["base", "chamber-mask", "wall", "separator-mask", "wall", "chamber-mask", "cap"]
-    assert balloon_numbers(classic) == [1, 1, 1, 1, 2, 2, 2]
-    carried = ["sheet", "separator-mask", *classic]
-    assert balloon_numbers(carried) == [None, None, 1, 1, 1, 1, 2, 2, 2]
-    assert balloon_numbers(["base", "cap", "base", "cap"], {(1, 2), (3, 4)}) == [1, 1, 2, 2]
 
 
 REFUSED: list[tuple[dict[str, Any], str]] = [

@@ -139,16 +139,6 @@ BAD = {
         'value = "1450 psi"',
         r"modulus = '1450 psi' must be a number, in MPa, or a text with its unit \(or kPa, GPa\)",
     ),
-    "pressure with its unit": (
-        "pressure_kpa = { value = 110.0",
-        'pressure_kpa = { value = "110 kPa"',
-        r"press.pressure_kpa = '110 kPa' must be a number without its unit, in kPa",
-    ),
-    "another product without its thickness": (
-        'product = "Stretchlon 200"\nthickness = { value = 0.038, source = "paper, Sec. 2" }',
-        'product = "TPU"',
-        r"lab.toml: films.tpe names another product than Stretchlon 200 and no thickness",
-    ),
     "value out of range": (
         "value = 0.038",
         "value = 38",
@@ -159,18 +149,7 @@ BAD = {
         "cuting_error =",
         r"registration.cuting_error is not a key of a kit; did you mean .*cutting_error\?",
     ),
-    "films that an adhesive bonds, without a source": (
-        '["Stretchlon 200"], source = "paper, Sec. 2" }',
-        '["Stretchlon 200"] }',
-        r"adhesives\.Loctite .*\.bonds must be \{ value = ..., source = ",
-    ),
     "waiver": ("[rules]", '[rules]\nwaive = ["sealing"]', r"rules.waive is a design's to say"),
-    "mask that may melt": (
-        "[press]",
-        '[films.foil]\nkind = "mask"\nproduct = "foil"\n'
-        'thickness = { value = 0.1, source = "x" }\ndensity = { value = 1, source = "x" }\n[press]',
-        r"films.foil is a mask without temperature_limit",
-    ),
 }
 
 

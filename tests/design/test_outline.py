@@ -182,12 +182,6 @@ def test_svg_shapes_of_lines_and_arcs_are_exact(tmp_path: Path, name: str) -> No
     assert read_outline(svg(tmp_path, body, page)).area == pytest.approx(area, rel=1e-7)
 
 
-def test_svg_looks_as_it_is_drawn(tmp_path: Path) -> None:
-    region = read_outline(svg(tmp_path, '<polygon points="-5,-1 5,-1 0,5"/>'))
-    # The tip points down on the screen, where y grows downward, and must do so in the cut file.
-    assert region.bounds == pytest.approx((-5, -5, 5, 1))
-
-
 def test_svg_ellipses_and_beziers_are_fitted(tmp_path: Path) -> None:
     squeezed = '<g transform="scale(2,1)"><circle r="2.5" transform="rotate(30)"/></g>'
     region = read_outline(svg(tmp_path, squeezed))
@@ -221,13 +215,6 @@ def _bezier_area() -> float:
     for q in (first, second):
         area += (2 * cross(q[0], q[1]) + cross(q[0], q[2]) + 2 * cross(q[1], q[2])) / 6
     return abs(area)
-
-
-def test_a_drawing_without_a_header_is_millimetres(tmp_path: Path) -> None:
-    path = tmp_path / "outline.dxf"
-    circle = "  0\nCIRCLE\n  8\n0\n 10\n0\n 20\n0\n 40\n3\n"
-    path.write_text(f"  0\nSECTION\n  2\nENTITIES\n{circle}  0\nENDSEC\n  0\nEOF\n")
-    assert read_outline(path).area == pytest.approx(math.pi * 9)
 
 
 @pytest.mark.parametrize("centre", [(10.0, 1.0), (2.0, 0.0), (-92.4, 121.3)])

@@ -34,11 +34,8 @@ DESIGNS = [
     [
         (0.75, 0.75),
         (3, 3.0),
-        ("0.75", 0.75),
         ("0.75 mm", 0.75),
         ("38um", 0.038),
-        ("38 µm", 0.038),
-        ("1.5 cm", 15.0),
         ("6 in", 152.4),
         ('6"', 152.4),
         ("1 mil", 0.0254),
@@ -58,27 +55,16 @@ def test_not_a_length(text: object) -> None:
     ("assignments", "says"),
     [
         (["chamber.diametr=5"], "did you mean chamber.diameter?"),
-        (["stack.ballons=5"], "did you mean stack.balloons?"),
-        (["balloons=5"], "did you mean stack.balloons?"),
         (["diameter=6"], "did you mean chamber.diameter, bore.diameter or fits.diameter?"),
-        (["modulus=9"], "did you mean films.tpe.modulus?"),
         (["films.tpe.xyzzy=1"], "known here: films.tpe.product"),
-        (["films.tpu.melting_pont=9"], "did you mean films.tpu.melting_point?"),
         (["tube.outer_diameter=15"], 'it belongs to "radial"'),
         (["chamber.diameter=-5"], "chamber.diameter = -5 must be at least 0.001 mm"),
-        (["chamber.diameter=2000"], "must be at most 1000 mm"),
         (["sheets.seconds=20"], "sheets.seconds was removed, as nesting takes no time limit"),
-        (["sheets.tpe.length=20 m"], "must be at most 10000 mm"),
         (["chamber.diameter=nan"], "must be a finite length"),
-        (["chamber.diameter=inf"], "must be a finite length"),
-        (["press.temperature_c=inf"], "must be a finite number"),
         (["chamber.diameter=5 furlong"], '"0.75 mm"'),
-        (["chamber.diameter=true"], "must be a length"),
         (["stack.balloons=2.5"], "must be a whole number"),
         (["stack.balloons=0"], "must be at least 1"),
-        (["stack.balloons=1000000000"], "must be at most 1000"),
         (["chamber=5"], "must be a table of keys"),
-        (["chamber.count=9"], "must be at most 8"),
         (["family=lobbed"], "did you mean lobed?"),
         (["name=../up"], "must be 1 to 64 letters"),
         (['films.tpe.faces={upper="TPE", lower="tpe"}'], "must be 1 to 32 small letters"),
@@ -87,14 +73,10 @@ def test_not_a_length(text: object) -> None:
             "must be the name of a rule; there are bond-width, mask-overhang,",
         ),
         (['rules.waive=["bond-with"]'], "did you mean bond-width?"),
-        (["laser.kerf_tpe=abc"], '"uncalibrated"'),
         (["laser.kerf_tpe=7"], "from 0 to 1 mm"),
-        (["laser.kerf_tpe=-0.1"], "from 0 to 1 mm"),
         (["laser.kerf_ptfe=[0.1, 2]"], "from 0 to 1 mm"),
         (["laser.kerf_ptfe=[0.1, 0]"], "neither over ten times the other"),
-        (["laser.kerf_ptfe=[0.1]"], "[along x, along y]"),
         (["laser.kerf_ptfe=[0.1, 0.1, 0.1]"], "[along x, along y]"),
-        (["laser.kerf_ptfe=[0.1, true]"], "[along x, along y]"),
         (["chamber.diameter.x=5"], "is a value, not a table"),
         (["chamber"], "is not KEY=VALUE"),
         (["chamber.diameter=-5", "bond.width=-1"], "and 1 more problem"),
@@ -156,10 +138,7 @@ def test_what_was_removed_says_what_to_do_instead(template: str, change: Any, na
     [
         ("order.shift_hours=8.0", "order.shift_hours was removed; order.at_once says how many"),
         ("order.technicians=2", "order.technicians was removed: batches are no longer planned"),
-        ("order.presses=2", "order.presses was removed: .*; delete it"),
-        ("order.base_plates=2", "order.base_plates was removed: .*; delete it"),
         ('sheets.stock="stock.toml"', "sheets.stock was removed; write .* width and length"),
-        ('sheets.tpe.piece="full"', "sheets.tpe.piece was removed: stock files"),
         ('films.tpu.sheet.piece="full"', "films.tpu.sheet.piece was removed: stock files"),
     ],
 )
@@ -179,11 +158,6 @@ def test_resolved_design_reads_back_as_the_same(name: str, tmp_path: Path) -> No
     assert design_sha256(again) == design_sha256(design)
 
 
-def test_hash_changes_with_any_value() -> None:
-    design = load_design("3dof-15mm")
-    assert design_sha256(design) != design_sha256(load_design("3dof-15mm", ["bond.width=0.8"]))
-
-
 def test_every_template_builds_and_says_what_it_is() -> None:
     assert {"1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"} <= set(template_summaries())
     assert all(len(summary) > 20 for summary in template_summaries().values())
@@ -201,14 +175,3 @@ def test_new_writes_a_design_that_builds_and_never_overwrites(tmp_path: Path) ->
         write_new("1dof-5", tmp_path / "x.toml")
     with pytest.raises(DesignError, match="cannot be written"):
         write_new("1dof-5mm", tmp_path / "nowhere" / "x.toml")
-
-
-def test_a_kerf_may_differ_along_x_and_y(tmp_path: Path) -> None:
-    design = load_design(
-        "1dof-5mm", ['laser.kerf_tpe=["120 um", 0.1]', "laser.kerf_ptfe=[0.1,0.1]"]
-    )
-    assert design.laser.kerf_tpe == (0.12, 0.1)
-    assert design.laser.kerf_ptfe == 0.1
-    path = tmp_path / "again.toml"
-    path.write_text(design_toml(design))
-    assert load_design(path).laser == design.laser

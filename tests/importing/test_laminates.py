@@ -41,13 +41,8 @@ DESIGNS: dict[str, tuple[str, list[str]]] = {
         "1dof-5mm",
         ["registration.method=ears", "registration.full_bond_pins=in"],
     ),
-    "middle first": ("1dof-5mm", ["registration.sequence=middle-first", "stack.balloons=2"]),
-    "seven lobes": ("3dof-15mm", ["chamber.count=7", "stack.balloons=2"]),
     "taper": (str(GALLERY / "taper-12-to-6.toml"), []),
-    "thick film": (str(GALLERY / "thick-film.toml"), []),
     "drawn outline": (str(GALLERY / "oval.toml"), []),
-    "pinned": (str(GALLERY / "pinned-15mm.toml"), []),
-    "lobed ears": ("3dof-15mm", ["registration.method=ears", "stack.balloons=2"]),
 }
 FEW = PAPER.with_("rules.yield_builds=100")
 

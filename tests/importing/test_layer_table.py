@@ -74,17 +74,7 @@ def test_drawings_that_no_row_names_are_named(importing: Importing, tmp_path: Pa
 
 
 REFUSED: dict[str, tuple[str, str, str]] = {
-    "column": (
-        LAYERS.replace("film", "flim", 1),
-        CHAMBERS,
-        "line 2: flim is not a key of a table; did you mean film?",
-    ),
     "no column": (LAYERS.replace("role", "layer", 1), CHAMBERS, "has the column layer twice"),
-    "no role": (
-        LAYERS.replace("chamber-mask", ""),
-        CHAMBERS,
-        "layers.csv, line 3: role is missing",
-    ),
     "role": (
         LAYERS.replace("cap", "lid"),
         CHAMBERS,
@@ -96,22 +86,13 @@ REFUSED: dict[str, tuple[str, str, str]] = {
         CHAMBERS,
         "line 4: file = 'cover.png' is no",
     ),
-    "layer": (LAYERS.replace("MASK", "MSK"), CHAMBERS, "paths lie on FILM, MASK"),
     "pieces": (
         LAYERS.replace("FILM,", "FILM,many"),
         CHAMBERS,
         "line 2: pieces = 'many' must be a whole number",
     ),
-    "both": (LAYERS.replace("FILM", ""), CHAMBERS, "cross or touch each other at x "),
-    "film": (LAYERS.replace("base,,", "base,foil,"), CHAMBERS, "film of layer 1 = 'foil' names no"),
-    "empty": ("file,role\n", CHAMBERS, "layers.csv has 0 rows under its head; add some"),
     "cells": (f"{LAYERS}a,b,c,d,e,f\n", CHAMBERS, "layers.csv, line 5 has 6 cells for 5 columns"),
     "mouth": (LAYERS, "name,x,y\npouch,0,0\n", "chambers.csv, line 2 has no mouth_x, of the first"),
-    "length": (
-        LAYERS,
-        CHAMBERS.replace("24;90", "up;90"),
-        "line 2: mouth_y = 'up' must be a length",
-    ),
     "second": (
         LAYERS,
         f"{CHAMBERS}pouch;5;5;;;;2\n",

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import math
-import os
 import re
-from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-import shapely
 from click.testing import CliRunner
 
 from sbafab.cli import app
-from sbafab.errors import SbafabError
 from sbafab.importing.parchmint import import_parchmint
 from sbafab.importing.records import Written, write_imported
 from sbafab.rules.nets import connectivity
 from tests.designs import PAPER
 from tests.importing.conftest import Importing
-from tests.quick import few
-
-CIRCUITS = Path(os.environ.get("SBAFAB_PARCHMINT", "none"))
-"""A folder of circuits of others, placed and routed; none are kept here."""
 
 
 def component(name: str, entity: str, corner: list[int], span: int, layer: str) -> dict[str, Any]:
@@ -250,12 +241,6 @@ def at(*keys: str | int) -> Callable[[dict[str, Any], object], None]:
 
 
 REFUSED: dict[str, tuple[Callable[[dict[str, Any], Any], None], object, str]] = {
-    "no layers": (at("layers"), None, "the file has no layers"),
-    "unplaced": (
-        at("components", 1, "params", "position"),
-        [-1, -1],
-        "component via1 (VIA, components[1]) has no place",
-    ),
     "text": (
         at("components", 0, "x-span"),
         "wide",
@@ -267,11 +252,6 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any], Any], None], object, str]] = 
         "connection c (connections[2]) has no path (paths[].wayPoints, or features); route the",
     ),
     "no width": (at("connections", 0, "params"), {}, "connection a (connections[0]) has no width"),
-    "no component": (
-        at("connections", 0, "source", "component"),
-        "in9",
-        "names a component 'in9' that is not there",
-    ),
     "no point": (
         at("connections", 0, "paths", 0, "wayPoints", 1),
         [3],
@@ -319,63 +299,6 @@ def test_what_is_inside_of_a_component_is_named(importing: Importing, tmp_path: 
 
 
 # Circuits of others, where they lie on this machine.
-
-
-def groups(document: dict[str, Any], layer: str) -> tuple[set[frozenset[str]], set[frozenset[str]]]:
-    """Components of a layer as channels join them on the plane, and as connections declare it."""
-    radius = {"PORT": "portRadius", "VIA": "radius", "VALVE3D": "valveRadius"}
-    places: dict[str, shapely.Point] = {}
-    parts: list[Any] = []
-    for row in document["components"]:
-        (x, y), w, h = row["params"]["position"], row["x-span"], row["y-span"]
-        if layer not in row["layers"] or w <= 0:
-            continue
-        places[row["id"]] = shapely.Point(x + w / 2, y + h / 2)
-        key = radius.get(row["entity"], "")
-        is_round = key in row["params"]
-        disc = places[row["id"]].buffer(row["params"].get(key, 0), 64)
-        parts.append(disc if is_round else shapely.box(x, y, x + w, y + h))
-    joined = {name: name for name in places}
-
-    def root(name: str) -> str:
-        return name if joined[name] == name else root(joined[name])
-
-    for row in document["connections"]:
-        if row["layer"] != layer:
-            continue
-        for path in row["paths"]:
-            points = [p for i, p in enumerate(path["wayPoints"]) if p != path["wayPoints"][i - 1]]
-            line = shapely.LineString(points) if len(points) > 1 else shapely.Point(points[0])
-            parts.append(line.buffer(row["params"]["channelWidth"] / 2))
-        ends = [row["source"]["component"], *(sink["component"] for sink in row["sinks"])]
-        known = [end for end in ends if end in places]
-        for end in known[1:]:
-            joined[root(end)] = root(known[0])
-    pieces = list(getattr(shapely.union_all(parts), "geoms", [shapely.union_all(parts)]))
-    real, declared = defaultdict(set), defaultdict(set)
-    for name, place in places.items():
-        real[next(i for i, piece in enumerate(pieces) if piece.intersects(place))].add(name)
-        declared[root(name)].add(name)
-    return {frozenset(g) for g in real.values()}, {frozenset(g) for g in declared.values()}
-
-
-FILES = sorted(CIRCUITS.rglob("*_PR.json")) if CIRCUITS.is_dir() else []
-
-
-@pytest.mark.skipif(not FILES, reason="SBAFAB_PARCHMINT names no folder of circuits")
-@pytest.mark.parametrize("path", few(FILES or [CIRCUITS], 2), ids=lambda path: path.stem)
-def test_circuits_of_others_are_wired_as_a_union_of_shapely_says(
-    path: Path, tmp_path: Path
-) -> None:
-    document = json.loads(path.read_text())
-    try:
-        laminate = written(copy.deepcopy(document), tmp_path).laminate
-    except SbafabError as error:
-        pytest.skip(str(error))
-    kinds = {fault.kind for fault in connectivity(laminate, PAPER).faults}
-    layers = [row["id"] for row in document["layers"] if row["type"] != "INTEGRATION"]
-    is_sound = all(real == declared for real, declared in (groups(document, i) for i in layers))
-    assert is_sound == (not kinds & {"open", "short"})
 
 
 def circuit_of_ports() -> dict[str, Any]:

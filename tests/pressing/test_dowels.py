@@ -12,10 +12,8 @@ from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.laminate.base_plate import (
     hole_deviation,
-    lone_pin_error,
     most_play,
     pin_deviations,
-    pin_error,
 )
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.dowels import (
@@ -136,16 +134,6 @@ def test_fits_are_those_of_iso_286() -> None:
         assert hole_deviation(diameter) == reamed / 1000
         assert most_play(diameter, "cnc-mill") == pytest.approx((reamed - low) / 1000)
         assert most_play(diameter, "jig-borer") == 0.002
-
-
-def test_what_pins_may_be_off_follows_from_the_machine() -> None:
-    # The paper's 4 um (Sec. 2), which a jig borer gives: 3 um of place and half of 2 um of play.
-    assert pin_error(1.0, "jig-borer") == 0.004
-    assert pin_error(1.0, "cnc-mill") == pytest.approx(0.025 + 0.008 / 2)
-    assert pin_error(1.0, "drill-press") == pytest.approx(0.2 + 0.008 / 2)
-    # All layers hang alike on a plate's only pin: half of H7's largest play with m6, 8 um, is left.
-    for machine in ("jig-borer", "cnc-mill", "drill-press"):
-        assert lone_pin_error(1.0, machine) == 0.004
 
 
 def test_the_shop_is_told_of_its_holes() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -44,25 +42,6 @@ def test_fifteen_balloons_take_the_papers_steps(stack: Stack) -> None:
     assert plan.estimated_build_minutes == 105
     assert "assumed" in plan.estimate_basis
     assert plan.warnings == ()
-
-
-def test_press_settings_are_the_papers(stack: Stack) -> None:
-    for step in schedule(stack(6), PAPER).steps:
-        assert (step.temperature_c, step.pressure_kpa, step.platen_mm) == (135, 110, (152.4, 152.4))
-        # 110 kPa on a square of 6 inches.
-        assert step.force_n / 1000 == pytest.approx(2.555, abs=0.001)
-
-
-def test_pins_are_in_for_flash_bonds_and_out_for_full_bonds(stack: Stack) -> None:
-    plan = schedule(stack(15, lumen=True), PAPER)
-    assert [step.pins for step in plan.steps] == [
-        ("chamber_1", "lumen"),
-        (),
-        ("chamber_1", "lumen"),
-        (),
-    ]
-    assert "on the pins chamber_1 and lumen," in plan.steps[0].instructions
-    assert "with no pin" in plan.steps[1].instructions
 
 
 def test_one_balloon_is_done_after_its_base(stack: Stack) -> None:
@@ -138,20 +117,6 @@ def test_what_was_never_tried_is_warned_about(stack: Stack, change: str, warning
     found = beside_hand_placing(schedule(stack(6), PAPER.with_(change)).warnings)
     (found,) = (text for text in found if not text.startswith("minutes stated"))
     assert found.startswith(warning)
-
-
-def test_csv_reads_back(stack: Stack) -> None:
-    rows = list(csv.DictReader(io.StringIO(press_csv(schedule(stack(15, lumen=True), PAPER)))))
-    assert [float(row["minutes"]) for row in rows] == [3, 12, 10, 20]
-    assert [row["adds"] for row in rows] == [
-        "layers 2 and 3",
-        "layer 1",
-        "layers 4 to 58",
-        "layer 59",
-    ]
-    assert rows[0]["pins"] == "chamber_1, lumen"
-    assert float(rows[0]["force_n"]) == pytest.approx(2554.8, abs=0.05)
-    assert all(None not in row and "" not in row for row in rows)
 
 
 def test_ears_and_tails_are_snipped_off_at_the_end(stack: Stack) -> None:

@@ -9,8 +9,6 @@ from sbafab.cutting.fixture import fixture
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.build_up import footprint
 from sbafab.pressing.cycles import (
-    Runs,
-    batch_times,
     design_runs,
     press_runs,
     runs_of,
@@ -49,13 +47,6 @@ def test_a_batch_fills_the_plate_in_rows_and_ends_in_a_smaller_cycle() -> None:
     assert runs.cycles == (12, 12, 6)
     assert runs.places[:5] == ((0, 0), (25, 0), (50, 0), (75, 0), (0, 35))
     assert press_runs(30, (-10.0, -5.0, 10.0, 25.0), (106.99, 112.0), 6.0).together == 9
-
-
-def test_times_of_a_batch_are_those_of_the_paper_a_copy_and_a_cycle() -> None:
-    plan = schedule(laminate(), load_design("1dof-5mm"))
-    assert plan.total_press_minutes == 45
-    times = batch_times(Runs(30, ((0.0, 0.0),) * 12), plan)
-    assert (times.press, times.hands, times.total) == (3 * 45, 30 * 60, 135 + 1800)
 
 
 def test_one_plate_has_every_hole_of_every_place() -> None:
