@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -55,6 +55,7 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
 """Keys of a shape, exactly one per shape, and the keys required beside it."""
 MOST_EDGES = 5000
 """Most edges of one shape; patterns of patterns would have any number."""
+CENTRE = (0.0, 0.0)
 PLACING = ("at", "turned")
 PATTERNS = ("round", "step")
 FURTHER: Mapping[str, tuple[str, ...]] = {"pattern": PATTERNS, "file": ("layer",)}
@@ -120,7 +121,7 @@ class NamedShape(DrawnRow):
     """The point that a pattern goes round."""
     step: Coordinates | None = None
     """From one copy of a pattern to the next, along x and y."""
-    at: Coordinates = (0.0, 0.0)
+    at: Coordinates = CENTRE
     """Position of the shape's origin."""
     turned: Angle = 0.0
     """Degrees by which it is first turned about its origin, counter-clockwise."""
@@ -222,62 +223,46 @@ class ShapeRegions:
         return self._regions[name]
 
     def _placed(self, name: str, shape: NamedShape) -> Region:
-        region = self._drawn(name, shape) if shape.kind in PRIMITIVES else self._made(name, shape)
+        region = self._made(name, shape)
         if shape.turned:
             region = region.turned(shape.turned)
-        return region.moved(*shape.at) if shape.at != (0.0, 0.0) else region
+        return region.moved(*shape.at) if shape.at != CENTRE else region
 
-    def _drawn(self, name: str, shape: NamedShape) -> Region:
-        centre = (0.0, 0.0)
-        if shape.disc is not None:
-            return disc(centre, shape.disc / 2)
-        if shape.ring is not None:
-            outer, inner = shape.ring
-            return disc(centre, outer / 2) - disc(centre, inner / 2)
-        if shape.slot is not None and shape.width is not None:
-            return strip(*shape.slot, shape.width)
-        if shape.stadium is not None:
-            return stadium(centre, *shape.stadium)
-        if shape.polygon is not None:
-            return _polygon(name, shape.polygon)
-        if shape.path is not None:
-            return _path(name, shape.path)
-        return read_drawing(self.files[f"shapes.{name}.file"], shape.layer)
-
-    def _made(self, name: str, shape: NamedShape) -> Region:
+    def _made(self, name: str, shape: Any) -> Region:
         def region(other: str) -> Region:
             return self.of(other, f"shapes.{name}.{shape.kind}")
 
-        if shape.offset is not None and shape.by is not None:
-            return grow(region(shape.offset), shape.by)
-        if shape.fillet is not None and shape.radius is not None:
-            return fillet(region(shape.fillet), shape.radius)
-        if shape.union is not None:
-            return union(map(region, shape.union))
-        if shape.difference is not None:
+        def cut() -> Region:
             first, *others = map(region, shape.difference)
             return difference(first, union(others))
-        assert shape.pattern is not None
-        assert shape.count is not None
-        repeated = region(shape.pattern)
-        if len(repeated.edges) * shape.count > MOST_EDGES:
-            raise DesignError(
-                f"shapes.{name}.count = {shape.count} makes more than {MOST_EDGES} edges; repeat "
-                "less"
-            )
-        return union(_copies(repeated, shape.count, shape.round, shape.step))
+
+        ways: Mapping[str, Callable[[], Region]] = {
+            "disc": lambda: disc(CENTRE, shape.disc / 2),
+            "ring": lambda: disc(CENTRE, shape.ring[0] / 2) - disc(CENTRE, shape.ring[1] / 2),
+            "slot": lambda: strip(shape.slot[0], shape.slot[1], shape.width),
+            "stadium": lambda: stadium(CENTRE, *shape.stadium),
+            "polygon": lambda: _polygon(name, shape.polygon),
+            "path": lambda: _path(name, shape.path),
+            "file": lambda: read_drawing(self.files[f"shapes.{name}.file"], shape.layer),
+            "offset": lambda: grow(region(shape.offset), shape.by),
+            "fillet": lambda: fillet(region(shape.fillet), shape.radius),
+            "union": lambda: union(map(region, shape.union)),
+            "difference": cut,
+            "pattern": lambda: _copies(name, region(shape.pattern), shape),
+        }
+        return ways[shape.kind]()
 
 
-PRIMITIVES = ("disc", "ring", "slot", "stadium", "polygon", "path", "file")
-
-
-def _copies(
-    region: Region, count: int, about: Point | None, step: Point | None
-) -> Sequence[Region]:
+def _copies(name: str, region: Region, shape: Any) -> Region:
+    count, about = shape.count, shape.round
+    if len(region.edges) * count > MOST_EDGES:
+        raise DesignError(
+            f"shapes.{name}.count = {count} makes more than {MOST_EDGES} edges; repeat less"
+        )
     if about is not None:
-        return [region.turned(360 * i / count, about) for i in range(count)]
-    x, y = step or (0.0, 0.0)
-    return [region.moved(i * x, i * y) for i in range(count)]
+        return union(region.turned(360 * i / count, about) for i in range(count))
+    x, y = shape.step
+    return union(region.moved(i * x, i * y) for i in range(count))
 
 
 def _polygon(name: str, points: Sequence[Point]) -> Region:

@@ -250,6 +250,7 @@ OUTLINE = "chamber.outline"
 DIAMETER = "chamber.diameter"
 _SHAPE_FILE = re.compile(r"shapes\.[^.]+\.file")
 KIT = "kit"
+FITS = "fits"
 AnyRecord = TypeVar("AnyRecord", bound=BaseModel)
 MOST_BYTES = 1_000_000
 ASSEMBLY = "assembly"
@@ -485,12 +486,6 @@ def checked(
         raise DesignError(sentence(error, record, families, prefix, file)) from None
 
 
-# Output of designs: resolved TOML, design hash, JSON schema.
-
-
-FITS = "fits"
-
-
 # The bundled designs and kits, and files that start from them.
 
 
@@ -531,13 +526,7 @@ def template_text(name: str) -> str:
 
 def template_summaries() -> dict[str, str]:
     """Return template names with the first comment line of each."""
-    return {
-        name: (templates_folder() / f"{name}.toml")
-        .read_text(encoding="utf-8")
-        .partition("\n")[0]
-        .lstrip("# ")
-        for name in template_names()
-    }
+    return {name: template_text(name).partition("\n")[0].lstrip("# ") for name in template_names()}
 
 
 def write_new(template: str, file: Path | None) -> Path:

@@ -49,19 +49,8 @@ FILE = "kit.toml"
 """A kit's copy in the output folder of a design."""
 VALUE, SOURCE = "value", "source"
 SECTIONS = (
-    *(
-        "films",
-        "layup",
-        "face_bonds",
-        "registration",
-        "seam_tools",
-        "press",
-        "acceptance",
-        "laser",
-        "sheets",
-        "rules",
-    ),
-    "models",
+    *("films", "layup", "face_bonds", "registration", "seam_tools", "press", "acceptance"),
+    *("laser", "sheets", "rules", "models"),
 )
 """Sections of a design that a kit fills in."""
 OF_A_DESIGN = (
@@ -175,7 +164,8 @@ def _kit(tables: Mapping[str, Any], path: Path, contents: bytes) -> Kit:
     plain = _without_sources(tables, "", sources, path)
     for key in OF_A_DESIGN:
         section, _, name = key.partition(".")
-        if name in _table(plain, section):
+        table = plain.get(section)
+        if isinstance(table, dict) and name in table:
             raise DesignError(f"{path}: {key} is a design's to say, not a kit's; remove it")
     try:
         record = checked(KitFile, plain, {}, file="kit")
@@ -303,11 +293,6 @@ def inlet_of_kit(kit: Kit, inlet: Mapping[str, Any], is_named: bool) -> dict[str
             "of those, add it to the kit, or give inlet.tube_outer_diameter"
         )
     return values
-
-
-def _table(tables: Mapping[str, Any], section: str) -> Mapping[str, Any]:
-    table = tables.get(section)
-    return table if isinstance(table, dict) else {}
 
 
 def write_kit(file: Path) -> Path:

@@ -14,11 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar
 
-from pydantic import (
-    ConfigDict,
-    Field,
-    PrivateAttr,
-)
+from pydantic import ConfigDict, Field, PrivateAttr
 
 from sbafab.design.files import (
     ASSEMBLY,
@@ -320,7 +316,6 @@ class Design(Section):
         return f"{type(self).__name__}({self.name!r}, {self.stack.balloons} balloons)"
 
     def _repr_html_(self) -> str:
-
         return table_html(("key", "value", "default"), keys_of(self), self.name)
 
     def completed(self) -> Self:
@@ -558,13 +553,14 @@ def _used(tables: dict[str, Any], design: Design) -> dict[str, Any]:
 
 
 def without_none(table: dict[str, Any]) -> dict[str, Any]:
-    return {key: _without_none(value) for key, value in table.items() if value is not None}
+    """Return nested tables without their keys of no value."""
 
+    def plain(value: Any) -> Any:
+        if isinstance(value, list):
+            return [plain(item) for item in value]
+        return without_none(value) if isinstance(value, dict) else value
 
-def _without_none(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_without_none(item) for item in value]
-    return without_none(value) if isinstance(value, dict) else value
+    return {key: plain(value) for key, value in table.items() if value is not None}
 
 
 def keys_of(design: Design) -> list[tuple[str, object, object]]:

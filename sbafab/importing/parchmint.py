@@ -165,14 +165,13 @@ def read_circuit(document: Any, stem: str) -> Circuit:
     remarks += named("holds no channels; it is not imported", skipped)
     if not titles:
         raise DesignError("layers holds no layer with channels; export the circuit again")
-    placed = _placed_features(root)
+    placed, routes = _features(root)
     _refuse_unplaced(root, placed)
     components: dict[str, Component] = {}
     for row in root.need("components").items():
         component = _component(row, titles, placed, remarks)
         if component is not None:
             components[component.id] = component
-    routes = _routed_features(root)
     connections = [
         _connection(row, titles, components, routes, remarks)
         for row in root.need("connections").items()
@@ -220,28 +219,24 @@ def _title(row: JsonPlace) -> str:
     return name.text if name is not None else row.need("id").text
 
 
-def _placed_features(root: JsonPlace) -> dict[str, tuple[Point, Point]]:
-    """Corner and span of components, um, if the circuit has them as features."""
+def _features(
+    root: JsonPlace,
+) -> tuple[dict[str, tuple[Point, Point]], dict[str, list[tuple[Point, Point, float]]]]:
+    """Corner and span of components, and straight channels of connections, um, that are features
+    of the circuit.
+    """
     features = root.get("features")
-    placed = {}
+    placed: dict[str, tuple[Point, Point]] = {}
+    routed: dict[str, list[tuple[Point, Point, float]]] = {}
     for row in features.items() if features is not None else ():
-        location = row.get("location")
+        location, connection = row.get("location"), row.get("connection")
         if location is not None:
             span = row.need("x-span").number, row.need("y-span").number
             placed[row.need("id").text] = (location.point, span)
-    return placed
-
-
-def _routed_features(root: JsonPlace) -> dict[str, list[tuple[Point, Point, float]]]:
-    """Straight channels of connections, um, if the circuit has them as features."""
-    features = root.get("features")
-    routed: dict[str, list[tuple[Point, Point, float]]] = {}
-    for row in features.items() if features is not None else ():
-        connection = row.get("connection")
         if connection is not None:
             segment = row.need("source").point, row.need("sink").point, row.need("width").number
             routed.setdefault(connection.text, []).append(segment)
-    return routed
+    return placed, routed
 
 
 def _component(
