@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import NamedTuple, NoReturn
+from typing import Literal, NamedTuple, NoReturn
 
 import click
 
@@ -29,7 +29,14 @@ from sbafab.errors import (
 
 RULE_FAILED = 1
 BAD_INPUT = 2
-KINDS = {DefectError: "defect", VoidError: "void", TooLargeError: "too-large"}
+ErrorKind = Literal[
+    "usage", "input", "void", "too-large", "yield", "defect", "stopped", "memory", "files"
+]
+KINDS: dict[type[SbafabError], ErrorKind] = {
+    DefectError: "defect",
+    VoidError: "void",
+    TooLargeError: "too-large",
+}
 """Errors that end as a failed rule does; all others are of the input."""
 RAISE_AGAIN_SECONDS = 0.01
 """Seconds after which a lost interrupt is raised again."""
@@ -38,7 +45,7 @@ RAISE_AGAIN_SECONDS = 0.01
 class Exit(NamedTuple):
     """The end of a command: kind of error, one sentence, exit code."""
 
-    kind: str
+    kind: ErrorKind
     sentence: str
     code: int
 
@@ -91,7 +98,9 @@ def exit_plainly(as_json: bool = False) -> Iterator[None]:
             sentence += f"{see} {error.ctx.command_path} --help"
         end(Exit("usage", sentence, BAD_INPUT), as_json)
     except SbafabError as error:
-        kind = next((name for kind, name in KINDS.items() if isinstance(error, kind)), "input")
+        kind: ErrorKind = next(
+            (name for kind, name in KINDS.items() if isinstance(error, kind)), "input"
+        )
         code = BAD_INPUT if kind == "input" else RULE_FAILED
         end(Exit(kind, str(error), code), as_json)
     except KeyboardInterrupt as stop:

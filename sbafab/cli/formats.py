@@ -6,13 +6,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import click
 from pydantic import BaseModel, Field
 
 from sbafab import actuators
 from sbafab.assemblies.records import Assembly
+from sbafab.cli.exit import ErrorKind
 from sbafab.cli.explain import ExplainDocument, ExplainedDocument
 from sbafab.cli.kerf import KerfDocument
 from sbafab.cli.make import NestedDocument, RunDocument
@@ -83,7 +84,7 @@ class NetsDocument(Document, schema=NETS):
 class ErrorEntry(Document):
     """The end of a command."""
 
-    kind: Literal["usage", "input", "too-large", "defect", "stopped", "memory", "files"]
+    kind: ErrorKind
     message: str
     exit_code: int
 

@@ -10,6 +10,7 @@ import pytest
 
 from sbafab.cli import COMMANDS
 from tests.cli.conftest import Run
+from tests.site.formats import hold
 
 OVAL = Path(__file__).parents[2] / "docs" / "gallery" / "oval.toml"
 CASES = f"""
@@ -174,6 +175,16 @@ def test_bad_input_is_one_sentence(line: str, said: str, tmp_path: Path, run: Ru
     assert list(tmp_path.iterdir()) == []
 
 
+FIXED = " ".join(
+    f"--set {key}"
+    for key in (
+        *("stack.balloons=2", "rules.yield_builds=100", "registration.method=channel-pin"),
+        *("bond.width=0.75", "mask.overhang=0.5", "registration.hand_placement=0.2"),
+    )
+)
+"""Keys that a yield may not change, of builds that a hand places roughly."""
+
+
 def test_no_command_shows_the_help(run: Run) -> None:
     code, out, err = run("")
     assert code == 2
@@ -189,6 +200,7 @@ def test_no_command_shows_the_help(run: Run) -> None:
         ("new 1dof-5mm --json", "usage", 2),
         ("generate 1dof-5mm --json --bogus", "usage", 2),
         ("cut radial-15mm --json --set sheets.tpe.width=40", "too-large", 1),
+        (f"generate 1dof-5mm --json --target-yield 0.99 {FIXED}", "yield", 1),
     ],
 )
 def test_errors_are_told_to_programs_too(
@@ -196,6 +208,7 @@ def test_errors_are_told_to_programs_too(
 ) -> None:
     code, out, err = run(line)
     told = json.loads(out)
+    hold("error", told)
     assert code == told["error"]["exit_code"] == exit_code
     assert (told["schema"], told["error"]["kind"]) == ("sbafab/error@1", kind)
     assert err == f"sbafab: {told['error']['message']}\n"
