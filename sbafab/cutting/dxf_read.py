@@ -1,18 +1,17 @@
-"""Cut files read back: entities, appearance, this program's form or ezdxf's, exact contours."""
+"""Cut files read back by ezdxf: entities, appearance, exact contours."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
-from sbafab.cutting.dxf_write import skeleton
 from sbafab.cutting.properties import COLOURS, CUT_INNER, CUT_OUTER, REFERENCE, SEAM
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour, circle
@@ -189,138 +188,7 @@ def _shown(item: Layer | DXFGraphic) -> str:
     return str(item.dxf.get("color")) if colour is None else f"#{colour & 0xFFFFFF:06x}"
 
 
-# Reading by the form in which this program writes, and by no other.
-#
-# All but numbers, properties and entities has to be the packaged empty document, letter by letter,
-# and every entity one of the four that are written, with the handle that is its turn. What such a
-# text holds for ezdxf is therefore known; ``tests/cutting/test_dxf_own.py`` compares the two.
-
-
-_NUMBER = r"-?\d{1,7}\.\d{1,9}"
-_VALUE = rf"({_NUMBER})\n"
-_PROPERTY = re.compile(
-    r"  9\n\$CUSTOMPROPERTYTAG\n  1\n([^\n]*)\n  9\n\$CUSTOMPROPERTY\n  1\n([^\n]*)\n"
-)
-_UNSURE = re.compile(r"\A\s|\s\Z|[\\^%]")
-"""Characters of a property that a DXF reader may take for a code, or leave out."""
-_LOW, _HIGH = (f" 10\n{_NUMBER}\n 20\n{_NUMBER}\n",) * 2
-_EXTENTS = re.compile(
-    rf"  9\n\$EXTMIN\n{_LOW} 30\n0\.0\n  9\n\$EXTMAX\n{_HIGH} 30\n0\.0\n"
-    rf"  9\n\$LIMMIN\n{_LOW}  9\n\$LIMMAX\n{_HIGH}"
-)
-ROUND = {"CIRCLE": ("x", "y", "radius"), "ARC": ("x", "y", "radius", "from", "to")}
-"""Fields of round entities."""
-_HANDLE = re.compile(r"[0-9A-F]{1,8}")
-_ROW = re.compile(rf" 10\n{_VALUE} 20\n{_VALUE}(?: 42\n{_VALUE})?")
-
-
-class OwnFile(NamedTuple):
-    """The content of a file in this program's form."""
-
-    properties: dict[str, str]
-    drawn: list[DrawnEntity]
-
-
-def as_written(text: str) -> OwnFile | None:
-    """Return the content of a file in this program's form; None for other text, and for a polyline
-    that cannot be cut.
-    """
-    form = skeleton()
-    if not (text.startswith(form.before_properties) and text.endswith(form.tail)):
-        return None
-    properties, place = _properties(text, len(form.before_properties))
-    if properties is None or not text.startswith(form.before_extents, place):
-        return None
-    extents = _EXTENTS.match(text, place + len(form.before_extents))
-    if extents is None or not text.startswith(form.before_seed, extents.end()):
-        return None
-    seed = _HANDLE.match(text, extents.end() + len(form.before_seed))
-    if seed is None or not text.startswith(form.before_entities, seed.end()):
-        return None
-    entities = text[seed.end() + len(form.before_entities) : len(text) - len(form.tail)]
-    try:
-        drawn = _entities(entities, form.first_handle, int(seed[0], 16))
-    except OutputError:
-        return None
-    return OwnFile(properties, drawn) if drawn is not None else None
-
-
-def _properties(text: str, place: int) -> tuple[dict[str, str] | None, int]:
-    """The custom properties from a position on, and their end; None if they may differ."""
-    properties: dict[str, str] = {}
-    while match := _PROPERTY.match(text, place):
-        name, value = match.groups()
-        if name in properties or any(
-            _UNSURE.search(string) or not string.isprintable() for string in (name, value)
-        ):
-            return None, place
-        properties[name] = value
-        place = match.end()
-    return properties, place
-
-
-@cache
-def _entity(model_space: str) -> re.Pattern[str]:
-    """One entity: kind, handle, layer and geometry."""
-    kinds = (
-        rf"AcDbPolyline\n 90\n(\d+)\n 70\n([01])\n((?: 10\n{_NUMBER}\n 20\n{_NUMBER}\n"
-        rf"(?: 42\n{_NUMBER}\n)?)+)",
-        rf"AcDbCircle\n 10\n{_VALUE} 20\n{_VALUE} 30\n0\.0\n 40\n{_VALUE}"
-        rf"(?:100\nAcDbArc\n 50\n{_VALUE} 51\n{_VALUE})?",
-        rf"AcDbLine\n 10\n{_VALUE} 20\n{_VALUE} 30\n0\.0\n 11\n{_VALUE} 21\n{_VALUE} 31\n0\.0\n",
-    )
-    return re.compile(
-        rf"  0\n(LWPOLYLINE|CIRCLE|LINE|ARC)\n  5\n([0-9A-F]+)\n330\n{model_space}\n100\n"
-        rf"AcDbEntity\n  8\n({'|'.join(COLOURS)})\n100\n(?:{'|'.join(kinds)})"
-    )
-
-
-def _entities(text: str, first_handle: int, seed: int) -> list[DrawnEntity] | None:
-    """All entities of a text of nothing else, their handles counted up to the ``seed``."""
-    drawn: list[DrawnEntity] = []
-    place = 0
-    for match in _entity(skeleton().model_space).finditer(text):
-        if match.start() != place or match[2] != f"{first_handle + len(drawn):X}":
-            return None
-        entity = _drawn_by_own_form(match)
-        if entity is None:
-            return None
-        drawn.append(entity)
-        place = match.end()
-    return drawn if place == len(text) and first_handle + len(drawn) == seed else None
-
-
-def _drawn_by_own_form(match: re.Match[str]) -> DrawnEntity | None:
-    kind, _, layer, count, closed, rows, *numbers = match.groups()
-    values = [float(number) for number in numbers if number is not None]
-    if kind == "LWPOLYLINE" and rows is not None:
-        points = list(_rows(rows))
-        if len(points) != int(count):
-            return None
-        edges = polyline(points, closed == "1", 0.0, layer not in (CUT_INNER, CUT_OUTER))
-        return of_polyline(kind, layer, edges, closed == "1")
-    is_round = numbers[0] is not None and len(values) == len(ROUND.get(kind, ""))
-    if is_round and values[2] > 0:
-        x, y, radius, *turn = values
-        if kind == "CIRCLE":
-            return DrawnEntity(kind, layer, circle((x, y), radius), ())
-        return DrawnEntity(kind, layer, None, arc((x, y), radius, *turn))
-    if kind == "LINE" and numbers[-1] is not None:
-        x, y, u, v = values
-        return DrawnEntity(kind, layer, None, [Line((x, y), (u, v))])
-    return None
-
-
-def _rows(text: str) -> Iterator[tuple[float, ...]]:
-    """Vertices as an LWPOLYLINE has them: x, y, start and end width, bulge."""
-    for x, y, bulge in _ROW.findall(text):
-        yield float(x), float(y), 0.0, 0.0, float(bulge or 0.0)
-
-
 # Reading back into exact contours, refused where they could not be cut.
-#
-# Those that stand letter by letter as this program writes them are read by that form; of all
-# others, including files edited by hand or by another program, are read with ezdxf.
 
 
 DRAWN = ("LWPOLYLINE", "POLYLINE", "CIRCLE", "LINE", "ARC")
@@ -368,14 +236,6 @@ def _read_text(text: str) -> ReadBack:
     """Equal texts hold the same, and are parsed once: a run reads its files when it writes them,
     and again, from the disk, when it checks the folder.
     """
-    own_file = as_written(text)
-    if own_file is not None:
-        return _put_together(own_file.drawn, own_file.properties, "mm")
-    return read_with_ezdxf(text)
-
-
-def read_with_ezdxf(text: str) -> ReadBack:
-    """Read a text with ezdxf. Raises OutputError as ``read_profile`` does."""
     check_space(text)
     document = _parsed(text)
     units = document.header.get("$INSUNITS"), document.header.get("$MEASUREMENT")
@@ -389,12 +249,7 @@ def read_with_ezdxf(text: str) -> ReadBack:
     for layout in document.layouts:
         if layout is not model and any(entity.dxftype() != "VIEWPORT" for entity in layout):
             raise OutputError(f"layout {layout.name} is not empty; draw in model space only.")
-    return _put_together(
-        map(drawn_entity, model),
-        dict(document.header.custom_vars.properties),
-        "mm" if says_units else "",
-        document,
-    )
+    return _put_together(document, "mm" if says_units else "")
 
 
 def _parsed(text: str) -> Drawing:
@@ -419,19 +274,14 @@ def _text(path: Path) -> str:
         raise OutputError(f"cannot be read ({error.strerror}); regenerate it.") from error
 
 
-def _put_together(
-    entities: Iterable[DrawnEntity],
-    properties: dict[str, str],
-    units: str,
-    document: Drawing | None = None,
-) -> ReadBack:
-    """The contours that entities draw; the ``document`` they are of, if it may look otherwise."""
+def _put_together(document: Drawing, units: str) -> ReadBack:
+    """The contours that the entities of a document draw."""
     closed: dict[str, list[Contour]] = {CUT_INNER: [], CUT_OUTER: []}
     loose: dict[str, list[Edge]] = {CUT_INNER: [], CUT_OUTER: []}
     layers: list[str] = []
     other_kinds: list[str] = []
     strokes: list[tuple[str, tuple[Edge, ...]]] = []
-    for kind, layer, contour, edges in entities:
+    for kind, layer, contour, edges in map(drawn_entity, document.modelspace()):
         drawn = contour.edges if contour else edges
         if any(map(_is_short, drawn[:1] if kind == "CIRCLE" else drawn)):
             raise OutputError(f"{_place(kind, drawn)} has an edge of no length; remove it.")
@@ -446,11 +296,11 @@ def _put_together(
             closed[layer].append(contour)
         else:
             loose[layer] += edges
-    if document is not None:
-        check_appearance(document)
+    check_appearance(document)
     contours = {layer: [*closed[layer], *closed_loops(loose[layer])] for layer in closed}
     check_clear([*contours[CUT_INNER], *contours[CUT_OUTER]])
     region = nested_region(contours[CUT_INNER], contours[CUT_OUTER])
+    properties = dict(document.header.custom_vars.properties)
     return ReadBack(region, properties, units, tuple(layers), tuple(other_kinds), tuple(strokes))
 
 

@@ -123,22 +123,6 @@ def test_each_is_there_alone_and_the_check_finds_it(entries: Entries) -> None:
 # Lead-ins find room, or are refused.
 
 
-def test_a_lead_in_goes_where_neighbours_leave_room() -> None:
-    """Two squares 0.5 mm apart: 1 mm has room on the far sides alone."""
-    pair = Region(
-        (
-            *rectangle((10.0, 10.0), (20.0, 20.0)).contours,
-            *rectangle((20.5, 10.0), (30.5, 20.0)).contours,
-        )
-    )
-    entries = Entries(lead_in=1.0, clearance=0.2)
-    runs = runs_of(pair, entries)
-    check_beam_runs(runs, pair, entries)
-    for run in runs:
-        x, _ = run.curves[0].start
-        assert not 20.0 < x < 20.5
-
-
 @pytest.mark.parametrize(
     ("region", "entries", "says"),
     [
@@ -319,33 +303,6 @@ def test_a_fault_is_told(name: str) -> None:
     check_beam_runs(runs, PARTS, ASKED)
     with pytest.raises(OutputError, match=says):
         check_beam_runs(change(runs), PARTS, ASKED)
-
-
-def test_lead_ins_near_a_neighbour_or_each_other_are_told() -> None:
-    """Squares 1 mm apart: lead-ins of 0.7 mm between them leave 0.3 to the other square."""
-    left, right = rectangle((10.0, 10.0), (20.0, 20.0)), rectangle((21.0, 10.0), (31.0, 20.0))
-    pair = Region((*left.contours, *right.contours))
-    entries = Entries(lead_in=0.7, clearance=0.2)
-
-    def square(corner: Point, start: Point, lead: Point) -> BeamRun:
-        x, y = corner
-        corners = [(x + 10, y + 10), (x, y + 10), (x, y), (x + 10, y)]
-        first = next(i for i in range(4) if between(corners[i - 1], start, corners[i]))
-        stops = [start, *corners[first:], *corners[:first], start]
-        edges = [Line(a, b) for a, b in zip(stops, stops[1:], strict=False) if a != b]
-        return BeamRun(CUT_OUTER, [Line(lead, start), *edges])
-
-    def between(a: Point, p: Point, b: Point) -> bool:
-        return math.dist(a, p) + math.dist(p, b) - math.dist(a, b) < 1e-9
-
-    far = square((21.0, 10.0), (31.0, 15.0), (31.7, 15.0))
-    near = square((10.0, 10.0), (20.0, 15.0), (20.7, 15.0))
-    check_beam_runs([near, far], pair, entries)
-    with pytest.raises(OutputError, match=r"nearer than 0\.4 mm to another contour"):
-        check_beam_runs([near, far], pair, replace(entries, clearance=0.4))
-    beside = square((21.0, 10.0), (21.0, 15.1), (20.3, 15.1))
-    with pytest.raises(OutputError, match="too near to each other"):
-        check_beam_runs([near, beside], pair, entries)
 
 
 def test_a_lead_in_that_meets_its_own_contour_is_told() -> None:

@@ -6,11 +6,10 @@ from itertools import pairwise
 
 import pytest
 
-from sbafab.cutting.chaining import JOINED, check_clear, closed_loops, nested_region
+from sbafab.cutting.chaining import JOINED, check_clear, closed_loops
 from sbafab.errors import OutputError
-from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line, Point
-from sbafab.geometry.region import disc, polygon, rectangle, stadium
+from sbafab.geometry.region import disc
 
 # A square of 1 mm whose last corner is cut off by three edges of half a micrometre each.
 TINY = 0.0005
@@ -48,38 +47,6 @@ def test_an_edge_drawn_twice_is_refused() -> None:
         closed_loops([*edges, edges[0].reversed()])
 
 
-def row(last: Point = (0.0, 0.0), slit: float = 0.5) -> tuple[list[Contour], list[Contour]]:
-    """Slots and discs in ten plates of 4 mm, the slot and disc of the last one moved."""
-    holes: list[Contour] = []
-    plates: list[Contour] = []
-    for number in range(10):
-        x = 5.0 * number
-        dx, dy = last if number == 9 else (0.0, 0.0)
-        plates += rectangle((x, 0.0), (x + 4.0, 4.0)).contours
-        for part in (stadium((x + 1.0 + dx, 2.0 + dy), slit, 2.0), disc((x + 3.0 + dx, 2.0), 0.5)):
-            holes += (contour.reversed() for contour in part.contours)
-    return holes, plates
-
-
-def test_what_holds_for_one_copy_is_not_said_of_one_that_lies_otherwise() -> None:
-    holes, plates = row()
-    check_clear([*holes, *plates])
-    assert len(nested_region(holes, plates).contours) == 30
-    for moved in ((-0.76, 0.0), (0.51, 0.0), (0.0, 1.01), (-0.75 - 1e-7, 0.0)):
-        holes, plates = row(moved)
-        with pytest.raises(OutputError, match=r"contours touch or cross at x 4[5-9]\."):
-            check_clear([*holes, *plates])
-
-
-def test_edges_on_one_line_that_meet_at_a_point_are_not_drawn_twice() -> None:
-    left, right = (polygon([(x, 0.0), (x + 1.0, 0.0), (x + 0.5, 1.0)]) for x in (0.0, 1.0))
-    with pytest.raises(OutputError, match=r"contours touch or cross at x 1\.000, y 0\.000"):
-        check_clear([*left.contours, *right.contours])
-    over, under = rectangle((0.0, 0.0), (2.0, 1.0)), rectangle((1.0, -1.0), (3.0, 0.0))
-    with pytest.raises(OutputError, match=r"edge drawn twice at x [12]\.000, y 0\.000"):
-        check_clear([*over.contours, *under.contours])
-
-
 @pytest.mark.parametrize("centre", [1.5, 0.5])
 def test_circles_that_just_touch_are_refused(centre: float) -> None:
     """Discs of 1 and 0.5 mm, the small one outside (1 + 0.5) or inside (1 - 0.5)."""
@@ -90,10 +57,3 @@ def test_circles_that_just_touch_are_refused(centre: float) -> None:
             check_clear([*disc((0, 0), 1.0).contours, *small.contours])
     small = disc((centre + way * 1e-4, 0.0), 0.5)
     check_clear([*disc((0, 0), 1.0).contours, *small.contours])
-
-
-def test_a_copy_outside_its_plate_is_no_hole() -> None:
-    holes, plates = row((20.0, 0.0))
-    check_clear([*holes, *plates])
-    with pytest.raises(OutputError, match="is an outline but on"):
-        nested_region(holes, plates)

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from xml.etree import ElementTree
 
 import ezdxf
 import pytest
 import shapely
-import svgelements
 
 from sbafab.cutting.calibration import SIZE, coupon, read_measurements, write_coupon
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.sheets import sheet_svg
 from sbafab.errors import DesignError
-from sbafab.geometry.region import disc, stadium
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -85,21 +80,6 @@ def test_it_fits_its_film_and_is_engraved_in_the_waste_alone(folder: Path) -> No
         assert line.distance(parts) > 0.5
 
 
-def test_the_arrow_points_along_x_on_the_middle_of_its_title(folder: Path) -> None:
-    model = ezdxf.readfile(folder / "coupon.dxf").modelspace()
-    strokes = [
-        [(x, y) for x, y, *_ in stroke.get_points()]
-        for stroke in model.query('LWPOLYLINE[layer=="ENGRAVE"]')
-    ]
-    # Nothing else of the lettering is 8 mm long.
-    [stem] = [s for s in strokes if shapely.LineString(s).length == pytest.approx(8.0)]
-    (start, y), (tip, also_y) = stem
-    assert (tip - start, also_y) == (pytest.approx(8.0), y)
-    title = [p for stroke in strokes for p in stroke if p[1] < 10 and p[0] < start - 0.5]
-    heights = [height for _, height in title]
-    assert (min(heights) + max(heights)) / 2 == pytest.approx(y, abs=0.01)
-
-
 def test_nothing_is_written_over(folder: Path) -> None:
     with pytest.raises(DesignError, match="exists"):
         write_coupon(folder, "sbafab 0")
@@ -107,37 +87,3 @@ def test_nothing_is_written_over(folder: Path) -> None:
 
 def test_an_empty_table_has_no_measurements(folder: Path) -> None:
     assert read_measurements(folder / "coupon.csv") == []
-
-
-def test_svg_has_the_same_sizes_in_millimetres(folder: Path) -> None:
-    root = ElementTree.parse(folder / "coupon.svg").getroot()
-    assert (root.get("width"), root.get("height")) == ("60mm", "60mm")
-    assert root.get("viewBox") == "0 0 60 60"
-    groups = {g.get("id"): g for g in root.iter(f"{SVG}g")}
-    assert list(groups) == ["ENGRAVE", "CUT_INNER", "CUT_OUTER", "REFERENCE"]
-    colours = [g.get("stroke") for g in groups.values()]
-    assert colours == ["#000000", "#0000ff", "#ff0000", "#808080"]
-    shapes = [
-        shape.bbox()
-        for shape in svgelements.SVG.parse(folder / "coupon.svg", ppi=25.4).elements()
-        if getattr(shape, "stroke", None) is not None
-        and str(shape.stroke) == "#ff0000"
-        and hasattr(shape, "segments")
-    ]
-    ours = sorted((x0, SIZE - y1, x1, SIZE - y0) for x0, y0, x1, y1 in shapes)
-    theirs = sorted(box.bounds for box in boxes(folder, "CUT_OUTER"))
-    assert ours == [pytest.approx(box, abs=1e-4) for box in theirs]
-
-
-def test_svg_keeps_arcs_and_circles() -> None:
-    region = stadium((10.0, 10.0), 4.0, 10.0) - disc((10.0, 12.0), 0.5)
-    text = sheet_svg(region.contours, Surroundings(), 20.0, 30.0, "a < b")
-    assert "<title>a &lt; b</title>" in text
-    circle = ElementTree.fromstring(text).find(f".//{SVG}circle")
-    assert circle is not None
-    assert (circle.get("cx"), circle.get("cy"), circle.get("r")) == ("10", "18", "0.5")
-    path = ElementTree.fromstring(text).find(f".//{SVG}path")
-    assert path is not None
-    read = svgelements.Path(path.get("d"))
-    assert read.bbox() == pytest.approx((8.0, 15.0, 12.0, 25.0), abs=1e-6)
-    assert path.get("d", "").count("A2 2") == 4

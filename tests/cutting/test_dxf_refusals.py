@@ -67,52 +67,61 @@ def test_doctored_file_is_refused(
     assert str(caught.value).startswith("001_TPE_base.dxf: ")
 
 
-@pytest.mark.parametrize("kind", ["LWPOLYLINE", "CIRCLE"])
-def test_contour_drawn_twice_is_refused(kind: str, plate_text: str) -> None:
-    original = entity(plate_text, kind)
-    handle = original.split("\n")[3]
-    copy = original.replace(f"  5\n{handle}\n", "  5\nFFF\n")
-    with pytest.raises(OutputError, match="twice"):
-        read_profile(plate_text.replace(original, original + copy))
+def line(model: Modelspace, points: list[tuple[float, ...]], **form: str) -> None:
+    layer = {"layer": form.pop("layer", "CUT_OUTER")}
+    model.add_lwpolyline(points, close=True, dxfattribs=layer, **form)
 
 
-def test_circle_drawn_again_as_a_polyline_is_refused(plate_text: str) -> None:
-    bent = [(0.0, 1.0, 1.0), (0.0, -1.0, 1.0)]
-    text = drawn(
-        plate_text,
-        lambda model: model.add_lwpolyline(
-            bent, format="xyb", close=True, dxfattribs={"layer": "CUT_INNER"}
-        ),
-    )
-    with pytest.raises(OutputError, match="twice"):
-        read_profile(text)
+def two(model: Modelspace) -> None:
+    line(model, SQUARE)
+    line(model, [(x + 4.0, y + 3.0) for x, y in SQUARE])
 
 
-def test_side_shared_in_part_by_two_squares_is_refused(plate_text: str) -> None:
-    def squares(model: Modelspace) -> None:
-        model.add_lwpolyline(SQUARE, close=True, dxfattribs=OUTER)
-        shifted = [(x + 4.0, y + 3.0) for x, y in SQUARE]
-        model.add_lwpolyline(shifted, close=True, dxfattribs=OUTER)
+def old(key: str, everywhere: bool) -> Callable[[Modelspace], object]:
+    """Group codes 40 and 41: of a vertex, or of the whole for vertices that have none (DXF)."""
 
-    with pytest.raises(OutputError, match=r"twice|touch or cross"):
-        read_profile(drawn(plate_text, squares))
+    def draw(model: Modelspace) -> None:
+        polyline = model.add_polyline2d(SQUARE, close=True, dxfattribs=OUTER)
+        if everywhere:
+            polyline.dxf.set(f"default_{key}", 0.2)
+        else:
+            polyline.vertices[2].dxf.set(key, 0.2)
 
-
-def test_contour_that_crosses_itself_is_refused(plate_text: str) -> None:
-    bow = [SQUARE[0], SQUARE[2], SQUARE[1], (20.0, 3.0)]
-    text = drawn(plate_text, lambda model: model.add_lwpolyline(bow, close=True, dxfattribs=OUTER))
-    with pytest.raises(OutputError, match="touch or cross"):
-        read_profile(text)
+    return draw
 
 
-def test_repeated_first_vertex_is_refused(plate_text: str) -> None:
-    closed_twice = [*SQUARE, SQUARE[0]]
-    text = drawn(
-        plate_text,
-        lambda model: model.add_lwpolyline(closed_twice, close=True, dxfattribs=OUTER),
-    )
-    with pytest.raises(OutputError, match=r"repeats its vertex x 20\.000, y 0\.000"):
-        read_profile(text)
+SPECK = [(20.0 + x * 1e-4, y * 1e-4) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+BOW = [SQUARE[0], SQUARE[2], SQUARE[1], (20.0, 3.0)]
+BENT = [(0.0, 1.0, 1.0), (0.0, -1.0, 1.0)]
+DRAWN: list[tuple[Callable[[Modelspace], object], str]] = [
+    (lambda m: line(m, BENT, format="xyb", layer="CUT_INNER"), "twice"),
+    (two, r"twice|touch or cross"),
+    (lambda m: line(m, BOW), "touch or cross"),
+    (lambda m: line(m, [*SQUARE, SQUARE[0]]), r"repeats its vertex x 20\.000, y 0\.000"),
+    (lambda m: line(m, [(x, y, 0.0, 0.2) for x, y in SQUARE], format="xyse"), "has a width"),
+    *((old(k, e), "has a width") for k in ("start_width", "end_width") for e in (True, False)),
+    (lambda m: line(m, SPECK), "encloses nothing"),
+    (lambda m: m.add_line((20, 0), (20, 0), dxfattribs=OUTER), "edge of no length"),
+    (lambda m: m.add_arc((20, 0), 1.0, 45.0, 45.0, dxfattribs=OUTER), "edge of no length"),
+    (lambda m: m.add_circle((20, 0), -1.0, dxfattribs=OUTER), "edge of no length"),
+    (lambda m: m.add_spline([(0, 0), (1, 1), (2, 0)], dxfattribs=OUTER), "cannot be cut"),
+    (lambda m: m.add_ellipse((0, 0), (3, 0), 0.5, dxfattribs=OUTER), "cannot be cut"),
+    (lambda m: m.add_text("P01", dxfattribs=OUTER), "cannot be cut"),
+    (lambda m: m.add_hatch(dxfattribs=OUTER), "cannot be cut"),
+    (lambda m: m.add_point((0, 0), dxfattribs=OUTER), "cannot be cut"),
+    (lambda m: m.add_polyline3d([(0, 0, 0), (1, 0, 0), (1, 1, 0)], dxfattribs=OUTER), "be cut"),
+    (lambda m: m.add_polyline2d(SQUARE, dxfattribs={**OUTER, "flags": 5}), "cannot be cut"),
+    (lambda m: m.add_blockref(m.doc.blocks.new("PART").name, (0, 0)), "cannot be cut"),
+    (lambda m: m.doc.paperspace().add_circle((0, 0), 1.0), "model space only"),
+]
+
+
+@pytest.mark.parametrize(("draw", "says"), DRAWN)
+def test_what_cannot_be_cut_is_refused(
+    draw: Callable[[Modelspace], object], says: str, plate_text: str
+) -> None:
+    with pytest.raises(OutputError, match=says):
+        read_profile(drawn(plate_text, draw))
 
 
 def test_missing_and_doubled_edges_of_a_chain_are_refused(plate: Region) -> None:
@@ -125,30 +134,6 @@ def test_missing_and_doubled_edges_of_a_chain_are_refused(plate: Region) -> None
         copy = edge.replace(f"  5\n{handle}\n", "  5\nFFF\n")
         with pytest.raises(OutputError, match="twice"):
             read_profile(text.replace(edge, edge + copy))
-
-
-@pytest.mark.parametrize(
-    "draw",
-    [
-        lambda model: model.add_spline([(0, 0), (1, 1), (2, 0)], dxfattribs=OUTER),
-        lambda model: model.add_ellipse((0, 0), (3, 0), 0.5, dxfattribs=OUTER),
-        lambda model: model.add_text("P01", dxfattribs=OUTER),
-        lambda model: model.add_hatch(dxfattribs=OUTER),
-        lambda model: model.add_point((0, 0), dxfattribs=OUTER),
-        lambda model: model.add_polyline3d([(*p, 0) for p in SQUARE], close=True, dxfattribs=OUTER),
-        lambda model: model.add_polyline2d(SQUARE, close=True, dxfattribs={**OUTER, "flags": 5}),
-        lambda model: model.add_blockref(model.doc.blocks.new("PART").name, (0, 0)),
-    ],
-)
-def test_other_entities_are_refused(draw: Callable[[Modelspace], object], plate_text: str) -> None:
-    with pytest.raises(OutputError, match="cannot be cut"):
-        read_profile(drawn(plate_text, draw))
-
-
-def test_paper_space_must_be_empty(plate_text: str) -> None:
-    text = drawn(plate_text, lambda model: model.doc.paperspace().add_circle((0, 0), 1.0))
-    with pytest.raises(OutputError, match="model space only"):
-        read_profile(text)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.05, 0.2, 0.5, 0.8, 0.9, 0.99, 0.9999])
@@ -164,21 +149,6 @@ def test_missing_file_is_refused(tmp_path: Path) -> None:
         read_profile(tmp_path / "gone.dxf")
 
 
-@pytest.mark.parametrize(
-    "draw",
-    [
-        lambda model: model.add_line((20, 0), (20, 0), dxfattribs=OUTER),
-        lambda model: model.add_arc((20, 0), 1.0, 45.0, 45.0, dxfattribs=OUTER),
-        lambda model: model.add_circle((20, 0), -1.0, dxfattribs=OUTER),
-    ],
-)
-def test_edges_of_no_length_are_refused(
-    draw: Callable[[Modelspace], object], plate_text: str
-) -> None:
-    with pytest.raises(OutputError, match="edge of no length"):
-        read_profile(drawn(plate_text, draw))
-
-
 @pytest.mark.parametrize("layer", ["ENGRAVE", "CUT_SHEET", "REFERENCE"])
 def test_what_is_not_of_the_part_is_counted_apart(layer: str, plate_text: str) -> None:
     text = drawn(
@@ -188,41 +158,6 @@ def test_what_is_not_of_the_part_is_counted_apart(layer: str, plate_text: str) -
     found = read_profile(text)
     assert found.region == read_profile(plate_text).region
     assert found.other == ("LINE", "LINE", "LWPOLYLINE")
-
-
-def test_width_at_a_vertex_is_refused(plate_text: str) -> None:
-    wide = [(x, y, 0.0, 0.2) for x, y in SQUARE]
-    text = drawn(
-        plate_text,
-        lambda model: model.add_lwpolyline(wide, format="xyse", close=True, dxfattribs=OUTER),
-    )
-    with pytest.raises(OutputError, match="has a width"):
-        read_profile(text)
-
-
-@pytest.mark.parametrize("key", ["start_width", "end_width"])
-@pytest.mark.parametrize("everywhere", [True, False])
-def test_width_of_an_old_polyline_is_refused(key: str, everywhere: bool, plate_text: str) -> None:
-    """Group codes 40 and 41: of a vertex, or of the whole for vertices that have none (DXF)."""
-
-    def old(model: Modelspace) -> None:
-        polyline = model.add_polyline2d(SQUARE, close=True, dxfattribs=OUTER)
-        if everywhere:
-            polyline.dxf.set(f"default_{key}", 0.2)
-        else:
-            polyline.vertices[2].dxf.set(key, 0.2)
-
-    with pytest.raises(OutputError, match="has a width"):
-        read_profile(drawn(plate_text, old))
-
-
-def test_contour_that_encloses_nothing_is_refused(plate_text: str) -> None:
-    speck = [(20.0 + x * 1e-4, y * 1e-4) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
-    text = drawn(
-        plate_text, lambda model: model.add_lwpolyline(speck, close=True, dxfattribs=OUTER)
-    )
-    with pytest.raises(OutputError, match="encloses nothing"):
-        read_profile(text)
 
 
 @pytest.mark.parametrize(("flags", "fitted"), [(1, False), (1 | 2, True), (1 | 4, True)])

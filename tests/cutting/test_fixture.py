@@ -55,13 +55,6 @@ def test_the_plate_is_as_large_as_the_platen_and_lacks_one_corner() -> None:
     assert outline.winding((x0 + 0.1, y0 + 0.1)) == 1
 
 
-def test_no_pins_no_plate(tmp_path: Path) -> None:
-    laminate = build(load_design("radial-15mm"))
-    assert laminate.pins == ()
-    assert write_fixture(laminate, tmp_path, SETTINGS, PLATEN) is None
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize("curves", [Curves("bulges"), Curves("arcs"), Curves("chords")])
 def test_the_plate_carries_what_the_shop_must_know(curves: Curves, tmp_path: Path) -> None:
     """Letters in single strokes on REFERENCE, on the plate, and the same words as a property."""

@@ -9,7 +9,6 @@ import math
 import os
 import random
 from collections.abc import Callable
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -22,7 +21,7 @@ from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.kerf import compensate
 from sbafab.geometry.arcs import bezier, fit_arcs
 from sbafab.geometry.contour import Contour
-from sbafab.geometry.edges import Arc, Edge, Point, edge_from_bulge
+from sbafab.geometry.edges import Arc, Edge, Point
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, polygon, stadium, union
 from tests.quick import few
@@ -103,27 +102,6 @@ def test_path_is_the_sum_with_the_beam_s_ellipse(number: int) -> None:
         path = compensate(region, pair)
         assert len(path.contours) == len(region.contours)
         assert_sum(path, region, pair)
-
-
-def test_a_corner_too_short_to_bend_is_no_kink() -> None:
-    """Grown round an almost smooth joint: arcs of 1 nm to 1 um, once stretched to lines."""
-    for turn in (4e-6, 1e-5, 1e-4, 1e-3):
-        bend, rise = math.cos(turn), math.sin(turn)
-        outline = grow(polygon([(-4, -2), (0, -2), (4 * bend, -2 + 4 * rise), (4, 3), (-4, 3)]), 1)
-        outline = grow(outline.turned(33.0), 0.75)
-        assert min(edge.length for edge in outline.edges) < 2e-3
-        path = compensate(outline, (0.12, 0.1))
-        assert_sum(path, outline, (0.12, 0.1))
-
-
-@pytest.mark.parametrize("bulge", [1e-6, 3e-6, 1e-5, 1e-4])
-def test_long_flat_arcs_stay_where_they_are(bulge: float) -> None:
-    """An arc of 8 mm that bulges 4 nm and more."""
-    corners = [(-4.0, -3.0), (4.0, -3.0), (4.0, 3.0), (-4.0, 3.0)]
-    edges = [edge_from_bulge(p, q, bulge) for p, q in pairwise([*corners, corners[0]])]
-    region = Region((Contour(tuple(edges)),)).turned(17.0)
-    path = compensate(region, (0.12, 0.1))
-    assert_sum(path, region, (0.12, 0.1))
 
 
 def test_a_hollow_narrower_than_the_beam_leaves_no_loop() -> None:

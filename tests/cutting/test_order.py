@@ -7,7 +7,6 @@ import random
 from itertools import pairwise
 
 import networkx
-import pytest
 
 from sbafab.cutting.order import cutting_order, travel
 from sbafab.geometry.region import Region, disc, rectangle, union
@@ -76,35 +75,3 @@ def test_every_contour_is_cut_once() -> None:
     field = grid(5, 7, 8.0, 3.0)
     for heat in (0.0, 3.0):
         assert sorted(map(id, cutting_order(field, heat))) == sorted(map(id, field.contours))
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_turning_no_stretch_round_makes_the_way_shorter(seed: int) -> None:
-    """Every stretch tried, as 2-opt defines it; one look along the path is not enough."""
-    draw = random.Random(seed)
-    places = [(draw.uniform(2, 98), draw.uniform(2, 98)) for _ in range(35)]
-    cuts = Region(tuple(c for p in places for c in disc(p, 0.5).contours))
-    order = list(cutting_order(cuts))
-    ours = travel(order)
-    for i in range(len(order)):
-        for j in range(i + 2, len(order) + 1):
-            assert travel([*order[:i], *order[i:j][::-1], *order[j:]]) > ours - 1e-3
-
-
-@pytest.mark.parametrize(
-    ("corner", "follows"), [((4.0, 5.0), True), ((5.9, 0.0), False), ((0.0, 5.9), False)]
-)
-def test_boxes_that_lie_aslant_are_as_far_apart_as_pythagoras_says(
-    corner: tuple[float, float], follows: bool
-) -> None:
-    """Squares of 1 mm: gaps of 3 and 4 mm make 5, after which the laser may go on at once."""
-    squares = Region(
-        tuple(
-            contour
-            for x, y in ((0.0, 0.0), corner, (60.0, 60.0))
-            for contour in rectangle((x, y), (x + 1.0, y + 1.0)).contours
-        )
-    )
-    order = [contour.bounds[:2] for contour in cutting_order(squares, heat_distance=5.0)]
-    assert order[0] == (0.0, 0.0)
-    assert (order[1] == corner) == follows

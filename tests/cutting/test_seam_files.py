@@ -73,15 +73,6 @@ def test_a_seam_is_read_back_as_its_path(tmp_path: Path) -> None:
     assert properties["ORDER"] == "1"
 
 
-@pytest.mark.parametrize(("off", "words"), [(0.0009, None), (0.0011, "0.001 mm off"), (1, "1.000")])
-def test_a_path_may_be_a_micrometre_off(off: float, words: str | None) -> None:
-    """A line along x moved along y, its ends too."""
-    line = Line((0.0, 0.0), (10.0, 0.0))
-    moved = Line((0.0, off), (10.0, off))
-    said = deviation(((moved,),), ((line,),))
-    assert (said is None) if words is None else (said is not None and words in said)
-
-
 def test_a_shorter_turned_or_second_path_is_another() -> None:
     line, short = Line((0.0, 0.0), (10.0, 0.0)), Line((0.0, 0.0), (9.0, 0.0))
     turned = Line((10.0, 0.0), (0.0, 0.0))
@@ -102,12 +93,3 @@ def test_a_file_that_holds_more_or_no_path_is_refused(tmp_path: Path) -> None:
         document.saveas(other)
         with pytest.raises(OutputError, match=words):
             read_seam(other)
-
-
-@pytest.mark.parametrize(
-    ("text", "width"), [("2", 2.0), ("0.25", 0.25), ("0", None), ("-1", None), ("inf", None)]
-)
-def test_a_width_of_no_tool_is_none(text: str, width: float | None) -> None:
-    assert stated_width({"TOOL_WIDTH": text}) == width
-    assert stated_width({}) is None
-    assert stated_width({"TOOL_WIDTH": "wide"}) is None

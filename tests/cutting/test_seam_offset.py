@@ -17,9 +17,6 @@ from ezdxf.document import Drawing
 from sbafab.actuators import build, load_design
 from sbafab.api import check_folder, generate
 from sbafab.as_built.check import read_folder
-from sbafab.design.identity import actuator_sha256
-from sbafab.design.kits import write_kit
-from sbafab.design.laminate_file import FILE
 from sbafab.errors import DesignError
 from sbafab.importing.laminates import import_folder
 from sbafab.importing.records import write_imported
@@ -88,22 +85,6 @@ def shown(finding: Finding) -> tuple[object, ...]:
     return finding.rule, finding.verdict, finding.measured, finding.limit, finding.message
 
 
-def test_all_else_shows_the_seam_as_it_is_made(folders: tuple[Path, Path]) -> None:
-    plain, beside = folders
-    assert list(map(shown, check_folder(beside))) == list(map(shown, check_folder(plain)))
-    same = [FILE, "checks.json", "press.json", "preview/layers.svg", "preview/stack.svg"]
-    same += [path.relative_to(plain).as_posix() for path in plain.glob("layers/0*.dxf")]
-    assert len(same) == 7
-    hashes = [json.loads((top / "manifest.json").read_text())["design_sha256"] for top in folders]
-    assert hashes[0] != hashes[1]
-    for name in same:
-        ours = (beside / name).read_text(encoding="utf-8").replace(hashes[1], hashes[0])
-        assert ours == (plain / name).read_text(encoding="utf-8"), name
-    designs = [load_design(top / "design.toml") for top in folders]
-    # Another bench makes no other actuator.
-    assert actuator_sha256(designs[0]) == actuator_sha256(designs[1])
-
-
 def test_pages_say_that_files_are_shifted_and_prints_are_not(folders: tuple[Path, Path]) -> None:
     plain, beside = folders
     sentence = (
@@ -158,16 +139,6 @@ def test_a_path_shifted_the_wrong_way_is_found(
     assert math.dist(start, (x, y)) == pytest.approx(off)
 
 
-def test_another_offset_than_the_design_s_is_named(
-    folders: tuple[Path, Path], tmp_path: Path
-) -> None:
-    folder = copied(folders[1], tmp_path)
-    text = (folder / SEAM_FILE).read_text(encoding="utf-8")
-    (folder / SEAM_FILE).write_text(text.replace("\n12, -3.5\n", "\n-12, 3.5\n"), encoding="utf-8")
-    failed = {f.rule: f for f in check_folder(folder) if f.verdict == "fail"}
-    assert "TOOL_OFFSET is '-12, 3.5', not '12, -3.5'" in (failed["manifest-claims"].message)
-
-
 def copied(folder: Path, to: Path) -> Path:
     for path in folder.rglob("*"):
         if path.is_file():
@@ -190,24 +161,6 @@ def test_an_imported_folder_keeps_offset_and_path(
     ]
     text = (again / SEAM_FILE).read_text(encoding="utf-8").replace(hashes[1], hashes[0])
     assert text == (beside / SEAM_FILE).read_text(encoding="utf-8")
-
-
-def test_a_kit_says_it_for_every_design_of_a_bench(tmp_path: Path) -> None:
-    kit = write_kit(tmp_path / "lab.toml")
-    kit.write_text(
-        kit.read_text()
-        + '\n[seam_tools.hot_tip]\noffset = {value = ["1.2 cm", -3.5], source = "measured"}\n'
-    )
-    (tmp_path / "welded.toml").write_text(tomli_w.dumps(welded(kit="lab.toml")))
-    design = load_design(tmp_path / "welded.toml")
-    assert design.seam_offsets == {"hot-tip": (X, Y)}
-    assert (
-        load_design(tmp_path / "welded.toml", ["seam_tools.hot_tip.offset=[0, 0]"]).seam_offsets
-        == {}
-    )
-    kit.write_text(kit.read_text().replace("{value = ", "").replace(', source = "measured"}', ""))
-    with pytest.raises(DesignError, match=r"seam_tools.hot_tip.offset = .* has no source"):
-        load_design(tmp_path / "welded.toml")
 
 
 def test_no_offset_changes_no_byte(folders: tuple[Path, Path], tmp_path: Path) -> None:

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import shapely
-from svgelements import SVG
-from svgelements import Path as SvgPath
 
 from sbafab.cutting import sheets as module
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.lettering import GLYPHS, strokes, width
 from sbafab.cutting.properties import CutSettings
-from sbafab.cutting.sheets import SheetFile, label, write_sheets
+from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.design.sections import Laser, Sheets
 from sbafab.errors import OutputError
-from sbafab.geometry.region import disc, rectangle, stadium
+from sbafab.geometry.region import disc
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import Nest, NestPart, Placement, Stock
 
@@ -46,14 +42,6 @@ def test_the_file_holds_the_parts_with_holes_before_outlines(tmp_path: Path) -> 
     assert sheet.counts == (("demo", "P01", 7),)
     assert found.properties["PARTS"] == "7 x demo P01"
     assert found.properties["PATTERN"] == "sheet 1 of 1"
-
-
-def test_time_is_cut_travel_and_piercing(tmp_path: Path) -> None:
-    (sheet,) = write_sheets([ring_nest(3)], tmp_path, SETTINGS, LASER, PLAIN)
-    length = 3 * 2 * math.pi * (5 + 2)
-    assert sheet.cut_length == pytest.approx(length)
-    assert sheet.minutes * 60 == pytest.approx(length / 10 + sheet.travel / 100 + 6 * 0.5)
-    assert sheet.contours == 6
 
 
 def test_the_frame_is_the_sheet_and_starts_at_the_origin(tmp_path: Path) -> None:
@@ -89,15 +77,6 @@ def engraved_box(sheet: SheetFile, folder: Path) -> tuple[float, float, float, f
     return shapely.MultiPoint(ends).bounds
 
 
-def test_a_sheet_says_that_its_narrow_border_has_no_room_for_a_label(tmp_path: Path) -> None:
-    narrow = STOCK.model_copy(update={"border": 2.0})
-    (sheet,) = write_sheets([ring_nest(1, narrow)], tmp_path, SETTINGS, LASER, PLAIN)
-    assert sheet.label == "no room"
-    assert "ENGRAVE" not in read_profile(tmp_path / sheet.path).layers
-    (plain,) = write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER, Sheets(label=False))
-    assert plain.label == "off"
-
-
 def test_a_label_makes_way_for_pins(tmp_path: Path) -> None:
     pins = [(30.0, 3.0, 3.0), (3.0, 40.0, 3.0), (30.0, 77.0, 3.0), (57.0, 40.0, 3.0)]
     # Below, left, above, right: where the label is while the pins before are in its way.
@@ -113,16 +92,6 @@ def test_a_label_makes_way_for_pins(tmp_path: Path) -> None:
     full_stock = STOCK.model_copy(update={"pins": tuple(pins)})
     (full,) = write_sheets([ring_nest(1, full_stock)], tmp_path, SETTINGS, LASER, PLAIN)
     assert full.label == "no room"
-
-
-@pytest.mark.parametrize(("gap", "stays"), [(0.1, True), (-0.1, False)])
-def test_a_label_stays_where_a_pin_s_edge_is_clear_of_it(gap: float, stays: bool) -> None:
-    """Letters are half of the border high, 3 mm, and begin at its corner; the pin is 2 mm thick."""
-    end = 6.0 + 3.0 * width("TPE", 1.0)
-    pinned = STOCK.model_copy(update={"pins": ((end + 1.0 + gap, 3.0, 2.0),)})
-    alone = label("TPE", STOCK, 80.0)
-    assert alone
-    assert (label("TPE", pinned, 80.0) == alone) is stays
 
 
 def test_a_label_that_is_too_long_is_turned_or_wrapped(tmp_path: Path) -> None:
@@ -155,39 +124,12 @@ def test_a_roll_is_cut_off_one_border_past_its_parts(tmp_path: Path) -> None:
     )
 
 
-def test_the_cut_that_frees_a_roll_takes_its_time(tmp_path: Path) -> None:
-    roll = STOCK.model_copy(update={"roll": True})
-    (sheet,) = write_sheets([ring_nest(3, roll)], tmp_path, SETTINGS, LASER, PLAIN)
-    length = 3 * 2 * math.pi * (5 + 2) + STOCK.width
-    assert sheet.cut_length == pytest.approx(length)
-    assert sheet.minutes * 60 == pytest.approx(length / 10 + sheet.travel / 100 + 7 * 0.5)
-    assert sheet.contours == 6
-
-
 def test_the_picture_has_the_sheets_size_and_colours(tmp_path: Path) -> None:
     (sheet,) = write_sheets([ring_nest(2)], tmp_path, SETTINGS, LASER, PLAIN)
     picture = (tmp_path / sheet.picture).read_text(encoding="utf-8")
     assert 'width="60mm" height="80mm" viewBox="0 0 60 80"' in picture
     assert picture.count('r="5"') == picture.count('r="2"') == 2
     assert picture.index("#0000ff") < picture.index("#ff0000")
-
-
-def test_the_picture_s_arcs_are_as_round_as_the_part_s(tmp_path: Path) -> None:
-    """As svgelements reads the outline of a stadium 14 mm long and 4 mm wide."""
-    part = NestPart("demo", "P01", 1, "TPE", stadium((0.0, 0.0), 4.0, 14.0), 1)
-    (placed,) = nest([part], {"TPE": STOCK})
-    (sheet,) = write_sheets([placed], tmp_path, SETTINGS, LASER, PLAIN)
-    picture = SVG.parse(tmp_path / sheet.picture, ppi=25.4)
-    lengths = [path.length() for path in picture.elements(lambda each: isinstance(each, SvgPath))]
-    assert any(length == pytest.approx(20 + 4 * math.pi, abs=1e-3) for length in lengths)
-
-
-def test_a_compensated_sheet_says_so_in_its_name(tmp_path: Path) -> None:
-    settings = replace(SETTINGS, kerf_widths={"TPE": 0.12})
-    (sheet,) = write_sheets([ring_nest(1)], tmp_path, settings, LASER, PLAIN)
-    assert sheet.path == "sheets/TPE_1_kerf0.12.dxf"
-    properties = read_profile(tmp_path / sheet.path).properties
-    assert (properties["KERF_STATE"], properties["KERF_WIDTH"]) == ("compensated", "0.12")
 
 
 def test_parts_that_overlap_are_not_let_through(tmp_path: Path) -> None:
@@ -218,26 +160,3 @@ def test_a_frame_of_another_size_is_found(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(module, "dxf_text", scaled)
     with pytest.raises(OutputError, match="REFERENCE"):
         write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER, PLAIN)
-
-
-def test_letters_are_as_high_and_wide_as_asked() -> None:
-    text = "".join(GLYPHS)
-    points = [p for run in strokes(text, (10.0, 20.0), 3.0) for p in run]
-    assert min(y for _, y in points) == 20.0
-    assert max(y for _, y in points) == 23.0
-    assert min(x for x, _ in points) == 10.0
-    assert max(x for x, _ in points) <= 10.0 + width(text, 3.0) + 1e-9
-
-
-def test_every_letter_is_another() -> None:
-    drawn = {strokes(letter, (0.0, 0.0), 6.0) for letter in GLYPHS}
-    assert len(drawn) == len(GLYPHS)
-    assert strokes("a", (0.0, 0.0), 6.0) == strokes("A", (0.0, 0.0), 6.0)
-    assert strokes(" ", (0.0, 0.0), 6.0) == ()
-
-
-def test_engraving_does_not_touch_a_part_that_fills_its_sheet(tmp_path: Path) -> None:
-    full = rectangle((0.0, 0.0), (48.0, 68.0))
-    (whole,) = nest([NestPart("demo", "P01", 1, "TPE", full, 1)], {"TPE": STOCK})
-    (sheet,) = write_sheets([whole], tmp_path, SETTINGS, LASER, PLAIN)
-    assert "ENGRAVE" in read_profile(tmp_path / sheet.path).layers

@@ -16,13 +16,6 @@ def test_packaged_document_is_the_one_ezdxf_writes() -> None:
     assert SKELETON.read_text(encoding="utf-8") == skeleton_text()
 
 
-def test_making_it_leaves_the_switch_of_ezdxf_as_it_was() -> None:
-    for state in (True, False):
-        ezdxf.options.write_fixed_meta_data_for_testing = state
-        skeleton_text()
-        assert ezdxf.options.write_fixed_meta_data_for_testing is state
-
-
 def test_it_is_an_empty_document_in_millimetres_with_the_cut_layers() -> None:
     document = ezdxf.readfile(SKELETON)
     assert document.dxfversion == "AC1024"

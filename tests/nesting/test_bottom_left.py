@@ -43,22 +43,6 @@ def test_squares_fill_the_grid_they_fit_in_exactly(spacing: float, a_row: int) -
     assert nested([part(square, a_row**2 + 1)], stock).sheets == 2
 
 
-@pytest.mark.parametrize(("usable", "column"), [(54.0, 5), (53.9, 4), (43.0, 4), (42.9, 3)])
-def test_a_column_holds_as_many_squares_as_its_length(usable: float, column: int) -> None:
-    stock = Stock(width=10 + 20, length=usable + 20)
-    result = nested([part(rectangle((0.0, 0.0), (10.0, 10.0)), 2 * column)], stock)
-    assert [len(result.on_sheet(sheet)) for sheet in range(result.sheets)] == [column, column]
-
-
-def test_discs_in_a_row_touch_the_spacing() -> None:
-    """Diameter 8 at spacing 2: ten need 98 mm of length in a channel as wide as one."""
-    stock = Stock(width=8 + 2 * 5, length=98 + 2 * 5, border=5, spacing=2.0)
-    result = nested([part(disc((0.0, 0.0), 4.0), 10)], stock)
-    assert result.sheets == 1
-    heights = sorted(result.region(place).bounds[1] for place in result.placements)
-    assert heights == pytest.approx([5.0 + 10.0 * i for i in range(10)], abs=1e-6)
-
-
 def test_discs_lie_closer_than_in_squares() -> None:
     """Rows of discs in a triangular array are sqrt(3)/2 of a pitch apart."""
     pitch, rows, a_row = 11.0, 9, 5

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -52,13 +51,6 @@ def test_a_sound_nest_passes() -> None:
 def test_a_faulty_nest_is_refused(faulty: Nest, message: str) -> None:
     with pytest.raises(OutputError, match=message):
         check_nest(faulty)
-
-
-def test_a_part_on_no_known_index_is_refused() -> None:
-    sound = nest_of((5, 5, 0))
-    stray = replace(sound, placements=(*sound.placements, Placement(3, 0, 0, (30.0, 30.0))))
-    with pytest.raises(OutputError, match="too many parts or sheets"):
-        check_nest(stray)
 
 
 def test_slack_allows_for_the_rounding_of_a_file() -> None:

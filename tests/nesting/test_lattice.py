@@ -51,13 +51,6 @@ def test_discs_lie_in_the_densest_packing(rows: int, a_row: int) -> None:
     assert len(laid.places) == a_row * rows - rows // 2
 
 
-@pytest.mark.parametrize("size", [(10.0, 10.0), (17.0, 6.0), (3.0, 19.0)])
-def test_rectangles_fill_what_they_fill_exactly(size: tuple[float, float]) -> None:
-    width, height = (5 * size[0] + 4 * 0.7, 6 * size[1] + 5 * 0.7)
-    laid = best(rectangle((1.0, 1.0), (1.0 + size[0], 1.0 + size[1])), 0.7, width, height)
-    assert len(laid.places) == 30
-
-
 @pytest.mark.parametrize("turned", [False, True])
 def test_rectangles_fill_a_sheet_that_takes_two_lattices(turned: bool) -> None:
     """Two columns of 11 lying and one of 4 standing fill it: 26 x 44 mm, each with 0.5 mm of gap

@@ -23,15 +23,6 @@ def test_the_parts_hold_all_film_of_the_laminate(copies: int, template: str) -> 
     assert {part.design for part in parts} == {laminate.name}
 
 
-def test_masks_of_three_equal_discs_are_one_part() -> None:
-    """15 balloons of three chambers: 14 masks without strips fall in three discs each."""
-    laminate = build(load_design("3dof-15mm"))
-    paths = {pattern: layers[0].profile for pattern, layers in laminate.patterns.items()}
-    (discs,) = (part for part in parts_of(laminate, paths, 2) if part.count == 2 * 14 * 3)
-    assert discs.piece == 1
-    assert laminate.patterns[discs.pattern][0].role == "chamber-mask"
-
-
 @pytest.mark.parametrize(
     ("copies", "wall", "base"),
     # Two films a balloon of six, less base, cap and the wall with the tab: 9 walls. A twentieth of

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from itertools import product
-
 import numpy as np
 import pytest
 from shapely.geometry import Polygon, box
 
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
-from sbafab.nesting.engines import aligned, grid_of, meetings, quarter_turned, raster
-from sbafab.nesting.records import TURNS
+from sbafab.nesting.engines import meetings, quarter_turned, raster
 
 SHAPES = {
     "disc": disc((0.3, -0.2), 2.0),
@@ -40,13 +36,6 @@ def test_a_cell_is_set_where_shapely_finds_the_region_in_it(name: str) -> None:
             assert not cells[row, column], (row, column)
 
 
-def test_a_square_on_the_grid_sets_its_own_cells_only() -> None:
-    cells, row, column = aligned(rectangle((1.0, 2.0), (1.5, 2.3)), (0.0, 0.0), 0.1)
-    assert (row, column) == (20, 10)
-    assert cells.shape == (3, 5)
-    assert cells.all()
-
-
 def test_turned_cells_are_those_of_the_turned_region() -> None:
     region = SHAPES["triangle"]
     base = raster(region, 0.2).cells
@@ -70,19 +59,3 @@ def test_meetings_are_what_trying_every_offset_finds() -> None:
     for row, column in np.ndindex(result.shape):
         expected = bool((padded[row : row + rows, column : column + columns] & b).any())
         assert result[row, column] == expected
-
-
-def test_what_keeps_two_forms_apart_does_not_hang_on_what_was_asked_before() -> None:
-    shapes = [SHAPES["triangle"], SHAPES["bent"]]
-    grid = grid_of(shapes, (0.0, 0.0, 30.0, 30.0), 1.0, TURNS)
-    assert len(grid.forms) == 8
-    for a, b in product(grid.forms, repeat=2):
-        assert np.array_equal(grid.clear(a, b), ~meetings(a.cells, b.cells)), (a, b)
-
-
-def test_the_cells_cover_the_area_and_little_more() -> None:
-    cell = 0.02
-    cells = raster(disc((0.0, 0.0), 2.0), cell).cells
-    area = cells.sum() * cell**2
-    # At most the cells along the circle are too many: 8 r / cell of them.
-    assert math.pi * 4 < area < math.pi * 4 + 16 * cell
