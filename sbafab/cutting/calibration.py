@@ -24,12 +24,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sbafab.cutting.beam_paths import contour_runs, drawn
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.lettering import Stroke, strokes
+from sbafab.cutting.machine_files import svg_text
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import coupon_properties
-from sbafab.cutting.sheets import sheet_svg
 from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
@@ -422,7 +423,8 @@ def write_coupon(folder: Path, generator: str) -> tuple[Path, ...]:
     drawing.write_bytes(dxf_text(contours, properties, sheet=sheet).encode())
     verify_file(drawing, region, properties)
     check_surroundings(read_profile(drawing), sheet)
-    picture.write_bytes(sheet_svg(contours, sheet, SIZE, SIZE, TITLE).encode())
+    runs = drawn(contour_runs(contours), sheet)
+    picture.write_bytes(svg_text(runs, (SIZE, SIZE), TITLE).encode())
     table.write_bytes(coupon_csv().encode())
     return paths
 

@@ -34,8 +34,15 @@ from sbafab.geometry.contour import circle
 from sbafab.geometry.edges import Arc, Edge, Line, Point
 from sbafab.geometry.region import chain_data, coord
 
-RGB = {ENGRAVE: "#000000", CUT_INNER: "#0000ff", CUT_OUTER: "#ff0000", CUT_SHEET: "#ff00ff"}
-"""Colours of the layers in the order of cutting, pure ones that a driver can map."""
+RGB = {
+    ENGRAVE: "#000000",
+    CUT_INNER: "#0000ff",
+    CUT_OUTER: "#ff0000",
+    CUT_SHEET: "#ff00ff",
+    REFERENCE: "#808080",
+}
+"""Colours of the layers in the order of cutting, pure ones that a driver can map; ENGRAVE is black,
+as its DXF colour is on white."""
 HAIRLINE = 0.0254
 """mm: 0.001 in."""
 UNITLESS, MILLIMETRES = 0, 4
@@ -115,19 +122,28 @@ def _read_rdworks(path: Path) -> Iterator[BeamRun]:
 
 
 def _epilog(runs: Sequence[LaserRun], size: Point, title: str) -> str:
+    return svg_text(runs, size, title, HAIRLINE)
+
+
+def svg_text(runs: Iterable[LaserRun], size: Point, title: str, stroke: float = 0.1) -> str:
+    """Return runs as an SVG on a page of a size in mm: a group for each layer, with true arcs.
+
+    The page's lower left corner is the origin; coordinates have no transforms. The beam follows the
+    middle of a line, which is ``stroke`` mm wide.
+    """
+    by_layer: dict[str, list[LaserRun]] = {layer: [] for layer in RGB}
+    for run in runs:
+        by_layer[run.layer].append(run)
     across, up = (coord(side) for side in size)
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{across}mm" height="{up}mm" '
         f'viewBox="0 0 {across} {up}">',
         f"<title>{escape(title)}</title>",
     ]
-    for layer, colour in RGB.items():
-        drawn = [run for run in runs if run.layer == layer]
+    for layer, drawn in by_layer.items():
         if drawn:
-            lines.append(
-                f'<g id="{layer}" fill="none" stroke="{colour}" stroke-width="{HAIRLINE:g}">'
-            )
-            lines += [_svg_shape(run, size[1]) for run in drawn]
+            look = f'fill="none" stroke="{RGB[layer]}" stroke-width="{coord(stroke)}"'
+            lines += [f'<g id="{layer}" {look}>', *(_svg_shape(run, size[1]) for run in drawn)]
             lines.append("</g>")
     return "\n".join((*lines, "</svg>\n"))
 

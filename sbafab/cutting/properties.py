@@ -64,21 +64,19 @@ class CutSettings:
         return self.kerf_widths.get(material)
 
 
-def file_properties(settings: CutSettings, material: Material, pattern: str) -> dict[str, str]:
-    """Custom properties of the cut file of one pattern, equal for all layers that share it."""
-    properties = _properties(settings, material, pattern, settings.kerf_width(material))
-    return {**properties, **warning_property(settings.warnings.get(material))}
-
-
-def sheet_properties(
-    settings: CutSettings, material: Material, sheet: str, parts: str
+def file_properties(
+    settings: CutSettings, material: Material, pattern: str, parts: str | None = None
 ) -> dict[str, str]:
-    """Custom properties of a film sheet: ``sheet`` is "1 of 2", ``parts`` lists its parts."""
-    properties = {
-        **_properties(settings, material, f"sheet {sheet}", settings.kerf_width(material)),
-        "PARTS": parts,
+    """Custom properties of the cut file of one pattern, equal for all layers that share it.
+
+    A film sheet says "sheet 1 of 2" for its pattern and lists its ``parts``.
+    """
+    warning = settings.warnings.get(material)
+    return {
+        **_properties(settings, material, pattern, settings.kerf_width(material)),
+        **({} if parts is None else {"PARTS": parts}),
+        **({"WARNING": warning} if warning else {}),
     }
-    return {**properties, **warning_property(settings.warnings.get(material))}
 
 
 def fixture_properties(settings: CutSettings, notes: Sequence[str] = ()) -> dict[str, str]:
@@ -105,6 +103,7 @@ def coupon_properties(generator: str) -> dict[str, str]:
 def _properties(
     settings: CutSettings, material: str, pattern: str, kerf: Kerf | None
 ) -> dict[str, str]:
+    curves = said_of(settings.curves)
     return {
         "DESIGN": settings.design,
         "DESIGN_SHA256": settings.design_sha256,
@@ -113,20 +112,10 @@ def _properties(
         "UNITS": "mm",
         **kerf_properties(kerf),
         "WAIVED": ", ".join(settings.waived) or "none",
-        **limit_properties(settings.lowered),
+        **({LIMITS: ", ".join(settings.lowered)} if settings.lowered else {}),
         "GENERATOR": settings.generator,
-        **curves_property(said_of(settings.curves)),
+        **({} if curves is None else {"CURVES": curves}),
     }
-
-
-def warning_property(text: str | None) -> dict[str, str]:
-    """Return a cut file's warning of the dangers of its film."""
-    return {"WARNING": text} if text else {}
-
-
-def limit_properties(lowered: Sequence[str]) -> dict[str, str]:
-    """Return a cut file's note on lowered limits; empty without any."""
-    return {LIMITS: ", ".join(lowered)} if lowered else {}
 
 
 def kerf_properties(kerf: Kerf | None) -> dict[str, str]:
@@ -182,13 +171,7 @@ def curves_of(text: str | None) -> Curves:
     """Return the drawing of arcs by a manifest's statement. Raises OutputError as
     ``chord_error_of``.
     """
-    error = chord_error_of(curves_property(text))
-    return Curves("chords", error) if error else TRUE_ARCS
-
-
-def curves_property(text: str | None) -> dict[str, str]:
-    """The custom property of that: only what departs from true arcs has to be said."""
-    return {} if text is None else {"CURVES": text}
+    return TRUE_ARCS if text is None else Curves("chords", chord_error_of({"CURVES": text}))
 
 
 def chord_error_of(properties: Mapping[str, str]) -> float:

@@ -7,12 +7,11 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 from sbafab.cutting.beam_check import BeamRun, check_beam_runs
-from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
+from sbafab.cutting.beam_paths import LaserRun, beam_runs, contour_runs, drawn
 from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.entries import PLAIN, Entries
@@ -31,26 +30,24 @@ from sbafab.cutting.machine_files import (
     PROGRAMS,
     machine_text,
     read_machine_file,
+    svg_text,
     verify_machine_file,
 )
 from sbafab.cutting.order import cutting_minutes, cutting_order, travel
 from sbafab.cutting.properties import (
     CUT_INNER,
     CUT_OUTER,
-    CUT_SHEET,
-    ENGRAVE,
-    REFERENCE,
     CutSettings,
     LaserProgram,
+    file_properties,
     kerf_suffix,
-    sheet_properties,
 )
 from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.design.sections import Laser, Sheets
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region, coord, path_data
+from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.nesting.records import Nest, Placement, Stock
 from sbafab.process import Counted
@@ -69,8 +66,7 @@ class SheetFile:
     says how many parts of each design and pattern lie on it: (design, pattern, count).
     ``unsorted_travel`` is the head's travel in the nest's own order. ``label`` states whether the
     sheet's label is engraved, did not fit the border, or was not requested. ``cut_length`` includes
-    the cut that frees a roll's sheet; ``contours`` counts the parts' contours. ``index_marks`` is
-    the number of parts with their number engraved beside them; None if not requested.
+    the cut that frees a roll's sheet; ``contours`` counts the parts' contours.
     ``machine_file`` is the file for a laser program other than LightBurn, if requested.
     """
 
@@ -90,7 +86,6 @@ class SheetFile:
     unsorted_travel: float
     minutes: float
     label: LabelState = "engraved"
-    index_marks: int | None = None
     machine_file: str | None = None
 
     @property
@@ -136,7 +131,7 @@ def _write_sheet(
     laser: Laser,
     sheets: Sheets,
 ) -> SheetFile:
-    marks = index_marks(nest, sheet) if sheets.index_marks else None
+    marks = index_marks(nest, sheet) if sheets.index_marks else ()
     placements = nest.on_sheet(sheet)
     region = Region(tuple(c for p in placements for c in nest.region(p).contours))
     contours = cutting_order(region, laser.heat_distance)
@@ -144,11 +139,10 @@ def _write_sheet(
     around = _surroundings(nest, sheet, (width, length), settings, sheets.label)
     unlabelled: LabelState = "no room" if sheets.label else "off"
     label_state: LabelState = "engraved" if around.engraved else unlabelled
-    beside = tuple(stroke for mark in marks or () for stroke in mark.strokes)
+    beside = tuple(stroke for mark in marks for stroke in mark.strokes)
     around = around._replace(engraved=(*around.engraved, *beside))
-    properties = sheet_properties(
-        settings, nest.material, f"{sheet + 1} of {nest.sheets}", _parts_said(nest, placements)
-    )
+    number = f"sheet {sheet + 1} of {nest.sheets}"
+    properties = file_properties(settings, nest.material, number, _parts_said(nest, placements))
     stem = f"{nest.material}_{sheet + 1}{kerf_suffix(settings.kerf_width(nest.material))}"
     path = folder / FOLDER / f"{stem}.dxf"
     text = dxf_text(contours, properties, settings.curves.profile, around)
@@ -161,10 +155,12 @@ def _write_sheet(
     layout = _Layout(nest, sheet, contours, around, entries)
     runs = _write_project(project, layout, settings, properties)
     picture = path.with_suffix(".svg")
-    title = f"{settings.design}: {nest.material} sheet {sheet + 1} of {nest.sheets}"
+    title = f"{settings.design}: {nest.material} {number}"
     machine_file = _write_machine_file(path, layout, sheets.program, runs, title)
     picture.write_text(
-        sheet_svg(contours, around, width, length, title), encoding="utf-8", newline="\n"
+        svg_text(drawn(contour_runs(contours), around), (width, length), title),
+        encoding="utf-8",
+        newline="\n",
     )
     partings = [math.dist(*ends) for ends in around.parting]
     cut_length = sum(contour.length for contour in contours) + sum(partings)
@@ -186,7 +182,6 @@ def _write_sheet(
         unsorted_travel=travel((*region.holes, *region.outers)),
         minutes=cutting_minutes(len(contours) + len(partings), cut_length, moved, laser),
         label=label_state,
-        index_marks=None if marks is None else len(marks),
         machine_file=machine_file,
     )
 
@@ -388,68 +383,3 @@ def _wrapped(text: str, count: int) -> list[str]:
         if len(lines) <= count:
             return lines
     return [text]
-
-
-# The picture beside a cut file: SVG in physical millimetres, in the colours of its layers.
-
-
-COLOURS = {
-    ENGRAVE: "#000000",
-    CUT_INNER: "#0000ff",
-    CUT_OUTER: "#ff0000",
-    CUT_SHEET: "#ff00ff",
-    REFERENCE: "#808080",
-}
-"""The DXF colours of the layers; ENGRAVE is black, as that colour is on white."""
-STROKE = 0.1
-"""Width of the lines in mm; the cut runs along their middle."""
-
-
-def sheet_svg(
-    contours: Sequence[Contour], sheet: Surroundings, width: float, height: float, title: str
-) -> str:
-    """The contours in the order given, with their surroundings, on a page of this size in mm.
-
-    The page's lower left corner is the origin; true arcs, coordinates without transforms.
-    """
-    drawn = {
-        ENGRAVE: [_run(run, height) for run in sheet.engraved],
-        CUT_INNER: [_closed(c, height) for c in contours if c.is_hole],
-        CUT_OUTER: [_closed(c, height) for c in contours if not c.is_hole],
-        CUT_SHEET: [_run(run, height) for run in sheet.parting],
-        REFERENCE: [_run(run, height) for run in sheet.frames],
-    }
-    return "\n".join(
-        (
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{coord(width)}mm" '
-            f'height="{coord(height)}mm" viewBox="0 0 {coord(width)} {coord(height)}">',
-            f"<title>{escape(title)}</title>",
-            *_groups(drawn),
-            "</svg>\n",
-        )
-    )
-
-
-def _groups(drawn: dict[str, list[str]]) -> Iterator[str]:
-    for layer, shapes in drawn.items():
-        if shapes:
-            yield (
-                f'<g id="{layer}" fill="none" stroke="{COLOURS[layer]}" '
-                f'stroke-width="{coord(STROKE)}">'
-            )
-            yield from shapes
-            yield "</g>"
-
-
-def _closed(contour: Contour, height: float) -> str:
-    if contour.circle is not None:
-        (x, y), radius = contour.circle
-        return f'<circle cx="{coord(x)}" cy="{coord(height - y)}" r="{coord(radius)}"/>'
-    flipped = Region((contour,)).mapped(lambda p: (p[0], height - p[1]), 1.0, True)
-    return f'<path d="{path_data(flipped)}"/>'
-
-
-def _run(run: Sequence[Point], height: float) -> str:
-    points = [f"{coord(x)} {coord(height - y)}" for x, y in run]
-    closed = "Z" if run[0] == run[-1] else ""
-    return f'<path d="M{"L".join(points[:-1] if closed else points)}{closed}"/>'
