@@ -13,12 +13,14 @@ import bisect
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate
-from typing import NamedTuple
+from pathlib import Path
+from typing import NamedTuple, Protocol
 
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.entries import Entries
 from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE
-from sbafab.errors import DesignError
+from sbafab.cutting.verify import TOLERANCE
+from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to, left_turn, meeting_points
 from sbafab.geometry.nearby import EdgeIndex, widened
@@ -292,3 +294,76 @@ def _tabs(lap: _Lap, start: float, entries: Entries, name: str) -> list[float]:
             )
         tabs.append(tab)
     return tabs
+
+
+# Machine files read back, against the runs that were written.
+
+
+BETWEEN = (0.25, 0.5, 0.75, 1.0)
+"""Shares of a curve, from its start, at which it is sampled."""
+
+
+class BeamCurve(Protocol):
+    """A line, an arc or a Bezier curve."""
+
+    @property
+    def start(self) -> Point: ...
+    @property
+    def end(self) -> Point: ...
+    def at(self, t: float) -> Point: ...
+
+
+class BeamRun(NamedTuple):
+    """Curves one after the other with the beam on, and the layer that they are on."""
+
+    layer: str
+    curves: Sequence[BeamCurve]
+
+
+def check_runs(path: Path, read: Sequence[BeamRun], expected: Sequence[LaserRun]) -> None:
+    """Raises OutputError with the file and the place of the first run that differs."""
+    difference = run_difference(read, expected)
+    if difference:
+        raise OutputError(f"{path.name}: {difference}; regenerate it")
+
+
+def run_difference(read: Sequence[BeamRun], expected: Sequence[LaserRun]) -> str:
+    """Return text on a run that is missing, on another layer, or off by more than TOLERANCE;
+    "" without any.
+    """
+    if len(read) != len(expected):
+        return f"it has {len(read)} lines, not {len(expected)}"
+    for drawn, run in zip(read, expected, strict=True):
+        x, y = run.edges[0].start
+        place = f"the line at x {x:.3f}, y {y:.3f}"
+        if drawn.layer != run.layer:
+            return f"{place} is one of {drawn.layer}, not of {run.layer}"
+        if run.circle is None and not _agrees(drawn.curves, run.edges):
+            return f"{place} differs from what was written"
+        if run.circle is not None and not _is_round(drawn.curves, *run.circle):
+            return f"{place} is not the circle that was written"
+    return ""
+
+
+def _agrees(curves: Sequence[BeamCurve], edges: Sequence[Edge]) -> bool:
+    """Return True if curves lie on edges, one by one; arcs may be read in several pieces."""
+    if math.dist(curves[0].start, edges[0].start) > TOLERANCE:
+        return False
+    number, share = 0, 0.0
+    for curve in curves:
+        if number == len(edges):
+            return False
+        edge = edges[number]
+        if any(distance_to(edge, curve.at(t)) > TOLERANCE for t in BETWEEN):
+            return False
+        share = edge.parameter(curve.end)
+        if math.dist(curve.end, edge.end) <= TOLERANCE:
+            number, share = number + 1, 0.0
+    return number == len(edges) and share == 0.0
+
+
+def _is_round(curves: Sequence[BeamCurve], centre: Point, radius: float) -> bool:
+    points = [curve.at(t) for curve in curves for t in BETWEEN]
+    low, high = (f(x for x, _ in points) for f in (min, max))
+    on = all(abs(math.dist(p, centre) - radius) <= TOLERANCE for p in points)
+    return on and high - low > 1.9 * radius

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from sbafab.cutting.beam_check import BeamCurve, BeamRun, check_runs
-from sbafab.cutting.beam_paths import LaserRun
+from sbafab.cutting.beam_paths import BeamCurve, BeamRun, LaserRun, check_runs
 from sbafab.cutting.properties import (
     CUT_INNER,
     CUT_OUTER,

@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from sbafab.cutting.beam_check import BeamRun, check_runs, run_difference
-from sbafab.cutting.beam_paths import LaserRun
+from sbafab.cutting.beam_paths import BeamRun, LaserRun, check_runs, run_difference
 from sbafab.cutting.dxf_read import drawn_entity
 from sbafab.cutting.dxf_write import number
 from sbafab.cutting.properties import (

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from sbafab.cutting.beam_check import BeamRun, check_beam_runs
 from sbafab.cutting.beam_paths import LaserRun, beam_runs, contour_runs, drawn
 from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
@@ -21,7 +20,6 @@ from sbafab.cutting.lightburn import (
     ENDING,
     NO_RECIPES,
     advice_of,
-    read_project,
     runs_text,
     sheet_layers,
     verify_project,
@@ -29,14 +27,11 @@ from sbafab.cutting.lightburn import (
 from sbafab.cutting.machine_files import (
     PROGRAMS,
     machine_text,
-    read_machine_file,
     svg_text,
     verify_machine_file,
 )
 from sbafab.cutting.order import cutting_minutes, cutting_order, travel
 from sbafab.cutting.properties import (
-    CUT_INNER,
-    CUT_OUTER,
     CutSettings,
     LaserProgram,
     file_properties,
@@ -212,8 +207,6 @@ def _write_project(
     notes = {**properties, **entries.properties}
     path.write_bytes(runs_text(layers, runs, notes, advice_of(settings, material)).encode())
     verify_project(path, layers, runs)
-    if not entries.is_plain:
-        check_cuts(path, read_project(path).runs, Region(tuple(layout.contours)), entries)
     return runs
 
 
@@ -230,18 +223,7 @@ def _write_machine_file(
     text = machine_text(program, runs, layout.around.frame, title)
     path.write_bytes(text.encode())
     verify_machine_file(path, program, runs)
-    cuts = read_machine_file(path, program)
-    check_cuts(path, cuts, Region(tuple(layout.contours)), layout.entries)
     return f"{FOLDER}/{path.name}"
-
-
-def check_cuts(path: Path, runs: Sequence[BeamRun], region: Region, entries: Entries) -> None:
-    """Raises OutputError with the file if its cuts of parts differ from the requested contours."""
-    try:
-        cuts = [run for run in runs if run.layer in (CUT_INNER, CUT_OUTER)]
-        check_beam_runs(cuts, region, entries)
-    except OutputError as error:
-        raise OutputError(f"{path.name}: {error}; regenerate it") from error
 
 
 def _surroundings(

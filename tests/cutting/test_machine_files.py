@@ -14,14 +14,12 @@ import pytest
 import shapely
 import svgelements
 
-from sbafab.cutting.beam_check import check_beam_runs
 from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.entries import PLAIN, Entries
 from sbafab.cutting.machine_files import (
     PROGRAMS,
     machine_text,
-    read_machine_file,
     verify_machine_file,
 )
 from sbafab.cutting.order import cutting_order
@@ -60,8 +58,6 @@ def test_what_is_written_reads_back(
 ) -> None:
     path = written(tmp_path, program, entries)
     verify_machine_file(path, program, runs_of(entries))
-    cuts = [run for run in read_machine_file(path, program) if run.layer.endswith("ER")]
-    check_beam_runs(cuts, PARTS, entries)
     assert "REFERENCE" not in path.read_text(), "what a program sees, it cuts"
 
 
