@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import wraps
-from threading import Lock
-from typing import Generic, ParamSpec, TypeVar
+from functools import lru_cache, wraps
+from typing import Any, ParamSpec, TypeVar
 
 Value = TypeVar("Value")
 Record = TypeVar("Record")
 Arguments = ParamSpec("Arguments")
-Several = TypeVar("Several", bound=tuple[object, ...])
 
 MOST = 256
 """Results kept per function, which bounds the memory over any number of designs."""
@@ -44,54 +42,32 @@ class Exact:
 
 
 class _Key:
-    """The arguments of a call: Exact records, tuples of them, and other values that hash."""
+    """A record that is told from others by its exact numbers."""
 
-    __slots__ = ("_hash", "arguments")
+    __slots__ = ("record",)
 
-    def __init__(self, arguments: tuple[object, ...]) -> None:
-        self.arguments = arguments
-        self._hash = hash(tuple([_hash(value) for value in arguments]))
+    def __init__(self, record: Exact) -> None:
+        self.record = record
 
     def __hash__(self) -> int:
-        return self._hash
+        return self.record.exact_hash()
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and _are_same(self.arguments, other.arguments)
+        return isinstance(other, _Key) and self.record.is_exactly(other.record)
 
 
-def _hash(value: object) -> int:
+def _key(value: Any) -> Any:
     if isinstance(value, Exact):
-        return value.exact_hash()
-    if isinstance(value, tuple) and value and isinstance(value[0], Exact):
-        return hash(tuple([_hash(item) for item in value]))
-    return hash(value)
+        return _Key(value)
+    is_of_records = isinstance(value, tuple) and value and isinstance(value[0], Exact)
+    return tuple(map(_key, value)) if is_of_records else value
 
 
-def _are_same(a: tuple[object, ...], b: tuple[object, ...]) -> bool:
-    return len(a) == len(b) and all(map(_is_same, a, b))
-
-
-def _is_same(a: object, b: object) -> bool:
-    if isinstance(a, Exact):
-        return a.is_exactly(b)
-    if isinstance(a, tuple) and a and isinstance(a[0], Exact):
-        return isinstance(b, tuple) and _are_same(a, b)
-    return a == b
-
-
-class _Results(Generic[Value]):
-    """The last results of a function, by the arguments of their calls."""
-
-    def __init__(self, most: int) -> None:
-        self.most = most
-        self.by_key: dict[_Key, Value] = {}
-        self.lock = Lock()
-
-    def add(self, key: _Key, value: Value) -> None:
-        with self.lock:
-            self.by_key[key] = value
-            if len(self.by_key) > self.most:
-                del self.by_key[next(iter(self.by_key))]
+def _value(key: Any) -> Any:
+    if isinstance(key, _Key):
+        return key.record
+    is_of_records = isinstance(key, tuple) and key and isinstance(key[0], _Key)
+    return tuple(map(_value, key)) if is_of_records else key
 
 
 def cached(function: Callable[Arguments, Value], most: int = MOST) -> Callable[Arguments, Value]:
@@ -100,16 +76,14 @@ def cached(function: Callable[Arguments, Value], most: int = MOST) -> Callable[A
     Arguments are regions, tuples of them, and other values that hash. A result is shared between
     calls and must not be changed.
     """
-    results: _Results[tuple[Value]] = _Results(most)
-    by_key = results.by_key
+
+    @lru_cache(maxsize=most)
+    def computed(arguments: tuple[Any, ...], named: tuple[tuple[str, Any], ...]) -> Value:
+        values: Any = [_value(key) for key in arguments]
+        return function(*values, **dict(named))  # type: ignore[arg-type]
 
     @wraps(function)
     def cached_function(*arguments: Arguments.args, **named: Arguments.kwargs) -> Value:
-        key = _Key((*arguments, *named.items()) if named else arguments)
-        result = by_key.get(key)
-        if result is None:
-            result = (function(*arguments, **named),)
-            results.add(key, result)
-        return result[0]
+        return computed(tuple([_key(value) for value in arguments]), tuple(named.items()))
 
     return cached_function

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Final
 
 Point = tuple[float, float]
 Bounds = tuple[float, float, float, float]
@@ -40,27 +40,13 @@ def _along(p: Point, origin: Point, unit: Point) -> float:
     return (p[0] - origin[0]) * unit[0] + (p[1] - origin[1]) * unit[1]
 
 
+@dataclass(slots=True, unsafe_hash=True)
 class Line:
     """A straight edge from ``start`` to ``end``."""
 
-    __slots__ = ("_length", "end", "start")
-
-    def __init__(self, start: Point, end: Point) -> None:
-        self.start: Final = start
-        self.end: Final = end
-        self._length = 0.0
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Line) and self.start == other.start and self.end == other.end
-
-    def __hash__(self) -> int:
-        return hash((self.start, self.end))
-
-    def __repr__(self) -> str:
-        return f"Line(start={self.start}, end={self.end})"
-
-    def __reduce__(self) -> tuple[type[Line], tuple[Point, Point]]:
-        return Line, (self.start, self.end)
+    start: Point
+    end: Point
+    _length: float = field(default=0.0, init=False, repr=False, compare=False)
 
     @property
     def length(self) -> float:
@@ -138,45 +124,21 @@ class Line:
         return Line((x0 + nx, y0 + ny), (x1 + nx, y1 + ny))
 
 
+@dataclass(slots=True, unsafe_hash=True)
 class Arc:
     """A circular edge round ``centre``, counter-clockwise if ``ccw``; at most half a turn.
 
     Its sweep and bounds are computed once.
     """
 
-    __slots__ = ("_bounds", "_start_angle", "_sweep", "ccw", "centre", "end", "radius", "start")
-
-    def __init__(self, start: Point, end: Point, centre: Point, radius: float, ccw: bool) -> None:
-        self.start: Final = start
-        self.end: Final = end
-        self.centre: Final = centre
-        self.radius: Final = radius
-        self.ccw: Final = ccw
-        self._start_angle = UNKNOWN
-        self._sweep = UNKNOWN
-        self._bounds: Bounds | None = None
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, Arc)
-            and self.start == other.start
-            and self.end == other.end
-            and self.centre == other.centre
-            and self.radius == other.radius
-            and self.ccw == other.ccw
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.start, self.end, self.centre, self.radius, self.ccw))
-
-    def __repr__(self) -> str:
-        return (
-            f"Arc(start={self.start}, end={self.end}, centre={self.centre}, "
-            f"radius={self.radius}, ccw={self.ccw})"
-        )
-
-    def __reduce__(self) -> tuple[type[Arc], tuple[Point, Point, Point, float, bool]]:
-        return Arc, (self.start, self.end, self.centre, self.radius, self.ccw)
+    start: Point
+    end: Point
+    centre: Point
+    radius: float
+    ccw: bool
+    _start_angle: float = field(default=UNKNOWN, init=False, repr=False, compare=False)
+    _sweep: float = field(default=UNKNOWN, init=False, repr=False, compare=False)
+    _bounds: Bounds | None = field(default=None, init=False, repr=False, compare=False)
 
     @property
     def ends_lie_on_circle(self) -> bool:
