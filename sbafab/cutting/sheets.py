@@ -62,7 +62,8 @@ class SheetFile:
     ``unsorted_travel`` is the head's travel in the nest's own order. ``label`` states whether the
     sheet's label is engraved, did not fit the border, or was not requested. ``cut_length`` includes
     the cut that frees a roll's sheet; ``contours`` counts the parts' contours.
-    ``machine_file`` is the file for a laser program other than LightBurn, if requested.
+    ``index_marks`` is the number of parts with their number engraved beside them; None if not
+    requested. ``machine_file`` is the file for a laser program other than LightBurn, if requested.
     """
 
     path: str
@@ -81,6 +82,7 @@ class SheetFile:
     unsorted_travel: float
     minutes: float
     label: LabelState = "engraved"
+    index_marks: int | None = None
     machine_file: str | None = None
 
     @property
@@ -177,6 +179,7 @@ def _write_sheet(
         unsorted_travel=travel((*region.holes, *region.outers)),
         minutes=cutting_minutes(len(contours) + len(partings), cut_length, moved, laser),
         label=label_state,
+        index_marks=len(marks) if sheets.index_marks else None,
         machine_file=machine_file,
     )
 

@@ -80,7 +80,7 @@ def cached(function: Callable[Arguments, Value], most: int = MOST) -> Callable[A
     @lru_cache(maxsize=most)
     def computed(arguments: tuple[Any, ...], named: tuple[tuple[str, Any], ...]) -> Value:
         values: Any = [_value(key) for key in arguments]
-        return function(*values, **dict(named))  # type: ignore[arg-type]
+        return function(*values, **dict(named))
 
     @wraps(function)
     def cached_function(*arguments: Arguments.args, **named: Arguments.kwargs) -> Value:
