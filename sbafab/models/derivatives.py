@@ -26,6 +26,8 @@ from sbafab.models.stack_loads import (
 )
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sbafab.models.film_elements import Array
     from sbafab.models.stack_loads import Load, LoadedEnergy
     from sbafab.models.stack_poses import Pose, PosedStack
@@ -215,12 +217,19 @@ def _solved(matrices: Array, right: Array) -> Array:
 # Second derivatives of the energy under a load.
 
 
-def hessian(now: LoadedEnergy, rest: Array, freedoms: Array, pitch: float) -> Array:
+def hessian(
+    now: LoadedEnergy,
+    rest: Array,
+    freedoms: Array,
+    pitch: float,
+    is_exact: NDArray[np.bool_] | None = None,
+) -> Array:
     """Return the second derivatives (..., freedoms, freedoms) of the energy of a stack under a
-    load; ``rest`` are those of all but the springs.
+    load; ``rest`` are those of all but the springs. They are as of ``LoadedEnergy.turned`` except
+    where ``is_exact`` (n).
     """
-    blocks = now.blocks.copy()
-    blocks[..., 1:, 1:] -= _tilt_works(now, freedoms, pitch)
+    blocks, works = now.blocks.copy(), _tilt_works(now, freedoms, pitch)
+    blocks[..., 1:, 1:] -= works if is_exact is None else works * is_exact[:, None, None, None]
     return with_diagonal_blocks(rest, blocks)
 
 

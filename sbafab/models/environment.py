@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sbafab.errors import DesignError
 from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import Line
-from sbafab.models.stack import Motion, Stack
+from sbafab.models.stack import Stack
 from sbafab.models.stack_batch import StackBatch
 
 
@@ -43,41 +43,24 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
         near: float = 0.2,
         **load: Any,
     ) -> None:
-        self.action_space, self.observation_space = _spaces(stack, most_pressure)
-        self.stack, self.line, self.load = stack, line, load
-        self.most_pressure, self.dt, self.steps, self.near = most_pressure, dt, steps, near
-        self._motion: Motion | None = None
-        self._target = np.zeros(3)
-        self._left = 0
+        self._one = ReachVectorEnvironment(stack, 1, line, most_pressure, dt, steps, near, **load)
+        self.action_space = self._one.single_action_space
+        self.observation_space = self._one.single_observation_space
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
         """Vent all chambers; the target is ``options["target"]`` (mm) or a random pose's tip."""
         super().reset(seed=seed)
-        target = (options or {}).get("target")
-        if target is None:
-            pressures = self.np_random.uniform(0.0, self.most_pressure, self.stack.chambers)
-            target = self.stack.pose(pressures.tolist(), **self.load).tip
-        self._target = np.asarray(target, dtype=float)
-        self._motion = self.stack.motion(line=self.line, **self.load)
-        self._left = self.steps
-        return self._observation(self._motion), {}
+        self._one.random[0] = self.np_random
+        (observation,), _ = self._one.reset(options=options)
+        return observation, {}
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Return the observation ``dt`` s later, the reward, if it arrived, and if time is over."""
-        if self._motion is None:
-            raise DesignError("the environment is at no place yet; call reset first")
-        valves = _valves(action, self.most_pressure)
-        self._motion.step(self.dt, pressures=valves.tolist())
-        self._left -= 1
-        observation = self._observation(self._motion)
-        away = float(np.linalg.norm(observation[6:9]))
-        return observation, -away, away <= self.near, self._left <= 0, {"time": self._motion.time}
-
-    def _observation(self, motion: Motion) -> Array:
-        tip = motion.pose.tip
-        return np.concatenate([tip, self._target, self._target - tip, motion.pressures])
+        seen, rewards, is_there, is_late, info = self._one.moved(np.asarray(action)[None])
+        is_over = bool(is_there[0]), bool(is_late[0])
+        return seen[0], float(rewards[0]), *is_over, {"time": float(info["time"][0])}
 
 
 class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
@@ -105,14 +88,25 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
     ) -> None:
         if num_envs < 1:
             raise DesignError(f"num_envs = {num_envs} must be at least 1")
-        self.single_action_space, self.single_observation_space = _spaces(stack, most_pressure)
+        if not 0 < most_pressure <= stack.most_pressure:
+            raise DesignError(
+                f"most_pressure = {most_pressure:g} kPa must be above 0 and at most "
+                f"{stack.most_pressure:g} kPa, to which the stack was made"
+            )
+        # Films may stretch: no tip is farther than this.
+        far = 2 * sum(stack.maps[kind].most_height + stack.pitch for kind in stack.levels)
+        most = np.array([far] * 9 + [stack.most_pressure] * stack.chambers)
+        least = np.array([-far] * 9 + [0.0] * stack.chambers)
+        box = gymnasium.spaces.Box
+        self.single_action_space = box(-1.0, 1.0, (stack.chambers,), np.float64)
+        self.single_observation_space = box(least, most, dtype=np.float64)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.num_envs, self.load = num_envs, load
         self.most_pressure, self.dt, self.steps, self.near = most_pressure, dt, steps, near
         self.batch = StackBatch(stack)
         self._motion = self.batch.motion(num_envs, line, **load)
-        self._random = [np_random()[0] for _ in range(num_envs)]
+        self.random = [np_random()[0] for _ in range(num_envs)]
         self._targets = np.zeros((num_envs, 3))
         self._left = np.zeros(num_envs, dtype=int)
         self._is_over = np.ones(num_envs, dtype=bool)
@@ -133,7 +127,7 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
                 raise DesignError(f"give a seed, or {self.num_envs} of them")
             for number, one in enumerate(seeds):
                 if one is not None:
-                    self._random[number] = np_random(one)[0]
+                    self.random[number] = np_random(one)[0]
         self._begin(np.ones(self.num_envs, dtype=bool), (options or {}).get("target"))
         self._has_begun = True
         return self._observations(), {}
@@ -145,31 +139,40 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
 
         Environments whose episode was over start the next one instead, with the reward 0.
         """
-        if not self._has_begun:
-            raise DesignError("the environments are at no place yet; call reset first")
-        valves = _valves(actions, self.most_pressure)
         anew = self._is_over
-        if anew.any():
-            self._begin(anew)
-            valves = np.where(anew[:, None], 0.0, valves)
-        self._motion.step(self.dt, valves)
+        if not (self._has_begun and anew.any()):
+            return self.moved(actions)
+        self._begin(anew)
+        resting = np.where(anew[:, None], -1.0, np.asarray(actions, dtype=float))
+        _, rewards, is_there, is_late, info = self.moved(resting)
+        self._motion.restart(anew)
+        self._left[anew] = self.steps
+        is_there, is_late = is_there & ~anew, is_late & ~anew
+        self._is_over = is_there | is_late
+        info["time"] = self._motion.times.copy()
+        return self._observations(), np.where(anew, 0.0, rewards), is_there, is_late, info
+
+    def moved(
+        self, actions: Any
+    ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Return what ``step`` does, without restarts."""
+        if not self._has_begun:
+            raise DesignError("the environment is at no place yet; call reset first")
+        shares = (np.clip(np.asarray(actions, dtype=float), -1.0, 1.0) + 1) / 2
+        self._motion.step(self.dt, shares * self.most_pressure)
         self._left -= 1
-        if anew.any():
-            self._motion.restart(anew)
-            self._left[anew] = self.steps
         observations = self._observations()
         away = np.sqrt((observations[:, 6:9] ** 2).sum(1))
-        is_there, is_late = (away <= self.near) & ~anew, (self._left <= 0) & ~anew
+        is_there, is_late = away <= self.near, self._left <= 0
         self._is_over = is_there | is_late
-        rewards = np.where(anew, 0.0, -away)
-        return observations, rewards, is_there, is_late, {"time": self._motion.times.copy()}
+        return observations, -away, is_there, is_late, {"time": self._motion.times.copy()}
 
     def _begin(self, which: NDArray[np.bool_], target: Any = None) -> None:
         """Begin an episode of some of the environments."""
         if target is None:
             count, most = self.batch.stack.chambers, self.most_pressure
             drawn = [
-                self._random[number].uniform(0.0, most, count) for number in np.flatnonzero(which)
+                self.random[number].uniform(0.0, most, count) for number in np.flatnonzero(which)
             ]
             target = self.batch.poses(np.stack(drawn), **self.load).tips
         self._targets[which] = target
@@ -181,29 +184,3 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         tips = self._motion.tips
         parts = [tips, self._targets, self._targets - tips, self._motion.pressures]
         return np.concatenate(parts, axis=1)
-
-
-def _spaces(
-    stack: Stack, most_pressure: float
-) -> tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]:
-    """Return the spaces of actions and of observations. Raises DesignError."""
-    if not 0 < most_pressure <= stack.most_pressure:
-        raise DesignError(
-            f"most_pressure = {most_pressure:g} kPa must be above 0 and at most "
-            f"{stack.most_pressure:g} kPa, to which the stack was made"
-        )
-    count = stack.chambers
-    # Films may stretch: no tip is farther than this.
-    far = 2 * sum(stack.maps[kind].most_height + stack.pitch for kind in stack.levels)
-    most = np.array([far] * 9 + [stack.most_pressure] * count)
-    least = np.array([-far] * 9 + [0.0] * count)
-    return (
-        gymnasium.spaces.Box(-1.0, 1.0, (count,), np.float64),
-        gymnasium.spaces.Box(least, most, dtype=np.float64),
-    )
-
-
-def _valves(actions: Any, most_pressure: float) -> Array:
-    """Return the pressures in kPa at the valves of actions."""
-    shares = (np.clip(np.asarray(actions, dtype=float), -1.0, 1.0) + 1) / 2
-    return np.asarray(shares * most_pressure)

@@ -127,12 +127,22 @@ class Search:
     load: Load | None
     most: float
 
+    @property
+    def _plate(self) -> tuple[Load, OuterPlate]:
+        assert self.load is not None
+        assert self.load.wall is not None
+        return self.load, self.load.wall
+
     def reached(self, places: Array, near: Pose | None) -> Equilibria:
         """Return the states whose tips stand at places (n, 3) in mm; ``near`` is a pose to start
         from. Raises UnreachableError with the nearest tip found.
         """
         if not len(places):
             return self.stack.no_states(self.load, 0)
+        if len(places) > TOGETHER:
+            parts = np.array_split(places, -(-len(places) // TOGETHER))
+            each = [self.reached(part, near) for part in parts]
+            return Equilibria(*(np.concatenate(part) for part in zip(*each, strict=True)))
         if near is None:
             guess = starts(self.stack, places, self.most)
         else:
@@ -178,9 +188,6 @@ class Search:
 
     def _by_freedoms(self, places: Array, x: Array, near: Array | None) -> Equilibria:
         """Return the states by Newton's method, from freedoms ``near`` (n, levels, 3)."""
-        if len(places) > TOGETHER:
-            parts = np.array_split(np.arange(len(places)), -(-len(places) // TOGETHER))
-            return _joined([self._by_freedoms(places[part], x[part], None) for part in parts])
         stack, live, found = (
             self.stack,
             np.arange(len(places)),
@@ -247,10 +254,10 @@ class Search:
         else:
             now = loaded_energy(springs, stack.pitch, load, at)
             gradient, plates, rest = now.gradient[:, None], now.plates, now.rest()
-            matrix = with_diagonal_blocks(rest, now.blocks)
             if is_close.any():
-                exact = hessian(now, rest, at, stack.pitch)
-                matrix = np.where(is_close[:, None, None], exact, matrix)
+                matrix = hessian(now, rest, at, stack.pitch, is_close)
+            else:
+                matrix = with_diagonal_blocks(rest, now.blocks)
             matrix, motion = matrix[:, None], plates.tip_motion(now.motions)[..., :3]
         right = np.concatenate([-gradient.reshape(*at.shape, 1), self._filling(springs, x, at)], -1)
         groups, size = matrix.shape[1:3]
@@ -271,15 +278,11 @@ class Search:
 
     def _by_attempts(self, places: Array, guess: Array) -> Equilibria:
         """Return the states nearest to their places that the first paths lead to."""
-        if len(places) > TOGETHER:
-            parts = np.array_split(np.arange(len(places)), -(-len(places) // TOGETHER))
-            return _joined([self._by_attempts(places[part], guess[part]) for part in parts])
         found = self.stack.no_states(self.load, len(places))
         best = np.full(len(places), math.inf)
-        assert self.load is not None
-        assert self.load.wall is not None
+        _, wall = self._plate
         rest = np.arange(len(places))
-        for x, way in first_attempts(self.load.wall, guess, self.most):
+        for x, way in first_attempts(wall, guess, self.most):
             states = self.by_contacts(places[rest], x[rest], self.begin(x[rest]), way.soft)
             away = np.linalg.norm(places[rest] - self.stack.tips(states.freedoms), axis=-1)
             is_nearer = states.is_met & (away < best[rest])
@@ -296,18 +299,17 @@ class Search:
         """Return the states by Newton's method from freedoms (n, levels, 3), with the plate's
         contact forces as additional unknowns, first against ``soft`` plates.
         """
-        assert self.load is not None
-        assert self.load.wall is not None
-        run = _ContactRun(places, x, at, np.full((len(x), len(self.load.wall.local)), np.nan))
+        load, wall = self._plate
+        run = _ContactRun(places, x, at, np.full((len(x), len(wall.local)), np.nan))
         for stiffness in soft:
-            run, _ = self._contact_newton(run, self.load._replace(stiffness=stiffness))
-        run, is_settled = self._contact_newton(run, self.load)
+            run, _ = self._contact_newton(run, load._replace(stiffness=stiffness))
+        run, is_settled = self._contact_newton(run, load)
         found, which = self.stack.no_states(self.load, len(x)), np.flatnonzero(is_settled)
         if not which.size:
             return found
         x, at = run.x[which], run.at[which]
         springs = self.stack.springs(P0 * np.sinh(x), by_level=True)
-        now = loaded_energy(springs, self.stack.pitch, self.load, at, run.forces[which])
+        now = loaded_energy(springs, self.stack.pitch, load, at, run.forces[which])
         put(found, which, self._settled(x, at, now.push))
         unstable = ~is_positive_definite(hessian(now, now.rest(), at, self.stack.pitch))
         if unstable.any():
@@ -408,12 +410,11 @@ class Search:
         """Return the steps of asinh(p / P0) (n, chambers) from the turns and moves of the top (n,
         6, 1 + chambers) to equilibrium and by each pressure.
         """
-        assert self.load is not None
-        assert self.load.wall is not None
+        _, wall = self._plate
         tip = now.plates.tip
         motion = tops[:, 3:] - crossing(tip).swapaxes(1, 2) @ tops[:, :3]
         rates, away = motion[..., 1:], run.places - tip
-        missing = movable(self.load.wall, away - motion[..., 0])
+        missing = movable(wall, away - motion[..., 0])
         # Friction may prevent pressures from moving it further, and they would stray.
         is_near = np.linalg.norm(missing, axis=-1) < NEAR / 2
         missing = np.where(is_near[:, None], 0.0, missing)
@@ -441,10 +442,6 @@ class _ContactRun(NamedTuple):
     x: Array
     at: Array
     forces: Array
-
-
-def _joined(parts: list[Equilibria]) -> Equilibria:
-    return Equilibria(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
 def is_turn(number: int) -> bool:
