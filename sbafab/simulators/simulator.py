@@ -177,25 +177,19 @@ class Result:
         rows = [(name, value, "kPa") for name, value in last.pressures.items()]
         if last.tip is not None and last.height is not None:
             rows += [
-                (f"tip {axis}", value, "mm") for axis, value in zip("xyz", last.tip, strict=True)
+                (f"tip {axis}", place, "mm") for axis, place in zip("xyz", last.tip, strict=True)
             ]
             rows += [("height", last.height, "mm")]
         rows += [] if last.tilt is None else [("tilt", last.tilt, "degrees")]
         rows += [(f"air {name}", value, "ul") for name, value in last.volumes.items()]
-        return rows + [
-            (*FIGURES[name][:1], v, FIGURES[name][1]) for name, v in self.figures.items()
-        ]
+        labels = ((FIGURES[name], value) for name, value in self.figures.items())
+        return rows + [(label, value, unit) for (label, unit), value in labels]
 
     def as_dict(self) -> dict[str, object]:
         """For a JSON file: the last state, the figures, all states."""
+        head = {"simulator": self.simulator, **asdict(self.last), **self.figures}
         states = [asdict(state) for state in self.states]
-        return {
-            "simulator": self.simulator,
-            **asdict(self.last),
-            **self.figures,
-            "states": states,
-            "stopped": self.stopped,
-        }
+        return {**head, "states": states, "stopped": self.stopped}
 
 
 class StateEntry(Document):
