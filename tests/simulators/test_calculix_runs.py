@@ -46,7 +46,7 @@ def inflated(folder: Path, settings: DeckSettings, h: float, minutes: float = 5)
 @needs_ccx
 @pytest.mark.long
 def test_the_balloon_in_3d_before_it_wrinkles(tmp_path: Path) -> None:
-    settings = DeckSettings({"chamber1": 0.95}, "static", outputs=4)
+    settings = DeckSettings({"chamber1": 0.95}, "static", outputs=8)
     found = inflated(tmp_path, settings, 0.5)
     assert found.stopped is None
     last = found.states[-1]
