@@ -66,16 +66,16 @@ SEPARATOR = disc(AXIS, 3.75) - disc(AXIS, 1.25)
 # The first fault of a rule is the one that its reference page shows.
 FAULTS = {
     "narrow neck ring": Fault(
-        "bond-width", ONE, 4, lambda mask: disc(AXIS, 3.75) - disc(AXIS, 1.2), 0.70
+        "bond-width", ONE, 4, lambda mask: disc(AXIS, 3.75) - disc(AXIS, 1.2), 0.7
     ),
     "wide pocket": Fault(
-        "bond-width", ONE, 10, lambda mask: disc(AXIS, 2.55) - disc(AXIS, 0.5), 0.70
+        "bond-width", ONE, 10, lambda mask: disc(AXIS, 2.55) - disc(AXIS, 0.5), 0.7
     ),
     "pocket off its axis": Fault(
         "bond-width", ONE, 6, lambda mask: disc((0.1, 0.0), 2.5) - disc(AXIS, 0.5), 0.65
     ),
     "separator grown too little": Fault(
-        "mask-overhang", ONE, 8, lambda mask: disc(AXIS, 3.65) - disc(AXIS, 1.25), 0.40
+        "mask-overhang", ONE, 8, lambda mask: disc(AXIS, 3.65) - disc(AXIS, 1.25), 0.4
     ),
     # The outline ends 5.75 past the third axis, the mask 0.5 further.
     "bite out of the sheet's separator": Fault(
@@ -115,7 +115,7 @@ FAULTS = {
     ),
     # Three pockets of each chamber, two of which have become one.
     "strip between two chambers": Fault(
-        "sealing", LOBED, 6, lambda mask: mask | (between_axes(0, 1, 0.7) - bores()), 5.0, 2
+        "sealing", LOBED, 6, lambda mask: mask | between_axes(0, 1, 0.7) - bores(), 5.0, 2
     ),
     "hole in the base": Fault("sealing", ONE, 1, lambda base: base - disc((1.5, 0.0), 0.5), 1.0),
     "hole in a wall between two balloons": Fault(
