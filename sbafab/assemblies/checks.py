@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sbafab.assemblies.build import Assembled, PlacedPart, inlet_of
+from sbafab.assemblies.build import Assembled, PlacedPart, about_axis, inlet_of
 from sbafab.assemblies.records import AssemblyRules, Base, CheckName, Cup, Line, Magnet, Tube
 from sbafab.assemblies.shapes import face, placed_surface
 from sbafab.design.records import Design, Discs
@@ -247,12 +247,7 @@ def _covered(tube: PlacedPart, assembled: Assembled) -> Iterator[tuple[str, floa
             low_x, low_y, high_x, high_y = piece.turned(sba.turn).bounds
             # A part's own turn comes first when it is placed, and is taken off again here.
             x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
-            unturn = math.radians(-sba.turn)
-            middle = (
-                x * math.cos(unturn) - y * math.sin(unturn),
-                x * math.sin(unturn) + y * math.cos(unturn),
-                0.0,
-            )
+            middle = about_axis(-sba.turn).at((x, y, 0.0))
             half = math.degrees((high_x - low_x) / 2 / sba.radius)
             yield sba.name, _angle(tube, sba.at(middle)), half
 

@@ -100,13 +100,9 @@ def lowered(design: Design, rule: str | None = None) -> tuple[str, ...]:
     return tuple(
         weakened(key.name, key.value(design), key.value(USUAL), key.source)
         for key in KEYS
-        if (rule is None or rule in key.rules) and _is_weaker(key, design)
+        if rule is None or rule in key.rules
+        if (key.value(design) - key.value(USUAL)) * (1 if key.is_weaker_above else -1) > 0
     )
-
-
-def _is_weaker(key: _Key, design: Design) -> bool:
-    value, usual = key.value(design), key.value(USUAL)
-    return value > usual if key.is_weaker_above else value < usual
 
 
 def weakened(name: str, value: float, usual: float, source: str) -> str:

@@ -53,10 +53,14 @@ def test_a_fault_is_caught_by_its_check_alone(
     name: CheckName, tables: Tables, put_together: Together
 ) -> None:
     template, changes = FAULTS[name]
-    findings = run_checks(put_together(changed(tables(template), changes)))
-    failed = [finding for finding in findings if finding.verdict == "fail"]
+    assembled = put_together(changed(tables(template), changes))
+    failed = [finding for finding in run_checks(assembled) if finding.verdict == "fail"]
     assert {finding.rule for finding in failed} == {name}
     assert all("; " in finding.message for finding in failed), "no remedy"
+    # The studio picks these out.
+    names = {part.name for part in assembled.parts}
+    assert all(set(finding.parts) <= names for finding in failed)
+    assert all(finding.parts and finding.parts[0] in finding.message for finding in failed)
 
 
 @pytest.mark.parametrize("template", ["aperture", "brace", "standing"])
