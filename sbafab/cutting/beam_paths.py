@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.entries import Entries
-from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE
+from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE, Entries
 from sbafab.cutting.verify import TOLERANCE
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.contour import Contour

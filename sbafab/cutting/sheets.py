@@ -13,7 +13,6 @@ from typing import Literal, NamedTuple
 from sbafab.cutting.beam_paths import LaserRun, beam_runs, contour_runs, drawn
 from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
-from sbafab.cutting.entries import PLAIN, Entries
 from sbafab.cutting.index_marks import index_marks
 from sbafab.cutting.lettering import Stroke, strokes, width
 from sbafab.cutting.lightburn import (
@@ -32,7 +31,9 @@ from sbafab.cutting.machine_files import (
 )
 from sbafab.cutting.order import cutting_minutes, cutting_order, travel
 from sbafab.cutting.properties import (
+    PLAIN,
     CutSettings,
+    Entries,
     LaserProgram,
     file_properties,
     kerf_suffix,

@@ -8,9 +8,8 @@ from functools import cached_property
 
 from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
-from sbafab.cutting.entries import Entries
 from sbafab.cutting.kerf import compensated_paths
-from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings, Recipes
+from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings, Entries, Recipes
 from sbafab.design.films import Sheet, material
 from sbafab.design.identity import design_sha256
 from sbafab.design.recipes import recipes_for

@@ -10,9 +10,8 @@ import shapely
 
 from sbafab.cutting.beam_paths import BeamRun, beam_runs
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.entries import Entries
 from sbafab.cutting.order import cutting_order
-from sbafab.cutting.properties import CUT_INNER, CUT_OUTER
+from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, Entries
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Edge, Point
 from sbafab.geometry.region import Region, disc, rectangle

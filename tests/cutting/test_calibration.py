@@ -80,18 +80,6 @@ def test_mean_and_uncertainty_by_hand() -> None:
     assert found.kerf.half_width == pytest.approx(4.30265 * expected, rel=1e-5)
 
 
-def test_readings_that_all_agree_leave_a_step_in_doubt() -> None:
-    """Of a step of 0.1 that hides all scatter, 0.1 / sqrt(12) is left, however many agree."""
-    rows = [
-        Measurement(kind, axis, 20.0, 20.0 + (0.1 if kind == "window" else -0.1))
-        for kind in KINDS
-        for axis in AXES
-        for _ in range(20)
-    ]
-    uncertainty = calibrated(rows, 0.1).overall.kerf.uncertainty
-    assert uncertainty == pytest.approx(0.1 / math.sqrt(12) * math.sqrt(1 + 1 / 80), rel=1e-9)
-
-
 KINDS: tuple[Kind, ...] = ("outer", "window")
 AXES: tuple[Axis, ...] = ("x", "y")
 COUPONS = 150
@@ -214,16 +202,6 @@ def test_inches_are_refused() -> None:
     inches = [replace(m, measured=m.measured / 25.4) for m in sizes(0.12, 0.12)]
     with pytest.raises(DesignError, match=r"about 0\.039\d* times .* millimetres"):
         calibrated(inches, 0.01)
-
-
-@pytest.mark.parametrize("row", range(16))
-@pytest.mark.parametrize("factor", [10.0, 0.1])
-def test_a_misplaced_decimal_point_names_its_row_only(row: int, factor: float) -> None:
-    """As 41.2 for 4.12: neither unit nor kerf is blamed, whichever row it is and whatever scale."""
-    rows = [replace(m, where=f"line {n}") for n, m in enumerate(sizes(0.12, 0.09, 0.998))]
-    rows[row] = replace(rows[row], measured=factor * rows[row].measured)
-    with pytest.raises(DesignError, match=rf"^line {row}: the (outer|window) along .* mend the"):
-        calibrated(rows, 0.01)
 
 
 def table(folder: Path, text: str) -> Path:

@@ -75,17 +75,6 @@ def test_kerf_is_stated_and_done_for_each_material(laminate: Laminate, tmp_path:
     assert nominal.region.key == laminate.layer(2).profile.key
 
 
-def test_ptfe_carries_the_fume_warning(laminate: Laminate, tmp_path: Path) -> None:
-    base, mask, _ = written(laminate, tmp_path, SETTINGS)
-    properties = read_profile(tmp_path / mask.path).properties
-    assert properties["WAIVED"] == "none"
-    assert properties["WARNING"].startswith("Extract the fumes: ")
-    for word in ("COF2", "HF", "permits", "drag knife"):
-        assert word in properties["WARNING"]
-    assert "safe" not in properties["WARNING"].lower()
-    assert "WARNING" not in read_profile(tmp_path / base.path).properties
-
-
 @pytest.mark.parametrize(
     ("profile", "kinds"), [("arcs", {"LINE", "ARC", "CIRCLE"}), ("chords", {"LWPOLYLINE"})]
 )

@@ -16,14 +16,13 @@ import svgelements
 
 from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.entries import PLAIN, Entries
 from sbafab.cutting.machine_files import (
     PROGRAMS,
     machine_text,
     verify_machine_file,
 )
 from sbafab.cutting.order import cutting_order
-from sbafab.cutting.properties import LaserProgram
+from sbafab.cutting.properties import PLAIN, Entries, LaserProgram
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region, disc, stadium
 

@@ -124,14 +124,6 @@ def test_a_roll_is_cut_off_one_border_past_its_parts(tmp_path: Path) -> None:
     )
 
 
-def test_the_picture_has_the_sheets_size_and_colours(tmp_path: Path) -> None:
-    (sheet,) = write_sheets([ring_nest(2)], tmp_path, SETTINGS, LASER, PLAIN)
-    picture = (tmp_path / sheet.picture).read_text(encoding="utf-8")
-    assert 'width="60mm" height="80mm" viewBox="0 0 60 80"' in picture
-    assert picture.count('r="5"') == picture.count('r="2"') == 2
-    assert picture.index("#0000ff") < picture.index("#ff0000")
-
-
 def test_parts_that_overlap_are_not_let_through(tmp_path: Path) -> None:
     part = NestPart("demo", "P01", 1, "TPE", RING, 2)
     places = (Placement(0, 0, 0, (11.0, 11.0)), Placement(0, 0, 0, (12.0, 11.0)))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import ezdxf
 import pytest
 
@@ -25,13 +23,3 @@ def test_it_is_an_empty_document_in_millimetres_with_the_cut_layers() -> None:
     assert colours.items() >= COLOURS.items()
     assert document.layers.get("REFERENCE").dxf.plot == 0
     assert document.layers.get("CUT_OUTER").dxf.plot == 1
-
-
-def test_next_handle_is_above_every_handle() -> None:
-    text = SKELETON.read_text(encoding="utf-8")
-    seed = re.search(r"\$HANDSEED\n  5\n(\w+)", text)
-    assert seed is not None
-    used = [int(handle, 16) for handle in re.findall(r"\n(?:  5|105)\n(\w+)\n", text)]
-    used.remove(int(seed[1], 16))
-    assert len(set(used)) == len(used)
-    assert max(used) < int(seed[1], 16)

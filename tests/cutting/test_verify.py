@@ -46,22 +46,6 @@ def test_half_a_micrometre_passes_and_two_do_not(write: Write) -> None:
         check(ring(hole_x=1.002), ring(), write)
 
 
-def test_chords_are_not_the_arcs_they_stand_for(plate: Region, write: Write) -> None:
-    path = write(dxf_text(cutting_order(in_chords(plate, "chamber-mask", 0.005)), {}, "chords"))
-    with pytest.raises(OutputError, match="mm off at x"):
-        verify_file(path, plate, {})
-    with pytest.raises(ValueError, match="an arc is left"):
-        dxf_text(cutting_order(plate), {}, "chords")
-
-
-def test_a_bulge_lost_on_the_way_is_found(plate: Region, plate_text: str, write: Write) -> None:
-    start = plate_text.index(" 42\n", plate_text.index("\nLWPOLYLINE\n"))
-    end = plate_text.index("\n 10\n", start) + 1
-    path = write(plate_text[:start] + plate_text[end:])
-    with pytest.raises(OutputError, match="mm off at x"):
-        verify_file(path, plate, {"DESIGN": "plate"})
-
-
 def test_area_is_held_to_a_ten_thousandth(write: Write) -> None:
     """0.9 um on the radius of 5 mm is inside a micrometre and 3.6e-4 of the area."""
     with pytest.raises(OutputError, match="its area is"):

@@ -7,7 +7,7 @@ from random import Random
 
 import pytest
 
-from sbafab.geometry.edges import Arc, Edge, Line, Point, edge_from_bulge
+from sbafab.geometry.edges import Arc, Point, edge_from_bulge
 from sbafab.geometry.offset import beam_path, dragged, fillet, grow, shrink, swept
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, union
 
@@ -93,32 +93,6 @@ def test_the_fillet_of_a_corner_adds_its_area(radius: float, angle: float) -> No
     assert arc.radius == pytest.approx(radius)
     assert not arc.ccw
     assert len(rounded.edges) == 7
-
-
-def lobed(count: int, radius: float) -> tuple[Region, list[Point]]:
-    axis = max(1 + 0.75 + 2.5, (2.5 + 0.375) / math.sin(math.pi / count))
-    centres = [
-        (axis * math.cos(math.tau * i / count), axis * math.sin(math.tau * i / count))
-        for i in range(count)
-    ]
-    hub = max(1.75, axis - 2.5)
-    body = union([*(disc(centre, 3.25) for centre in centres), disc((0, 0), hub)])
-    return fillet(body, radius), centres
-
-
-@pytest.mark.parametrize("count", range(2, 9))
-@pytest.mark.parametrize("radius", [0.3, 1.0, 3.0])
-def test_filleted_lobed_plates(count: int, radius: float) -> None:
-    plate, centres = lobed(count, radius)
-    concave = {round(e.radius, 6) for e in plate.edges if isinstance(e, Arc) and not e.ccw}
-    assert concave == {radius}
-    assert len(plate.outers) == 1
-    assert all(plate.contains(centre) for centre in centres)
-    # A fillet of the same radius finds nothing more to fill.
-    assert fillet(plate, radius).area == pytest.approx(plate.area, abs=1e-5)
-    # Convex lobes come back from a growth by the fillet's radius, and by half of it.
-    for distance in (radius, radius / 2):
-        assert shrink(grow(plate, distance), distance).area == pytest.approx(plate.area, abs=1e-5)
 
 
 def two_discs(r: float, s: float, gap: float) -> float:
@@ -207,17 +181,6 @@ def test_segments_grow_round_their_sharp_tips(radius: float, distance: float) ->
         assert grow(shape, distance).area == pytest.approx(expected, abs=1e-5 * around)
 
 
-@pytest.mark.parametrize(("width", "height"), [(44, 1.5), (32, 1.05)])
-def test_flat_segments_shrink_to_segments(width: float, height: float) -> None:
-    """A line and an arc, both moved in by the distance, bound a segment again."""
-    radius = (width**2 / 4 + height**2) / (2 * height)
-    for distance in (0.05, 0.25, 0.5):
-        expected = cap_area(radius - distance, height - 2 * distance)
-        assert shrink(segment(radius, height), distance).area == pytest.approx(expected, abs=1e-5)
-        grown = grow(segment(radius, height), distance)
-        assert shrink(grown, distance).area == pytest.approx(cap_area(radius, height), abs=1e-5)
-
-
 def test_a_kerf_wider_than_an_outline_is_high_keeps_it() -> None:
     for height in (0.05, 0.02):
         path = beam_path(segment(7.5, height), 0.1)
@@ -266,15 +229,3 @@ def test_a_region_covers_on_its_way_all_sums_of_points(seed: int) -> None:
         if covered.contains(p) != any(map(shape.contains, copies)):
             # Between two copies, or on the edge.
             assert min(map(shape.distance_to_edge, copies)) < way.length / 400
-
-
-def test_a_figure_of_eight_is_covered_on_both_loops() -> None:
-    """Two triangles that meet in a point, each as a closed path of its own covers it."""
-    left, right = [(0.0, 0.0), (-9.0, 5.0), (-9.0, -5.0)], [(0.0, 0.0), (9.0, 5.0), (9.0, -5.0)]
-
-    def closed(corners: list[Point]) -> list[Edge]:
-        return [Line(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
-
-    both = swept(closed([*left, *right]), 1.5, True)
-    assert both == swept(closed(left), 1.5, True) | swept(closed(right), 1.5, True)
-    assert len(both.holes) == 2

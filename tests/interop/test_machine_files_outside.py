@@ -19,11 +19,10 @@ import shapely
 from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.entries import PLAIN, Entries
 from sbafab.cutting.lightburn import ADVICE, runs_text, sheet_layers
 from sbafab.cutting.machine_files import machine_text
 from sbafab.cutting.order import cutting_order
-from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, ENGRAVE
+from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, ENGRAVE, PLAIN, Entries
 from sbafab.design.recipes import Recipe
 from tests.interop.made import EXACT, LENGTH, WIDTH, Sheet, outline_bounds
 from tests.interop.painting import painted

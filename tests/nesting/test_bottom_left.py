@@ -98,17 +98,6 @@ def test_a_roll_is_cut_off_after_its_parts() -> None:
     assert result.length(0) == pytest.approx(10 + 3 * 10 + 2 * 1 + 10)
 
 
-def test_sheets_have_their_whole_length() -> None:
-    result = nested([part(disc((0.0, 0.0), 5.0), 1)], Stock(width=60, length=70))
-    assert result.length(0) == 70
-
-
-def test_the_same_parts_are_nested_alike() -> None:
-    parts = [part(polygon([(0.0, 0.0), (9.0, 1.0), (3.0, 7.0)]), 9), part(disc((1.0, 2.0), 3.0), 7)]
-    stock = Stock(width=70, length=60, border=5, spacing=0.8)
-    assert nested(parts, stock).placements == nested(parts, stock).placements
-
-
 sizes = st.floats(2.0, 14.0)
 regions = st.one_of(
     sizes.map(lambda d: disc((d, -d), d / 2)),

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Arc, Line
+from sbafab.geometry.edges import Line
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
-from sbafab.nesting.check import check_nest, check_placed, edge_distance, least_distance
+from sbafab.nesting.check import check_nest, check_placed, least_distance
 from sbafab.nesting.records import Nest, NestPart, Placement, Stock
 
 SQUARE = rectangle((0.0, 0.0), (10.0, 10.0))
@@ -94,39 +94,10 @@ def test_nothing_is_told_beyond_the_reach() -> None:
     assert least_distance(disc((0, 0), 2), disc((9, 0), 2), 5.1).value == pytest.approx(5.0)
 
 
-def test_the_place_lies_between_the_parts() -> None:
-    gap = least_distance(disc((0, 0), 2), disc((5, 0), 2), 2.0)
-    assert gap.place == pytest.approx((2.0, 0.0))
-
-
 spots = st.tuples(st.floats(-4, 4), st.floats(-4, 4))
 
 
-def arc(centre: tuple[float, float], radius: float, first: float, sweep: float) -> Arc:
-    ends = [
-        (centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle))
-        for angle in (first, first + sweep)
-    ]
-    return Arc(ends[0], ends[1], centre, radius, sweep > 0)
-
-
-arcs = st.builds(
-    arc,
-    spots,
-    st.floats(0.5, 6),
-    st.floats(-3, 3),
-    st.floats(0.2, 1.5) | st.floats(-1.5, -0.2),
-)
 lines = st.builds(Line, spots, spots).filter(lambda line: line.length > 0.1)
-
-
-@given(arcs | lines, arcs | lines)
-def test_edge_distances_are_what_dense_samples_find(a: Arc | Line, b: Arc | Line) -> None:
-    count = 400
-    sampled = min(math.dist(b.nearest(p), p) for p in (a.at(i / count) for i in range(count + 1)))
-    result = edge_distance(a, b).value
-    assert result <= sampled + 1e-6
-    assert result >= sampled - a.length / count
 
 
 sizes = st.floats(0.5, 3)
