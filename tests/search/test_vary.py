@@ -21,83 +21,66 @@ from sbafab.search.vary import (
     varied_keys,
 )
 
+READ: dict[str, tuple[object, ...]] = {
+    # A tenth has no exact binary form: steps of it must not drift.
+    "a=0.1:0.5:0.1": (0.1, 0.2, 0.3, 0.4, 0.5),
+    "a=4:8:2": (4, 6, 8),
+    "a=4:7.9:2": (4, 6),
+    "a=38 um:0.04:1 um": (0.038, 0.039, 0.04),
+    "a=3,6.5": (3.0, 6.5),
+    "a=ears,channel-pin": ("ears", "channel-pin"),
+    'a="0.5 mm",1': ("0.5 mm", 1),
+    "a=[5, 6],[7, 8]": ([5, 6], [7, 8]),
+    "a=true,false": (True, False),
+    "a=7": (7,),
+}
+PYTHON: dict[str, Any] = {
+    "4:8:0.5": np.linspace(4, 8, 9),
+    "3,4,5": np.arange(3, 6),
+    "3:5:1": range(3, 6),
+    "4,4.5": pd.Series([4.0, 4.5]),
+    "3,4.5": [np.int64(3), np.float32(4.5)],
+    "[5, 6],[7, 8]": np.array([[5, 6], [7, 8]]),
+    "4.5": np.float64(4.5),
+    "4:8": "4:8",
+    "ears,channel-pin": ["ears", "channel-pin"],
+}
+REFUSED: list[tuple[Any, str]] = [
+    ("a", "KEY=VALUES"),
+    ("=3", "KEY=VALUES"),
+    ("a=8:4:1", "smaller number first"),
+    ("a=1:2:0", "STEP = 0"),
+    ("a=1:2:-1", "STEP = -1"),
+    ("a=1:x:1", "must be a length"),
+    ("a=1:2:3:4", "START:STOP:STEP"),
+    ("a=0:1000:0.001", "at most 10,000"),
+    ("a=3,4,3", "3 twice"),
+    ({"a": []}, "vary holds no value of a"),
+    ({"a": [3, np.int64(3)]}, "names 3 twice"),
+    ({"a": np.arange(10_001)}, "a has 10,001 values, and at most 10,000"),
+    ({"a": "8:4"}, "smaller number first"),
+]
 
-@pytest.mark.parametrize(
-    ("text", "values"),
-    [
-        # A tenth has no exact binary form: steps of it must not drift.
-        ("a=0.1:0.5:0.1", (0.1, 0.2, 0.3, 0.4, 0.5)),
-        ("a=4:8:2", (4, 6, 8)),
-        ("a=4:7.9:2", (4, 6)),
-        ("a=38 um:0.04:1 um", (0.038, 0.039, 0.04)),
-        ("a=3,6,9", (3, 6, 9)),
-        ("a=3,6.5", (3.0, 6.5)),
-        ("a=ears,channel-pin", ("ears", "channel-pin")),
-        ('a="0.5 mm",1', ("0.5 mm", 1)),
-        ("a=[5, 6],[7, 8]", ([5, 6], [7, 8])),
-        ("a=true,false", (True, False)),
-        ("a=7", (7,)),
-    ],
-)
-def test_values(text: str, values: tuple[object, ...]) -> None:
+
+@pytest.mark.parametrize("text", READ)
+def test_values(text: str) -> None:
     found = read_varied(text).values
-    assert found == values
-    assert [type(one) for one in found] == [type(one) for one in values]
+    assert found == READ[text]
+    assert [type(one) for one in found] == [type(one) for one in READ[text]]
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("a", "KEY=VALUES"),
-        ("=3", "KEY=VALUES"),
-        ("a=8:4:1", "smaller number first"),
-        ("a=1:2:0", "STEP = 0"),
-        ("a=1:2:-1", "STEP = -1"),
-        ("a=1:x:1", "must be a length"),
-        ("a=1:2:3:4", "START:STOP:STEP"),
-        ("a=0:1000:0.001", "at most 10,000"),
-        ("a=3,4,3", "3 twice"),
-    ],
-)
-def test_what_is_no_range_is_said(text: str, said: str) -> None:
-    with pytest.raises(DesignError, match=said):
-        read_varied(text)
-
-
-@pytest.mark.parametrize(
-    ("values", "text"),
-    [
-        (np.linspace(4, 8, 9), "4:8:0.5"),
-        (np.arange(3, 6), "3,4,5"),
-        (range(3, 6), "3:5:1"),
-        (pd.Series([4.0, 4.5]), "4,4.5"),
-        ((value for value in (3, 4.5)), "3,4.5"),
-        ([np.int64(3), np.float32(4.5)], "3,4.5"),
-        (np.array([[5, 6], [7, 8]]), "[5, 6],[7, 8]"),
-        (np.float64(4.5), "4.5"),
-        ("4:8", "4:8"),
-        (["ears", "channel-pin"], "ears,channel-pin"),
-    ],
-)
-def test_values_of_python_are_those_of_a_text(values: Any, text: str) -> None:
-    (found,) = varied_keys({"a": values})
+@pytest.mark.parametrize("text", PYTHON)
+def test_values_of_python_are_those_of_a_text(text: str) -> None:
+    (found,) = varied_keys({"a": PYTHON[text]})
     (written,) = varied_keys([f"a={text}"])
     assert found == written
     assert [type(one) for one in found.values] == [type(one) for one in written.values]
 
 
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        ([], "vary holds no value of a"),
-        ([3, np.int64(3)], "names 3 twice"),
-        (np.arange(10_001), "a has 10,001 values, and at most 10,000"),
-        ("8:4", "smaller number first"),
-    ],
-)
-def test_what_is_no_list_of_values_is_said(values: Any, said: str) -> None:
+@pytest.mark.parametrize(("vary", "said"), REFUSED)
+def test_what_is_no_range_is_said(vary: Any, said: str) -> None:
     with pytest.raises(DesignError, match=said):
-        varied_keys({"a": values})
+        varied_keys(vary)
 
 
 def test_unknown_keys_and_keys_without_any_good_value_are_refused() -> None:
