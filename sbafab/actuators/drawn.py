@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -16,16 +15,14 @@ from sbafab.actuators import Family
 from sbafab.actuators.shapes import (
     Angle,
     Coordinates,
-    DrawnRow,
     NamedShapes,
     Names,
     ShapeRegions,
     Vertex,
-    is_table,
     marks_of,
 )
 from sbafab.actuators.stacking import CutFilm, channel_pin, layers
-from sbafab.design.files import listed, shown
+from sbafab.design.files import hint, shown
 from sbafab.design.outline import polyline, read_drawing
 from sbafab.design.records import Design, Drawn, Form, Free, Mechanism, MechanismKind, Wrap, card
 from sbafab.design.sections import NAME_PATTERN
@@ -54,7 +51,7 @@ LayerPair = Annotated[tuple[int, int], Field(strict=False)]
 MOST_LAYERS = 500
 
 
-class DrawnLayer(DrawnRow):
+class DrawnLayer(Section):
     """A layer: what it is for, its shape by name, and how many parts it is meant to have."""
 
     role: Role
@@ -69,7 +66,7 @@ class DrawnLayer(DrawnRow):
     """True if it lies with its upper face down; the upper half of a fold does so by itself."""
 
 
-class DrawnChamber(DrawnRow):
+class DrawnChamber(Section):
     """A chamber, and the inlet strip through which it is filled."""
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -88,7 +85,7 @@ class DrawnChamber(DrawnRow):
     """The chamber gaps that it has pockets in, from 1 at the bottom; all by default."""
 
 
-class DrawnPin(DrawnRow):
+class DrawnPin(Section):
     """A dowel pin of the press fixture; it holds every layer with a hole that fits."""
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -101,7 +98,7 @@ class DrawnPin(DrawnRow):
     """Excess of the layers' holes for it over its diameter."""
 
 
-class DrawnTube(DrawnRow):
+class DrawnTube(Section):
     """The tube that the finished laminate is wrapped round."""
 
     outer_diameter: Length
@@ -114,7 +111,7 @@ class DrawnTube(DrawnRow):
     """Adhesive or tape that holds the sheet round the tube."""
 
 
-class DrawnSeam(DrawnRow):
+class DrawnSeam(Section):
     """A seam: two films bonded by a moving tool along a path."""
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -147,7 +144,7 @@ class DrawnSeam(DrawnRow):
         return self
 
 
-class DrawnFold(DrawnRow):
+class DrawnFold(Section):
     """A film folded along a straight line into two layers."""
 
     layers: LayerPair
@@ -162,7 +159,7 @@ class DrawnFold(DrawnRow):
         return self
 
 
-class DrawnMechanism(DrawnRow):
+class DrawnMechanism(Section):
     """Action of the pockets when they fill, for the closed forms of ``predict``; none by
     default.
     """
@@ -184,7 +181,7 @@ class DrawnMechanism(DrawnRow):
         return self
 
 
-class DrawnPort(DrawnRow):
+class DrawnPort(Section):
     """A place in a gap that nets name: a pocket, the end of a channel, or a hole for a tube."""
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -264,14 +261,18 @@ class DrawnDesign(Design):
     def _balloons_are_counted(cls, data: Any) -> Any:
         """One balloon for each gap with a chamber, unless the file gives their number."""
         rows, stack = data.get("layers"), data.get("stack", {})
-        if not isinstance(rows, list | tuple) or not is_table(stack) or "balloons" in stack:
+        if (
+            not isinstance(rows, list | tuple)
+            or not isinstance(stack, Mapping)
+            or "balloons" in stack
+        ):
             return data
-        roles = [str(row.get("role")) if is_table(row) else "" for row in rows]
+        roles = [str(row.get("role")) if isinstance(row, Mapping) else "" for row in rows]
         seams = data.get("seams")
         pairs = {
             tuple(row["layers"])
             for row in (seams if isinstance(seams, list | tuple) else ())
-            if is_table(row) and isinstance(row.get("layers"), list | tuple)
+            if isinstance(row, Mapping) and isinstance(row.get("layers"), list | tuple)
         }
         count = sum(chamber_gaps(roles, pairs).values())
         return {**data, "stack": {**stack, "balloons": count}} if count else data
@@ -534,9 +535,8 @@ def _faults_of_nets(design: DrawnDesign) -> Iterator[str]:
             yield f"nets.{net} is no name; take letters, digits, dots, - and _, 64 at most"
         for member in members:
             if member not in names:
-                near = difflib.get_close_matches(member, names, 1)
-                hint = f"did you mean {near[0]}?" if near else f"there are {listed(names)}"
-                yield f"nets.{net} names {shown(member)}, which is no port or chamber; {hint}"
+                remedy = hint(member, names)
+                yield f"nets.{net} names {shown(member)}, which is no port or chamber; {remedy}"
             if member in home:
                 where = "twice" if home[member] == net else f"and so does nets.{home[member]}"
                 yield f"nets.{net} names {shown(member)} {where}; a port belongs to one net, once"

@@ -104,8 +104,11 @@ def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) ->
                 f"the ear {ray.name} starts at x {x:.3f}, y {y:.3f}, outside the films; make the "
                 'chamber larger there, or use registration.method = "channel-pin"'
             )
-    roots = [_reach(ray, body, design) + radius + overhang + _longer(ray) for ray in rays]
-    ears = [_ear(ray, root, design) for ray, root in zip(rays, roots, strict=True)]
+    least = radius + overhang
+    ears = [
+        _ear(ray, _reach(ray, body, design) + least + LONGER[ray.holder][ray.long], design)
+        for ray in rays
+    ]
     # At a sharp angle to its neighbour, an ear's fillet reaches farther out.
     spread = filleted(plates, ears, radius)
     ears = [
@@ -126,15 +129,8 @@ def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) ->
 def _ear(ray: Ray, root: float, design: Design) -> Ear:
     bond, pin = design.bond.width, design.registration.hole_diameter
     hole = root + bond + pin / 2
-    return Ear(ray, root, hole, hole + pin / 2 + bond, pin + 2 * bond, *_pin_of(design))
-
-
-def _pin_of(design: Design) -> tuple[float, float]:
-    return design.registration.pin_diameter, design.registration.pin_clearance
-
-
-def _longer(ray: Ray) -> float:
-    return LONGER[ray.holder][ray.long]
+    size = design.registration.pin_diameter, design.registration.pin_clearance
+    return Ear(ray, root, hole, hole + pin / 2 + bond, pin + 2 * bond, *size)
 
 
 def _reach(ray: Ray, body: Region, design: Design) -> float:

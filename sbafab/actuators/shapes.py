@@ -5,7 +5,6 @@ Shapes may be made of others by name; several layers may use the same one.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +14,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
-from sbafab.design.files import listed, shown
+from sbafab.design.files import hint, shown
 from sbafab.design.outline import Strand, polyline, read_drawing, refuse_crossings
 from sbafab.design.toml_table import Section
 from sbafab.design.units import LONGEST, Length, Millimetres
@@ -62,21 +61,7 @@ FURTHER: Mapping[str, tuple[str, ...]] = {"pattern": PATTERNS, "file": ("layer",
 """Keys optional for a shape of this kind."""
 
 
-class DrawnRow(Section):
-    """A table in a list or under a user's name, which reports unknown keys."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _knows_its_keys(cls, data: Any) -> Any:
-        strange = [key for key in data if key not in cls.model_fields] if is_table(data) else []
-        if strange:
-            near = difflib.get_close_matches(strange[0], cls.model_fields, 1)
-            hint = f"did you mean {near[0]}" if near else f"known are {', '.join(cls.model_fields)}"
-            raise ValueError(f"has a key {shown(strange[0])} that is not known; {hint}?")
-        return data
-
-
-class NamedShape(DrawnRow):
+class NamedShape(Section):
     """A shape: a disc, ring, slot, stadium, polygon, path or drawing, or one made of others."""
 
     disc: Length | None = None
@@ -181,11 +166,6 @@ class NamedShapes(Section):
         return self.__pydantic_extra__ or {}
 
 
-def is_table(value: object) -> bool:
-    """Return True for a table of a design file."""
-    return isinstance(value, Mapping)
-
-
 def _entries(value: object) -> int:
     return len(value) if isinstance(value, list | tuple) else 0
 
@@ -203,9 +183,9 @@ class ShapeRegions:
     def of(self, name: str, user: str) -> Region:
         """Return the shape of this name for its ``user``, a key. Raises DesignError."""
         if name not in self.shapes:
-            near = difflib.get_close_matches(name, self.shapes, 1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {listed(self.shapes)}"
-            raise DesignError(f"{user} names a shape {shown(name)} that is not there; {hint}")
+            raise DesignError(
+                f"{user} names a shape {shown(name)} that is not there; {hint(name, self.shapes)}"
+            )
         if name in self._open:
             raise DesignError(
                 f"shapes.{name} is made of itself, by way of {' and '.join(self._open)}; name "

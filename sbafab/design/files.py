@@ -64,6 +64,13 @@ def listed(values: Iterable[object]) -> str:
     return ", ".join(f'"{value}"' for value in values)
 
 
+def hint(name: str, known: Iterable[str]) -> str:
+    """Return the known name that is most like another one as a question, or all of them."""
+    known = list(known)
+    near = difflib.get_close_matches(name, known, 1)
+    return f"did you mean {near[0]}?" if near else f"there are {listed(known)}"
+
+
 def shown(value: object) -> str:
     """Return a value as it may appear in a message: short, on one line."""
     try:
@@ -533,9 +540,7 @@ def write_new(template: str, file: Path | None) -> Path:
     """Copy a template's commented file, named after the new file; never over an old one."""
     names = template_names()
     if template not in names:
-        near = difflib.get_close_matches(template, names, 1)
-        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
-        raise DesignError(f"{shown(template)} is not a template; {hint}")
+        raise DesignError(f"{shown(template)} is not a template; {hint(template, names)}")
     return write_copy(templates_folder() / f"{template}.toml", file or Path(f"{template}.toml"))
 
 

@@ -10,7 +10,7 @@ import json
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
 from pydantic import Field
 
@@ -25,13 +25,22 @@ from sbafab.design.units import Length
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, polygon, union
 from sbafab.importing.popupcad import SUFFIX, cad_layer
-from sbafab.importing.records import Imported, file_name, key_name, not_json, read_text, yaml_of
+from sbafab.importing.records import (
+    LAYERS,
+    Imported,
+    file_name,
+    key_name,
+    loaded,
+    not_json,
+    read_text,
+    yaml_of,
+)
 from sbafab.laminate.laminate import Role
 
 if TYPE_CHECKING:
     import shapely
 
-LAYERS, CHAMBERS, KIT = "layers.csv", "chambers.csv", "kit.toml"
+CHAMBERS, KIT = "chambers.csv", "kit.toml"
 MOUTH = ("mouth_x", "mouth_y", "angle", "width")
 """Columns of a chamber's first row."""
 DRAWINGS = (".dxf", ".svg")
@@ -218,11 +227,11 @@ def polygon_layers(path: Path) -> list[list[str]]:
     return _geometries(path, read_text(path, MOST_OF_POLYGONS))
 
 
-def refuse_without_table(path: Path, table: str) -> DesignError:
-    """Return the error for a laminate of polygons imported without a table of its layers."""
+def refuse_without_table(path: Path) -> NoReturn:
+    """Refuse a laminate of polygons that is imported without a table of its layers."""
     count = len(polygon_layers(path))
-    return DesignError(
-        f"{path} holds {count} layers of polygons and not what they are for; write {table} beside "
+    raise DesignError(
+        f"{path} holds {count} layers of polygons and not what they are for; write {LAYERS} beside "
         f'it, with a row "{path.name},ROLE,NUMBER" a layer under "file,role,layer", and import the '
         "folder"
     )
@@ -254,11 +263,7 @@ def _document(path: Path, text: str) -> Any:
     loader: Any = type("Loader", (yaml.SafeLoader,), {})
     for tag in LAMINATE_TAGS:
         loader.add_constructor(tag, lambda made, node: made.construct_mapping(node, deep=True))
-    try:
-        return yaml.load(text, loader)
-    except (yaml.YAMLError, RecursionError) as error:
-        line = " ".join(str(error).split())
-        raise DesignError(f"{path} is no YAML of plain values: {line}; save it again") from None
+    return loaded(path, text, loader, "plain values")
 
 
 def _parts(path: Path, layer: str, number: int, text: str) -> Iterator[Region]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache, reduce
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from sbafab.design.files import shown
 from sbafab.design.outline import crossing
@@ -23,7 +23,7 @@ from sbafab.errors import DesignError
 from sbafab.geometry.edges import Line, Point, meeting_points
 from sbafab.geometry.offset import grow, swept
 from sbafab.geometry.region import Region, disc, polygon, union
-from sbafab.importing.records import MOST_NAMED, read_text, yaml_of
+from sbafab.importing.records import LAYERS, MOST_NAMED, loaded, read_text, yaml_of
 
 SUFFIX = ".cad"
 MOST_BYTES = 20_000_000
@@ -93,11 +93,7 @@ def _records(path: Path, text: str) -> Any:
             loader.add_constructor(
                 f"!{vertex}{form}", lambda made, node, kind=vertex + form: record(made, kind, node)
             )
-    try:
-        return yaml.load(text, loader)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        line = " ".join(str(error).split())
-        raise DesignError(f"{path} is no YAML of popupCAD: {line}; save it again") from None
+    return loaded(path, text, loader, "popupCAD")
 
 
 # Geometry of a layer: areas, and lines and points that offsets widen into areas.
@@ -544,15 +540,13 @@ def _similar(
             f"{place} scales arcs by {along:g} along its line and {across:g} across it, and "
             "ellipses are not read; give both the same scale"
         )
-    (x, y), (u, v) = first[0], second[0]
-    ours, theirs = (math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in (first, second))
+    start, end = complex(*first[0]), complex(*second[0])
+    ours, theirs = (complex(b[0] - a[0], b[1] - a[1]) for a, b in (first, second))
 
     def point(p: Point) -> Point:
-        dx, dy = p[0] - x, p[1] - y
-        c, s = math.cos(ours), math.sin(ours)
-        dx, dy = along * (c * dx + s * dy), across * (c * dy - s * dx)
-        c, s = math.cos(theirs), math.sin(theirs)
-        return u + c * dx - s * dy, v + s * dx + c * dy
+        step = (complex(*p) - start) * abs(ours) / ours
+        step = complex(along * step.real, across * step.imag) * theirs / abs(theirs)
+        return (end + step).real, (end + step).imag
 
     return tuple(
         Flat(
@@ -697,8 +691,8 @@ def _operation(design: CadDesign, name: str, layer: str) -> int:
     return names.index(name)
 
 
-def refuse_alone(path: Path, table: str) -> DesignError:
-    """Return the error for a design imported without a table of its layers."""
+def refuse_alone(path: Path) -> NoReturn:
+    """Refuse a design that is imported without a table of its layers."""
     design = cad_design(path)
     unread = [
         f"{index + 1} ({operation.kind})"
@@ -710,10 +704,10 @@ def refuse_alone(path: Path, table: str) -> DesignError:
     of = "" if last is None else f" for operation {last}, the last that rests on what is read"
     more = "" if len(unread) <= MOST_NAMED else f" and {len(unread) - MOST_NAMED} more"
     strange = f"; operations that are not read: {', '.join(unread[:MOST_NAMED])}{more}"
-    return DesignError(
-        f"{path} holds {len(design.layers)} layers and not what they are for; write {table} beside "
-        f'it, with a row "{path.name},ROLE,{which}/NUMBER" a layer under "file,role,layer"{of}, '
-        f"and import the folder{strange if unread else ''}"
+    raise DesignError(
+        f"{path} holds {len(design.layers)} layers and not what they are for; write {LAYERS} "
+        f'beside it, with a row "{path.name},ROLE,{which}/NUMBER" a layer under '
+        f'"file,role,layer"{of}, and import the folder{strange if unread else ""}'
     )
 
 

@@ -17,6 +17,8 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 
+LAYERS = "layers.csv"
+"""The table of layers in a folder of drawings."""
 MOST_NAMED = 20
 """At most this many places of one kind are named one by one."""
 
@@ -130,6 +132,16 @@ def yaml_of(path: Path) -> Any:
             f'{path} is YAML, which takes PyYAML to read; pip install "sbafab[yaml]"'
         ) from None
     return yaml
+
+
+def loaded(path: Path, text: str, loader: Any, what: str) -> Any:
+    """Return the content of YAML by a loader. Raises DesignError if it is not ``what``."""
+    yaml = yaml_of(path)
+    try:
+        return yaml.load(text, loader)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        line = " ".join(str(error).split())
+        raise DesignError(f"{path} is no YAML of {what}: {line}; save it again") from None
 
 
 # Out: all or nothing, never over an existing file.

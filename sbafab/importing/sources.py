@@ -10,15 +10,10 @@ from typing import NamedTuple
 from sbafab.design.laminate_file import SCHEMA
 from sbafab.errors import DesignError
 from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
-from sbafab.importing.layer_table import (
-    LAYERS,
-    MOST_OF_POLYGONS,
-    import_table,
-    refuse_without_table,
-)
+from sbafab.importing.layer_table import MOST_OF_POLYGONS, import_table, refuse_without_table
 from sbafab.importing.parchmint import import_parchmint
 from sbafab.importing.popupcad import SUFFIX, refuse_alone
-from sbafab.importing.records import Imported, not_json, read_text
+from sbafab.importing.records import LAYERS, Imported, not_json, read_text
 
 
 class SourceFormat(NamedTuple):
@@ -52,10 +47,6 @@ def _refuse_broken_json(source: Path) -> None:
         raise not_json(source, error) from None
 
 
-def _has_design(source: Path) -> bool:
-    return (source / DESIGN).is_file()
-
-
 def _holds(mark: str) -> Callable[[Path], bool]:
     """Return a test for a JSON file with this text near its beginning or anywhere in it."""
 
@@ -67,34 +58,25 @@ def _holds(mark: str) -> Callable[[Path], bool]:
     return matches
 
 
-def _has_table(source: Path) -> bool:
-    return (source / LAYERS).is_file()
-
-
 def _is_polygons(source: Path) -> bool:
-    suffix = source.suffix.lower()
-    return suffix in (".yaml", ".yml") or _holds('"geoms"')(source)
-
-
-def _no_table(source: Path) -> Imported:
-    raise refuse_without_table(source, LAYERS)
+    return source.suffix.lower() in (".yaml", ".yml") or _holds('"geoms"')(source)
 
 
 def _is_popupcad(source: Path) -> bool:
     return source.suffix.lower() == SUFFIX and source.is_file()
 
 
-def _no_table_of_popupcad(source: Path) -> Imported:
-    raise refuse_alone(source, LAYERS)
-
-
 FORMATS = (
-    SourceFormat(f"a folder of drawings with {LAYERS}", _has_table, import_table),
-    SourceFormat("an output folder, with its design.toml", _has_design, import_folder),
+    SourceFormat(
+        f"a folder of drawings with {LAYERS}", lambda s: (s / LAYERS).is_file(), import_table
+    ),
+    SourceFormat(
+        "an output folder, with its design.toml", lambda s: (s / DESIGN).is_file(), import_folder
+    ),
     SourceFormat("a laminate.json", _holds(SCHEMA), import_laminate),
     SourceFormat("a circuit in ParchMint JSON", _holds('"components"'), import_parchmint),
-    SourceFormat("a laminate of polygons, with a table of its layers", _is_polygons, _no_table),
     SourceFormat(
-        "a popupCAD design, with a table of its layers", _is_popupcad, _no_table_of_popupcad
+        "a laminate of polygons, with a table of its layers", _is_polygons, refuse_without_table
     ),
+    SourceFormat("a popupCAD design, with a table of its layers", _is_popupcad, refuse_alone),
 )

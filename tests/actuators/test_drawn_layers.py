@@ -135,7 +135,11 @@ def test_a_path_has_exact_arcs(tmp_path: Path) -> None:
 REFUSED: list[tuple[Sequence[str], object, str]] = [
     (("layers", "1", "role"), "cap", "layers has no gap with a chamber; lay a chamber-mask"),
     (("layers", "1", "shape"), "msk", "layer 2 names a shape 'msk' that is not there; did you"),
-    (("layers", "0", "flim"), "tpe", "has a key 'flim' that is not known; did you mean film?"),
+    (
+        ("layers", "0", "flim"),
+        "tpe",
+        "layers.0.flim is not a key of a design file; did you mean layers.0.film?",
+    ),
     (("shapes", "mask", "union"), ["mask"], "shapes.mask is made of itself, by way of mask"),
     (("shapes", "mask"), {"disc": 3, "ring": [3, 2]}, "has disc and ring; a shape is one of"),
     (("shapes", "mask"), {"slot": [[0, 0], [1, 0]]}, "is a slot without width; add it"),

@@ -126,7 +126,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"shape": "film"}, "has either a shape or a path; give one of the two"),
     ({"tool": "glue"}, "seams.0.tool = 'glue' must be"),
     ({"width": 0}, "seams.0.width = 0 must be"),
-    ({"whidth": 1}, "has a key 'whidth' that is not known; did you mean width"),
+    ({"whidth": 1}, "seams.0.whidth is not a key of a design file; did you mean seams.0.width"),
 ]
 
 
