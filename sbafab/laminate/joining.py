@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Literal, NamedTuple
 
 from sbafab.errors import DesignError
@@ -145,15 +146,10 @@ def _refuse_strangers(laminate: Laminate) -> None:
 
 def _presses(laminate: Laminate) -> Iterator[_Task]:
     """Yield runs of interfaces that bond in the press, bottom to top."""
-    run: list[int] = []
-    for gap in laminate.interfaces:
-        if gap.pressed:
-            run.append(gap.index)
-        elif run:
-            yield _Task(run[0], run[-1])
-            run = []
-    if run:
-        yield _Task(run[0], run[-1])
+    for is_pressed, run in groupby(laminate.interfaces, key=lambda gap: gap.pressed):
+        first, *rest = (gap.index for gap in run)
+        if is_pressed:
+            yield _Task(first, rest[-1] if rest else first)
 
 
 def _seams(laminate: Laminate) -> Iterator[_Task]:

@@ -103,7 +103,10 @@ def shared_edge(a: Region, b: Region) -> tuple[tuple[float, float], tuple[float,
 
 
 REFUSED: list[tuple[dict[str, Any], str]] = [
-    ({"folds": [{"layers": [1, 2], "line": [*LINE]}]}, "layers 1 and 2: they are not two films"),
+    (
+        {"folds": [{"layers": [1, 2], "line": [*LINE]}]},
+        "are not two films that lie next to each other",
+    ),
     (
         {"folds": [{"layers": [1, 3], "line": [[-19, -15], [-19, 15]]}]},
         "layer 1 has no edge on the line from x -19, y -15 to x -19, y 15",
