@@ -15,8 +15,8 @@ from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import seam_text
 from sbafab.cutting.properties import FOLDER, REFERENCE, SEAM, CutSettings
 from sbafab.errors import OutputError
-from sbafab.geometry.contour import Similarity, shift
-from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to
+from sbafab.geometry.edges import Edge, Point, distance_to
+from sbafab.geometry.offset import shifted
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Laminate
 
@@ -76,13 +76,7 @@ def moved(chains: Chains, by: Point) -> tuple[tuple[Edge, ...], ...]:
     """Return chains moved by an offset in mm along x and y; the same chains for a zero offset."""
     if by == CENTRED:
         return tuple(map(tuple, chains))
-    return tuple(tuple(_moved(edge, shift(*by)) for edge in chain) for chain in chains)
-
-
-def _moved(edge: Edge, to: Similarity) -> Edge:
-    if isinstance(edge, Line):
-        return Line(to(edge.start), to(edge.end))
-    return Arc(to(edge.start), to(edge.end), to(edge.centre), edge.radius, edge.ccw)
+    return tuple(tuple(shifted(edge, by) for edge in chain) for chain in chains)
 
 
 def offset_text(offset: Point) -> str:

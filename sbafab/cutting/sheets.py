@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import Literal, NamedTuple
 
 from sbafab.cutting.beam_paths import LaserRun, beam_runs, contour_runs, drawn
@@ -358,14 +359,8 @@ def _box(ends: tuple[Point, Point]) -> Bounds:
 
 def _wrapped(text: str, count: int) -> list[str]:
     """The text in at most this number of lines, the longest as short as words allow."""
-    words = text.split()
-    for most in range(max(map(len, words)), len(text) + 1):
-        lines = [words[0]]
-        for word in words[1:]:
-            if len(lines[-1]) + 1 + len(word) <= most:
-                lines[-1] += f" {word}"
-            else:
-                lines.append(word)
-        if len(lines) <= count:
+    for most in range(1, len(text) + 1):
+        lines = wrap(text, most, break_long_words=False, break_on_hyphens=False)
+        if len(lines) <= count and max(map(len, lines)) <= most:
             return lines
     return [text]

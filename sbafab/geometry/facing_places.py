@@ -41,25 +41,11 @@ def sampled(edges: Sequence[Edge], room: float = 0.0) -> tuple[list[Point], list
             count = max(2, math.ceil(abs(edge.sweep) / STEP))
         share = room / edge.length if room > 0 else 0.0
         shares = [min(1 - share, max(share, i / count)) for i in range(count + 1)]
-        points += _places_along(edge, shares)
+        # The ends exactly.
+        ends = {0.0: edge.start, 1.0: edge.end}
+        points += [ends[t] if t in ends else edge.at(t) for t in shares]
         counts.append(count + 1)
     return points, counts
-
-
-def _places_along(edge: Edge, shares: list[float]) -> list[Point]:
-    """Return the points at these shares of an edge's length; its exact ends at 0 and 1."""
-    if not isinstance(edge, Arc):
-        return [edge.start if t == 0 else edge.end if t == 1 else edge.at(t) for t in shares]
-    first, sweep = edge.start_angle, edge.sweep
-    x, y = edge.centre
-    r = edge.radius
-    angles = [first + t * sweep for t in shares]
-    points = [(x + r * math.cos(a), y + r * math.sin(a)) for a in angles]
-    if shares[0] == 0:
-        points[0] = edge.start
-    if shares[-1] == 1:
-        points[-1] = edge.end
-    return points
 
 
 NEAR = 10 * TOUCH

@@ -656,11 +656,12 @@ def _slid(edge: Edge, way: Edge) -> Iterator[Sequence[Edge]]:
         shares += [t for t in turns if 0 < t < 1]
     for t0, t1 in pairwise(sorted(shares)):
         part = edge.part(edge.at(t0), edge.at(t1))
-        near, far = _shifted(part, way.start), _shifted(part, way.end)
+        near, far = shifted(part, way.start), shifted(part, way.end)
         yield near, Line(near.end, far.end), far.reversed(), Line(far.start, near.start)
 
 
-def _shifted(edge: Edge, by: Point) -> Edge:
+def shifted(edge: Edge, by: Point) -> Edge:
+    """Return an edge moved by a vector, mm."""
     start, end = ((p[0] + by[0], p[1] + by[1]) for p in (edge.start, edge.end))
     if isinstance(edge, Line):
         return Line(start, end)

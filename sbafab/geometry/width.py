@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 from sbafab.geometry.cache import cached, stored
@@ -106,11 +106,9 @@ class Boundary:
         return SideTable(self.sides)
 
 
-def _boundary(region: Region, sharp: float) -> Boundary:
+@partial(cached, most=16)
+def boundary_of(region: Region, sharp: float) -> Boundary:
     return Boundary(region.contours, sharp)
-
-
-boundary_of = cached(_boundary, most=16)
 
 
 class _Narrowest:
@@ -197,12 +195,7 @@ def _corners(contour: Contour) -> list[Corner | None]:
 
 
 def _side(edge: Edge, box: Bounds) -> BoundarySide:
-    if isinstance(edge, Arc):
-        # Like ``at``, without recomputing the sweep.
-        sweep = edge.sweep
-        middle, half_turn = edge.on_circle(edge.start_angle + 0.5 * sweep), abs(sweep) / 2
-    else:
-        middle, half_turn = edge.at(0.5), 0.0
+    middle, half_turn = edge.at(0.5), abs(edge.sweep) / 2 if isinstance(edge, Arc) else 0.0
     half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
     return BoundarySide(edge, box, middle, half_turn, half)
 
