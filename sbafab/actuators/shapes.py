@@ -15,7 +15,8 @@ from typing import Annotated, Any, Self
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
 from sbafab.design.files import hint, shown
-from sbafab.design.outline import Strand, polyline, read_drawing, refuse_crossings
+from sbafab.design.outline import read_drawing, refuse_crossings
+from sbafab.design.strands import Strand, polyline
 from sbafab.design.toml_table import Section
 from sbafab.design.units import LONGEST, Length, Millimetres
 from sbafab.errors import DesignError

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
 
-from sbafab.design.outline import Strand, Traced, nothing_on, place, refuse_more_than_limit
+from sbafab.design.strands import Strand, Traced, nothing_on, place, refuse_more_than_limit
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import bezier, elliptical_arc, fit_arcs
 from sbafab.geometry.edges import EPSILON, Edge, Line, Point
