@@ -384,7 +384,7 @@ class Search:
             return None
         by_top = motions.swapaxes(1, 2) @ moves
         begin, by_pull = by_top[..., :-6], by_top[..., -6:]
-        before = is_in
+        before, live = is_in, np.ones(count, dtype=bool)
         for number in range(CONTACT_ROUNDS):
             stiffness, pull = _contact_top(touch, is_in)
             more = stiffness - first
@@ -396,12 +396,12 @@ class Search:
             top = (tops @ columns[..., None])[..., 0]
             deeper = (touch.lines @ top[..., None])[..., 0]
             after = touch.deep + deeper > touch.least
-            goes = (after != is_in).any(1)
+            live &= (after != is_in).any(1)
             if is_turn(number):
-                goes &= (after != before).any(1)
-            if not goes.any():
+                live &= (after != before).any(1)
+            if not live.any():
                 break
-            before, is_in = is_in, np.where(goes[:, None], after, is_in)
+            before, is_in = is_in, np.where(live[:, None], after, is_in)
         back = pull + (more @ top[..., None])[..., 0]
         columns = np.concatenate([columns, -back], axis=1)
         return (moves @ columns[..., None]).reshape(at.shape), ahead, deeper
