@@ -416,7 +416,7 @@ class Search:
         rates, away = motion[..., 1:], run.places - tip
         missing = movable(wall, away - motion[..., 0])
         # Friction may prevent pressures from moving it further, and they would stray.
-        is_near = np.linalg.norm(missing, axis=-1) < NEAR / 2
+        is_near = np.linalg.norm(missing, axis=-1) < NEAR / 4
         missing = np.where(is_near[:, None], 0.0, missing)
         # A top flat on the plate cannot move along its normal, so distant steps must not try to.
         share = LEAST_DAMPING + PLATE_DAMPING * np.minimum((away * away).sum(-1), 1.0)
