@@ -15,7 +15,7 @@ SHEET = 900
 def nested_and_cut(copies: int, turn: int) -> float:
     """Seconds from the design to its findings, layer files and film sheets, all read back."""
     from sbafab.actuators import load_design
-    from sbafab.runs.run import RunRequest, generate
+    from sbafab.folders.run import RunRequest, generate
 
     sheets = [
         f"sheets.{film}.{side}={SHEET}" for film in ("tpe", "ptfe") for side in ("width", "length")

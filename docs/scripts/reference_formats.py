@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from sbafab.cli.formats import FORMATS, schema_of
-from sbafab.output.artefacts import ARTEFACTS
+from sbafab.folders.artefacts import ARTEFACTS
 
 HEAD = """# File formats
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sbafab.actuators import build, load_design
+from sbafab.folders.run import RunRequest, generate
 from sbafab.rules.registration_yield import simulate
-from sbafab.runs.run import RunRequest, generate
 from tests.judge.yields import judged_yield
 
 ROOT = Path(__file__).parents[2]

@@ -75,6 +75,6 @@ def check_folder(folder: str | Path, nets: str | Path | None = None) -> Findings
     netlist cannot be read.
     """
     # Reading a folder back takes longer to load than the rules.
-    from sbafab.as_built.check import check_folder as read_and_check
+    from sbafab.folders.check import check_folder as read_and_check
 
     return Findings(read_and_check(Path(folder), None if nets is None else Path(nets)))

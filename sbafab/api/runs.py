@@ -12,13 +12,13 @@ from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.design.files import Change
 from sbafab.design.records import Design
+from sbafab.folders.run import Conforming, Run, RunRequest, Simulated
+from sbafab.folders.run import generate as run
+from sbafab.folders.run import simulate as run_simulator
 from sbafab.importing.records import default_file, write_imported
 from sbafab.importing.sources import import_source
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
 from sbafab.process import Progress
-from sbafab.runs.run import Conforming, Run, RunRequest, Simulated
-from sbafab.runs.run import generate as run
-from sbafab.runs.run import simulate as run_simulator
 from sbafab.simulators.simulator import Name, SimulationRequest
 
 

@@ -40,12 +40,12 @@ from sbafab.design.files import template_names
 from sbafab.design.identity import cited
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, SbafabError
+from sbafab.folders.advice import Advice, advise
+from sbafab.folders.checks import checks
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.formulas import size_phrases, sizes
 from sbafab.orders.build import Build, refuse_undoable
 from sbafab.orders.order import Order, make_order
-from sbafab.output.advice import Advice, advise
-from sbafab.output.checks import checks
 from sbafab.process import Progress
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
@@ -213,7 +213,7 @@ def _check_folder(folder: Path, nets: Path | None) -> CheckOutcome:
     import logging
 
     # Modules that read a folder back take as long to load as those that check a design.
-    from sbafab.as_built.check import check_folder
+    from sbafab.folders.check import check_folder
 
     # A broken file becomes a finding; the log of ezdxf would repeat it on the screen.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())

@@ -22,15 +22,15 @@ from sbafab.design.laminate_file import SCHEMA as LAMINATE
 from sbafab.design.laminate_file import LaminateDocument
 from sbafab.documents import Document, json_schema
 from sbafab.errors import ERROR_SCHEMA
+from sbafab.folders.artefacts import PredictDocument
+from sbafab.folders.checks import Checks
+from sbafab.folders.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.inspection.inspection import InspectionDocument
 from sbafab.laminate.joints import PortKind
 from sbafab.laminate.netlist import SCHEMA as NETS
 from sbafab.models.map_files import MapDocument
 from sbafab.models.sensitivities import SensitivityRow
 from sbafab.orders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
-from sbafab.output.artefacts import PredictDocument
-from sbafab.output.checks import Checks
-from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.pressing.schedule_files import PressDocument
 from sbafab.reports.assembly_prediction import SCHEMA as ASSEMBLY_PREDICTION
 from sbafab.reports.assembly_prediction import AssemblyPrediction

@@ -104,8 +104,8 @@ def _reference(
 
 def write_inspection(inspection: Inspection, out: Path) -> list[Path]:
     """Write picture, result, entry and table of sizes; return their paths."""
+    from sbafab.folders.swap import replace_text
     from sbafab.inspection.inspection import InspectionDocument, drawing, history, sizes_csv
-    from sbafab.output.swap import replace_text
 
     out.mkdir(parents=True, exist_ok=True)
     stem = f"{inspection.sheet.name.replace('/', '_')}-{inspection.picture.path.stem}"

@@ -47,13 +47,13 @@ from sbafab.design.files import changed_keys
 from sbafab.design.records import Design
 from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
+from sbafab.folders.artefacts import EVERYTHING, RunPart
+from sbafab.folders.checks import FindingEntry
+from sbafab.folders.run import Conforming, Run, RunRequest
+from sbafab.folders.run import generate as run_design
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
 from sbafab.meshing.formats import CONFORMING_ENDINGS
-from sbafab.output.artefacts import EVERYTHING, RunPart
-from sbafab.output.checks import FindingEntry
 from sbafab.pressing.cycles import batch_times, design_runs
-from sbafab.runs.run import Conforming, Run, RunRequest
-from sbafab.runs.run import generate as run_design
 from sbafab.simulators.simulator import NAMES
 
 

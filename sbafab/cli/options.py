@@ -244,7 +244,7 @@ def _refuse_file(ctx: click.Context, _: click.Parameter, out: Path) -> Path:
     file, before anything is computed.
     """
     # Help and completion do without it.
-    from sbafab.output.swap import refuse_file_as_folder
+    from sbafab.folders.swap import refuse_file_as_folder
 
     refuse_file_as_folder(out)
     if out.suffix.lower() == ".toml":

@@ -38,6 +38,8 @@ from sbafab.cli.printing import (
 from sbafab.cli.progress import shown_progress
 from sbafab.design.records import Design, Drawn
 from sbafab.errors import OutputError
+from sbafab.folders.artefacts import prediction_json
+from sbafab.folders.run import RunRequest, generate
 from sbafab.models.balloons import has_balloons
 from sbafab.models.drawn_pockets import model_form
 from sbafab.models.figures import (
@@ -52,9 +54,7 @@ from sbafab.models.figures import (
 from sbafab.models.formulas import size_phrases, usual_pressures
 from sbafab.models.prediction import predict as predicted
 from sbafab.models.sensitivities import SensitivityRow, sensitivity_table
-from sbafab.output.artefacts import prediction_json
 from sbafab.reports.assembly_prediction import SCHEMA, AssemblyPrediction, predict_assembly
-from sbafab.runs.run import RunRequest, generate
 
 ELASTIC_OPTIONS = ("pocket_loss", "modulus_mpa", "sensitivity")
 """Options of the model of elastic balloons alone."""

@@ -30,9 +30,9 @@ from sbafab.cli.printing import (
     print_verdict,
 )
 from sbafab.cli.progress import shown_progress
-from sbafab.output.checks import checks
-from sbafab.runs.run import result_json
-from sbafab.runs.run import simulate as run
+from sbafab.folders.checks import checks
+from sbafab.folders.run import result_json
+from sbafab.folders.run import simulate as run
 from sbafab.simulators.simulator import CHOICES, NAMES, Name, Result, SimulationRequest
 
 MOST_MINUTES = 10_000

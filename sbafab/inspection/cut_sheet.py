@@ -6,14 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sbafab.as_built.as_cut import path_in_folder
-from sbafab.as_built.records import is_job, read_claims, read_job
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.errors import DesignError, OutputError
+from sbafab.folders.as_cut import path_in_folder
+from sbafab.folders.manifest import JobManifest, Manifest, is_job, read_claims, read_job
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.nesting.records import TURNS
-from sbafab.output.manifest import JobManifest, Manifest
 
 SPACING = 1.0
 """Default distance between cuts, for a file without one, mm."""

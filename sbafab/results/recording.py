@@ -18,7 +18,7 @@ from sbafab.design.files import Change
 from sbafab.design.identity import kit_of
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
-from sbafab.output.swap import replace_text
+from sbafab.folders.swap import replace_text
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.record_sheet import TESTS_TABLE, RecordTable, record_tables
 from sbafab.results.builds import RecordedDesign, promised, recorded_sha256

@@ -14,7 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from sbafab import api
-from sbafab.output.checks import FindingEntry
+from sbafab.folders.checks import FindingEntry
 
 if TYPE_CHECKING:
     from sbafab.assemblies.build import Assembled, PlacedPart

@@ -13,18 +13,18 @@ import pytest
 import tomli_w
 
 from sbafab.actuators import FAMILIES, build, load_design
-from sbafab.as_built.check import check_folder
 from sbafab.design.files import template_text
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import validated
 from sbafab.errors import DesignError
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import PredictionRequest
 from sbafab.models.pouch import half_angle
 from sbafab.models.prediction import predict
 from sbafab.rules.deck import run_deck
-from sbafab.runs.run import RunRequest, generate
 from tests.designs import PAPER
 
 FEW = PAPER.with_("rules.yield_builds=100")

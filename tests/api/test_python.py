@@ -16,8 +16,8 @@ import shapely
 
 import sbafab
 from sbafab.errors import DesignError, OutputError
+from sbafab.folders.run import Run
 from sbafab.rules.finding import Finding, Findings, Place
-from sbafab.runs.run import Run
 from tests.importing.test_parchmint import circuit
 
 SMALL = {"stack.balloons": 2, "rules": {"yield_builds": 100}}

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.runs.run import RunRequest, generate
+from sbafab.folders.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 from tests.faults.once import remembering
 

@@ -14,14 +14,14 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
 from sbafab.cli import main
 from sbafab.cutting.kerf import in_chords
 from sbafab.errors import OutputError
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.offset import grow, shrink
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
-from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder, read_folder
 from sbafab.cutting.properties import Curves, DxfProfile
+from sbafab.folders.check import check_folder, read_folder
+from sbafab.folders.run import RunRequest, generate
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
-from sbafab.runs.run import RunRequest, generate
 from tests.quick import few
 
 DROP = (

@@ -10,15 +10,15 @@ from typing import Any
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import ENGRAVE
 from sbafab.errors import OutputError
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.region import Region, disc
 from sbafab.rules.finding import Finding
-from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 from tests.quick import few
 

@@ -15,8 +15,8 @@ from sbafab.actuators import build, load_design
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.properties import Curves
 from sbafab.errors import DesignError
+from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.region import disc, rectangle
-from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 from tests.quick import few
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.as_built.differences import file_difference
+from sbafab.folders.differences import file_difference
 
 TABLE = "step,title,minutes\n1,flash,3\n2,bond,12\n"
 

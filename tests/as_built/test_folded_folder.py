@@ -9,7 +9,7 @@ import pytest
 import tomli_w
 
 from sbafab.api import check_folder, generate
-from sbafab.as_built.check import read_folder, rules_as_cut
+from sbafab.folders.check import read_folder, rules_as_cut
 from tests.laminate.test_folding import folded
 
 

@@ -13,10 +13,10 @@ from random import Random
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
-from sbafab.output.manifest import file_hash
+from sbafab.folders.check import check_folder
+from sbafab.folders.manifest import file_hash
+from sbafab.folders.run import RunRequest, generate
 from sbafab.rules.finding import Finding
-from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 from tests.quick import few
 

@@ -12,9 +12,9 @@ import pytest
 from ezdxf.document import Drawing
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder, read_folder
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.runs.run import RunRequest, generate
+from sbafab.folders.check import check_folder, read_folder
+from sbafab.folders.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 ASKED = [

@@ -14,14 +14,14 @@ from typing import Any
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
 from sbafab.cli import main
 from sbafab.errors import DesignError
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.region import Region, disc, strip
 from sbafab.laminate.netlist import compare, parchmint_nets, read_netlist
 from sbafab.rules.finding import Finding
 from sbafab.rules.nets import netlist_findings
-from sbafab.runs.run import RunRequest, generate
 from tests.actuators.test_drawn_nets import ROUTED
 from tests.as_built.doctoring import Doctor
 from tests.designs import PAPER

@@ -19,11 +19,11 @@ from ezdxf.addons import r12export
 from ezdxf.document import Drawing
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
 from sbafab.cutting.properties import Curves, DxfProfile
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import RunRequest, generate
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
-from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 from tests.quick import few
 

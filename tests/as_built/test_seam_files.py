@@ -14,7 +14,7 @@ import tomli_w
 from ezdxf.document import Drawing
 
 from sbafab.api import check_folder, generate, press
-from sbafab.as_built.check import read_folder, rules_as_cut
+from sbafab.folders.check import read_folder, rules_as_cut
 from sbafab.rules.finding import Finding
 from tests.actuators.test_free_layers import WELDED
 from tests.as_built.doctoring import Doctor

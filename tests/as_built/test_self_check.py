@@ -12,8 +12,6 @@ from unittest.mock import patch
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built import check as as_built
-from sbafab.as_built.check import check_folder
 from sbafab.cli.exit import exit_plainly
 from sbafab.cutting import layer_files
 from sbafab.cutting.dxf_read import read_profile
@@ -21,15 +19,17 @@ from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.layer_files import write_layer_files
 from sbafab.cutting.order import cutting_order
 from sbafab.errors import DefectError, OutputError
+from sbafab.folders import artefacts
+from sbafab.folders import check as as_built
+from sbafab.folders.check import check_folder
+from sbafab.folders.manifest import file_hashes
+from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.contour import Contour
 from sbafab.models.figures import Factors, PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.nesting.engines import bottom_left
 from sbafab.nesting.records import NestPart, Placement, Stock
-from sbafab.output import artefacts
-from sbafab.output.manifest import file_hashes
 from sbafab.rules.rule import Explanation, Rule
-from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 FEW = ("stack.balloons=1", "rules.yield_builds=100")

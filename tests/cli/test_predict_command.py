@@ -7,8 +7,8 @@ import json
 from pathlib import Path
 
 import sbafab
-from sbafab.output.manifest import file_hashes
-from sbafab.runs.run import RunRequest, generate
+from sbafab.folders.manifest import file_hashes
+from sbafab.folders.run import RunRequest, generate
 from tests.cli.conftest import Run
 from tests.site.formats import hold
 

@@ -10,8 +10,8 @@ import pytest
 import shapely
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
-from sbafab.runs.run import Run, RunRequest, generate
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import Run, RunRequest, generate
 
 BORDER = 10.0
 SPACING = 2.5

@@ -16,8 +16,8 @@ from ezdxf.document import Drawing
 
 from sbafab.actuators import build, load_design
 from sbafab.api import check_folder, generate
-from sbafab.as_built.check import read_folder
 from sbafab.errors import DesignError
+from sbafab.folders.check import read_folder
 from sbafab.importing.laminates import import_folder
 from sbafab.importing.records import write_imported
 from sbafab.rules.finding import Finding

@@ -10,11 +10,11 @@ from pathlib import Path
 from filelock import FileLock
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import read_folder
-from sbafab.as_built.records import DESIGNED
 from sbafab.design.identity import design_sha256
 from sbafab.errors import DesignError
-from sbafab.runs.run import RunRequest, generate
+from sbafab.folders.check import read_folder
+from sbafab.folders.differences import DESIGNED
+from sbafab.folders.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 from tests.faults import beside, chords, claims, files, holes, joints, layers, masks, sheets
 from tests.faults.record import PAPER, Fault, Kind

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 
 import pytest
 
-from sbafab.as_built.as_cut import CutPart
+from sbafab.folders.as_cut import CutPart
 from tests.faults.catalogue import Goods, good_folders
 from tests.faults.once import remembering
 from tests.shared import shared_folder

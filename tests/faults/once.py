@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from sbafab.as_built import check as as_built
+from sbafab.folders import check as as_built
 from sbafab.orders import build as builds
 
 

@@ -10,10 +10,10 @@ from hashlib import sha256
 from pathlib import Path
 from unittest.mock import patch
 
-from sbafab.as_built import as_cut
-from sbafab.as_built import check as as_built
-from sbafab.as_built.as_cut import CutPart, Expected, read_part
-from sbafab.as_built.check import check_folder
+from sbafab.folders import as_cut
+from sbafab.folders import check as as_built
+from sbafab.folders.as_cut import CutPart, Expected, read_part
+from sbafab.folders.check import check_folder
 from sbafab.geometry.region import Region
 from sbafab.laminate import laminate
 from sbafab.laminate.laminate import Laminate, Layer, Role, interface_regions

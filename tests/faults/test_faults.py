@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.as_built.as_cut import CutPart
-from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.errors import DesignError
+from sbafab.folders.as_cut import CutPart
+from sbafab.folders.differences import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.rules.deck import rule_names
 from tests.faults.catalogue import FAULTS, KINDS, TEMPLATES, Goods, caught_by, cell
 from tests.faults.record import PAPER, Fault

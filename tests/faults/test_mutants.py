@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
 from sbafab.errors import OutputError
-from sbafab.runs.run import RunRequest, generate
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 from tests.faults.harmless import changes_nothing
 from tests.faults.mutants import mutated

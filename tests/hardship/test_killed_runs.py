@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from sbafab.output import swap
-from sbafab.output.swap import replaced_folder
+from sbafab.folders import swap
+from sbafab.folders.swap import replaced_folder
 
 pytestmark = pytest.mark.long
 
@@ -119,7 +119,7 @@ def test_killed_on_either_side_of_the_exchange(
     kill = f"os.kill(os.getpid(), {signal.SIGKILL:d})"
     first, second = (kill, "real(a, b)") if place == "before exchange" else ("real(a, b)", kill)
     before = (
-        "import os; from sbafab.output import swap; real = swap._exchange\n"
+        "import os; from sbafab.folders import swap; real = swap._exchange\n"
         f"swap._exchange = lambda a, b, os=os, real=real: ({first}, {second})"
     )
     ended = runs.run(output.arguments("0.75"), output.folder, before)
@@ -135,7 +135,7 @@ def test_killed_between_two_renames_the_old_folder_comes_back(
     runs: Runs, output: Output, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = (
-        "import os; from pathlib import Path; from sbafab.output import swap\n"
+        "import os; from pathlib import Path; from sbafab.folders import swap\n"
         "swap._exchange = lambda a, b: False\n"
         "rename = Path.rename\n"
         "def once(self, target, rename=rename, os=os):\n"

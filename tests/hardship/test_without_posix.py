@@ -18,9 +18,9 @@ from pathlib import Path
 import pytest
 
 from sbafab.cli import main
+from sbafab.folders import swap
+from sbafab.folders.swap import replaced_folder
 from sbafab.orders.order import SCHEMA
-from sbafab.output import swap
-from sbafab.output.swap import replaced_folder
 from sbafab.simulators import simulator
 
 PACKAGE = Path(__file__).parents[2] / "sbafab"

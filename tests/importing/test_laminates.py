@@ -16,11 +16,11 @@ from sbafab.actuators import build, load_design
 from sbafab.design.files import template_names
 from sbafab.design.identity import design_sha256
 from sbafab.design.laminate_file import FILE, laminate_json
+from sbafab.folders.run import RunRequest, generate
 from sbafab.importing.laminates import import_folder, import_laminate
 from sbafab.importing.records import Written, write_imported
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.deck import run_deck
-from sbafab.runs.run import RunRequest, generate
 from tests.designs import PAPER
 from tests.importing.conftest import Importing
 from tests.properties.designs import Draft, valid

@@ -10,8 +10,8 @@ from pyogrio import raw
 
 from sbafab.actuators import load_design
 from sbafab.cutting.properties import Curves, DxfProfile
+from sbafab.folders.run import Run, RunRequest, generate
 from sbafab.laminate.films import Material
-from sbafab.runs.run import Run, RunRequest, generate
 
 DESIGNS = {"3dof-15mm": 4, "radial-15mm": 2}
 """Balloons by template: as many as go on one sheet of each film."""

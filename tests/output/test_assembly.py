@@ -13,12 +13,12 @@ import pytest
 import trimesh
 from lxml import html as lxml_html
 
-from sbafab.as_built.check import check_folder
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import assembly_sha256, load_assembly
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.output.manifest import file_hashes
-from sbafab.runs.run import Run, RunRequest, generate
+from sbafab.folders.check import check_folder
+from sbafab.folders.manifest import file_hashes
+from sbafab.folders.run import Run, RunRequest, generate
 from tests.quick import few
 from tests.site.formats import hold
 

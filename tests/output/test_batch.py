@@ -9,9 +9,9 @@ import pytest
 from lxml import html as lxml_html
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import Run, RunRequest, generate
 from sbafab.rules.deck import has_failed
-from sbafab.runs.run import Run, RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 COPIES = 5

@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
 from sbafab.assemblies.files import load
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import Curves
 from sbafab.errors import OutputError
+from sbafab.folders.artefacts import RunPart
+from sbafab.folders.check import check_folder
+from sbafab.folders.manifest import file_hashes
+from sbafab.folders.run import Conforming, RunRequest, generate
 from sbafab.meshing.conforming.layup import MeshSettings
-from sbafab.output.artefacts import RunPart
-from sbafab.output.manifest import file_hashes
-from sbafab.runs.run import Conforming, RunRequest, generate
 from tests.quick import few
 
 SMALL = ("stack.balloons=1",)

@@ -11,14 +11,14 @@ import math
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder
 from sbafab.design.identity import kit_of
 from sbafab.design.kits import write_kit
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import Run, RunRequest, generate
 from sbafab.pressing.schedule import schedule
 from sbafab.rules.deck import has_failed
-from sbafab.runs.run import Run, RunRequest, generate
 from sbafab.simulators.calculix.deck import deck_settings
 from sbafab.simulators.coarse import CoarseActuator, round_stack, why_not_round
 from sbafab.simulators.mujoco.run import model_text

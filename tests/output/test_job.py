@@ -11,8 +11,8 @@ from sbafab.actuators import load_design
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.output.manifest import file_hashes
-from sbafab.runs.run import Run, RunRequest, generate
+from sbafab.folders.manifest import file_hashes
+from sbafab.folders.run import Run, RunRequest, generate
 from tests.site.formats import hold
 
 

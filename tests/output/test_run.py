@@ -12,14 +12,14 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder
 from sbafab.design.identity import design_sha256
 from sbafab.design.laminate_file import read_laminate
 from sbafab.errors import OutputError
+from sbafab.folders import artefacts
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import Conforming, RunRequest, generate
 from sbafab.meshing import mesh_files
 from sbafab.meshing.conforming.layup import MeshSettings
-from sbafab.output import artefacts
-from sbafab.runs.run import Conforming, RunRequest, generate
 from tests.quick import few
 
 TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]

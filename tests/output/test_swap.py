@@ -12,9 +12,9 @@ import pytest
 from filelock import FileLock
 
 from sbafab.errors import OutputError
+from sbafab.folders import swap
+from sbafab.folders.swap import replaced_folder
 from sbafab.orders.order import SCHEMA
-from sbafab.output import swap
-from sbafab.output.swap import replaced_folder
 
 
 def write_run(folder: Path, text: str) -> None:
@@ -64,7 +64,8 @@ def test_a_killed_run_leaves_the_old_folder_whole(tmp_path: Path) -> None:
     with replaced_folder(target) as folder:
         write_run(folder, "one")
     script = (
-        "import os, sys; from pathlib import Path; from sbafab.output.swap import replaced_folder\n"
+        "import os, sys; from pathlib import Path\n"
+        "from sbafab.folders.swap import replaced_folder\n"
         "with replaced_folder(Path(sys.argv[1])) as folder:\n"
         "    (folder / 'manifest.json').write_text('half')\n"
         "    os.kill(os.getpid(), 9)\n"

@@ -11,7 +11,7 @@ ROOT = Path(sbafab.__file__).parent
 STATES = {
     "geometry/edges.py": {"Arc", "Line"},
     "models/motion.py": {"Motion", "BatchMotion"},
-    "output/artefacts.py": {"DesignFolder"},
+    "folders/artefacts.py": {"DesignFolder"},
     "rules/voids.py": {"VoidGraph"},
     "studio/app.py": {"Studio"},
     "studio/model.py": {"AnswerShapes"},

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.region import Region, disc
 from sbafab.reports.traveller.lay_up import over_tab
 from sbafab.rules.finding import Finding
-from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 AXIS = (0.0, 0.0)

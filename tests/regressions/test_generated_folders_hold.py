@@ -9,8 +9,8 @@ import ezdxf
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
-from sbafab.runs.run import RunRequest, generate
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import RunRequest, generate
 from tests.quick import few
 
 FEW = ("rules.yield_builds=100", "registration.method=ears")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
-from sbafab.runs.run import RunRequest, generate
+from sbafab.folders.check import check_folder
+from sbafab.folders.run import RunRequest, generate
 
 
 def test_a_tab_no_longer_than_its_fillet_is_found_as_built(tmp_path: Path) -> None:

@@ -14,8 +14,8 @@ from PIL import Image
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.files import load_assembly
+from sbafab.folders.run import RunRequest, generate
 from sbafab.reports.traveller.page import record_text, traveller_html
-from sbafab.runs.run import RunRequest, generate
 from sbafab.version import GENERATOR
 from tests.quick import few
 from tests.reports.pages import work_of

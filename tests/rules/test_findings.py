@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import pytest
 
 import sbafab
+from sbafab.folders.checks import FindingEntry
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, disc, rectangle, strip
 from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Laminate, Pin
-from sbafab.output.checks import FindingEntry
 from sbafab.rules import bond_width, mask_overhang, press_fit
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding, Place

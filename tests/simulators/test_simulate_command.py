@@ -231,7 +231,7 @@ def test_a_result_is_kept_where_its_folder_is_taken_meanwhile(
     tmp_path: Path, risen: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another run has begun while the simulator ran: what was asked before is no longer so."""
-    monkeypatch.setattr("sbafab.runs.run.refuse_busy", lambda target: None)
+    monkeypatch.setattr("sbafab.folders.run.refuse_busy", lambda target: None)
     out = tmp_path / "out"
     out.mkdir()
     with FileLock(out / ".1dof-5mm.lock"):

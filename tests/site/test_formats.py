@@ -12,7 +12,7 @@ import pytest
 import sbafab
 from sbafab.cli import formats, main
 from sbafab.cli.formats import schema_of
-from sbafab.output.artefacts import prediction_json
+from sbafab.folders.artefacts import prediction_json
 from tests.site.formats import hold
 
 ONE = "stack.balloons=1"

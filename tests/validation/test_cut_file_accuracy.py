@@ -9,7 +9,7 @@ import shapely
 
 from sbafab.actuators import load_design
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.runs.run import RunRequest, generate
+from sbafab.folders.run import RunRequest, generate
 
 pyogrio = pytest.importorskip("pyogrio", reason="pyogrio is not installed")
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.folders.run import RunRequest, generate
 from sbafab.rules.registration_yield import simulate
-from sbafab.runs.run import RunRequest, generate
 from tests.judge.yields import judged_yield
 from tests.quick import few
 

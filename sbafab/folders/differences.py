@@ -1,4 +1,4 @@
-"""Differences of two files: bytes first, then contents.
+"""Problems of a folder's files, and differences of two files: bytes first, then contents.
 
 Another program or another version of a library may write the same contents in other bytes.
 """
@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import base64
 import csv
+import hashlib
 import json
 import math
 import re
 import tomllib
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 from zipfile import ZipFile
@@ -20,14 +23,15 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.as_built.as_cut import check_sequence, sound_digest
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.machine_files import PROGRAMS, rdworks_difference
+from sbafab.cutting.properties import CUT_SEQUENCE
 from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.errors import OutputError
+from sbafab.folders.swap import CUT_FOLDERS
 from sbafab.meshing.surface import Surface, open_edges
-from sbafab.output.swap import CUT_FOLDERS
+from sbafab.rules.finding import Finding, Place, Verdict
 
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-6, 1e-6
 """Tolerances of numbers, since libraries round differently."""
@@ -40,6 +44,91 @@ COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 PICTURE = re.compile(r"data:image/png;base64,([A-Za-z0-9+/=\s]+)")
 LONGEST_SHOWN = 40
+
+INTEGRITY = "file-integrity"
+CLAIMS = "manifest-claims"
+DESIGNED = "as-designed"
+MAX_SHOWN = 12
+"""Problems of a rule that are reported one by one."""
+MAX_BYTES = 20_000_000
+MAX_ENTITIES = 300_000
+"""Entities and points of a cut file: more would take minutes to check."""
+MARK = re.compile(rb"\n *1?0\r?\n")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A fault outside the rule deck."""
+
+    rule: str
+    message: str
+    layers: tuple[int, ...] = ()
+    interface: int | None = None
+    x: float | None = None
+    y: float | None = None
+    verdict: Verdict = "fail"
+
+
+def findings_of(rule: str, problems: Sequence[Problem], passed: str) -> list[Finding]:
+    """Return the findings of a rule: at most MAX_SHOWN problems in full, or one that passes."""
+    rule_problems = [problem for problem in problems if problem.rule == rule]
+    if not any(problem.verdict == "fail" for problem in rule_problems):
+        rule_problems.append(Problem(rule, passed, verdict="pass"))
+    shown, rest = rule_problems[:MAX_SHOWN], rule_problems[MAX_SHOWN:]
+    if rest:
+        layers = tuple(dict.fromkeys(index for problem in rest for index in problem.layers))
+        message = f"and {len(rest)} more like these"
+        failed = any(problem.verdict == "fail" for problem in rest)
+        shown.append(
+            Problem(rule=rule, message=message, layers=layers, verdict="fail" if failed else "warn")
+        )
+    return [_finding(problem) for problem in shown]
+
+
+def _finding(problem: Problem) -> Finding:
+    place = Place(problem.interface, problem.layers, problem.x, problem.y)
+    return Finding(problem.rule, problem.verdict, None, None, "", place, problem.message)
+
+
+# Files that are sound.
+
+
+def sound_digest(path: Path) -> str:
+    """Return the sha256 of a file. Raises OutputError if it is missing, unreadable or too large."""
+    try:
+        # Reading a pipe or a device would never end.
+        if path.exists() and not path.is_file():
+            raise OutputError("no plain file; regenerate it")
+        if path.stat().st_size > MAX_BYTES:
+            raise OutputError(f"larger than {MAX_BYTES:,} bytes; regenerate it")
+        data = path.read_bytes()
+        # Each mark is on a separate line, and counting lines is fast.
+        is_long = data.count(b"\n") > MAX_ENTITIES
+        marks = sum(1 for _ in MARK.finditer(data)) if is_long else 0
+        if marks > MAX_ENTITIES:
+            raise OutputError(
+                f"drawn with {marks:,} entities and points, where at most {MAX_ENTITIES:,} may be"
+            )
+        return hashlib.sha256(data).hexdigest()
+    except (FileNotFoundError, NotADirectoryError):
+        raise OutputError("missing; regenerate it") from None
+    except OSError as error:
+        if isinstance(error, OutputError):
+            raise
+        raise OutputError(f"cannot be read ({error.strerror or error}); regenerate it") from None
+
+
+def check_sequence(drawing: ReadBack) -> None:
+    """Raise OutputError if an outline is cut before a hole, or any other layer out of sequence."""
+    ranks = [CUT_SEQUENCE.index(layer) for layer in drawing.layers if layer in CUT_SEQUENCE]
+    for before, after in pairwise(ranks):
+        if before > after:
+            raise OutputError(
+                f"{CUT_SEQUENCE[before]} is cut before {CUT_SEQUENCE[after]}; regenerate it"
+            )
+
+
+# Two files compared.
 
 
 def file_difference(actual: Path, expected: Path, name: str) -> str:

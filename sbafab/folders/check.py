@@ -18,35 +18,6 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from sbafab.actuators import load_design
-from sbafab.as_built.as_cut import (
-    ExpectedLaminate,
-    LayerFile,
-    chords_for_arc,
-    expected_laminate,
-    laminate_as_cut,
-    layer_departures,
-    path_in_folder,
-    read_layers,
-    read_seams,
-)
-from sbafab.as_built.differences import (
-    bodies,
-    file_difference,
-    has_lost_properties,
-    index_difference,
-    unreadable,
-)
-from sbafab.as_built.records import (
-    CLAIMS,
-    DESIGNED,
-    INTEGRITY,
-    Problem,
-    findings_of,
-    is_assembly,
-    is_job,
-    read_claims,
-    read_job,
-)
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.checks import run_checks
 from sbafab.assemblies.files import DESIGN_FILE, load_assembly
@@ -56,13 +27,7 @@ from sbafab.cutting.properties import curves_of
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, GeometryError, OutputError
-from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.netlist import read_netlist
-from sbafab.models.figures import PredictionRequest
-from sbafab.models.prediction import predict
-from sbafab.orders.build import Build, make_build
-from sbafab.orders.order import SCHEMA, Order, of_assembly
-from sbafab.output.artefacts import (
+from sbafab.folders.artefacts import (
     ARTEFACTS,
     EVERYTHING,
     PAGES,
@@ -74,10 +39,49 @@ from sbafab.output.artefacts import (
     write_nested_sheets,
     write_plates,
 )
-from sbafab.output.carry_over import MESH, PREDICTION, PRESS
-from sbafab.output.folder import write_design, write_folder
-from sbafab.output.manifest import JobManifest, Manifest, as_json, file_hashes, file_names
-from sbafab.output.swap import is_among_cut_files
+from sbafab.folders.as_cut import (
+    ExpectedLaminate,
+    LayerFile,
+    chords_for_arc,
+    expected_laminate,
+    laminate_as_cut,
+    layer_departures,
+    path_in_folder,
+    read_layers,
+    read_seams,
+)
+from sbafab.folders.carry_over import MESH, PREDICTION, PRESS
+from sbafab.folders.differences import (
+    CLAIMS,
+    DESIGNED,
+    INTEGRITY,
+    Problem,
+    bodies,
+    file_difference,
+    findings_of,
+    has_lost_properties,
+    index_difference,
+    unreadable,
+)
+from sbafab.folders.folder import write_design, write_folder
+from sbafab.folders.manifest import (
+    JobManifest,
+    Manifest,
+    as_json,
+    file_hashes,
+    file_names,
+    is_assembly,
+    is_job,
+    read_claims,
+    read_job,
+)
+from sbafab.folders.swap import is_among_cut_files
+from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.netlist import read_netlist
+from sbafab.models.figures import PredictionRequest
+from sbafab.models.prediction import predict
+from sbafab.orders.build import Build, make_build
+from sbafab.orders.order import SCHEMA, Order, of_assembly
 from sbafab.process import ignore_progress
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding, Place, Verdict

@@ -11,10 +11,10 @@ from typing import Any
 from sbafab.design.files import shown
 from sbafab.design.records import Design, dotted, resolved
 from sbafab.errors import OccupiedError, OutputError
+from sbafab.folders.artefacts import ARTEFACTS, tops_of
+from sbafab.folders.manifest import carried_over, file_hash, file_names, identity
+from sbafab.folders.swap import listed_files, read_manifest
 from sbafab.orders.build import Build
-from sbafab.output.artefacts import ARTEFACTS, tops_of
-from sbafab.output.manifest import carried_over, file_hash, file_names, identity
-from sbafab.output.swap import listed_files, read_manifest
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 
 CUT = tops_of("cut")

@@ -14,10 +14,7 @@ from sbafab.assemblies.records import Cup
 from sbafab.assemblies.shapes import colours, cup_mould, linear, placed_surface
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DefectError
-from sbafab.meshing.formats import Node, write_scene, write_stl
-from sbafab.nesting.records import Nest
-from sbafab.orders.order import SCHEMA, Order
-from sbafab.output.artefacts import (
+from sbafab.folders.artefacts import (
     BENCH,
     FINDINGS,
     TRAVELLER,
@@ -29,8 +26,11 @@ from sbafab.output.artefacts import (
     write_nested_sheets,
     write_text,
 )
-from sbafab.output.checks import checks
-from sbafab.output.manifest import AssemblyManifest, as_json, file_hashes, job_manifest, manifest
+from sbafab.folders.checks import checks
+from sbafab.folders.manifest import AssemblyManifest, as_json, file_hashes, job_manifest, manifest
+from sbafab.meshing.formats import Node, write_scene, write_stl
+from sbafab.nesting.records import Nest
+from sbafab.orders.order import SCHEMA, Order
 from sbafab.process import Progress
 
 SOLID = "mesh/assembled.glb"

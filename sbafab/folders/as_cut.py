@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
-from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY, Problem
 from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.properties import (
     CUT_INNER,
     CUT_OUTER,
-    CUT_SEQUENCE,
     CutSettings,
     chord_error_of,
     file_properties,
@@ -39,6 +34,14 @@ from sbafab.cutting.seam_files import (
 from sbafab.cutting.verify import check_contours, check_datum
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, GeometryError, OutputError
+from sbafab.folders.differences import (
+    CLAIMS,
+    DESIGNED,
+    INTEGRITY,
+    Problem,
+    check_sequence,
+    sound_digest,
+)
 from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import Arc, Point, edge_from_bulge
 from sbafab.geometry.offset import Kerf, shrink, widths
@@ -54,10 +57,6 @@ from sbafab.rules.measures import Measures
 
 AGREEMENT = 2 * TOLERANCE
 """Largest distance of two contours that are each within TOLERANCE of the expected one, mm."""
-MAX_BYTES = 20_000_000
-MAX_ENTITIES = 300_000
-"""Entities and points of a cut file: more would take minutes to check."""
-MARK = re.compile(rb"\n *1?0\r?\n")
 DATUM = "LINE"
 """Entity of the datum cross, the only one in a layer file beside its contours."""
 
@@ -292,31 +291,6 @@ def path_in_folder(folder: Path, file: str | None) -> Path:
     return folder / pure
 
 
-def sound_digest(path: Path) -> str:
-    """Return the sha256 of a file. Raises OutputError if it is missing, unreadable or too large."""
-    try:
-        # Reading a pipe or a device would never end.
-        if path.exists() and not path.is_file():
-            raise OutputError("no plain file; regenerate it")
-        if path.stat().st_size > MAX_BYTES:
-            raise OutputError(f"larger than {MAX_BYTES:,} bytes; regenerate it")
-        data = path.read_bytes()
-        # Each mark is on a separate line, and counting lines is fast.
-        is_long = data.count(b"\n") > MAX_ENTITIES
-        marks = sum(1 for _ in MARK.finditer(data)) if is_long else 0
-        if marks > MAX_ENTITIES:
-            raise OutputError(
-                f"drawn with {marks:,} entities and points, where at most {MAX_ENTITIES:,} may be"
-            )
-        return hashlib.sha256(data).hexdigest()
-    except (FileNotFoundError, NotADirectoryError):
-        raise OutputError("missing; regenerate it") from None
-    except OSError as error:
-        if isinstance(error, OutputError):
-            raise
-        raise OutputError(f"cannot be read ({error.strerror or error}); regenerate it") from None
-
-
 def read_part(
     path: Path,
     has_chords: bool = False,
@@ -382,16 +356,6 @@ def _check_drawn(drawing: ReadBack) -> None:
             )
     check_datum(drawing)
     check_sequence(drawing)
-
-
-def check_sequence(drawing: ReadBack) -> None:
-    """Raise OutputError if an outline is cut before a hole, or any other layer out of sequence."""
-    ranks = [CUT_SEQUENCE.index(layer) for layer in drawing.layers if layer in CUT_SEQUENCE]
-    for before, after in pairwise(ranks):
-        if before > after:
-            raise OutputError(
-                f"{CUT_SEQUENCE[before]} is cut before {CUT_SEQUENCE[after]}; regenerate it"
-            )
 
 
 def read_seams(

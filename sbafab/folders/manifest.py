@@ -10,9 +10,9 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.properties import CutSettings, layer_path, said_of
@@ -20,6 +20,8 @@ from sbafab.cutting.seam_files import seam_path
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.identity import citation, design_sha256
 from sbafab.design.records import Design
+from sbafab.errors import OutputError
+from sbafab.folders.swap import read_manifest
 from sbafab.geometry.offset import Kerf
 from sbafab.laminate.assembly import laying
 from sbafab.laminate.films import Film, Material
@@ -28,7 +30,7 @@ from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, 
 from sbafab.meshing.mesh_files import MeshFile
 from sbafab.models.formulas import sizes
 from sbafab.orders.build import Build, warnings
-from sbafab.orders.order import SCHEMA, BatchSchema
+from sbafab.orders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, BatchSchema
 from sbafab.pressing.cycles import Runs
 from sbafab.version import GENERATOR
 
@@ -564,3 +566,73 @@ def identity(build: Build) -> dict[str, Any]:
 def carried_over(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
     """True if files of the old run belong to the new one's design and version."""
     return all(old.get(key) == new.get(key) for key in ("design_sha256", "generator", "waived"))
+
+
+# Manifests of folders read.
+
+
+MAX_MANIFEST_BYTES = 50_000_000
+
+
+def read_claims(folder: Path) -> Manifest:
+    """Return the manifest of an output folder. Raises OutputError if it is missing or unsound."""
+    return _read(folder, Manifest, SCHEMA)
+
+
+def is_job(folder: Path) -> bool:
+    """Return True if a folder holds several designs, of a job or an assembly."""
+    path = folder / "manifest.json"
+    try:
+        is_small = path.is_file() and path.stat().st_size <= MAX_MANIFEST_BYTES
+    except OSError:
+        return False
+    return is_small and (read_manifest(folder) or {}).get("schema") in (JOB_SCHEMA, ASSEMBLY_SCHEMA)
+
+
+def read_job(folder: Path) -> JobManifest:
+    """Return the manifest of a job's folder. Raises OutputError as ``read_claims`` does."""
+    return _read(folder, JobManifest, JOB_SCHEMA)
+
+
+def is_assembly(job: JobManifest) -> bool:
+    """Return True if a job's designs are the parts of an assembly."""
+    return job.schema_name == ASSEMBLY_SCHEMA
+
+
+def read_assembly(folder: Path) -> AssemblyManifest:
+    """Return the manifest of an assembly's folder. Raises OutputError as ``read_claims`` does."""
+    return _read(folder, AssemblyManifest, ASSEMBLY_SCHEMA)
+
+
+Read = TypeVar("Read", Manifest, JobManifest, AssemblyManifest)
+
+
+def _read(folder: Path, kind: type[Read], schema: str) -> Read:
+    path = folder / "manifest.json"
+    try:
+        # Reading a pipe or a device would never end.
+        if path.exists() and not path.is_file():
+            raise OutputError(f"{path} is no plain file; regenerate the folder")
+        if path.stat().st_size > MAX_MANIFEST_BYTES:
+            raise OutputError(
+                f"{path} is larger than {MAX_MANIFEST_BYTES:,} bytes; regenerate the folder"
+            )
+        data = path.read_bytes()
+    except (FileNotFoundError, NotADirectoryError):
+        raise OutputError(
+            f"{folder} holds no manifest.json; give a folder that sbafab generate has written"
+        ) from None
+    except OSError as error:
+        if isinstance(error, OutputError):
+            raise
+        raise OutputError(f"{path} cannot be read: {error.strerror or error}") from None
+    try:
+        return kind.model_validate_json(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        reason = first["msg"][:1].lower() + first["msg"][1:]
+        fault = f"{where}: {reason}" if where else reason
+        raise OutputError(
+            f"{path} is not a sound {schema}: {fault}; regenerate the folder with sbafab generate"
+        ) from None
