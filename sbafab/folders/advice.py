@@ -1,4 +1,4 @@
-"""What a design needs for a yield: bond and overhang, the order of stacking, plate, registration.
+"""Changes of a design that reach a yield: bond and overhang, order of stacking, plate, registration.
 
 ``advise`` says the least bond and overhang, ``reach_yield`` changes a design as little as it needs.
 Every trial is built and counted like the design itself; the result is counted again with another
@@ -36,15 +36,15 @@ OTHERWISE = {
     "channel-pin": 'registration.method = "ears" pins every film',
     "ears": "smaller registration.hand_turn and registration.hand_placement do",
 }
-"""What reaches a yield that bond and overhang do not, by registration method."""
+"""The remedy if bond and overhang reach no yield, by registration method."""
 
 
 @dataclass(frozen=True)
 class Advice:
     """The least ``bond`` and ``overhang`` (mm) that reach ``target``, and the share of good builds
-    that another seed gives them; None where none does.
+    that another seed gives them; None if none reaches it.
 
-    A design whose bonds and overhangs are drawn takes neither: its share is that of it as drawn.
+    A design whose bonds and overhangs are drawn takes neither: its share is counted as drawn.
     """
 
     target: float
@@ -109,10 +109,10 @@ def advise(design: Design, target: float, progress: Progress = ignore_progress) 
 
 @dataclass(frozen=True)
 class YieldDesign:
-    """A design for a yield: ``design`` is ``given`` with the ``changes``, by key; None where no
+    """A design for a yield: ``design`` is ``given`` with the ``changes``, by key; None if no
     change reaches the share ``target``.
 
-    ``share`` is that of the changed design by another seed, or of the one given where that is
+    ``share`` is counted on the changed design by another seed, or on the given one if that is
     enough; ``best`` and ``best_changes`` are the best that was reached where nothing is enough.
     ``fixed``: keys that were not changed although a change might have helped.
     """
@@ -128,7 +128,7 @@ class YieldDesign:
 
     @property
     def sentence(self) -> str:
-        """What was changed and what that reaches; why nothing is, where the target is too high."""
+        """The changes and the yield they reach, or why no change reaches the target."""
         if self.design is None:
             return self._too_high()
         if self.share is None:
@@ -265,7 +265,7 @@ Outcome = Literal["short", "reached", "impossible"]
 
 
 class Steps(NamedTuple):
-    """By how many steps bond and overhang are wider than at the start."""
+    """Steps by which bond and overhang are wider than at the start."""
 
     bond: int
     overhang: int
@@ -306,7 +306,7 @@ class _Trials:
         return self.design.with_(self.lengths(steps))
 
     def counted(self, steps: Steps, seed: int) -> Share | None:
-        """The share of good builds; None where such a design cannot be built."""
+        """The share of good builds; None if such a design cannot be built."""
         try:
             design = self._changed(steps)
             laminate = build(design)
@@ -317,7 +317,7 @@ class _Trials:
     def share(self, steps: Steps) -> Share | None:
         """The share by the seed of the rule, counted once."""
         if steps not in self.shares:
-            # How many it takes nobody knows.
+            # The number of trials is not known in advance.
             self.progress(
                 f"bond and overhang that reach the yield, trial {len(self.shares) + 1}", 0, 0
             )

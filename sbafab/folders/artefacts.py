@@ -1,4 +1,4 @@
-"""The files of a design's folder: one table, a row a file or folder, and what writes each.
+"""The files of a design's folder: one table with a row for each file or folder.
 
 Adding an output file takes one row of ``ARTEFACTS`` and the function that renders it, which imports
 pictures and pages itself: a run of some parts loads none of them.
@@ -63,10 +63,10 @@ PICTURES_OF_A_DESIGN = 3
 
 
 RunPart = Literal["cut", "press", "mesh", "preview", "predict"] | Name
-"""What a run writes of a design: by rules and geometry, by models, or for a simulator."""
+"""Parts of a design's folder: by rules and geometry, by models, or for a simulator."""
 EVERYTHING: tuple[RunPart, ...] = ("cut", "press", "mesh", "preview")
 PICTURES: tuple[RunPart, ...] = ("preview",)
-"""What is left, beside the findings, of a design that is not to be cut."""
+"""Parts of a design that must not be cut, beside the findings."""
 
 
 @dataclass
@@ -115,7 +115,7 @@ class DesignFolder:
 
     @cached_property
     def work(self) -> Work:
-        """What the pages for the bench are made from."""
+        """The work that the pages for the bench show."""
         return work_of(self.build, self.sheets)
 
     @cached_property
@@ -131,7 +131,7 @@ class DesignFolder:
 class Artefact:
     """A file or folder of a design's folder.
 
-    ``part`` of a run has it written, "" every run; ``needs``: further parts without which it is
+    ``part`` of a run has it written, "" every run; ``needs``: further parts; without them it is
     left out. ``render`` returns the file's contents, or writes a folder itself and returns None;
     without one it is written for all designs of a job together. ``schema``: the id of its format,
     if programs may rely on it. ``is_page``: an assembly has one for all its designs.
@@ -515,6 +515,6 @@ ARTEFACTS: tuple[Artefact, ...] = (
         _design,
     ),
 )
-"""All that lies in a design's folder beside its index, in the order of writing."""
+"""All files of a design's folder but its index, in the order of writing."""
 PAGES = tuple(row.path for row in ARTEFACTS if row.is_page)
-"""Pages, of which an assembly has one for all its designs."""
+"""Pages; an assembly has one of each for all its designs."""

@@ -253,7 +253,7 @@ def laminate_as_cut(files: Sequence[LayerFile], laminate: Laminate) -> Laminate:
     for layer, part in zip(laminate.layers, parts, strict=True):
         region = part.region
         if not part.is_expected:
-            # As it lies: turned over, or its half of a folded film.
+            # As assembled: turned over, or its half of a folded film.
             root = laminate.cut_with(layer)
             region = region.mirrored() if laminate.layer(root).turned else region
             if root in roots:

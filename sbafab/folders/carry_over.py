@@ -24,7 +24,7 @@ PREDICTION = tops_of("predict")
 MOST_KEYS = 3
 """Keys that a message names, at most."""
 RESULTS = "result.json"
-"""Of a simulator's folder that has run, not only got its input."""
+"""Result of a simulator; a folder without it holds input only."""
 WORTH_KEEPING = {*CUT, *PRESS, *MESH, *PREDICTION, *SIMULATORS}
 """Files and folders that a design which breaks a rule does not get."""
 WHOLE = {"layers", "sheets", "preview", "predict"}

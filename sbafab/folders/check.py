@@ -1,8 +1,8 @@
 """``sbafab check FOLDER``: an output folder read, and made again from its design to be compared.
 
-Hashes and the manifest are compared, the layers are read and the rules run on what lies there, and
-every other file is compared with that of a folder made again from ``design.toml``; the places of
-parts on film sheets are those of ``nest.json``.
+Hashes and the manifest are compared, the layers are read and the rules run on them as cut, and
+every other file is compared with its like in a folder made again from ``design.toml``; parts take
+their places on film sheets from ``nest.json``.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
     whether all files are what the design makes; with ``nets``, a file, also whether the layers join
     what that netlist lists.
 
-    Of a job's folder, those of every design, and of the film sheets they share. Raises OutputError
+    In a job's folder all designs are checked, and the film sheets they share. Raises OutputError
     for a folder without a sound manifest or without cut files, DesignError for a netlist that
     cannot be read, or one of a job.
     """
@@ -510,7 +510,7 @@ def _read_index(path: Path) -> dict[str, Any]:
 def _index_problems(
     folder: Path, index: Mapping[str, Any], left_out: Collection[str]
 ) -> list[Problem]:
-    """Return the first difference of the manifest from that of the folder made again."""
+    """Return the first difference of the manifest from the one made again."""
     actual, expected = _read_index(folder / INDEX), json.loads(as_json(index))
     difference = index_difference(actual, expected, left_out)
     if not difference and "meshes" in left_out:

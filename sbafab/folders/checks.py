@@ -16,7 +16,7 @@ Micrometres = Annotated[float, AfterValidator(lambda value: round(value, 4))]
 
 
 class PlaceEntry(Document):
-    """Where a value was found."""
+    """The place of a value."""
 
     interface: int | None
     """counted from 1, bottom to top"""
@@ -61,7 +61,7 @@ class AdviceEntry(Document):
 
 
 class Checks(Document, schema="sbafab/checks@1"):
-    """What the rules found, as ``checks.json`` holds it."""
+    """The findings, as ``checks.json`` holds them."""
 
     design: str
     """name of the design or assembly, or the folder's path"""

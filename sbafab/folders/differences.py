@@ -178,7 +178,7 @@ def _is_cut(path: Path) -> bool:
 def index_difference(actual: Any, expected: Any, left_out: Collection[str]) -> str:
     """Return the first difference of two manifests, except the keys ``left_out``; "" if none."""
     if not isinstance(actual, dict):
-        return "it is no index"
+        return "it is not an index"
     actual_index, expected_index = (
         {key: value for key, value in index.items() if key not in left_out}
         for index in (actual, expected)

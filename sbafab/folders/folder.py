@@ -215,7 +215,7 @@ def _material(placed: PlacedPart) -> str:
 
 
 def _claims(assembled: Assembled) -> dict[str, Any]:
-    """Return the keys of an assembly's manifest beyond those of a job."""
+    """Return the keys of an assembly's manifest that a job's lacks."""
     return {
         "family": assembled.assembly.family,
         "design_sha256": assembly_sha256(assembled),
@@ -228,7 +228,7 @@ def _bench_pages(
     order: Order, assembled: Assembled, sheets: Sequence[SheetFile], picture: bytes
 ) -> tuple[str, str]:
     """Return the traveller and the page of the bench."""
-    # Nor has it the pages of an assembly, whose modules take 0.1 s to load.
+    # Pages of an assembly: their modules take 0.1 s to load.
     from sbafab.reports.traveller.assembly_page import AssemblyWork, assembly_html
     from sbafab.reports.traveller.bench import bench_html
 

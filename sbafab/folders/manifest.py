@@ -140,7 +140,7 @@ class _FilmNeed(_OfFilm):
 
 
 class FilmUseClaim(_OfFilm):
-    """Sheets of a film and their area in mm2; nothing where there are none."""
+    """Sheets of a film and their area in mm2; zeros without sheets."""
 
     sheets: int = 0
     sheet_area: float = 0.0
@@ -277,7 +277,7 @@ class JobManifest(_Claim):
 
 
 class AssemblyManifest(JobManifest):
-    """``manifest.json`` of an assembly: that of a job, with the parts and their places."""
+    """``manifest.json`` of an assembly: a job's, with the parts and their places."""
 
     family: str
     design_sha256: str
@@ -303,7 +303,7 @@ def manifest(
 ) -> dict[str, Any]:
     """Return the manifest of a design's folder, without the hashes of its files.
 
-    ``is_cut``: it has cut files; ``statistics`` are those of conforming meshes.
+    ``is_cut``: it has cut files; ``statistics`` describe conforming meshes.
     """
     design, laminate = build.design, build.laminate
     curves = said_of(build.curves) if is_cut else None
@@ -375,7 +375,7 @@ def job_manifest(
 ) -> dict[str, Any]:
     """Return the manifest of the folder of several designs, without the hashes of its files.
 
-    ``settings`` are those of the shared ``sheets``.
+    ``settings`` belong to the shared ``sheets``.
     """
     return JobManifest(
         schema=schema,

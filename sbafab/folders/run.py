@@ -115,7 +115,7 @@ class Run:
 
     @property
     def laminate(self) -> Laminate:
-        """The laminate, that of the first design of several."""
+        """The laminate, of several designs the first one's."""
         return self.builds[0].laminate
 
     @property
@@ -242,7 +242,7 @@ UNITS = {
     "time": "s",
     "rate": "steps/s",
 }
-"""Of the values in ``result.json``."""
+"""Units of the values in ``result.json``."""
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from sbafab.orders.order import SCHEMA, SCHEMAS
 
 MANIFEST = "manifest.json"
 CUT_FOLDERS = ("layers", "sheets")
-"""Where a file of somebody else would be cut together with those of the run."""
+"""Folders in which a foreign file would be cut together with the run's."""
 SYSTEM_FILES = (".DS_Store", "Thumbs.db", "desktop.ini")
-"""What file managers leave in a folder that is looked at; no laser program opens them."""
+"""Files that file managers leave in folders; no laser program opens them."""
 BEGUN, ASIDE = ".part", ".old.part"
 """Endings of a folder that is being written, and of an old one that is moved out of its way."""
 LONGEST_SHOWN = 120

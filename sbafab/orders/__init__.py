@@ -1,4 +1,4 @@
-"""Builds and orders: a design with all that follows from it, and what is made together.
+"""Builds and orders: a design with its results, and designs that are made together.
 
 In: a ``Design``, several, or an ``Assembly``. Out: a ``Build`` with its laminate, findings, cut
 paths and press schedule, each computed when first asked for; an ``Order`` of builds with their

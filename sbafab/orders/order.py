@@ -28,30 +28,30 @@ from sbafab.rules.finding import Finding
 
 SCHEMA: Final = "sbafab/manifest@1"
 JOB_SCHEMA: Final = "sbafab/job@1"
-"""Of a folder that holds several designs cut together."""
+"""Schema of a folder with several designs cut together."""
 ASSEMBLY_SCHEMA: Final = "sbafab/assembly@1"
-"""Of a folder that holds the designs of an assembly, cut together."""
+"""Schema of a folder with the designs of an assembly, cut together."""
 SCHEMAS = (SCHEMA, JOB_SCHEMA, ASSEMBLY_SCHEMA)
 BatchSchema = Literal["sbafab/job@1", "sbafab/assembly@1"]
 Schema = Literal["sbafab/manifest@1"] | BatchSchema
-"""Of a folder's ``manifest.json``."""
+"""Schema of a folder's ``manifest.json``."""
 RESERVED = {
     "sheets": "the job's folder of film sheets",
     "manifest.json": "the job's index",
 }
-"""What lies in a job's folder beside those of its designs."""
+"""Names in a job's folder that no design may have."""
 SHARED = ("films", "sheets", "laser")
 """Sections that must be alike in all designs that are cut from the same film."""
 MOST_BYTES = 50_000_000
-"""Of saved places; more are not read but searched for again."""
+"""Limit of saved places; a larger file is not read, and places are searched for again."""
 
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """What is made together into one folder: the builds of a design, of several, or of the parts of
+    """Builds made together into one folder: those of a design, of several, or of the parts of
     an assembly.
 
-    ``schema`` is that of the folder's manifest. ``between``: the findings between the parts of an
+    ``schema`` identifies the folder's manifest. ``between``: the findings between the parts of an
     assembly, None for designs.
     """
 
@@ -127,7 +127,7 @@ def make_order(
     progress: Progress | None = None,
     curves: Curves = TRUE_ARCS,
 ) -> Order:
-    """Check a design, an assembly and what lies between its parts, or the designs of job ``name``.
+    """Check a design, an assembly with the space between its parts, or the designs of job ``name``.
 
     Raises DesignError if one cannot be built, or if the film sheets, kerf or machine of several are
     not equal.
@@ -222,7 +222,7 @@ def _nested(parts: Sequence[NestPart], design: Design) -> tuple[Nest, ...]:
 
 
 def _saved(parts: Sequence[NestPart], design: Design, path: Path) -> tuple[Nest, ...] | None:
-    """Return the places of an earlier run; None where none are sound and for these parts."""
+    """Return the places of an earlier run; None if none are sound and for these parts."""
     try:
         if not path.is_file() or path.stat().st_size > MOST_BYTES:
             return None
