@@ -1,4 +1,4 @@
-"""Changes of a design that reach a yield: bond and overhang, order of stacking, plate, registration.
+"""Changes of a design that reach a yield: bond, overhang, order of stacking, plate, registration.
 
 ``advise`` says the least bond and overhang, ``reach_yield`` changes a design as little as it needs.
 Every trial is built and counted like the design itself; the result is counted again with another
