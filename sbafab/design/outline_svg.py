@@ -406,8 +406,9 @@ def _refuse_length(name: str, key: str, text: str) -> None:
 def _path_data(text: str) -> str:
     """Return the data of a path as the library reads it. Raises DesignError if it is damaged."""
     text = text.strip(WHITE).removeprefix("none")
-    # A letter and seven numbers make the longest segment, an arc.
-    refuse_more_than_limit(len(_NUMBER.findall(text)) // 8)
+    # A letter and seven numbers make the longest segment, an arc; a closing is its letter alone.
+    closings = text.count("z") + text.count("Z")
+    refuse_more_than_limit(len(_NUMBER.findall(text)) // 8 + closings)
     if text and text[0] not in "Mm":
         raise DesignError("has <path> with d that does not begin with a move; draw it again")
     return _UNLIKE.sub(r"\g<0>l0 0", _sound(_PATH, text, "<path> with d", DRAW_AGAIN))

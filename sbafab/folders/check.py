@@ -8,6 +8,7 @@ their places on film sheets from ``nest.json``.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -466,8 +467,10 @@ def _compared(folder: Path, fresh: Path, listed: Collection[str], generator: str
         if name == INDEX or is_layer or not _is_compared(name, generator):
             continue
         rule, found = DESIGNED, folder / name
-        if name not in listed or not found.is_file():
+        if name not in listed or not os.path.lexists(found):
             difference = f"{name} is missing"
+        elif not found.is_file():
+            rule, difference = INTEGRITY, f"{name}: no plain file"
         elif name.endswith(f"/{INDEX}"):
             rule = CLAIMS
             difference = index_difference(_read_index(found), _read_index(path), ("files",))

@@ -113,7 +113,7 @@ FILES: dict[str, tuple[Change, str]] = {
     "lines": (drawing("  0\nLINE\n"), "entities and points, where at most"),
     "pipe": (replaced(os.mkfifo), "no plain file"),
     "device": (replaced(lambda path: path.symlink_to("/dev/zero")), "no plain file"),
-    "link to itself": (replaced(lambda path: path.symlink_to(path)), "cannot be read"),
+    "link to itself": (replaced(lambda path: path.symlink_to(path)), "no plain file"),
     "folder": (replaced(Path.mkdir), "no plain file"),
 }
 

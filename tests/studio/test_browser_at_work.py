@@ -280,6 +280,7 @@ def test_phone_width(chrome: Any, link: str, scheme: str) -> None:
     assert watched.say("document.documentElement.scrollWidth") <= 390
     page.evaluate("text => studio.open(text)", api.template("pouch"))
     watched.ready()
+    page.get_by_role("button", name="Views").click()
     for name in ("Draw", "Nets"):
         page.get_by_role("tab", name=name).click()
         assert watched.say("document.documentElement.scrollWidth") <= 390
