@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.dxf_read import ReadBack, read_profile
-from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.properties import (
     CUT_INNER,
     CUT_OUTER,
@@ -49,6 +48,7 @@ from sbafab.geometry.region import Region, centroid
 from sbafab.laminate.folding import halves
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.orders.build import Build
 from sbafab.rules import registration_yield
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding
@@ -112,14 +112,10 @@ class ExpectedLaminate(NamedTuple):
         return [Expected(layer.profile, self.paths[layer.pattern]) for layer in layers]
 
 
-def expected_laminate(laminate: Laminate, settings: CutSettings) -> ExpectedLaminate:
-    """Return a laminate and its paths as drawn by the settings; with chords, the laminate that
-    these cut.
-    """
-    paths = compensated_paths(laminate, settings)
-    if settings.curves.in_chords:
-        laminate = as_cut(laminate, paths, settings)
-    return ExpectedLaminate(laminate, paths)
+def expected_laminate(build: Build) -> ExpectedLaminate:
+    """Return the laminate and paths of a build; with chords, the laminate that these cut."""
+    laminate = as_cut(build) if build.curves.in_chords else build.laminate
+    return ExpectedLaminate(laminate, build.paths)
 
 
 def departure(path: Region, expected: Region) -> str:
@@ -535,13 +531,11 @@ def _circle(a: Point, b: Point, c: Point) -> tuple[Point, float] | None:
 # Laminates cut in chords, against their limits.
 
 
-def refuse_coarse(
-    laminate: Laminate, paths: Mapping[str, Region], settings: CutSettings, design: Design
-) -> None:
-    """Raise DesignError if a passing laminate fails a rule when its ``paths`` are cut in chords."""
-    error = settings.curves.chord_error
+def refuse_coarse(build: Build) -> None:
+    """Raise DesignError if a passing laminate fails a rule when its paths are cut in chords."""
+    error = build.curves.chord_error
     try:
-        failed = _first_failure(as_cut(laminate, paths, settings), design)
+        failed = _first_failure(as_cut(build), build.design)
     except (OutputError, GeometryError) as failure:
         raise DesignError(_refusal(error, f"leave no sound contours: {failure}")) from failure
     if failed is not None:
@@ -555,13 +549,13 @@ def _refusal(error: float, why: str) -> str:
     )
 
 
-def as_cut(laminate: Laminate, paths: Mapping[str, Region], settings: CutSettings) -> Laminate:
-    """Return the laminate of the parts that a beam along the paths leaves."""
-    files = []
+def as_cut(build: Build) -> Laminate:
+    """Return the laminate of the parts that a beam along the paths of a build leaves."""
+    laminate, files = build.laminate, []
     for layer in laminate.layers:
-        path = paths[laminate.layer(laminate.cut_with(layer)).pattern]
+        path = build.paths[laminate.layer(laminate.cut_with(layer)).pattern]
         check_clear(path.contours)
-        region = _without_kerf(path, settings.kerf_width(layer.film.material) or 0.0)
+        region = _without_kerf(path, build.settings.kerf_width(layer.film.material) or 0.0)
         files.append(LayerFile(layer, "", CutPart(region, path, {})))
     return laminate_as_cut(files, laminate)
 

@@ -209,9 +209,10 @@ def refuse_unmakable(order: Order, parts: Collection[RunPart]) -> None:
     """
     for build in order.builds:
         if "press" in parts:
-            assert build.schedule
+            # Computing it refuses what the press cannot do.
+            _ = build.schedule
         if "cut" in parts and build.curves.in_chords:
-            refuse_coarse(build.laminate, build.paths, build.settings, build.design)
+            refuse_coarse(build)
 
 
 def _extras(

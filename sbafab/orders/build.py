@@ -122,7 +122,8 @@ def make_build(
 def refuse_undoable(builds: Sequence[Build]) -> None:
     """Raises DesignError if press, kerf or film sheets cannot do designs that pass the rules."""
     for each in builds:
-        assert each.schedule
+        # Computing it refuses what the press cannot do.
+        _ = each.schedule
         refuse_unfit(each.pieces, stocks(each.design))
 
 

@@ -25,7 +25,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
         lambda design, curves: f"{design.model_dump_json()} {curves} {id(builds.run_deck)}",
     )
     expected = _remembered(
-        as_built.expected_laminate, lambda made, settings: f"{made.name} {settings}"
+        as_built.expected_laminate, lambda build: f"{build.laminate.name} {build.settings}"
     )
     made: dict[str, Any] = {}
 
