@@ -470,7 +470,7 @@ def _compared(folder: Path, fresh: Path, listed: Collection[str], generator: str
         if name not in listed or not os.path.lexists(found):
             difference = f"{name} is missing"
         elif not found.is_file():
-            rule, difference = INTEGRITY, f"{name}: no plain file"
+            rule, difference = INTEGRITY, f"{name}: not a plain file"
         elif _are_equal(found, path):
             continue
         elif name.endswith(f"/{INDEX}"):

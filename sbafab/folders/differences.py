@@ -98,7 +98,7 @@ def sound_digest(path: Path) -> str:
     try:
         # Reading a pipe or a device would never end.
         if path.exists() and not path.is_file():
-            raise OutputError("no plain file; regenerate it")
+            raise OutputError("not a plain file; regenerate it")
         if path.stat().st_size > MAX_BYTES:
             raise OutputError(f"larger than {MAX_BYTES:,} bytes; regenerate it")
         data = path.read_bytes()

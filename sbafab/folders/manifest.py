@@ -612,7 +612,7 @@ def _read(folder: Path, kind: type[Read], schema: str) -> Read:
     try:
         # Reading a pipe or a device would never end.
         if path.exists() and not path.is_file():
-            raise OutputError(f"{path} is no plain file; regenerate the folder")
+            raise OutputError(f"{path} is not a plain file; regenerate the folder")
         if path.stat().st_size > MAX_MANIFEST_BYTES:
             raise OutputError(
                 f"{path} is larger than {MAX_MANIFEST_BYTES:,} bytes; regenerate the folder"

@@ -111,10 +111,10 @@ FILES: dict[str, tuple[Change, str]] = {
     "zeros": (replaced(lambda path: path.write_bytes(b"\0" * 1_000_000)), "not an ASCII DXF"),
     "circles": (drawing(CIRCLE), "entities and points, where at most"),
     "lines": (drawing("  0\nLINE\n"), "entities and points, where at most"),
-    "pipe": (replaced(os.mkfifo), "no plain file"),
-    "device": (replaced(lambda path: path.symlink_to("/dev/zero")), "no plain file"),
-    "link to itself": (replaced(lambda path: path.symlink_to(path)), "no plain file"),
-    "folder": (replaced(Path.mkdir), "no plain file"),
+    "pipe": (replaced(os.mkfifo), "not a plain file"),
+    "device": (replaced(lambda path: path.symlink_to("/dev/zero")), "not a plain file"),
+    "link to itself": (replaced(lambda path: path.symlink_to(path)), "not a plain file"),
+    "folder": (replaced(Path.mkdir), "not a plain file"),
 }
 
 
@@ -133,8 +133,8 @@ def test_bad_sheets_are_told_in_time(name: str, runs: Runs, output: Output) -> N
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (os.mkfifo, "no plain file"),
-        (lambda path: path.symlink_to("/dev/zero"), "no plain file"),
+        (os.mkfifo, "not a plain file"),
+        (lambda path: path.symlink_to("/dev/zero"), "not a plain file"),
         (lambda path: path.symlink_to(path), "cannot be read"),
     ],
     ids=["pipe", "device", "link to itself"],
