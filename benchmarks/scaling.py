@@ -16,7 +16,7 @@ def rules_and_cut_files(balloons: int, turn: int) -> float:
     from sbafab.actuators import build, load_design
     from sbafab.cutting.kerf import compensated_paths
     from sbafab.cutting.layer_files import write_layer_files
-    from sbafab.orders.build import cut_settings
+    from sbafab.folders.build import cut_settings
     from sbafab.rules.deck import run_deck
 
     another = f"chamber.diameter={5 + turn / 1000}"

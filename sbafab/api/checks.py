@@ -32,7 +32,7 @@ def check(
     built. Limits are the paper's (Sec. 2) if it gives one, else ours.
     """
     # A job takes models, hence numpy; a page without numpy has the rules of a design.
-    from sbafab.orders.order import make_order
+    from sbafab.folders.order import make_order
 
     return Findings(make_order(either_of(source, changes, tables), progress=progress).findings)
 

@@ -40,16 +40,16 @@ from sbafab.design.files import template_names
 from sbafab.design.identity import cited
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, SbafabError
-from sbafab.folders.advice import Advice, advise
+from sbafab.folders.build import Build, refuse_undoable
 from sbafab.folders.checks import checks
+from sbafab.folders.order import Order, make_order
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.formulas import size_phrases, sizes
-from sbafab.orders.build import Build, refuse_undoable
-from sbafab.orders.order import Order, make_order
 from sbafab.process import Progress
 from sbafab.rules.deck import has_failed
 from sbafab.rules.finding import Finding
 from sbafab.rules.nets import netlist_findings
+from sbafab.search.advice import Advice, advise
 
 YIELD_RULE = "registration-yield"
 DEFAULT_KIT = "paper"

@@ -25,12 +25,12 @@ from sbafab.errors import ERROR_SCHEMA
 from sbafab.folders.artefacts import PredictDocument
 from sbafab.folders.checks import Checks
 from sbafab.folders.manifest import AssemblyManifest, JobManifest, Manifest
+from sbafab.folders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.inspection.inspection import InspectionDocument
 from sbafab.laminate.joints import PortKind
 from sbafab.laminate.netlist import SCHEMA as NETS
 from sbafab.models.map_files import MapDocument
 from sbafab.models.sensitivities import SensitivityRow
-from sbafab.orders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.schedule_files import PressDocument
 from sbafab.reports.assembly_prediction import SCHEMA as ASSEMBLY_PREDICTION
 from sbafab.reports.assembly_prediction import AssemblyPrediction

@@ -18,7 +18,7 @@ from sbafab.rules.finding import Finding, counted, decisive
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sbafab.orders.build import Build
+    from sbafab.folders.build import Build
 
 NO_BREAK = "\u00a0"
 """No-break space: `print_wrapped` keeps the words on both sides on one line."""

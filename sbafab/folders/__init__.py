@@ -1,5 +1,6 @@
-"""Output folders: their files, the swap that puts a folder in place, and the check of a folder.
+"""Builds and their output folders: what follows from a design, written, swapped in and checked.
 
-In: a ``RunRequest`` or an ``Order`` of builds. Out: a folder with a row of ``ARTEFACTS`` a file and
-its manifest; of ``check FOLDER`` the findings on a folder that is made again and compared.
+In: a ``Design``, several, or an ``Assembly``. Out: a ``Build`` with its laminate, findings, beam
+paths and press schedule; of a ``RunRequest`` a folder with a row of ``ARTEFACTS`` a file and its
+manifest; of ``check FOLDER`` the findings on a folder that is made again and compared.
 """

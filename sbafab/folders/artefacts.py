@@ -27,6 +27,7 @@ from sbafab.design.laminate_file import SCHEMA as LAMINATE_SCHEMA
 from sbafab.design.laminate_file import laminate_json
 from sbafab.design.records import Design, design_toml
 from sbafab.errors import DesignError, OutputError
+from sbafab.folders.build import Build, hole_notes
 from sbafab.folders.checks import Checks, checks
 from sbafab.folders.manifest import as_json
 from sbafab.laminate.laminate import Laminate
@@ -36,7 +37,6 @@ from sbafab.models.calibrated import NONE, load_calibration, shipped_names
 from sbafab.models.figures import Prediction, PredictionDocument
 from sbafab.nesting.nest import PLACES, as_dict
 from sbafab.nesting.records import Nest
-from sbafab.orders.build import Build, hole_notes
 from sbafab.pressing.cycles import batch_entry
 from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json
 from sbafab.process import Progress

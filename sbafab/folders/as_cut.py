@@ -33,6 +33,7 @@ from sbafab.cutting.seam_files import (
 from sbafab.cutting.verify import check_contours, check_datum
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, GeometryError, OutputError
+from sbafab.folders.build import Build
 from sbafab.folders.differences import (
     CLAIMS,
     DESIGNED,
@@ -48,7 +49,6 @@ from sbafab.geometry.region import Region, centroid
 from sbafab.laminate.folding import halves
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.orders.build import Build
 from sbafab.rules import registration_yield
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding

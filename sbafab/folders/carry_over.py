@@ -12,9 +12,9 @@ from sbafab.design.files import shown
 from sbafab.design.records import Design, dotted, resolved
 from sbafab.errors import OccupiedError, OutputError
 from sbafab.folders.artefacts import ARTEFACTS, tops_of
+from sbafab.folders.build import Build
 from sbafab.folders.manifest import carried_over, file_hash, file_names, identity
 from sbafab.folders.swap import listed_files, read_manifest
-from sbafab.orders.build import Build
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 
 CUT = tops_of("cut")

@@ -51,6 +51,7 @@ from sbafab.folders.as_cut import (
     read_layers,
     read_seams,
 )
+from sbafab.folders.build import Build, make_build
 from sbafab.folders.carry_over import MESH, PREDICTION, PRESS
 from sbafab.folders.differences import (
     CLAIMS,
@@ -76,13 +77,12 @@ from sbafab.folders.manifest import (
     read_claims,
     read_job,
 )
+from sbafab.folders.order import SCHEMA, Order, of_assembly
 from sbafab.folders.swap import is_among_cut_files
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.figures import PredictionRequest
 from sbafab.models.prediction import predict
-from sbafab.orders.build import Build, make_build
-from sbafab.orders.order import SCHEMA, Order, of_assembly
 from sbafab.process import ignore_progress
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding, Place, Verdict

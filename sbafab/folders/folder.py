@@ -28,9 +28,9 @@ from sbafab.folders.artefacts import (
 )
 from sbafab.folders.checks import checks
 from sbafab.folders.manifest import AssemblyManifest, as_json, file_hashes, job_manifest, manifest
+from sbafab.folders.order import SCHEMA, Order
 from sbafab.meshing.formats import Node, write_scene, write_stl
 from sbafab.nesting.records import Nest
-from sbafab.orders.order import SCHEMA, Order
 from sbafab.process import Progress
 
 SOLID = "mesh/assembled.glb"

@@ -21,6 +21,8 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.design.identity import citation, design_sha256
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
+from sbafab.folders.build import Build, warnings
+from sbafab.folders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, BatchSchema
 from sbafab.folders.swap import read_manifest
 from sbafab.geometry.offset import Kerf
 from sbafab.laminate.assembly import laying
@@ -29,8 +31,6 @@ from sbafab.laminate.joints import SeamKind, SeamTool
 from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, Role
 from sbafab.meshing.mesh_files import MeshFile
 from sbafab.models.formulas import sizes
-from sbafab.orders.build import Build, warnings
-from sbafab.orders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, BatchSchema
 from sbafab.pressing.cycles import Runs
 from sbafab.version import GENERATOR
 

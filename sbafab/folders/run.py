@@ -21,16 +21,16 @@ from sbafab.design.records import Design
 from sbafab.errors import OccupiedError, OutputError
 from sbafab.folders.artefacts import EVERYTHING, PICTURES, RunPart, tops_of
 from sbafab.folders.as_cut import refuse_coarse
+from sbafab.folders.build import Build, make_build
 from sbafab.folders.carry_over import carry_over, refuse_to_replace, removed_files, would_replace
 from sbafab.folders.folder import close_folder, write_folder
 from sbafab.folders.manifest import as_json, identity
+from sbafab.folders.order import JOB_SCHEMA, SCHEMA, Order, make_order
 from sbafab.folders.swap import listed_files, refuse_busy, replaced_folder
 from sbafab.laminate.burst import burst
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import Prediction
 from sbafab.notebook import table_html
-from sbafab.orders.build import Build, make_build
-from sbafab.orders.order import JOB_SCHEMA, SCHEMA, Order, make_order
 from sbafab.pressing.schedule import Schedule
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Finding, Findings

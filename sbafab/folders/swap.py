@@ -15,7 +15,7 @@ from pathlib import Path, PurePath
 from filelock import FileLock, Timeout
 
 from sbafab.errors import OutputError, SbafabError
-from sbafab.orders.order import SCHEMA, SCHEMAS
+from sbafab.folders.order import SCHEMA, SCHEMAS
 
 MANIFEST = "manifest.json"
 CUT_FOLDERS = ("layers", "sheets")

@@ -21,8 +21,7 @@ from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, validated
 from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError, OutputError
-from sbafab.folders import advice
-from sbafab.folders.advice import YieldDesign, value_of
+from sbafab.folders.build import Build, make_build
 from sbafab.folders.swap import replace_text
 from sbafab.markup import environment
 from sbafab.models.balloons import has_balloons
@@ -34,10 +33,11 @@ from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import MOST_PRESSURE, stack
-from sbafab.orders.build import Build, make_build
 from sbafab.process import Progress, ignore_progress
 from sbafab.reports.inflated_picture import WHY, PictureRequest, pictures_at_one_scale
 from sbafab.reports.solid_png import solid_png
+from sbafab.search import advice
+from sbafab.search.advice import YieldDesign, value_of
 from sbafab.search.sweep_report import CSV, JOURNAL
 from sbafab.search.trials import RuleMargin, margins
 from sbafab.search.vary import NOTHING, format_value, key_values

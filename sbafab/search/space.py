@@ -22,9 +22,9 @@ from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, Free
 from sbafab.design.units import millimetres
 from sbafab.errors import BeyondError, DesignError, GeometryError
+from sbafab.folders.build import Build, refuse_undoable
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.stack import MOST_PRESSURE
-from sbafab.orders.build import Build, refuse_undoable
 from sbafab.process import Progress
 from sbafab.rules.deck import run_deck
 from sbafab.search.quantities import (

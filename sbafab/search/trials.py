@@ -29,10 +29,10 @@ from sbafab.design.files import checked as checked_record
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError, SbafabError
+from sbafab.folders.build import make_build, refuse_undoable
 from sbafab.models.figures import PredictionRequest
 from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
-from sbafab.orders.build import make_build, refuse_undoable
 from sbafab.plugins import FAMILIES, RULES, installed
 from sbafab.process import prepare, processors
 from sbafab.rules.deck import AT_MOST

@@ -11,11 +11,11 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
+from sbafab.folders.build import make_build
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, disc
 from sbafab.laminate.assembly import assembly
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.orders.build import make_build
 
 DESIGNS = [
     ("1dof-5mm", []),

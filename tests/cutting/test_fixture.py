@@ -13,7 +13,7 @@ from sbafab.actuators import build, load_design
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.fixture import PATH, fixture, plate_corner, write_fixture
 from sbafab.cutting.properties import Curves, CutSettings
-from sbafab.orders.build import hole_notes
+from sbafab.folders.build import hole_notes
 
 SETTINGS = CutSettings("test", "0" * 64)
 PLATEN = (152.4, 152.4)

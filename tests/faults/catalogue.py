@@ -15,10 +15,10 @@ from sbafab.errors import DesignError
 from sbafab.folders.check import read_folder
 from sbafab.folders.differences import DESIGNED
 from sbafab.folders.run import RunRequest, generate
-from tests.as_built.doctoring import Doctor
 from tests.faults import beside, chords, claims, files, holes, joints, layers, masks, sheets
 from tests.faults.record import PAPER, Fault, Kind
 from tests.faults.specimen import Specimen, failing, unabridged
+from tests.folders.doctoring import Doctor
 
 TEMPLATES = (*PAPER, joints.TEMPLATE)
 BALLOONS = 2

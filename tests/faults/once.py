@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+from sbafab.folders import build as builds
 from sbafab.folders import check as as_built
-from sbafab.orders import build as builds
 
 
 def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:

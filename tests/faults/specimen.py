@@ -11,16 +11,16 @@ from pathlib import Path
 from unittest.mock import patch
 
 from sbafab.folders import as_cut
+from sbafab.folders import build as builds
 from sbafab.folders import check as as_built
 from sbafab.folders.as_cut import CutPart, Expected, read_part
 from sbafab.folders.check import check_folder
 from sbafab.geometry.region import Region
 from sbafab.laminate import laminate
 from sbafab.laminate.laminate import Laminate, Layer, Role, interface_regions
-from sbafab.orders import build as builds
 from sbafab.rules import registration_worst_case, registration_yield
 from sbafab.rules.deck import RULES, run_deck
-from tests.as_built.doctoring import Doctor
+from tests.folders.doctoring import Doctor
 
 Change = Callable[[Region, Laminate], Region]
 Pick = Callable[[Laminate], Layer]

@@ -16,10 +16,10 @@ from sbafab.actuators import load_design
 from sbafab.errors import OutputError
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import RunRequest, generate
-from tests.as_built.doctoring import Doctor
 from tests.faults.harmless import changes_nothing
 from tests.faults.mutants import mutated
 from tests.faults.once import remembering
+from tests.folders.doctoring import Doctor
 from tests.quick import few
 
 COUNT = int(os.environ.get("SBAFAB_FAULTS", "16"))

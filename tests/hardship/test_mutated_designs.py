@@ -20,7 +20,7 @@ from sbafab.assemblies.files import assembly_toml, load
 from sbafab.design.files import template_names, templates_folder
 from sbafab.design.records import Design, design_toml
 from sbafab.errors import SbafabError
-from sbafab.orders.order import make_order
+from sbafab.folders.order import make_order
 from tests.quick import few
 
 COUNT = int(os.environ.get("SBAFAB_MUTATIONS", "120"))

@@ -22,10 +22,10 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 NEIGHBOURS = {
-    "rules": ("tests/regressions", "tests/faults", "tests/as_built"),
-    "cutting": ("tests/as_built", "tests/faults", "tests/regressions"),
+    "rules": ("tests/regressions", "tests/faults", "tests/folders"),
+    "cutting": ("tests/folders", "tests/faults", "tests/regressions"),
     "pressing": ("tests/reports",),
-    "output": ("tests/as_built", "tests/faults"),
+    "folders": ("tests/faults",),
     "models": ("tests/validation",),
 }
 SWAPPED: dict[type[ast.AST], str] = {

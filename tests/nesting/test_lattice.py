@@ -16,12 +16,12 @@ from shapely.geometry import Point as ShapelyPoint
 from shapely.geometry import Polygon, box
 
 from sbafab.actuators import build, load_design
+from sbafab.folders.build import make_build, stocks
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.lattice import Lattice, lattices_of
 from sbafab.nesting.nest import nest, of_material
 from sbafab.nesting.records import TURNS, Nest, NestPart, Stock, placed
-from sbafab.orders.build import make_build, stocks
 
 
 def best(shape: Region, spacing: float, width: float, length: float) -> Lattice:

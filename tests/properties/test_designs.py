@@ -19,9 +19,9 @@ from hypothesis import strategies as st
 from sbafab.actuators import load_design
 from sbafab.cli import main
 from sbafab.errors import DesignError
+from sbafab.folders.build import make_build
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import RunRequest, generate
-from sbafab.orders.build import make_build
 from tests.properties.designs import Draft, lobed, one_dof, radial, valid
 from tests.properties.faults import REFUSALS, RULES
 

@@ -12,7 +12,7 @@ from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.region import Region, disc
 from sbafab.reports.traveller.lay_up import over_tab
 from sbafab.rules.finding import Finding
-from tests.as_built.doctoring import Doctor
+from tests.folders.doctoring import Doctor
 
 AXIS = (0.0, 0.0)
 

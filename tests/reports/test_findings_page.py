@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from sbafab.orders.build import make_build
+from sbafab.folders.build import make_build
 from sbafab.reports.traveller.findings import findings_html, other_hands
 from sbafab.rules.finding import Finding, Place
 from tests.reports.pages import EARS, built

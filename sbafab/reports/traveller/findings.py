@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from sbafab.design.records import Design
+from sbafab.folders.build import Build
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.laminate.laminate import Laminate
-from sbafab.orders.build import Build
 from sbafab.reports.nets_svg import nets_svg
 from sbafab.reports.traveller.formatting import frame, render
 from sbafab.rules.finding import Finding

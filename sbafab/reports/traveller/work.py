@@ -8,8 +8,8 @@ from functools import cached_property
 
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.sheets import SheetFile
+from sbafab.folders.build import Build
 from sbafab.laminate.films import Film
-from sbafab.orders.build import Build
 from sbafab.reports.prints import NAME as UNDERLAY
 from sbafab.reports.prints import guides
 

@@ -17,7 +17,7 @@ from sbafab.cutting.properties import Curves
 from sbafab.errors import DesignError
 from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.region import disc, rectangle
-from tests.as_built.doctoring import Doctor
+from tests.folders.doctoring import Doctor
 from tests.quick import few
 
 EARS = "registration.method=ears"

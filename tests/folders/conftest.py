@@ -11,8 +11,8 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.folders.run import RunRequest, generate
-from tests.as_built.doctoring import Doctor
 from tests.faults.once import remembering
+from tests.folders.doctoring import Doctor
 
 FEW_BUILDS = "rules.yield_builds=100"
 

@@ -9,12 +9,12 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.cli import main
 from sbafab.design.records import Design
-from sbafab.folders.advice import CHECK_SEED, SEED, YieldDesign, advise, reach_yield
+from sbafab.folders.build import make_build
 from sbafab.folders.checks import AdviceEntry
 from sbafab.laminate.base_plate import for_a_cnc_mill
-from sbafab.orders.build import make_build
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.registration_yield import simulate
+from sbafab.search.advice import CHECK_SEED, SEED, YieldDesign, advise, reach_yield
 from sbafab.search.compare import ReachedYield
 
 SMALL = ("1dof-5mm", "stack.balloons=2", "rules.yield_builds=1000")

@@ -24,7 +24,7 @@ from sbafab.folders.check import check_folder
 from sbafab.folders.run import RunRequest, generate
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
-from tests.as_built.doctoring import Doctor
+from tests.folders.doctoring import Doctor
 from tests.quick import few
 
 Move = Callable[[float], float]

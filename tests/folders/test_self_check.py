@@ -30,7 +30,7 @@ from sbafab.models.prediction import predict
 from sbafab.nesting.engines import bottom_left
 from sbafab.nesting.records import NestPart, Placement, Stock
 from sbafab.rules.rule import Explanation, Rule
-from tests.as_built.doctoring import Doctor
+from tests.folders.doctoring import Doctor
 
 FEW = ("stack.balloons=1", "rules.yield_builds=100")
 Edit = Callable[[Path], object]

@@ -17,7 +17,7 @@ from sbafab.api import check_folder, generate, press
 from sbafab.folders.check import read_folder, rules_as_cut
 from sbafab.rules.finding import Finding
 from tests.actuators.test_free_layers import WELDED
-from tests.as_built.doctoring import Doctor
+from tests.folders.doctoring import Doctor
 
 
 @pytest.fixture(scope="module")

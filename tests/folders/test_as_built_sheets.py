@@ -19,7 +19,7 @@ from sbafab.folders.check import check_folder
 from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.region import Region, disc
 from sbafab.rules.finding import Finding
-from tests.as_built.doctoring import Doctor
+from tests.folders.doctoring import Doctor
 from tests.quick import few
 
 Claims = dict[str, Any]

@@ -12,7 +12,7 @@ from sbafab.actuators import load_design
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import Run, RunRequest, generate
 from sbafab.rules.deck import has_failed
-from tests.as_built.doctoring import Doctor
+from tests.folders.doctoring import Doctor
 
 COPIES = 5
 

@@ -15,7 +15,7 @@ from sbafab.actuators import load_design
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.folders.check import check_folder, read_folder
 from sbafab.folders.run import RunRequest, generate
-from tests.as_built.doctoring import Doctor
+from tests.folders.doctoring import Doctor
 
 ASKED = [
     *("stack.balloons=2", "rules.yield_builds=100", "sheets.tpe.lead_in=0.4"),

@@ -23,8 +23,8 @@ from sbafab.laminate.netlist import compare, parchmint_nets, read_netlist
 from sbafab.rules.finding import Finding
 from sbafab.rules.nets import netlist_findings
 from tests.actuators.test_drawn_nets import ROUTED
-from tests.as_built.doctoring import Doctor
 from tests.designs import PAPER
+from tests.folders.doctoring import Doctor
 from tests.importing.test_parchmint import circuit as circuit_of_two_channels
 from tests.importing.test_parchmint import written
 from tests.site.formats import hold

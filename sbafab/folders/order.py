@@ -18,10 +18,10 @@ from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings
 from sbafab.design.records import Design
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.errors import DefectError, DesignError, GeometryError, OutputError
+from sbafab.folders.build import Build, make_build, stocks
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import PLACES, from_dict, nest
 from sbafab.nesting.records import Nest, NestPart
-from sbafab.orders.build import Build, make_build, stocks
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding

@@ -17,7 +17,7 @@ from sbafab.folders.check import check_folder
 from sbafab.folders.manifest import file_hash
 from sbafab.folders.run import RunRequest, generate
 from sbafab.rules.finding import Finding
-from tests.as_built.doctoring import Doctor
+from tests.folders.doctoring import Doctor
 from tests.quick import few
 
 COUNT = int(os.environ.get("SBAFAB_FOREIGN", "10"))

@@ -22,7 +22,7 @@ from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.offset import grow, shrink
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
-from tests.as_built.doctoring import Doctor
+from tests.folders.doctoring import Doctor
 
 
 def failed(folder: Path) -> dict[str, Finding]:
