@@ -15,8 +15,9 @@ import numpy as np
 
 from docs.scripts.measured import Record, keep, texts, versions
 from docs.scripts.tables import Table
-from sbafab.calibration.curve_intervals import curve_intervals, uncertainty_for
-from sbafab.calibration.fit import (
+from sbafab.validation.curve_intervals import curve_intervals, uncertainty_for
+from sbafab.validation.files import shipped_evidence
+from sbafab.validation.fit import (
     as_calibration,
     film_of,
     left_out_fits,
@@ -24,10 +25,9 @@ from sbafab.calibration.fit import (
     sizes_of_groups,
     usable_curves,
 )
-from sbafab.calibration.posterior import Posterior, SampledCurve
-from sbafab.calibration.surface import surfaces
-from sbafab.evidence.files import shipped_evidence
-from sbafab.evidence.records import Evidence, MeasuredCurve
+from sbafab.validation.posterior import Posterior, SampledCurve
+from sbafab.validation.records import Evidence, MeasuredCurve
+from sbafab.validation.surface import surfaces
 
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array

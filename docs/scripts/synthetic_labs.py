@@ -9,7 +9,7 @@ from datetime import date
 
 from docs.scripts.measured import Record, keep, texts, versions
 from docs.scripts.tables import Table
-from tests.calibration.synthetic import held_out_inside, share_and_error
+from tests.validation.synthetic import held_out_inside, share_and_error
 
 COMMAND = "python -m docs.scripts.synthetic_labs"
 NAME = "synthetic_labs"

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from docs.scripts import candidates, measured, sensitivity
 from docs.scripts.tables import FOLDER, Table, markdown_rows
-from sbafab.reproduction import calibrated
-from sbafab.reproduction.calibrated import TITLE
-from sbafab.reproduction.page import page
+from sbafab.validation import paper_calibrated
+from sbafab.validation.page import page
+from sbafab.validation.paper_calibrated import TITLE
 
 PATH = FOLDER / "validation.csv"
 COLUMNS = ("section", "figure", "paper", "where", "predicted", "residual", "model", "why")
@@ -21,7 +21,7 @@ def validation() -> tuple[Table, Table]:
     rows = list(markdown_rows(page()))
     return (
         Table(COLUMNS, [row for row in rows if row[0] != TITLE and len(row) == len(COLUMNS)]),
-        Table(calibrated.COLUMNS, [row[1:] for row in rows if row[0] == TITLE]),
+        Table(paper_calibrated.COLUMNS, [row[1:] for row in rows if row[0] == TITLE]),
     )
 
 

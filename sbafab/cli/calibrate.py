@@ -10,7 +10,6 @@ from typing import Any
 
 import click
 
-from sbafab.calibration.fit import Fit, HeldOutPoint, calibration_text, fit
 from sbafab.cli.options import folder_option, json_option
 from sbafab.cli.printing import print_json, print_table, print_verdict
 from sbafab.cli.progress import shown_progress
@@ -21,6 +20,7 @@ from sbafab.folders.swap import replace_text
 from sbafab.models.calibrated import NONE, shipped_names
 from sbafab.models.unknowns import UNKNOWNS
 from sbafab.results.evidence import load_source
+from sbafab.validation.fit import Fit, HeldOutPoint, calibration_text, fit
 
 
 @click.command()

@@ -34,14 +34,14 @@ from sbafab.models.sensitivities import SensitivityRow
 from sbafab.pressing.schedule_files import PressDocument
 from sbafab.reports.assembly_prediction import SCHEMA as ASSEMBLY_PREDICTION
 from sbafab.reports.assembly_prediction import AssemblyPrediction
-from sbafab.reproduction.comparison import ComparisonDocument
-from sbafab.reproduction.page import ReproductionDocument
 from sbafab.results.records import HistoryDocument, RecordsDocument
 from sbafab.results.report import ReportDocument
 from sbafab.search.compare import CompareDocument, YieldEntry
 from sbafab.search.find import FindDocument
 from sbafab.search.sweep import SweepDocument
 from sbafab.simulators.simulator import SimulateDocument
+from sbafab.validation.comparison import ComparisonDocument
+from sbafab.validation.page import ReproductionDocument
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

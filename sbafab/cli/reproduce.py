@@ -9,20 +9,20 @@ import click
 
 from sbafab.cli.options import json_option, out_option
 from sbafab.cli.printing import print_json, print_verdict
-from sbafab.evidence.files import shipped_evidence
 from sbafab.models.calibrated import load_calibration
-from sbafab.reproduction import page
-from sbafab.reproduction.calibrated import PAPER, TITLE
-from sbafab.reproduction.comparison import (
+from sbafab.results.evidence import load_source
+from sbafab.validation import page
+from sbafab.validation.comparison import (
     ComparisonDocument,
     compare,
     compare_calibrated,
     table_lines,
 )
-from sbafab.results.evidence import load_source
+from sbafab.validation.files import shipped_evidence
+from sbafab.validation.paper_calibrated import PAPER, TITLE
 
 if TYPE_CHECKING:
-    from sbafab.reproduction.rows import Row
+    from sbafab.validation.rows import Row
 
 FOLDER = "reproduction"
 ALL = "all"

@@ -10,16 +10,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sbafab.errors import DesignError
-from sbafab.evidence.files import load_evidence
-from sbafab.evidence.records import (
+from sbafab.results.report import Built, items
+from sbafab.results.store import Lab
+from sbafab.validation.files import load_evidence
+from sbafab.validation.records import (
     Evidence,
     MeasuredActuator,
     MeasuredCurve,
     Setup,
     StatedError,
 )
-from sbafab.results.report import Built, items
-from sbafab.results.store import Lab
 
 
 class _Recorded(NamedTuple):

@@ -103,13 +103,13 @@ def test_what_is_predicted_of_an_assembly_is_of_its_schema() -> None:
 
 
 def test_the_reproduction_is_of_its_schema() -> None:
-    from sbafab.evidence.files import load_evidence
     from sbafab.models.calibrated import load_calibration
     from sbafab.models.paper import Measured
-    from sbafab.reproduction.calibrated import CalibratedPaper
-    from sbafab.reproduction.comparison import ComparedCurve, ComparedPoint
-    from sbafab.reproduction.page import as_json as told
-    from sbafab.reproduction.rows import Row
+    from sbafab.validation.comparison import ComparedCurve, ComparedPoint
+    from sbafab.validation.files import load_evidence
+    from sbafab.validation.page import as_json as told
+    from sbafab.validation.paper_calibrated import CalibratedPaper
+    from sbafab.validation.rows import Row
 
     rows = [Row("x", Measured(1.0, 0.1, "mm", "Sec. 2"), value, "m", "w") for value in (1.1, None)]
     points = (ComparedPoint(1.0, 0.5, 0.1, (0.4, 0.6), (0.3, 0.7)),)

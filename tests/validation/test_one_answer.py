@@ -19,10 +19,8 @@ import pytest
 import sbafab
 from docs.scripts.gallery import FIGURES, figures_of, numbers_of
 from sbafab.assemblies.files import load
-from sbafab.calibration.model_values import ModelValues, model_values
 from sbafab.design.files import template_names
 from sbafab.design.records import Design
-from sbafab.evidence.records import MeasuredActuator, MeasuredCurve, Setup
 from sbafab.laminate.assembly import pressed_layers
 from sbafab.laminate.burst import burst
 from sbafab.models.figures import Figure, Prediction
@@ -30,6 +28,8 @@ from sbafab.models.formulas import size_phrases, sizes
 from sbafab.models.intervals import factors_of
 from sbafab.search.quantities import Subject, read_quantity
 from sbafab.studio.jobs import elastic, motion
+from sbafab.validation.model_values import ModelValues, model_values
+from sbafab.validation.records import MeasuredActuator, MeasuredCurve, Setup
 from tests.studio.worked import job
 from tests.validation.commands import run_predict
 

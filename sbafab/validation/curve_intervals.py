@@ -6,14 +6,14 @@ import math
 from collections.abc import Mapping
 from functools import cache
 
-from sbafab.calibration.fit import GROUP_OF, MIDDLES, relative_errors, term_of
-from sbafab.calibration.model_values import ModelledActuator, ModelValue, NoModel, model_values
 from sbafab.errors import DesignError
-from sbafab.evidence.records import MeasuredCurve
 from sbafab.models.calibrated import SHARE, Ends, ModelCalibration, deviations
 from sbafab.models.figures import Factors
 from sbafab.models.intervals import ActuatorSizes, Uncertainty, for_film
 from sbafab.models.unknowns import factors_at
+from sbafab.validation.fit import GROUP_OF, MIDDLES, relative_errors, term_of
+from sbafab.validation.model_values import ModelledActuator, ModelValue, NoModel, model_values
+from sbafab.validation.records import MeasuredCurve
 
 """Least and largest value."""
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.calibration.curve_intervals import curve_intervals, uncertainty_for, widened
-from sbafab.calibration.model_values import ModelValues
-from sbafab.evidence.records import MeasuredActuator, MeasuredCurve, Setup, StatedError
 from sbafab.models.calibrated import ModelCalibration, load_calibration
 from sbafab.models.figures import Factors
 from sbafab.models.intervals import Uncertainty
 from sbafab.models.unknowns import UNKNOWNS
+from sbafab.validation.curve_intervals import curve_intervals, uncertainty_for, widened
+from sbafab.validation.model_values import ModelValues
+from sbafab.validation.records import MeasuredActuator, MeasuredCurve, Setup, StatedError
 
 FILMS, MASKS = 12 * 0.038, 11 * 0.025
 """mm: twelve films of the 1-DoF and eleven masks between them."""
@@ -69,7 +69,7 @@ def test_what_a_source_leaves_open_widens_the_interval(
         series = {"10 kPa": (factors.modulus_ratio,), "100 kPa": (40.0,), "300 kPa": (None,)}
         return ModelValues("m", series)
 
-    monkeypatch.setattr("sbafab.calibration.curve_intervals.model_values", model)
+    monkeypatch.setattr("sbafab.validation.curve_intervals.model_values", model)
     of = curve("height_mm", y=7.0)
     intervals = curve_intervals(of, uncertainty_for(of, paper))
     assert intervals is not None

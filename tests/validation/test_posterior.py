@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from docs.scripts.measured import FOLDER, record
-from sbafab.calibration.posterior import (
+from sbafab.models.calibrated import GROUPS
+from sbafab.models.unknowns import UNKNOWNS
+from sbafab.validation.posterior import (
     SHARED,
     Likelihood,
     Posterior,
@@ -19,10 +21,8 @@ from sbafab.calibration.posterior import (
     sampled,
     set_up_probabilities,
 )
-from sbafab.calibration.surface import NODE_COORDINATES, ValueSurface
-from sbafab.models.calibrated import GROUPS
-from sbafab.models.unknowns import UNKNOWNS
-from tests.calibration.synthetic import held_out_inside, lab, share_and_error, surface
+from sbafab.validation.surface import NODE_COORDINATES, ValueSurface
+from tests.validation.synthetic import held_out_inside, lab, share_and_error, surface
 
 
 def curve(rates: np.ndarray, measured: list[float], errors: list[float]) -> SampledCurve:  # type: ignore[type-arg]

@@ -10,30 +10,30 @@ from pathlib import Path
 import pytest
 
 import sbafab
-from sbafab.calibration.model_values import (
+from sbafab.cli import main
+from sbafab.errors import DesignError
+from sbafab.models.figures import Factors
+from sbafab.models.stack import Stack
+from sbafab.results.evidence import from_lab_records
+from sbafab.results.store import Lab
+from sbafab.validation.comparison import compare, table_lines
+from sbafab.validation.files import load_evidence
+from sbafab.validation.model_values import (
     ANSWERS,
     WITHOUT_MODEL,
     ModelValues,
     NoModel,
     model_values,
 )
-from sbafab.cli import main
-from sbafab.errors import DesignError
-from sbafab.evidence.files import load_evidence
-from sbafab.evidence.records import (
+from sbafab.validation.records import (
     QUANTITIES,
     Evidence,
     MeasuredActuator,
     MeasuredCurve,
     Setup,
 )
-from sbafab.models.figures import Factors
-from sbafab.models.stack import Stack
-from sbafab.reproduction.comparison import compare, table_lines
-from sbafab.results.evidence import from_lab_records
-from sbafab.results.store import Lab
-from tests.evidence.tables import evidence_csv
 from tests.site.formats import hold
+from tests.validation.tables import evidence_csv
 
 ONE = MeasuredActuator("1dof-5mm")
 THREE = MeasuredActuator("3dof-15mm")

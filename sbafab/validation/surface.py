@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sbafab.calibration.model_values import NoModel, model_values
 from sbafab.errors import DesignError
-from sbafab.evidence.records import MeasuredCurve
 from sbafab.models.calibrated import DESIGN_UNKNOWNS
 from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
 from sbafab.models.unknowns import UNKNOWNS, factors_at
+from sbafab.validation.model_values import NoModel, model_values
+from sbafab.validation.records import MeasuredCurve
 
 NODES = (11, 6, 6)
 """Nodes by modulus ratio, pocket loss and press factor."""

@@ -6,12 +6,12 @@ import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from sbafab.calibration.curve_intervals import curve_intervals, uncertainty_for
-from sbafab.calibration.model_values import NoModel, model_values
 from sbafab.documents import Document, Short, attribute
-from sbafab.evidence.records import Evidence, MeasuredCurve
 from sbafab.models.calibrated import Ends, ModelCalibration
 from sbafab.models.figures import Factors
+from sbafab.validation.curve_intervals import curve_intervals, uncertainty_for
+from sbafab.validation.model_values import NoModel, model_values
+from sbafab.validation.records import Evidence, MeasuredCurve
 
 Intervals = Callable[[MeasuredCurve], Sequence[Ends | None] | None]
 """Intervals of a prediction at the points of a curve; None for a point or a curve without any."""

@@ -1,13 +1,13 @@
-"""Measured curves written as a table, which ``sbafab.evidence`` reads."""
+"""Measured curves written as a table, which ``sbafab.validation`` reads."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-from sbafab.evidence.files import COLUMNS, NUMBERS
-from sbafab.evidence.records import MeasuredCurve
 from sbafab.spreadsheet import csv_text
+from sbafab.validation.files import COLUMNS, NUMBERS
+from sbafab.validation.records import MeasuredCurve
 
 
 def evidence_csv(curves: Sequence[MeasuredCurve]) -> str:

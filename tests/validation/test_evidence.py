@@ -9,7 +9,8 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.errors import DesignError
-from sbafab.evidence.files import (
+from sbafab.models import paper, printed
+from sbafab.validation.files import (
     COLUMNS,
     evidence_ids,
     load_evidence,
@@ -17,9 +18,8 @@ from sbafab.evidence.files import (
     read_evidence,
     shipped_evidence,
 )
-from sbafab.evidence.records import AXES, KINDS, QUANTITIES, TIPS, MeasuredCurve, StatedError
-from sbafab.models import paper, printed
-from tests.evidence.tables import evidence_csv
+from sbafab.validation.records import AXES, KINDS, QUANTITIES, TIPS, MeasuredCurve, StatedError
+from tests.validation.tables import evidence_csv
 
 ROOT = Path(__file__).parents[2]
 
@@ -120,7 +120,7 @@ def test_curves_have_a_source_and_a_design_that_can_be_built(name: str) -> None:
 
 
 def test_files_that_ship_are_all_found_the_paper_first() -> None:
-    files = {path.stem for path in (ROOT / "sbafab" / "evidence").glob("*.toml")}
+    files = {path.stem for path in (ROOT / "sbafab" / "validation").glob("*.toml")}
     assert set(evidence_ids()) == files
     assert evidence_ids()[0] == shipped_evidence()[0].id == "paper"
     assert load_evidence("textile-array").curve("force-8mm").y == (2.1,)
@@ -131,7 +131,7 @@ def test_files_that_ship_are_all_found_the_paper_first() -> None:
 def test_a_wheel_holds_the_files() -> None:
     builder = pytest.importorskip("hatchling.builders.wheel").WheelBuilder(str(ROOT))
     packed = {included.distribution_path for included in builder.recurse_included_files()}
-    assert {f"sbafab/evidence/{name}.toml" for name in evidence_ids()} <= packed
+    assert {f"sbafab/validation/{name}.toml" for name in evidence_ids()} <= packed
 
 
 def test_axes_and_quantities_agree() -> None:

@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sbafab.calibration.surface import ValueSurface, interpolated
 from sbafab.errors import DesignError
 from sbafab.models.calibrated import GROUPS
 from sbafab.models.film_elements import Array
 from sbafab.models.unknowns import UNKNOWNS
+from sbafab.validation.surface import ValueSurface, interpolated
 
 SHARED = 0.5
 """Share of the discrepancy's variance that the points of a curve have in common."""

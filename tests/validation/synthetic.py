@@ -10,16 +10,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.calibration.posterior import (
+from sbafab.models.calibrated import GROUPS
+from sbafab.models.unknowns import UNKNOWNS
+from sbafab.validation.posterior import (
     SCALE_MIDDLE,
     SCALE_SPREAD,
     SampledCurve,
     discrepancies,
     sampled,
 )
-from sbafab.calibration.surface import NODE_COORDINATES, ValueSurface
-from sbafab.models.calibrated import GROUPS
-from sbafab.models.unknowns import UNKNOWNS
+from sbafab.validation.surface import NODE_COORDINATES, ValueSurface
 
 Array = NDArray[np.float64]
 ERROR = 0.02

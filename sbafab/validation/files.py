@@ -17,7 +17,8 @@ from sbafab.design.files import checked, listed, read_toml, shown
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.design.toml_table import Section
 from sbafab.errors import DesignError
-from sbafab.evidence.records import (
+from sbafab.spreadsheet import plain_text
+from sbafab.validation.records import (
     KINDS,
     NO_AXIS,
     QUANTITIES,
@@ -28,7 +29,6 @@ from sbafab.evidence.records import (
     Setup,
     StatedError,
 )
-from sbafab.spreadsheet import plain_text
 
 FOLDER = Path(__file__).parent
 MOST_BYTES = 1_000_000

@@ -9,9 +9,9 @@ import pytest
 from docs.scripts import held_out
 from docs.scripts.measured import FOLDER, record
 from docs.scripts.tables import Table
-from sbafab.calibration.fit import GROUP_OF
-from sbafab.evidence.files import shipped_evidence
 from sbafab.models.calibrated import load_calibration
+from sbafab.validation.files import shipped_evidence
+from sbafab.validation.fit import GROUP_OF
 
 TABLES = record(held_out.NAME).tables
 

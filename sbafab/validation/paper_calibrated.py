@@ -6,17 +6,17 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from sbafab.documents import Document, attribute
-from sbafab.evidence.files import load_evidence
-from sbafab.evidence.records import MeasuredCurve
 from sbafab.models.calibrated import ModelCalibration, load_calibration
 from sbafab.models.unknowns import UNKNOWNS
-from sbafab.reproduction.comparison import (
+from sbafab.validation.comparison import (
     ComparedCurve,
     ComparedPoint,
     CurveDocument,
     compare_calibrated,
     span,
 )
+from sbafab.validation.files import load_evidence
+from sbafab.validation.records import MeasuredCurve
 
 PAPER = "paper"
 """Name of the calibration, and of the evidence, whose values stand side by side."""

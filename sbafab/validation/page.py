@@ -10,9 +10,9 @@ from sbafab.documents import Document, PlainNumber, Short, attribute
 from sbafab.errors import OutputError
 from sbafab.models.figures import Prediction, Relation
 from sbafab.reports.charts import relation_svg
-from sbafab.reproduction import calibrated, rows
-from sbafab.reproduction.calibrated import CalibratedDocument, CalibratedPaper
-from sbafab.reproduction.rows import Row, predicted, table
+from sbafab.validation import paper_calibrated, rows
+from sbafab.validation.paper_calibrated import CalibratedDocument, CalibratedPaper
+from sbafab.validation.rows import Row, predicted, table
 
 HEAD = """# The paper's figures beside the predictions
 
@@ -55,7 +55,7 @@ def tables(single: Prediction, three: Prediction) -> dict[str, list[Row]]:
 def page() -> str:
     """The text of the page."""
     single, three = predicted("1dof-5mm"), predicted("3dof-15mm")
-    return page_of(tables(single, three), calibrated.calibrated_paper(), single, three)
+    return page_of(tables(single, three), paper_calibrated.calibrated_paper(), single, three)
 
 
 def page_of(
@@ -65,7 +65,7 @@ def page_of(
     three: Prediction,
 ) -> str:
     """Return the page of rows that are computed already."""
-    parts = [HEAD, *calibrated.lines(by_calibration)]
+    parts = [HEAD, *paper_calibrated.lines(by_calibration)]
     for title, lines in sections.items():
         parts += table(title, lines)
     return "\n".join([*parts, FACTORS + "\n".join(rows.factors(single, three)), ""])
@@ -101,7 +101,7 @@ def reproduce(folder: Path) -> tuple[dict[str, list[Row]], CalibratedPaper]:
     Raises OutputError if the folder cannot be written.
     """
     single, three = predicted("1dof-5mm"), predicted("3dof-15mm")
-    sections, by_calibration = tables(single, three), calibrated.calibrated_paper()
+    sections, by_calibration = tables(single, three), paper_calibrated.calibrated_paper()
     files = {
         "reproduction.md": page_of(sections, by_calibration, single, three),
         "reproduction.json": json.dumps(as_json(sections, by_calibration), indent=1) + "\n",

@@ -16,7 +16,6 @@ from sbafab.actuators import build, load_design, records
 from sbafab.design.files import toml_tables
 from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError
-from sbafab.evidence.records import MeasuredActuator, MeasuredCurve
 from sbafab.laminate.laminate import Laminate
 from sbafab.models import elastic, paper
 from sbafab.models.balloon import Balloon
@@ -32,6 +31,7 @@ from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count
 from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack
 from sbafab.models.unknowns import UNKNOWNS
+from sbafab.validation.records import MeasuredActuator, MeasuredCurve
 
 ModelValue = float | None
 """A value of a model; None if the model has no such state."""

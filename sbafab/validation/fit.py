@@ -12,8 +12,14 @@ from typing import NamedTuple
 import numpy as np
 import tomli_w
 
-from sbafab.calibration.model_values import ModelledActuator, NoModel, model_values
-from sbafab.calibration.posterior import (
+from sbafab.errors import DesignError
+from sbafab.models.calibrated import GROUPS, SHARE, ModelCalibration, SizeRange
+from sbafab.models.film_elements import Array
+from sbafab.models.intervals import sizes_of
+from sbafab.models.unknowns import UNKNOWNS, factors_at
+from sbafab.process import Progress
+from sbafab.validation.model_values import ModelledActuator, NoModel, model_values
+from sbafab.validation.posterior import (
     LEAST_ERROR,
     Posterior,
     SampledCurve,
@@ -21,14 +27,8 @@ from sbafab.calibration.posterior import (
     sampled,
     set_up_probabilities,
 )
-from sbafab.calibration.surface import ValueSurface, surfaces
-from sbafab.errors import DesignError
-from sbafab.evidence.records import Evidence, MeasuredCurve
-from sbafab.models.calibrated import GROUPS, SHARE, ModelCalibration, SizeRange
-from sbafab.models.film_elements import Array
-from sbafab.models.intervals import sizes_of
-from sbafab.models.unknowns import UNKNOWNS, factors_at
-from sbafab.process import Progress
+from sbafab.validation.records import Evidence, MeasuredCurve
+from sbafab.validation.surface import ValueSurface, surfaces
 
 DIGITS = 6
 TOLD_APART = 0.3

@@ -1,1 +1,0 @@
-"""Calibration: from measured curves to the posterior of the models' unknowns."""
