@@ -7,7 +7,7 @@ from pathlib import Path
 
 from benchmarks.task import FILLET, Plate, file_name, plates
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.order import cutting_order
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.offset import fillet
 from sbafab.geometry.region import Region, disc, union
 
@@ -21,7 +21,7 @@ def profile(plate: Plate) -> Region:
 
 def main(folder: Path) -> None:
     for index, plate in enumerate(plates()):
-        text = dxf_text(cutting_order(profile(plate)), {})
+        text = dxf_text(cutting_sequence(profile(plate)), {})
         (folder / file_name(index)).write_text(text)
 
 

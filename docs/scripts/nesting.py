@@ -24,16 +24,16 @@ from typing import Any
 import shapely
 
 from sbafab.actuators import load_design
+from sbafab.cutting.bottom_left import bottom_left
+from sbafab.cutting.nest import NestPart, Stock
+from sbafab.cutting.nest_check import check_nest
+from sbafab.cutting.nesting import materials_of, nest, of_material
 from sbafab.design.files import template_names
 from sbafab.errors import DesignError
 from sbafab.folders.build import make_build, stocks
 from sbafab.geometry.contour import run_chords
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region
-from sbafab.nesting.check import check_nest
-from sbafab.nesting.engines import bottom_left
-from sbafab.nesting.nest import materials_of, nest, of_material
-from sbafab.nesting.records import NestPart, Stock
 
 COPIES = (1, 4, 8, 20)
 SECONDS = 25

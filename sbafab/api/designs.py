@@ -18,7 +18,7 @@ from sbafab.assemblies.files import load_assembly, load_text, plain_tables
 from sbafab.assemblies.records import Assembly
 from sbafab.assemblies.shapes import bent_surface
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.order import cutting_order
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.design import laminate_file
 from sbafab.design.files import Change, as_in_a_file, shown, template_names, template_text
 from sbafab.design.records import Design
@@ -203,7 +203,7 @@ def drawing(layer: Layer) -> Drawing:
     """
     from ezdxf.filemanagement import read
 
-    text = dxf_text(cutting_order(layer.profile), {"PATTERN": layer.pattern, "UNITS": "mm"})
+    text = dxf_text(cutting_sequence(layer.profile), {"PATTERN": layer.pattern, "UNITS": "mm"})
     return read(StringIO(text))
 
 

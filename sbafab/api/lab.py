@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.api.designs import Source, command
-from sbafab.cutting.calibration import Calibration, calibrated, read_measurements
 from sbafab.design.files import Change
 from sbafab.errors import DesignError
+from sbafab.lab import recording
+from sbafab.lab.coupon import Calibration, calibrated, read_measurements
+from sbafab.lab.records import HistoryEntry, Record, columns, row_of
+from sbafab.lab.report import Report
+from sbafab.lab.report import report as report_of
+from sbafab.lab.store import Lab, store_photograph
 from sbafab.reports.traveller.record_sheet import RecordTable
-from sbafab.results import recording
-from sbafab.results.records import HistoryEntry, Record, columns, row_of
-from sbafab.results.report import Report
-from sbafab.results.report import report as report_of
-from sbafab.results.store import Lab, store_photograph
 
 
 def kerf(

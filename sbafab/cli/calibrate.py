@@ -17,9 +17,9 @@ from sbafab.design.files import shown
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.errors import DesignError, OutputError
 from sbafab.folders.swap import replace_text
+from sbafab.lab.evidence import load_source
 from sbafab.models.calibrated import NONE, shipped_names
 from sbafab.models.unknowns import UNKNOWNS
-from sbafab.results.evidence import load_source
 from sbafab.validation.fit import Fit, HeldOutPoint, calibration_text, fit
 
 

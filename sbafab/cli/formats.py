@@ -26,7 +26,9 @@ from sbafab.folders.artefacts import PredictDocument
 from sbafab.folders.checks import Checks
 from sbafab.folders.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.folders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
-from sbafab.inspection.inspection import InspectionDocument
+from sbafab.lab.inspection import InspectionDocument
+from sbafab.lab.records import HistoryDocument, RecordsDocument
+from sbafab.lab.report import ReportDocument
 from sbafab.laminate.joints import PortKind
 from sbafab.laminate.netlist import SCHEMA as NETS
 from sbafab.models.map_files import MapDocument
@@ -34,8 +36,6 @@ from sbafab.models.sensitivities import SensitivityRow
 from sbafab.pressing.schedule_files import PressDocument
 from sbafab.reports.assembly_prediction import SCHEMA as ASSEMBLY_PREDICTION
 from sbafab.reports.assembly_prediction import AssemblyPrediction
-from sbafab.results.records import HistoryDocument, RecordsDocument
-from sbafab.results.report import ReportDocument
 from sbafab.search.compare import CompareDocument, YieldEntry
 from sbafab.search.find import FindDocument
 from sbafab.search.sweep import SweepDocument

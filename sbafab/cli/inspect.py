@@ -18,9 +18,9 @@ from sbafab.cli.printing import (
     print_written,
 )
 from sbafab.errors import DesignError
-from sbafab.inspection.inspection import Inspection
-from sbafab.inspection.picture import ScanPicture
-from sbafab.inspection.scale import Reference
+from sbafab.lab.inspection import Inspection
+from sbafab.lab.picture import ScanPicture
+from sbafab.lab.scale import Reference
 
 MOST_LINES = 20
 """Pieces amiss that are printed; the files have all."""
@@ -69,9 +69,9 @@ def inspect(
     if find_spec("skimage") is None or find_spec("scipy") is None:
         raise DesignError('sbafab inspect needs scikit-image: pip install "sbafab[scan]"')
     # An extra that may be missing, checked above.
-    from sbafab.inspection.cut_sheet import read_cut_sheet
-    from sbafab.inspection.inspection import InspectionDocument, inspect_picture
-    from sbafab.inspection.picture import read_picture
+    from sbafab.lab.cut_sheet import read_cut_sheet
+    from sbafab.lab.inspection import InspectionDocument, inspect_picture
+    from sbafab.lab.picture import read_picture
 
     cut, seen = read_cut_sheet(folder, sheet), read_picture(picture)
     scale = _reference(seen, photo, **reference)
@@ -105,7 +105,7 @@ def _reference(
 def write_inspection(inspection: Inspection, out: Path) -> list[Path]:
     """Write picture, result, entry and table of sizes; return their paths."""
     from sbafab.folders.swap import replace_text
-    from sbafab.inspection.inspection import InspectionDocument, drawing, history, sizes_csv
+    from sbafab.lab.inspection import InspectionDocument, drawing, history, sizes_csv
 
     out.mkdir(parents=True, exist_ok=True)
     stem = f"{inspection.sheet.name.replace('/', '_')}-{inspection.picture.path.stem}"

@@ -9,7 +9,10 @@ import click
 
 from sbafab.cli.options import FiniteRange, json_option
 from sbafab.cli.printing import print_json, print_verdict, several
-from sbafab.cutting.calibration import (
+from sbafab.design.films import FILM_NAME, is_kerf
+from sbafab.documents import Document, attribute
+from sbafab.errors import DesignError
+from sbafab.lab.coupon import (
     Calibration,
     Estimate,
     Measurement,
@@ -17,9 +20,6 @@ from sbafab.cutting.calibration import (
     calibrated,
     read_measurements,
 )
-from sbafab.design.films import FILM_NAME, is_kerf
-from sbafab.documents import Document, attribute
-from sbafab.errors import DesignError
 
 
 class KerfEstimate(Document):

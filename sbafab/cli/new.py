@@ -70,7 +70,7 @@ def _list(as_json: bool) -> None:
 
 def _coupon(folder: Path) -> None:
     # Its drawing takes numpy, which no other file to start from does.
-    from sbafab.cutting.calibration import write_coupon
+    from sbafab.lab.coupon import write_coupon
 
     drawing, picture, table = write_coupon(folder, GENERATOR)
     click.echo(f"Cut {drawing} (picture: {picture}) from each film with a kerf offset of 0.")

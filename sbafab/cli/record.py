@@ -12,8 +12,8 @@ import click
 from sbafab.cli.options import LENGTH, PRESSURE, Command, json_option, set_option
 from sbafab.cli.printing import cell_text, print_json, print_table, print_verdict, several
 from sbafab.errors import DesignError
-from sbafab.results import recording
-from sbafab.results.records import (
+from sbafab.lab import recording
+from sbafab.lab.records import (
     ERRORS,
     HistoryEntry,
     HistoryRow,
@@ -25,8 +25,8 @@ from sbafab.results.records import (
     columns,
     row_of,
 )
-from sbafab.results.report import Report, ReportDocument, report, success_svg
-from sbafab.results.store import Contents, Lab
+from sbafab.lab.report import Report, ReportDocument, report, success_svg
+from sbafab.lab.store import Contents, Lab
 
 MEASUREMENTS: tuple[tuple[str, str, Any, str, str], ...] = (
     ("--leak", "leak", click.Choice(["pass", "fail"]), "", "Result of the leak test."),

@@ -9,8 +9,8 @@ import click
 
 from sbafab.cli.options import json_option, out_option
 from sbafab.cli.printing import print_json, print_verdict
+from sbafab.lab.evidence import load_source
 from sbafab.models.calibrated import load_calibration
-from sbafab.results.evidence import load_source
 from sbafab.validation import page
 from sbafab.validation.comparison import (
     ComparisonDocument,

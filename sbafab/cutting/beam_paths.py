@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.nest_check import edge_distance
 from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE, Entries
 from sbafab.cutting.verify import TOLERANCE
 from sbafab.errors import DesignError, OutputError
@@ -24,7 +25,6 @@ from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to, left_turn, meeting_points
 from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Region
-from sbafab.nesting.check import edge_distance
 
 CORNER = math.radians(10)
 """A turn from edge to edge by more is a corner."""

@@ -8,8 +8,8 @@ from pathlib import Path
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.lettering import Stroke, strokes, width
-from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, fixture_properties
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Bounds, Point
@@ -113,7 +113,7 @@ def write_fixture(
     written = _lettered((title, *notes), plate) if notes else ()
     if settings.curves.in_chords:
         plate = in_chords(plate, None, settings.curves.chord_error)
-    text = dxf_text(cutting_order(plate), properties, settings.curves.profile, notes=written)
+    text = dxf_text(cutting_sequence(plate), properties, settings.curves.profile, notes=written)
     path = folder / PATH
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(text.encode())

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import FOLDER, CutSettings, file_properties, layer_path
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
@@ -63,7 +63,7 @@ def _write_pattern(
     material = first.film.material
     kerf = settings.kerf_width(material)
     properties = file_properties(settings, material, first.pattern)
-    contours = cutting_order(path)
+    contours = cutting_sequence(path)
     text = dxf_text(contours, properties, settings.curves.profile)
     data = text.encode()
     original = folder / layer_path(first.name, kerf)

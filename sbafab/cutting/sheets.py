@@ -30,7 +30,7 @@ from sbafab.cutting.machine_files import (
     svg_text,
     verify_machine_file,
 )
-from sbafab.cutting.order import cutting_minutes, cutting_order, travel
+from sbafab.cutting.nest import Nest, Placement, Stock
 from sbafab.cutting.properties import (
     PLAIN,
     CutSettings,
@@ -39,6 +39,7 @@ from sbafab.cutting.properties import (
     file_properties,
     kerf_suffix,
 )
+from sbafab.cutting.sequence import cutting_minutes, cutting_sequence, travel
 from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.design.sections import Laser, Sheets
 from sbafab.errors import OutputError
@@ -46,7 +47,6 @@ from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
-from sbafab.nesting.records import Nest, Placement, Stock
 from sbafab.process import Counted
 
 FOLDER = "sheets"
@@ -133,7 +133,7 @@ def _write_sheet(
     marks = index_marks(nest, sheet) if sheets.index_marks else ()
     placements = nest.on_sheet(sheet)
     region = Region(tuple(c for p in placements for c in nest.region(p).contours))
-    contours = cutting_order(region, laser.heat_distance)
+    contours = cutting_sequence(region, laser.heat_distance)
     width, length = nest.stock.width, nest.length(sheet)
     around = _surroundings(nest, sheet, (width, length), settings, sheets.label)
     unlabelled: LabelState = "no room" if sheets.label else "off"

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.layer_files import write_layer_files
+from sbafab.cutting.nest import Nest
+from sbafab.cutting.nesting import PLACES, as_dict
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.seam_files import write_seam_files
 from sbafab.cutting.sheets import SheetFile, write_sheets
@@ -35,8 +37,6 @@ from sbafab.meshing.mesh_files import MeshFile, write_meshes
 from sbafab.models.calibrated import FILE as CALIBRATION_FILE
 from sbafab.models.calibrated import NONE, load_calibration, shipped_names
 from sbafab.models.figures import Prediction, PredictionDocument
-from sbafab.nesting.nest import PLACES, as_dict
-from sbafab.nesting.records import Nest
 from sbafab.pressing.cycles import batch_entry
 from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json
 from sbafab.process import Progress

@@ -9,6 +9,8 @@ from functools import cached_property
 from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
 from sbafab.cutting.kerf import compensated_paths
+from sbafab.cutting.nest import TURNS, NestPart, Stock, parts_of
+from sbafab.cutting.nesting import refuse_unfit
 from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings, Entries, Recipes
 from sbafab.design.films import Sheet, material
 from sbafab.design.identity import design_sha256
@@ -19,8 +21,6 @@ from sbafab.geometry.offset import widths
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate
-from sbafab.nesting.nest import refuse_unfit
-from sbafab.nesting.records import TURNS, NestPart, Stock, parts_of
 from sbafab.pressing import dowels
 from sbafab.pressing.cycles import Runs, design_runs
 from sbafab.pressing.schedule import Schedule, plate_holes, schedule

@@ -12,6 +12,7 @@ from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
 from sbafab.assemblies.records import Cup
 from sbafab.assemblies.shapes import colours, cup_mould, linear, placed_surface
+from sbafab.cutting.nest import Nest
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DefectError
 from sbafab.folders.artefacts import (
@@ -30,7 +31,6 @@ from sbafab.folders.checks import checks
 from sbafab.folders.manifest import AssemblyManifest, as_json, file_hashes, job_manifest, manifest
 from sbafab.folders.order import SCHEMA, Order
 from sbafab.meshing.formats import Node, write_scene, write_stl
-from sbafab.nesting.records import Nest
 from sbafab.process import Progress
 
 SOLID = "mesh/assembled.glb"

@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 
 from sbafab.cli import main
 from tests.cli.conftest import Run
-from tests.inspection.scans import Camera, render, save
+from tests.lab.scans import Camera, render, save
 
 CAMERA = Camera(dpi=400, kerf=0.14, tilt=1)
 

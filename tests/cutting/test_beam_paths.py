@@ -10,8 +10,8 @@ import shapely
 
 from sbafab.cutting.beam_paths import BeamRun, beam_runs
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, Entries
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Edge, Point
 from sbafab.geometry.region import Region, disc, rectangle
@@ -24,7 +24,7 @@ ASKED = Entries(lead_in=1.0, overcut=0.5, tab_width=0.6, tabs=2, kerf=0.2, clear
 
 
 def runs_of(region: Region, entries: Entries) -> list[BeamRun]:
-    runs = beam_runs(cutting_order(region), entries, AROUND)
+    runs = beam_runs(cutting_sequence(region), entries, AROUND)
     return [BeamRun(run.layer, run.edges) for run in runs]
 
 
@@ -143,7 +143,7 @@ def test_lead_ins_keep_off_pins_and_engraving() -> None:
     bar = rectangle((10.0, 20.0), (50.0, 30.0))
     entries = Entries(lead_in=1.0, clearance=0.2)
     engraved = Surroundings(engraved=(((29.0, 19.5), (31.0, 19.5)),), frame=(80.0, 60.0))
-    contours = cutting_order(bar)
+    contours = cutting_sequence(bar)
     [plain] = beam_runs(contours, entries, AROUND)
     assert plain.edges[0].start == pytest.approx((30.0, 19.0))
     [other] = beam_runs(contours, entries, engraved)

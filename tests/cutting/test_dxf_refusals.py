@@ -12,7 +12,7 @@ from ezdxf.layouts import Modelspace
 
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.order import cutting_order
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 
@@ -125,7 +125,7 @@ def test_what_cannot_be_cut_is_refused(
 
 
 def test_missing_and_doubled_edges_of_a_chain_are_refused(plate: Region) -> None:
-    text = dxf_text(cutting_order(plate), {}, "arcs")
+    text = dxf_text(cutting_sequence(plate), {}, "arcs")
     for kind in ("LINE", "ARC"):
         edge = entity(text, kind)
         with pytest.raises(OutputError, match="contour open at x"):

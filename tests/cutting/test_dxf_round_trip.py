@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text, number
 from sbafab.cutting.kerf import in_chords
-from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import DxfProfile
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.contour import in_reading_order
 from sbafab.geometry.offset import shrink
 from sbafab.geometry.region import Region, disc, union
@@ -36,7 +36,7 @@ def test_what_is_written_is_read(
     gap = least_gap(region, 0.0)
     assume(min(edge.length for edge in region.edges) > 0.01 and (not gap or gap.value > 0.01))
     drawn = in_chords(region, None, 0.005) if profile == "chords" else region
-    read = read_profile(dxf_text(cutting_order(drawn), {}, profile)).region
+    read = read_profile(dxf_text(cutting_sequence(drawn), {}, profile)).region
     assert Region(in_reading_order(read.contours)) == drawn
     assert read.area == pytest.approx(drawn.area, abs=1e-6)
 
@@ -48,14 +48,14 @@ def test_custom_properties_come_back() -> None:
 
 
 def test_holes_come_first_and_the_datum_last(plate: Region) -> None:
-    found = read_profile(dxf_text(cutting_order(plate), {}))
+    found = read_profile(dxf_text(cutting_sequence(plate), {}))
     assert found.layers == (*["CUT_INNER"] * 4, "CUT_OUTER", "REFERENCE", "REFERENCE")
     assert found.other == ("LINE", "LINE")
     assert found.units == "mm"
 
 
 def test_datum_can_be_left_out(plate: Region) -> None:
-    assert read_profile(dxf_text(cutting_order(plate), {}, sheet=Surroundings())).other == ()
+    assert read_profile(dxf_text(cutting_sequence(plate), {}, sheet=Surroundings())).other == ()
 
 
 def test_a_large_bulge_from_elsewhere_is_read_exactly(plate_text: str) -> None:
@@ -90,5 +90,5 @@ def test_numbers_have_no_exponent_and_no_negative_zero(value: float, text: str) 
 
 def test_outlines_go_on_from_the_last_hole() -> None:
     ring = disc((10.0, 0.0), 2.0) - disc((10.0, 0.0), 1.0)
-    order = [contour.circle for contour in cutting_order(ring | disc((3.0, 0.0), 1.0))]
+    order = [contour.circle for contour in cutting_sequence(ring | disc((3.0, 0.0), 1.0))]
     assert [circle[0][0] for circle in order if circle] == pytest.approx([10.0, 10.0, 3.0])

@@ -20,7 +20,7 @@ from sbafab.cutting.lightburn import (
     sheet_layers,
     verify_project,
 )
-from sbafab.cutting.order import cutting_order
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region, disc
 
@@ -34,7 +34,7 @@ PROPERTIES = {"DESIGN": 'arm "2" & co', "WARNING": "hot"}
 
 def of_sheet(region: Region, around: Surroundings) -> tuple[list[LaserLayer], list[LaserRun]]:
     """Return the layers and runs of a sheet without recipes."""
-    runs = list(drawn(contour_runs(cutting_order(region)), around))
+    runs = list(drawn(contour_runs(cutting_sequence(region)), around))
     return sheet_layers({run.layer for run in runs}, {}), runs
 
 

@@ -21,8 +21,8 @@ from sbafab.cutting.machine_files import (
     machine_text,
     verify_machine_file,
 )
-from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import PLAIN, Entries, LaserProgram
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region, disc, stadium
 
@@ -41,7 +41,7 @@ AREA = math.pi * (10**2 - 4**2) + math.pi * 8**2 + 20 * 16
 
 
 def runs_of(entries: Entries) -> list[LaserRun]:
-    return list(drawn(beam_runs(cutting_order(PARTS), entries, AROUND), AROUND))
+    return list(drawn(beam_runs(cutting_sequence(PARTS), entries, AROUND), AROUND))
 
 
 def written(folder: Path, program: LaserProgram, entries: Entries = PLAIN) -> Path:

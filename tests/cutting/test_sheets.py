@@ -10,13 +10,13 @@ import shapely
 
 from sbafab.cutting import sheets as module
 from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.nest import Nest, NestPart, Placement, Stock
+from sbafab.cutting.nesting import nest
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.design.sections import Laser, Sheets
 from sbafab.errors import OutputError
 from sbafab.geometry.region import disc
-from sbafab.nesting.nest import nest
-from sbafab.nesting.records import Nest, NestPart, Placement, Stock
 
 SETTINGS = CutSettings("demo", "cd" * 32, generator="sbafab 1.2.3")
 STOCK = Stock(width=60.0, length=80.0, border=6.0)

@@ -9,8 +9,8 @@ import pytest
 
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
-from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import DxfProfile
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region, disc, rectangle
@@ -23,7 +23,7 @@ def ring(hole_x: float = 1.0, hole_radius: float = 0.5, radius: float = 5.0) -> 
 
 
 def check(found: Region, expected: Region, write: Write) -> None:
-    verify_file(write(dxf_text(cutting_order(found), {"A": "b"})), expected, {"A": "b"})
+    verify_file(write(dxf_text(cutting_sequence(found), {"A": "b"})), expected, {"A": "b"})
 
 
 @pytest.mark.parametrize("name", ["disc", "discs", "stadium", "tab", "plate", "island"])
@@ -34,7 +34,7 @@ def test_what_was_written_passes(
     region = profiles[name]
     if profile == "chords":
         region = in_chords(region, "wall", 0.005)
-    path = write(dxf_text(cutting_order(region), {}, profile))
+    path = write(dxf_text(cutting_sequence(region), {}, profile))
     verify_file(path, region, {})
 
 
@@ -65,14 +65,14 @@ def test_missing_piece_is_found(write: Write, profiles: dict[str, Region]) -> No
 
 
 def test_outline_before_its_hole_is_found(write: Write) -> None:
-    backwards = cutting_order(ring())[::-1]
+    backwards = cutting_sequence(ring())[::-1]
     with pytest.raises(OutputError, match="CUT_OUTER is cut before CUT_INNER"):
         verify_file(write(dxf_text(backwards, {})), ring(), {})
 
 
 @pytest.mark.parametrize("expected", [{}, {"A": "c"}, {"A": "b", "C": "d"}])
 def test_other_properties_are_found(expected: dict[str, str], write: Write) -> None:
-    path = write(dxf_text(cutting_order(ring()), {"A": "b"}))
+    path = write(dxf_text(cutting_sequence(ring()), {"A": "b"}))
     with pytest.raises(OutputError, match=r"custom property [AC] is"):
         verify_file(path, ring(), expected)
 

@@ -12,8 +12,8 @@ from zipfile import ZipFile
 
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import ENGRAVE
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from tests.faults.record import Fault, Kind
@@ -80,7 +80,7 @@ def plate(name: str, change: Callable[[Region], Region]) -> Fault:
         region = Region((*outline.outers, *found.region.holes))
         # After the datum cross come the letters that tell the shop of its holes.
         notes = [[edges[0].start, *(e.end for e in edges)] for _, edges in found.strokes[2:]]
-        text = dxf_text(cutting_order(region), found.properties, notes=notes)
+        text = dxf_text(cutting_sequence(region), found.properties, notes=notes)
         path.write_text(text, newline="\n")
         specimen.doctor.rehash()
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
-from sbafab.cutting.order import cutting_order
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.region import Region, polygon
 from tests.faults.record import Fault, Kind
@@ -26,7 +26,7 @@ def chorded(name: str, rule: str, pick: Pick, draw: Callable[[Region], Region]) 
         path = specimen.doctor.path(layer.index)
         found = read_profile(path)
         told = {**found.properties, "CURVES": f"chords within {ERROR:g} mm"}
-        path.write_text(dxf_text(cutting_order(found.region), told), newline="\n")
+        path.write_text(dxf_text(cutting_sequence(found.region), told), newline="\n")
         specimen.doctor.rehash()
 
     return Fault(name, rule, put)

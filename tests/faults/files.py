@@ -10,7 +10,7 @@ from pathlib import Path
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
-from sbafab.cutting.order import cutting_order
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line, meeting_points
 from sbafab.geometry.region import Region, disc
@@ -129,7 +129,7 @@ def on_entity(group: str) -> Callable[[str], str]:
 def redone(change: Callable[[Region], Region]) -> Callable[[Path], None]:
     def rewrite(path: Path) -> None:
         found = read_profile(path)
-        path.write_text(dxf_text(cutting_order(change(found.region)), found.properties))
+        path.write_text(dxf_text(cutting_sequence(change(found.region)), found.properties))
 
     return rewrite
 
@@ -137,7 +137,7 @@ def redone(change: Callable[[Region], Region]) -> Callable[[Path], None]:
 def as_chords(path: Path) -> None:
     found = read_profile(path)
     drawn = in_chords(found.region, "separator-mask", 0.005)
-    path.write_text(dxf_text(cutting_order(drawn), found.properties, "chords"))
+    path.write_text(dxf_text(cutting_sequence(drawn), found.properties, "chords"))
 
 
 def crossing_itself(region: Region) -> Region:

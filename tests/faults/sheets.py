@@ -9,13 +9,13 @@ from typing import Any
 
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
-from sbafab.cutting.order import cutting_order
+from sbafab.cutting.nest_check import least_distance
 from sbafab.cutting.properties import CUT_SHEET, ENGRAVE
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region
-from sbafab.nesting.check import least_distance
 from tests.faults.files import inches
 from tests.faults.holes import EARS
 from tests.faults.record import Fault, Kind
@@ -71,7 +71,7 @@ def rearranged(
         found = read_profile(path)
         region = Region(tuple(c for p in change(list(found.region.pieces)) for c in p.contours))
         path.write_text(
-            drawn(found, cutting_order(region), (told["width"], told["length"])), newline="\n"
+            drawn(found, cutting_sequence(region), (told["width"], told["length"])), newline="\n"
         )
         specimen.doctor.rehash()
 
@@ -158,7 +158,7 @@ def engraved_through(specimen: Specimen) -> None:
     middle = (low_y + high_y) / 2
     stroke = ((low_x - 0.3, middle), (high_x + 0.3, middle))
     frame = claims["width"], claims["length"]
-    path.write_text(drawn(found, cutting_order(found.region), frame, [stroke]), newline="\n")
+    path.write_text(drawn(found, cutting_sequence(found.region), frame, [stroke]), newline="\n")
 
 
 def parted(specimen: Specimen) -> None:
@@ -166,7 +166,7 @@ def parted(specimen: Specimen) -> None:
     found = read_profile(path)
     frame = claims["width"], claims["length"]
     stroke = ((0.0, 76.2), (frame[0], 76.2))
-    contours = cutting_order(found.region)
+    contours = cutting_sequence(found.region)
     path.write_text(drawn(found, contours, frame, parting=[stroke]), newline="\n")
     assert CUT_SHEET in read_profile(path).layers
 
@@ -175,7 +175,7 @@ def framed(specimen: Specimen) -> None:
     claims, path = sheet_of(specimen)
     found = read_profile(path)
     frame = claims["width"] + 1.0, claims["length"]
-    path.write_text(drawn(found, cutting_order(found.region), frame), newline="\n")
+    path.write_text(drawn(found, cutting_sequence(found.region), frame), newline="\n")
 
 
 def in_inches(specimen: Specimen) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.order import cutting_order
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Line, Point
 from sbafab.geometry.region import Region
@@ -40,7 +40,7 @@ class Doctor:
     def redraw(self, layer: int, change: Callable[[Region], Region]) -> None:
         """The layer's file with its profile changed and everything else as it was."""
         found = read_profile(self.path(layer))
-        contours = cutting_order(change(found.region))
+        contours = cutting_sequence(change(found.region))
         self.path(layer).write_text(dxf_text(contours, found.properties), newline="\n")
 
     def edit(self, layer: int, old: str, new: str) -> None:

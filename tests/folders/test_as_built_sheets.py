@@ -12,8 +12,8 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
-from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import ENGRAVE
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import RunRequest, generate
@@ -42,7 +42,7 @@ def redraw(doctor: Doctor, change: Callable[[list[Region]], list[Region]]) -> No
         if layer == ENGRAVE
     ]
     around = Surroundings(engraved, frame=(sheet["width"], sheet["length"]))
-    text = dxf_text(cutting_order(region), found.properties, sheet=around)
+    text = dxf_text(cutting_sequence(region), found.properties, sheet=around)
     path.write_text(text, newline="\n")
     doctor.rehash()
 

@@ -100,7 +100,7 @@ def doctored(doctor: Doctor, file: str, change: object) -> set[str]:
 def test_a_plate_without_a_hole_of_one_place_fails(doctor: Doctor) -> None:
     from sbafab.cutting.dxf_read import read_profile
     from sbafab.cutting.dxf_write import dxf_text
-    from sbafab.cutting.order import cutting_order
+    from sbafab.cutting.sequence import cutting_sequence
     from sbafab.geometry.region import Region
 
     file = doctor.manifest["fixture"]
@@ -110,7 +110,7 @@ def test_a_plate_without_a_hole_of_one_place_fails(doctor: Doctor) -> None:
         found = read_profile(path)
         holes = found.region.holes
         left = Region(tuple(c for c in found.region.contours if c is not holes[-1]))
-        path.write_text(dxf_text(cutting_order(left), found.properties), newline="\n")
+        path.write_text(dxf_text(cutting_sequence(left), found.properties), newline="\n")
 
     assert doctored(doctor, file, put) == {"as-designed"}
 
@@ -119,7 +119,7 @@ def test_a_plate_with_other_notes_of_its_holes_fails(doctor: Doctor) -> None:
     """A shop that bores to another depth, or to none, has pins that stand off their height."""
     from sbafab.cutting.dxf_read import read_profile
     from sbafab.cutting.dxf_write import dxf_text
-    from sbafab.cutting.order import cutting_order
+    from sbafab.cutting.sequence import cutting_sequence
 
     file = doctor.manifest["fixture"]
     path = doctor.folder / file
@@ -133,7 +133,7 @@ def test_a_plate_with_other_notes_of_its_holes_fails(doctor: Doctor) -> None:
         (found.properties, notes[:-1], False),
         (found.properties, (), False),
     ):
-        text = dxf_text(cutting_order(found.region), properties, notes=strokes)
+        text = dxf_text(cutting_sequence(found.region), properties, notes=strokes)
 
         def put(text: str = text) -> None:
             path.write_text(text, newline="\n")
@@ -146,7 +146,7 @@ def test_places_that_are_too_near_fail_though_the_plate_agrees(doctor: Doctor) -
     from sbafab.cutting.dxf_read import read_profile
     from sbafab.cutting.dxf_write import dxf_text
     from sbafab.cutting.fixture import fixture
-    from sbafab.cutting.order import cutting_order
+    from sbafab.cutting.sequence import cutting_sequence
 
     file = doctor.manifest["fixture"]
     path = doctor.folder / file
@@ -158,7 +158,7 @@ def test_places_that_are_too_near_fail_though_the_plate_agrees(doctor: Doctor) -
         plate = fixture(laminate, (152.4, 152.4), near)
         assert plate is not None
         properties = read_profile(path).properties
-        path.write_text(dxf_text(cutting_order(plate), properties), newline="\n")
+        path.write_text(dxf_text(cutting_sequence(plate), properties), newline="\n")
         places = [{"x": x, "y": y} for x, y in near]
         doctor.set_manifest(lambda m: m["batch"].update(places=places))
 

@@ -14,10 +14,12 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.cli.exit import exit_plainly
 from sbafab.cutting import layer_files
+from sbafab.cutting.bottom_left import bottom_left
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.layer_files import write_layer_files
-from sbafab.cutting.order import cutting_order
+from sbafab.cutting.nest import NestPart, Placement, Stock
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import DefectError, OutputError
 from sbafab.folders import artefacts
 from sbafab.folders import check as as_built
@@ -27,8 +29,6 @@ from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.contour import Contour
 from sbafab.models.figures import Factors, PredictionRequest
 from sbafab.models.prediction import predict
-from sbafab.nesting.engines import bottom_left
-from sbafab.nesting.records import NestPart, Placement, Stock
 from sbafab.rules.rule import Explanation, Rule
 from tests.folders.doctoring import Doctor
 
@@ -49,7 +49,7 @@ def spoilt(edit: Edit) -> Callable[..., object]:
 
 def redrawn(path: Path) -> None:
     found = read_profile(path)
-    text = dxf_text(cutting_order(found.region.moved(0.15, 0.0)), found.properties)
+    text = dxf_text(cutting_sequence(found.region.moved(0.15, 0.0)), found.properties)
     path.write_text(text, newline="\n")
 
 
@@ -152,7 +152,7 @@ def test_parts_of_a_nest_that_lie_badly_are_not_let_through(
         return (replace(first, shift=(x + shift[0], y + shift[1])), *others)
 
     with (
-        patch("sbafab.nesting.nest.bottom_left", moved),
+        patch("sbafab.cutting.nesting.bottom_left", moved),
         pytest.raises(DefectError, match=said),
     ):
         generate(RunRequest(load_design("1dof-5mm", FEW), tmp_path, ("cut",)))

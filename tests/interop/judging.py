@@ -12,7 +12,7 @@ import shapely
 from pyogrio import raw
 
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.order import cutting_order
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_gap, least_width
 from sbafab.laminate.laminate import Laminate
@@ -144,7 +144,7 @@ def areas(laminate: Laminate, folder: Path) -> Iterator[tuple[float, float]]:
     path = folder / "layer.dxf"
     for layers in laminate.patterns.values():
         profile = layers[0].profile
-        path.write_text(dxf_text(cutting_order(profile), {}), encoding="utf-8")
+        path.write_text(dxf_text(cutting_sequence(profile), {}), encoding="utf-8")
         yield profile.area, _gdal_area(path)
 
 

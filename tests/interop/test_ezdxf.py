@@ -12,8 +12,8 @@ from ezdxf.document import Drawing
 
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
-from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import DxfProfile
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.region import Region, disc, strip, union
 
 AXES = [(4.25 * math.cos(turn), 4.25 * math.sin(turn)) for turn in (0.5, 2.6, 4.7)]
@@ -28,7 +28,7 @@ def lobed() -> Region:
 
 def text(profile: DxfProfile) -> str:
     region = in_chords(lobed(), "wall", 0.005) if profile == "chords" else lobed()
-    return dxf_text(cutting_order(region), {"DESIGN": "lobed", "UNITS": "mm"}, profile)
+    return dxf_text(cutting_sequence(region), {"DESIGN": "lobed", "UNITS": "mm"}, profile)
 
 
 def document(profile: DxfProfile) -> Drawing:

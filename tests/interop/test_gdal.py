@@ -13,8 +13,8 @@ from pyogrio import raw
 
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
-from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import DxfProfile
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.offset import fillet
 from sbafab.geometry.region import Region, disc, stadium, strip, union
 
@@ -72,7 +72,7 @@ def read(region: Region, profile: DxfProfile, folder: Path) -> tuple[list[str], 
     if profile == "chords":
         region = in_chords(region, None, 0.005)
     path = folder / "part.dxf"
-    path.write_text(dxf_text(cutting_order(region), {}, profile), encoding="utf-8")
+    path.write_text(dxf_text(cutting_sequence(region), {}, profile), encoding="utf-8")
     _, _, shapes, (layers,) = raw.read(path, columns=["Layer"])
     kept = [index for index, layer in enumerate(layers) if layer.startswith("CUT_")]
     return [layers[index] for index in kept], [shapely.from_wkb(shapes[index]) for index in kept]

@@ -21,8 +21,8 @@ from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.lightburn import ADVICE, runs_text, sheet_layers
 from sbafab.cutting.machine_files import machine_text
-from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, ENGRAVE, PLAIN, Entries
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.design.recipes import Recipe
 from tests.interop.made import EXACT, LENGTH, WIDTH, Sheet, outline_bounds
 from tests.interop.painting import painted
@@ -48,7 +48,7 @@ STEP = 0.0254
 
 
 def runs_of(sheet: Sheet, entries: Entries) -> list[LaserRun]:
-    contours = cutting_order(read_profile(sheet.files["bulges"]).region)
+    contours = cutting_sequence(read_profile(sheet.files["bulges"]).region)
     return list(drawn(beam_runs(contours, entries, AROUND), AROUND))
 
 

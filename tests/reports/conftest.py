@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from sbafab.cutting.nest import Nest, NestPart, Placement, Stock, Turn
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate
-from sbafab.nesting.records import Nest, NestPart, Placement, Stock, Turn
 
 STOCK = Stock(pins=((5.0, 5.0, 4.0),))
 MATERIALS: tuple[Material, ...] = ("TPE", "PTFE")

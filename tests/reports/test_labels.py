@@ -10,8 +10,8 @@ import pytest
 import shapely
 from lxml import html as lxml_html
 
+from sbafab.cutting.nest import Nest
 from sbafab.cutting.sheets import SheetFile
-from sbafab.nesting.records import Nest
 from sbafab.reports.traveller.sheet_map import sheet_map
 from tests.reports.pages import built
 

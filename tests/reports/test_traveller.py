@@ -23,13 +23,13 @@ from sbafab.actuators import FAMILIES
 from sbafab.cutting.properties import COLOURS, CUT_SEQUENCE, REFERENCE
 from sbafab.design.sections import Acceptance
 from sbafab.geometry.region import Region
+from sbafab.lab.recording import entries_of
 from sbafab.reports.traveller import formatting
 from sbafab.reports.traveller.bench import cutting, held_films
 from sbafab.reports.traveller.materials import cut_list, release_films
 from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS
 from sbafab.reports.traveller.times import HANDLING_MINUTES, times
-from sbafab.results.recording import entries_of
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding, Place
 from tests.quick import few

@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 
 from sbafab import api
+from sbafab.lab.store import Lab
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS
-from sbafab.results.store import Lab
 from sbafab.studio.app import Studio, app
 from tests.studio.asking import Client
 

@@ -12,10 +12,10 @@ import pytest
 import sbafab
 from sbafab.cli import main
 from sbafab.errors import DesignError
+from sbafab.lab.evidence import from_lab_records
+from sbafab.lab.store import Lab
 from sbafab.models.figures import Factors
 from sbafab.models.stack import Stack
-from sbafab.results.evidence import from_lab_records
-from sbafab.results.store import Lab
 from sbafab.validation.comparison import compare, table_lines
 from sbafab.validation.files import load_evidence
 from sbafab.validation.model_values import (

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 import sbafab
+from sbafab.lab.builds import promised
 from sbafab.models.quantity import Conditions, FigureKey, ModelId, Quantity
-from sbafab.results.builds import promised
 from sbafab.search.sweep import SweepRequest, sweep
 from sbafab.search.vary import read_varied
 

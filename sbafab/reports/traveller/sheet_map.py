@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sbafab.cutting.nest import Placement
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region, coord
 from sbafab.laminate.films import Film
-from sbafab.nesting.records import Placement
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller.shapes import Picture, label
 

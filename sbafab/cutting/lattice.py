@@ -1,0 +1,431 @@
+"""Lattices of one shape on a film sheet: rows of copies, straight, offset, or turned by half.
+
+Copies are apart if outlines grown by half the spacing do not meet. The least distance of two copies
+along an axis follows from envelopes: it is the maximum, over the other coordinate, of the front of
+one less the back of the other. Lattices are ranked by a table of these distances and laid by the
+exact distances.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
+
+from sbafab.cutting.nest import TURNS, Turn, placed
+from sbafab.geometry.contour import run_chords
+from sbafab.geometry.edges import Bounds, Point, unit
+from sbafab.geometry.offset import grow
+from sbafab.geometry.on_demand import np
+from sbafab.geometry.region import Region
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[np.float64]
+
+SAGITTA = 5e-4
+"""mm by which the polygons of grown outlines may reach past arcs."""
+LEVEL = 1e-10
+"""mm beside a corner at which an envelope is read, since it may jump there."""
+STEPS = 96
+"""Offsets that are tried between two rows, and between the two copies of a pair."""
+TABLE = 192
+"""Entries of a table of distances."""
+MOST_ROWS = 60
+"""Rows that are counted to rank a lattice."""
+PROMISING = 16
+"""Number of best-ranked lattices that are laid."""
+NEVER = -1e9
+"""mm: what need not lie above at all."""
+FEW = 40
+"""Copies on a sheet up to which two lattices are tried beside each other."""
+ROOM = 0.02
+"""mm more than there is, in which copies are counted to rank a lattice."""
+ROUNDING = 5e-7
+"""mm by which a copy may lie past the border: less than the check's tolerance."""
+
+
+Value = TypeVar("Value")
+"""A number, or an array of a number of many rows."""
+
+
+class Lattice(NamedTuple):
+    """Places of copies of one shape on an empty sheet, the lowest first: turn and shift in mm.
+
+    ``top`` is the highest y that they reach; ``is_pair`` is true of two lattices side by side.
+    """
+
+    places: tuple[tuple[Turn, Point], ...]
+    top: float
+    is_pair: bool = False
+
+
+def lattices_of(
+    shape: Region, spacing: float, area: Bounds, turns: Sequence[Turn]
+) -> list[Lattice]:
+    """Return the lattices that hold most copies of a shape in ``area``, the best first.
+
+    Copies are ``spacing`` mm apart, and turned by ``turns`` alone. Where few fit, a lattice may be
+    two, one beside the other.
+    """
+    rows = tuple(_Rows(shape, base, spacing) for base in TURNS[:2])
+    laid = list(_laid_in(rows, area, turns))
+    if 0 < max(len(lattice.places) for lattice in laid) <= FEW:
+        laid += _pairs(rows, area, turns)
+    return sorted(laid, key=most_copies)
+
+
+def most_copies(lattice: Lattice) -> tuple[int, float]:
+    """Sort key: most copies, then least length."""
+    return -len(lattice.places), round(lattice.top, 3)
+
+
+def _laid_in(rows: Sequence[_Rows], area: Bounds, turns: Sequence[Turn]) -> Iterator[Lattice]:
+    """Yield lattices of a shape, as it is drawn and turned, in ``area``."""
+    low_x, low_y, high_x, high_y = area
+    width, length = high_x - low_x, high_y - low_y
+    for base, in_turn in zip(TURNS, rows, strict=False):
+        if base in turns:
+            for copies in in_turn.layouts((width, length)):
+                places = [(turn, (low_x + u, low_y + v)) for turn, (u, v) in copies]
+                yield lattice_of(in_turn.shape, places)
+        if TURNS[base + 1] in turns and abs(width - length) > LEVEL:
+            # Columns: the sheet's y is the rows' x.
+            for copies in in_turn.layouts((length, width)):
+                places = [
+                    (TURNS[(turn + 1) % 4], (high_x - v, low_y + u)) for turn, (u, v) in copies
+                ]
+                yield lattice_of(in_turn.shape, places)
+
+
+def _pairs(rows: Sequence[_Rows], area: Bounds, turns: Sequence[Turn]) -> Iterator[Lattice]:
+    """Yield pairs of lattices: one leaves a strip as wide as one copy, another fills the strip."""
+    shape, spacing = rows[0].shape, rows[0].spacing
+    low_x, low_y, high_x, high_y = area
+    # On a square, a strip on top is one at the side, turned.
+    is_square = abs(high_x - low_x - (high_y - low_y)) < LEVEL and len(turns) == len(TURNS)
+    for strip in sorted({2 * rows[0].half_width, 2 * rows[0].half_height}):
+        for is_above in (False,) if is_square else (False, True):
+            across, up = (0.0, strip + spacing) if is_above else (strip + spacing, 0.0)
+            inside = low_x, low_y, high_x - across, high_y - up
+            first = min(_laid_in(rows, inside, turns), key=most_copies)
+            if not first.places:
+                continue
+            beyond = first.top if is_above else _right(shape, first)
+            corner = (low_x, beyond + spacing) if is_above else (beyond + spacing, low_y)
+            rest = min(_laid_in(rows, (*corner, high_x, high_y), turns), key=most_copies)
+            pair = lattice_of(shape, [*first.places, *rest.places])
+            yield pair._replace(is_pair=True)
+
+
+def _right(shape: Region, lattice: Lattice) -> float:
+    """Return the highest x that the copies reach."""
+    right = {turn: placed(shape, turn, (0.0, 0.0)).bounds[2] for turn, _ in lattice.places}
+    return max(right[turn] + shift[0] for turn, shift in lattice.places)
+
+
+def lattice_of(shape: Region, places: Sequence[tuple[Turn, Point]]) -> Lattice:
+    """Return the copies of a shape, the lowest first."""
+    tops = {
+        turn: placed(shape, turn, (0.0, 0.0)).bounds[3] for turn in {turn for turn, _ in places}
+    }
+    highest = [tops[turn] + shift[1] for turn, shift in places]
+    order = sorted(range(len(places)), key=lambda i: (round(highest[i], 6), places[i][1][0]))
+    return Lattice(tuple(places[i] for i in order), max(highest, default=0.0))
+
+
+class _Copy(NamedTuple, Generic[Value]):
+    """A copy in a row: 1 if it is turned by half, else 0, and its shift in mm."""
+
+    half: int
+    x: Value
+    y: Value
+
+
+class _Row(NamedTuple, Generic[Value]):
+    """Copies that repeat every ``pitch`` mm."""
+
+    copies: tuple[_Copy[Value], ...]
+    pitch: Value
+
+
+class _Pattern(NamedTuple, Generic[Value]):
+    """Rows that repeat upward; each begins one of ``steps`` mm to the right of that below it."""
+
+    rows: tuple[_Row[Value], ...]
+    steps: tuple[Value, ...]
+
+
+class _Rows:
+    """Rows along x of a shape in a turn and in its half turn."""
+
+    def __init__(self, shape: Region, turn: Turn, spacing: float) -> None:
+        self.shape, self.spacing = shape, spacing
+        self.turns: tuple[Turn, Turn] = turn, TURNS[(turn + 2) % 4]
+        (outline,) = grow(Region(shape.outers), spacing / 2).outers
+        polygon = np.array([p for run in outline.runs for p in run_chords(run, True, SAGITTA)])
+        boxes = [placed(shape, each, (0.0, 0.0)).bounds for each in self.turns]
+        self.centres = [((box[0] + box[2]) / 2, (box[1] + box[3]) / 2) for box in boxes]
+        self.half_width, self.half_height = (
+            (boxes[0][axis + 2] - boxes[0][axis]) / 2 for axis in (0, 1)
+        )
+        outlines = [
+            _turned(polygon, each) - centre
+            for each, centre in zip(self.turns, self.centres, strict=True)
+        ]
+        self.upright = [_sides(outline) for outline in outlines]
+        self.lying = [_sides(outline[:, ::-1]) for outline in outlines]
+        self.reach: Point = tuple((2 * np.abs(outlines[0]).max(axis=0)).tolist())
+        self._known: dict[tuple[_Row[float], _Row[float], float], float] = {}
+
+    @cached_property
+    def is_symmetric(self) -> bool:
+        """True if the half turn is the shape itself, moved."""
+        first, second = (
+            np.concatenate([side.levels, side.front, side.back]) for side in self.upright
+        )
+        return len(first) == len(second) and bool(np.abs(first - second).max() < SAGITTA)
+
+    # How near copies and rows come.
+
+    def beside(self, first: int, second: int, rise: Numbers) -> Numbers:
+        """Return how far right of the first copy the second, ``rise`` mm higher, must lie."""
+        return _slides(self.upright[first], self.upright[second], rise)
+
+    def above(self, first: int, second: int, right: Numbers) -> Numbers:
+        """Return how far above the first copy the second, ``right`` mm to the right, must lie."""
+        return _slides(self.lying[first], self.lying[second], right)
+
+    def climb(self, low: _Row[float], high: _Row[float], right: float) -> float:
+        """Return how far above a row another, ``right`` mm to the right, must lie."""
+        key = low, high, round(right % low.pitch, 9)
+        if key not in self._known:
+            heights = []
+            for a in low.copies:
+                for b in high.copies:
+                    offset = b.x - a.x + right
+                    first = math.ceil((-self.reach[0] - offset) / low.pitch)
+                    last = math.floor((self.reach[0] - offset) / low.pitch)
+                    offsets = np.array([offset + k * low.pitch for k in range(first, last + 1)])
+                    heights += (self.above(a.half, b.half, offsets) + (a.y - b.y)).tolist()
+            self._known[key] = max(heights, default=-math.inf)
+        return self._known[key]
+
+    def _ranked_climb(self, low: _Row[Numbers], high: _Row[Numbers], right: Numbers) -> Numbers:
+        """Return about what ``climb`` does, for arrays of rows."""
+        best = np.full(np.shape(right), -math.inf)
+        reach = math.ceil(self.reach[0] / np.min(low.pitch))
+        for a in low.copies:
+            for b in high.copies:
+                places, heights = self._table[a.half, b.half]
+                offset = (b.x - a.x + right) % low.pitch
+                for times in range(-reach, reach + 1):
+                    height = np.interp(offset + times * low.pitch, places, heights, NEVER, NEVER)
+                    best = np.maximum(best, height + a.y - b.y)
+        return best
+
+    @cached_property
+    def _table(self) -> dict[tuple[int, int], tuple[Numbers, Numbers]]:
+        """The least height of one copy above another, by its offset to the right."""
+        width = self.reach[0] - 1e-6
+        places = np.linspace(-width, width, TABLE)
+        halves = (0,) if self.is_symmetric else (0, 1)
+        return {
+            (a, b): (places, self.above(a, b, places) if (a, b) != (1, 1) else places)
+            for a in halves
+            for b in halves
+        } | ({} if self.is_symmetric else {(1, 1): (places, self.above(0, 0, places))})
+
+    # The patterns that are tried.
+
+    def layouts(self, box: tuple[float, float]) -> list[list[tuple[Turn, Point]]]:
+        """Return the copies of the patterns that promise most, in a box from the origin.
+
+        Returns one layout without copies if the box is too small for any.
+        """
+        if box[0] < 2 * self.half_width - ROUNDING or box[1] < 2 * self.half_height - ROUNDING:
+            return [[]]
+        ranked = [entry for family in self._families() for entry in self._ranked(family, box)]
+        ranked.sort(key=lambda entry: -entry[0])
+        return [self._laid(pattern, box) for _, pattern in ranked[:PROMISING]]
+
+    def _families(self) -> Iterator[_Pattern[Numbers]]:
+        """Yield patterns with arrays of numbers: of rows alike, in turn by half, and of pairs."""
+        origin, pitch = np.array(0.0), np.array(self.beside(0, 0, np.zeros(1))[0])
+        upright = _Row((_Copy(0, origin, origin),), pitch)
+        steps = np.linspace(0.0, float(pitch), STEPS, endpoint=False)
+        yield _Pattern((upright,), (steps,))
+        yield _Pattern((upright,), (steps, -steps))
+        if self.is_symmetric:
+            return
+        turned = _Row((_Copy(1, origin, origin),), pitch)
+        yield _Pattern((upright, turned), (steps, -steps))
+        yield _Pattern((upright, turned), (steps, steps))
+        rises = np.linspace(-self.reach[1], self.reach[1], STEPS + 1)[1:-1]
+        there = self.beside(0, 1, rises)
+        pitches = np.maximum(there + self.beside(1, 0, -rises), pitch)
+        shares = np.linspace(0.0, 1.0, STEPS, endpoint=False)
+        rise, share = (each.ravel() for each in np.meshgrid(rises, shares, indexing="ij"))
+        there, pitches = np.repeat(there, STEPS), np.repeat(pitches, STEPS)
+        pair = _Row((_Copy(0, origin, origin), _Copy(1, there, rise)), pitches)
+        yield _Pattern((pair,), (share * pitches,))
+        yield _Pattern((pair,), (share * pitches, -share * pitches))
+
+    def _ranked(
+        self, family: _Pattern[Numbers], box: tuple[float, float]
+    ) -> list[tuple[float, _Pattern[float]]]:
+        """Return a family's patterns with the number of copies that they promise."""
+        counts = self._promise(family, box)
+        best = np.argsort(-counts, kind="stable")[:PROMISING]
+        return [(float(counts[i]), _member(family, int(i))) for i in best]
+
+    def _promise(self, family: _Pattern[Numbers], box: tuple[float, float]) -> Numbers:
+        rows, steps = family.rows, family.steps
+        width, height = (
+            side - 2 * half + ROOM
+            for side, half in zip(box, (self.half_width, self.half_height), strict=True)
+        )
+        right = np.zeros(np.shape(steps[0]))
+        up = right - reduce(np.minimum, [copy.y for copy in rows[0].copies])
+        counts = np.zeros(np.shape(right))
+        before: Numbers | None = None
+        for number in range(MOST_ROWS):
+            row = rows[number % len(rows)]
+            added = np.zeros(np.shape(right))
+            for copy in row.copies:
+                room = width - (right + copy.x) % row.pitch
+                across = np.where(room >= 0, np.floor(room / row.pitch) + 1, 0)
+                added += np.where(up + copy.y <= height, across, 0)
+            counts += added
+            if not added.any():
+                break
+            step, after = steps[number % len(steps)], rows[(number + 1) % len(rows)]
+            higher = up + self._ranked_climb(row, after, step)
+            if before is not None:
+                across_two = step + steps[(number - 1) % len(steps)]
+                below = rows[(number - 1) % len(rows)]
+                higher = np.maximum(higher, before + self._ranked_climb(below, after, across_two))
+            before, up, right = up, higher, right + step
+        return counts
+
+    def _laid(self, pattern: _Pattern[float], box: tuple[float, float]) -> list[tuple[Turn, Point]]:
+        """Return the copies of a pattern that lie in a box from the origin."""
+        rows, steps = pattern.rows, pattern.steps
+        copies: list[tuple[Turn, Point]] = []
+        right, up = 0.0, -min(copy.y for copy in rows[0].copies)
+        below: list[tuple[_Row[float], float, float]] = []
+        number = 0
+        while True:
+            row = rows[number % len(rows)]
+            for other, other_right, other_up in below[-3:]:
+                up = max(up, other_up + self.climb(other, row, right - other_right))
+            in_row = list(self._in_row(row, (right, up), box))
+            if not in_row:
+                return copies
+            copies += in_row
+            below.append((row, right, up))
+            right += steps[number % len(steps)]
+            number += 1
+
+    def _in_row(
+        self, row: _Row[float], start: Point, box: tuple[float, float]
+    ) -> Iterator[tuple[Turn, Point]]:
+        width, height = (
+            side - 2 * half + ROUNDING
+            for side, half in zip(box, (self.half_width, self.half_height), strict=True)
+        )
+        for copy in row.copies:
+            y, (centre_x, centre_y) = start[1] + copy.y, self.centres[copy.half]
+            if not -ROUNDING <= y <= height:
+                continue
+            first = (start[0] + copy.x + LEVEL) % row.pitch
+            for times in range(math.floor((width - first) / row.pitch) + 1):
+                yield (
+                    self.turns[copy.half],
+                    (
+                        self.half_width + first + times * row.pitch - centre_x,
+                        self.half_height + y - centre_y,
+                    ),
+                )
+
+
+def _member(family: _Pattern[Numbers], number: int) -> _Pattern[float]:
+    """Return a pattern of a family that has arrays for numbers."""
+
+    def chosen(values: Numbers) -> float:
+        return float(values if values.ndim == 0 else values[number])
+
+    rows = tuple(
+        _Row(tuple(_Copy(c.half, chosen(c.x), chosen(c.y)) for c in row.copies), chosen(row.pitch))
+        for row in family.rows
+    )
+    return _Pattern(rows, tuple(chosen(step) for step in family.steps))
+
+
+# Envelopes of polygons.
+
+
+@dataclass(frozen=True)
+class _Sides:
+    """Front and back of a polygon along an axis, as straight pieces between levels across it."""
+
+    levels: Numbers
+    front: Numbers
+    back: Numbers
+
+
+def _sides(polygon: Numbers) -> _Sides:
+    """Return the sides of a polygon along its first coordinate, by its second."""
+    starts, ends = polygon, np.roll(polygon, -1, axis=0)
+    corners = np.unique(polygon[:, 1])
+    corners = corners[np.concatenate([[True], np.diff(corners) > 8 * LEVEL])]
+    low, high = corners[:-1], corners[1:]
+    middle = (low + high) / 2
+    # No edge ends between two levels, and none crosses another.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = (ends[:, 0] - starts[:, 0]) / (ends[:, 1] - starts[:, 1])
+        along = starts[:, 0] + (middle[:, None] - starts[:, 1]) * slopes
+    spans = (np.minimum(starts, ends)[:, 1] < middle[:, None]) & (
+        np.maximum(starts, ends)[:, 1] > middle[:, None]
+    )
+    levels = np.stack([low + LEVEL, high - LEVEL], axis=1)
+    sides = []
+    for edges in (
+        np.where(spans, along, -math.inf).argmax(axis=1),
+        np.where(spans, along, math.inf).argmin(axis=1),
+    ):
+        chosen = edges[:, None]
+        sides.append(starts[chosen, 0] + (levels - starts[chosen, 1]) * slopes[chosen])
+    return _Sides(levels.ravel(), *(side.ravel() for side in sides))
+
+
+def _slides(first: _Sides, second: _Sides, offsets: Numbers) -> Numbers:
+    """Return the distance along the axis at which the second polygon clears the first.
+
+    It is moved across by each offset; -inf where they then pass each other.
+    """
+    shifts = offsets[:, None]
+    beside = 2 * LEVEL * np.resize([1.0, -1.0], len(first.levels))
+    beside_second = 2 * LEVEL * np.resize([1.0, -1.0], len(second.levels))
+    low = np.maximum(first.levels[0], second.levels[0] + shifts)
+    high = np.minimum(first.levels[-1], second.levels[-1] + shifts)
+    levels = np.concatenate(
+        [
+            np.broadcast_to(first.levels + beside, (len(offsets), len(first.levels))),
+            second.levels + beside_second + shifts,
+        ],
+        axis=1,
+    )
+    levels = np.clip(levels, low, np.maximum(low, high))
+    gaps = np.interp(levels, first.levels, first.front) - np.interp(
+        levels - shifts, second.levels, second.back
+    )
+    return np.where((high - low)[:, 0] > 8 * LEVEL, gaps.max(axis=1), -math.inf)
+
+
+def _turned(polygon: Numbers, turn: Turn) -> Numbers:
+    c, s = unit(90.0 * turn)
+    return np.asarray(polygon @ np.array([[c, s], [-s, c]]))

@@ -1,0 +1,150 @@
+"""The order in which contours are cut: inner before outer, short travel, heat spread; its time."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+from sbafab.design.sections import Laser
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.on_demand import np
+from sbafab.geometry.region import Region
+
+ORIGIN: Point = (0.0, 0.0)
+SWEEPS = 6
+"""Number of passes over a path to undo crossings."""
+LOOKED_AHEAD = 40
+"""Contours along the path that one end of a crossing may lie from the other."""
+FEW = 20
+"""Contours up to which looking at every stretch costs less than fetching numpy."""
+SHORTER = 1e-6
+"""mm by which a path has to become shorter to be turned round."""
+
+
+def cutting_sequence(region: Region, heat_distance: float = 0.0) -> tuple[Contour, ...]:
+    """Holes first, then outlines, each time on to the nearest start, from the origin.
+
+    Contours nearer to each other than ``heat_distance`` mm do not follow each other, as far as
+    others are left to cut in between.
+    """
+    holes = _short(region.holes, ORIGIN)
+    here = _start(holes[-1]) if holes else ORIGIN
+    outers = _short(region.outers, here)
+    return (*_spread(holes, heat_distance), *_spread(outers, heat_distance))
+
+
+def travel(contours: Iterable[Contour]) -> float:
+    """Mm that the head moves from the origin to each contour, which ends where it starts."""
+    stops = [ORIGIN, *map(_start, contours)]
+    return sum(math.dist(a, b) for a, b in pairwise(stops))
+
+
+def cutting_minutes(cuts: int, cut_length: float, moved: float, laser: Laser) -> float:
+    """Return the minutes that cuts and travel (mm) take.
+
+    Engraving and the way to the cut that frees a roll's sheet are left out.
+    """
+    seconds = (
+        cut_length / laser.cut_speed + moved / laser.travel_speed + cuts * laser.pierce_seconds
+    )
+    return seconds / 60
+
+
+def _start(contour: Contour) -> Point:
+    return contour.edges[0].start
+
+
+def _short(contours: Iterable[Contour], here: Point) -> list[Contour]:
+    """A short path through all contours: on to the nearest, then crossings undone."""
+    rest = list(contours)
+    starts = np.array([_start(contour) for contour in rest], dtype=float).reshape(-1, 2)
+    path: list[Contour] = []
+    place = np.array(here, dtype=float)
+    while len(path) < len(rest):
+        # Rounding lets equal ways stay equal on every machine; the first of them wins.
+        number = int(np.round(np.hypot(*(starts - place).T), 6).argmin())
+        path.append(rest[number])
+        place = starts[number].copy()
+        starts[number] = math.inf
+    for _ in range(SWEEPS):
+        if not _undo_crossings(path, here):
+            break
+    return path
+
+
+def _undo_crossings(path: list[Contour], here: Point) -> bool:
+    """Turns stretches of the path round wherever that shortens it (2-opt)."""
+    shorter = False
+    stops = [here, *map(_start, path)]
+    count = len(path)
+    worth = _worth_a_look(stops) if count > FEW else [True] * count
+    steps = [math.dist(a, b) for a, b in pairwise(stops)] + [0.0]
+    changed = -1
+    for i in range(count - 1):
+        if i > changed and not worth[i]:
+            continue
+        for j in range(i + 1, min(count, i + LOOKED_AHEAD)):
+            # Behind the last stop there is nothing to go on to.
+            before = steps[i] + steps[j + 1]
+            after = math.dist(stops[i], stops[j + 1])
+            if after < before - SHORTER and j + 1 < count:
+                after += math.dist(stops[i + 1], stops[j + 2])
+            if after < before - SHORTER:
+                path[i : j + 1] = path[i : j + 1][::-1]
+                stops[i + 1 : j + 2] = stops[i + 1 : j + 2][::-1]
+                steps[i + 1 : j + 1] = steps[i + 1 : j + 1][::-1]
+                steps[i] = math.dist(stops[i], stops[i + 1])
+                if j + 1 < count:
+                    steps[j + 1] = math.dist(stops[j + 1], stops[j + 2])
+                shorter = True
+                changed = max(changed, j + 1)
+    return shorter
+
+
+def _worth_a_look(stops: Sequence[Point]) -> list[bool]:
+    """For each stop, True if reversing a stretch after it may shorten the current path.
+
+    All stretches are tested at once; a saving above half of ``SHORTER`` counts.
+    """
+    count = len(stops) - 1
+    xy = np.array(stops)
+    worth = np.zeros(count, dtype=bool)
+    steps = np.hypot(*(xy[1:] - xy[:-1]).T)
+    for ahead in range(1, min(LOOKED_AHEAD, count)):
+        # The stretch from stop i + 1 to stop i + ahead + 1; the last one has nothing behind it.
+        saved = steps[: count - ahead] - np.hypot(*(xy[ahead + 1 :] - xy[: count - ahead]).T)
+        saved[:-1] += steps[ahead + 1 :] - np.hypot(*(xy[ahead + 2 :] - xy[1 : count - ahead]).T)
+        worth[: count - ahead] |= saved > SHORTER / 2
+    flags: list[bool] = worth.tolist()
+    return flags
+
+
+def _spread(path: Sequence[Contour], heat_distance: float) -> list[Contour]:
+    """The path with the next contour that is not near the last one, time after time."""
+    if heat_distance <= 0.0:
+        return list(path)
+    rest = deque(path)
+    spread: list[Contour] = []
+    while rest:
+        last = spread[-1].bounds if spread else None
+        index = next(
+            (
+                i
+                for i, contour in enumerate(rest)
+                if last is None or _apart(last, contour.bounds) >= heat_distance
+            ),
+            0,
+        )
+        spread.append(rest[index])
+        del rest[index]
+    return spread
+
+
+def _apart(a: Bounds, b: Bounds) -> float:
+    """The gap between two bounding boxes in mm."""
+    across = max(a[0] - b[2], b[0] - a[2], 0.0)
+    along = max(a[1] - b[3], b[1] - a[3], 0.0)
+    return math.hypot(across, along)

@@ -1,1 +1,0 @@
-"""Measure a picture of a cut sheet against its cut file."""

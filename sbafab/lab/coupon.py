@@ -1,0 +1,591 @@
+"""The calibration piece, its table of measured sizes, and the kerf from them with its uncertainty.
+
+An outside comes out smaller by the kerf, a window larger; a constant reading error makes both
+larger, and a scale both in proportion. So all three are fitted together, by least squares of
+measured = scale * nominal -/+ kerf + offset, as far as the sizes tell them apart. What no size
+tells from kerf is an instrument that reads outsides too small and windows too large.
+
+Uncertainties follow the usual guide to their expression: scatter and what rounding leaves in
+quadrature, Student's t for the interval.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from statistics import median
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbafab.cutting.beam_paths import contour_runs, drawn
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_write import Surroundings, dxf_text
+from sbafab.cutting.lettering import Stroke, strokes
+from sbafab.cutting.machine_files import svg_text
+from sbafab.cutting.properties import coupon_properties
+from sbafab.cutting.sequence import cutting_sequence
+from sbafab.cutting.verify import check_surroundings, verify_file
+from sbafab.errors import DesignError
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Region, rectangle, union
+from sbafab.spreadsheet import csv_text
+
+MOST_DEGREES = 200
+"""Degrees of freedom from which on Student's t is taken as if there were no more."""
+LARGEST = 1.0
+"""mm; a wider kerf is a mistake in the table."""
+WORST_SCALE = 0.1
+"""Bounds of measured over nominal size: a larger deviation means another unit, not the machine."""
+LARGEST_SLIP = 0.25
+"""mm; more than twice the largest error of laser cutting (paper, Sec. 2) is a slip of the pen."""
+MOST_SUSPECTS = 20
+"""Sizes that are tried as the one slip, starting with the farthest from the middle one."""
+WIDEST = 0.05
+"""mm; half the largest error of laser cutting: a kerf known no better deserves a warning."""
+
+
+SAME_COLUMN = 1e-6
+"""Singular values of columns of length 1, below which the sizes do not tell two causes apart."""
+FREE = 4
+"""Degrees of freedom that a difference between x and y must leave: Student's t is 2.8 there."""
+RESOLUTIONS = {"calliper": 0.01, "scanner": 25.4 / 2400, "microscope": 0.001}
+"""mm: the least step of each instrument; a scanner's is for 2400 dots per inch."""
+UNNAMED = RESOLUTIONS["calliper"]
+"""mm: the least step of an unnamed instrument."""
+Kind = Literal["outer", "window"]
+Axis = Literal["x", "y"]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A size of the piece, mm; ``where`` it stands in the table, for messages."""
+
+    kind: Kind
+    axis: Axis
+    nominal: float
+    measured: float
+    where: str = field(default="", compare=False)
+    instrument: str = ""
+
+    @property
+    def sign(self) -> int:
+        """The kerf's sign in the size: -1 for an outside, 1 for a window."""
+        return -1 if self.kind == "outer" else 1
+
+    @property
+    def along_x(self) -> int:
+        """1 along x, -1 along y."""
+        return 1 if self.axis == "x" else -1
+
+    @property
+    def kerf(self) -> float:
+        """The kerf by this size alone, mm."""
+        return self.sign * (self.measured - self.nominal)
+
+    def __str__(self) -> str:
+        place = f"{self.where}: " if self.where else ""
+        sizes = f"nominal {self.nominal:g} and measured {self.measured:g} mm"
+        return f"{place}the {self.kind} along {self.axis}, {sizes},"
+
+
+@dataclass(frozen=True)
+class Value:
+    """A value, its standard uncertainty and the half width of its 95 % interval.
+
+    ``value``, ``uncertainty`` and ``half_width`` are mm of a kerf; a scale's are a ratio.
+    """
+
+    value: float
+    uncertainty: float
+    half_width: float
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval, in the unit of the value."""
+        return self.value - self.half_width, self.value + self.half_width
+
+    def differs_from(self, other: float) -> bool:
+        """Return True if the interval does not hold ``other``."""
+        return abs(self.value - other) > self.half_width
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The kerf in mm from ``count`` sizes, fitted together with offsets and scale.
+
+    ``offsets``: the excess of each instrument's readings, mm, by its name; empty if the sizes do
+    not determine it, and then taken as 0. ``scale``: measured over nominal size after kerf and
+    offsets; None if the sizes do not determine it, and then taken as 1. Kerf and scale are means
+    of x and y; ``kerf_along_x`` mm and ``scale_along_x``, a ratio, are added to them along x and
+    subtracted along y. ``degrees`` of freedom are left.
+    """
+
+    kerf: Value
+    scale: Value | None
+    offsets: Mapping[str, Value]
+    count: int
+    degrees: int
+    kerf_along_x: float = 0.0
+    scale_along_x: float = 0.0
+
+    @property
+    def is_scaled(self) -> bool:
+        """True if the sizes show a scale other than 1."""
+        return self.scale is not None and self.scale.differs_from(1.0)
+
+    @property
+    def is_vague(self) -> bool:
+        """True if the kerf may be 0, or is too uncertain to compensate with."""
+        return self.kerf.interval[0] <= 0 or self.kerf.half_width > WIDEST
+
+    def gap(self, size: Measurement) -> float:
+        """Return the distance of a size from its value by kerf and scale, mm."""
+        scale = 1.0 if self.scale is None else self.scale.value
+        scale += size.along_x * self.scale_along_x
+        kerf = self.kerf.value + size.along_x * self.kerf_along_x
+        offset = self.offsets[size.instrument].value if self.offsets else 0.0
+        return abs(size.measured - scale * size.nominal - size.sign * kerf - offset)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The kerf from all sizes, and from the sizes along x and along y if both are known.
+
+    ``difference``: kerf along x less kerf along y.
+    """
+
+    overall: Estimate
+    x: Estimate | None
+    y: Estimate | None
+    difference: Value | None
+
+    @property
+    def differs(self) -> bool:
+        """True if the kerf along x differs from that along y."""
+        return self.difference is not None and self.difference.differs_from(0.0)
+
+
+def calibrated(measurements: Sequence[Measurement], resolution: float | None = None) -> Calibration:
+    """The kerf from two sizes or more; ``resolution`` in mm is the instrument's least step.
+
+    By default it comes from RESOLUTIONS, the coarsest if several instruments were used. Raises
+    DesignError for fewer sizes, if one of them is a slip, or if the kerf is implausible.
+    """
+    if resolution is None:
+        steps = [RESOLUTIONS.get(size.instrument, UNNAMED) for size in measurements]
+        resolution = max(steps, default=UNNAMED)
+    _refuse_a_slip(measurements, resolution)
+    overall = _estimate(measurements, resolution)
+    along = {axis: [m for m in measurements if m.axis == axis] for axis in ("x", "y")}
+    if min(map(len, along.values())) < 2:
+        return Calibration(overall, None, None, None)
+    x, y = (_estimate(along[axis], resolution, f" along {axis}") for axis in ("x", "y"))
+    uncertainty = math.hypot(x.kerf.uncertainty, y.kerf.uncertainty)
+    degrees = min(x.degrees, y.degrees)
+    difference = Value(x.kerf.value - y.kerf.value, uncertainty, student_t(degrees) * uncertainty)
+    return Calibration(overall, x, y, difference)
+
+
+def _estimate(measurements: Sequence[Measurement], resolution: float, where: str = "") -> Estimate:
+    if len(measurements) < 2:
+        raise DesignError(
+            f"sizes measured{where}: {len(measurements)}, and a kerf needs 2; fill in more rows"
+        )
+    estimate = _fitted(measurements, resolution)
+    if _is_other_unit(estimate):
+        assert estimate.scale is not None
+        raise DesignError(
+            f"the measured sizes{where} are about {estimate.scale.value:.3g} times the nominal "
+            "ones; give them in millimetres"
+        )
+    if not 0 <= estimate.kerf.value <= LARGEST:
+        kind = "negative" if estimate.kerf.value < 0 else f"over {LARGEST:g} mm"
+        raise DesignError(
+            f"the kerf{where} comes out as {estimate.kerf.value:.3f} mm, which is {kind}; check "
+            "the measurements, the unit and which rows are outers and windows"
+        )
+    worst = max(measurements, key=estimate.gap)
+    if estimate.gap(worst) > LARGEST_SLIP:
+        raise DesignError(
+            f"{worst} is {estimate.gap(worst):.2f} mm off what the sizes together say; measure it "
+            "again, and the others too"
+        )
+    return estimate
+
+
+def _is_other_unit(estimate: Estimate) -> bool:
+    return estimate.scale is not None and abs(estimate.scale.value - 1) > WORST_SCALE
+
+
+def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> None:
+    """Raises DesignError naming the one size without which all others agree, if there is one.
+
+    A slip of the pen shifts the common fit, so that kerf or unit would be blamed.
+    """
+    if len(measurements) < 3:
+        return
+    middle = median(m.kerf for m in measurements)
+    by_distance = sorted(measurements, key=lambda m: -abs(m.kerf - middle))
+    slips: list[tuple[float, float, Measurement]] = []
+    for suspect in by_distance[:MOST_SUSPECTS]:
+        rest = [m for m in measurements if m is not suspect]
+        if suspect.instrument not in {size.instrument for size in rest}:
+            continue
+        estimate = _fitted(rest, resolution)
+        spread = max(map(estimate.gap, rest))
+        is_sound = 0 <= estimate.kerf.value <= LARGEST and not _is_other_unit(estimate)
+        if is_sound and spread <= LARGEST_SLIP < estimate.gap(suspect):
+            slips.append((spread, estimate.gap(suspect), suspect))
+    if slips:
+        _, off, slip = min(slips, key=lambda entry: entry[0])
+        raise DesignError(
+            f"{slip} is {off:.2f} mm off what the other sizes say; mend the entry or measure it "
+            "again"
+        )
+
+
+def _fitted(measurements: Sequence[Measurement], resolution: float) -> Estimate:
+    """Kerf, offsets and scale by least squares, likely or not; from two sizes or more."""
+    instruments = sorted({size.instrument for size in measurements})
+    count = len(measurements)
+    nominal = np.array([size.nominal for size in measurements])
+    departure = np.array([size.measured for size in measurements]) - nominal
+    columns = np.array([[size.sign] for size in measurements], dtype=float)
+    along_x = np.array([size.along_x for size in measurements], dtype=float)[:, None]
+    is_read_by = [[size.instrument == name for name in instruments] for size in measurements]
+    # The last two are small: with few sizes the fit is better if they are taken as 0.
+    blocks = {
+        "offsets": (np.array(is_read_by, dtype=float), 1),
+        "scale": (nominal[:, None], 1),
+        "kerf along x": (columns * along_x, FREE),
+        "scale along x": (nominal[:, None] * along_x, FREE),
+    }
+    # Where each cause that can be told stands among the columns.
+    places: dict[str, int] = {}
+    for cause, (block, free) in blocks.items():
+        wider = np.hstack([columns, block])
+        if count - wider.shape[1] >= free and _are_apart(wider):
+            places[cause] = columns.shape[1]
+            columns = wider
+    values = np.linalg.lstsq(columns, departure, rcond=None)[0]
+    degrees = count - columns.shape[1]
+    scatter = float(np.sum((departure - columns @ values) ** 2)) / degrees
+    spread = np.linalg.inv(columns.T @ columns).diagonal()
+    # No reading is better than the instrument, however well a few of them agree.
+    noise = max(scatter, resolution**2 / 12)
+    errors = np.sqrt(noise * spread).tolist()
+    errors[0] = math.hypot(errors[0], _left_by_rounding(scatter, resolution))
+    t = student_t(degrees)
+    fitted = [Value(v, u, t * u) for v, u in zip(values.tolist(), errors, strict=True)]
+    kerf_along_x, scale_along_x = (
+        fitted[places[cause]].value if cause in places else 0.0
+        for cause in ("kerf along x", "scale along x")
+    )
+    scale = fitted[places["scale"]] if "scale" in places else None
+    return Estimate(
+        kerf=fitted[0],
+        scale=None if scale is None else replace(scale, value=1 + scale.value),
+        offsets=dict(zip(instruments, fitted[1:], strict=False)) if "offsets" in places else {},
+        count=count,
+        degrees=degrees,
+        kerf_along_x=kerf_along_x,
+        scale_along_x=scale_along_x,
+    )
+
+
+def _are_apart(columns: NDArray[Any]) -> bool:
+    """Return True if the sizes tell the causes of the columns from each other."""
+    unit = columns / np.linalg.norm(columns, axis=0)
+    return bool(np.linalg.matrix_rank(unit, tol=SAME_COLUMN) == unit.shape[1])
+
+
+def _left_by_rounding(scatter: float, resolution: float) -> float:
+    """The standard uncertainty that rounding to a step leaves in a mean of readings.
+
+    A mean of Gaussian readings of deviation s, rounded to steps d, is off by up to d / pi *
+    exp(-2 (pi s / d)^2) (B. Widrow, I. Kollar, Quantization Noise, 2008): of readings that all
+    agree, a step's whole width remains in doubt, and of those that scatter by half a step nothing.
+    """
+    if resolution == 0:
+        return 0.0
+    variance = max(scatter - resolution**2 / 12, 0.0)
+    return resolution / math.sqrt(12) * math.exp(-2 * math.pi**2 * variance / resolution**2)
+
+
+@cache
+def student_t(degrees: int) -> float:
+    """The t that 95 % of Student's distribution stay within, by its series for whole degrees."""
+    degrees = min(degrees, MOST_DEGREES)
+    low, high = 1.0, 20.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _within(middle, degrees) < 0.95 else (low, middle)
+    return (low + high) / 2
+
+
+def _within(t: float, degrees: int) -> float:
+    """The share of Student's distribution between -t and t."""
+    angle = math.atan(t / math.sqrt(degrees))
+    cosine, odd = math.cos(angle), degrees % 2
+    term = math.sin(angle) * (cosine if odd else 1.0)
+    total = 0.0
+    for k in range(1 + odd, degrees, 2):
+        total += term
+        term *= cosine**2 * k / (k + 1)
+    return 2 / math.pi * (angle + total) if odd else total
+
+
+# The calibration piece: four frames of film whose sizes tell how wide the beam cuts.
+#
+# A frame's outside comes out smaller by the kerf, its window larger, and the piece that falls out
+# of the window smaller again. Sides along x and y differ, so that a frame that fell out still
+# tells which is which. A window and its piece are drawn alike, so that they tell a reading error,
+# which makes both larger, from kerf; several sizes tell a scale from both.
+
+
+SIZE = 60.0
+"""Side in mm of the film that the piece needs."""
+COLUMNS = ("feature", "axis", "nominal_mm", "measured_mm")
+HINTS = (
+    "# Cut coupon.dxf with kerf offset 0; measure each size in the middle of the side; "
+    "leave what you cannot measure empty",
+    "# A piece is what fell out of the window of A: keep it",
+    "# A scan at 2400 dpi or a microscope touches no edge; a calliper bends thin film",
+)
+LETTER = 2.4
+TITLE = "KERF COUPON"
+
+
+class CouponFrame(NamedTuple):
+    """A frame of film: its name, lower left corner, outside and window along x and y, in mm."""
+
+    name: str
+    corner: Point
+    outer: tuple[float, float]
+    window: tuple[float, float]
+
+    @property
+    def region(self) -> Region:
+        return self._box(self.outer) - self._box(self.window)
+
+    def _box(self, size: tuple[float, float]) -> Region:
+        x, y = self.corner[0] + self.outer[0] / 2, self.corner[1] + self.outer[1] / 2
+        return rectangle((x - size[0] / 2, y - size[1] / 2), (x + size[0] / 2, y + size[1] / 2))
+
+
+FRAMES = (
+    CouponFrame("A", (4.0, 34.0), (24.0, 20.0), (14.0, 10.0)),
+    CouponFrame("B", (32.0, 34.0), (24.0, 20.0), (14.0, 10.0)),
+    CouponFrame("C", (8.0, 12.0), (16.0, 12.0), (8.0, 6.0)),
+    CouponFrame("D", (36.0, 12.0), (16.0, 12.0), (8.0, 6.0)),
+)
+
+
+def coupon() -> Region:
+    """The frames, nominal, on a square of film with its lower left corner at the origin."""
+    return union(frame.region for frame in FRAMES)
+
+
+def coupon_csv() -> str:
+    """The table to fill in: a row for each size along each axis."""
+    rows: list[Sequence[str]] = [COLUMNS]
+    for frame in FRAMES:
+        sizes = {"outer": frame.outer, "window": frame.window, "piece": frame.window}
+        rows += [
+            (f"{frame.name} {kind}", axis, f"{nominal:g}", "")
+            for kind, size in sizes.items()
+            for axis, nominal in zip("xy", size, strict=True)
+        ]
+    return "".join(f"{hint}\n" for hint in HINTS) + csv_text(rows)
+
+
+def write_coupon(folder: Path, generator: str) -> tuple[Path, ...]:
+    """Writes ``coupon.dxf``, ``.svg`` and ``.csv``, read back; never over an old one.
+
+    Raises DesignError if one exists, OutputError if the file does not read back as drawn.
+    """
+    paths = tuple(folder / f"coupon.{ending}" for ending in ("dxf", "svg", "csv"))
+    for path in paths:
+        if path.exists():
+            raise DesignError(f"{path} exists; choose another folder or remove it first")
+    folder.mkdir(parents=True, exist_ok=True)
+    region, properties = coupon(), coupon_properties(generator)
+    contours = cutting_sequence(region)
+    sheet = Surroundings(engraved=_labels(), frame=(SIZE, SIZE))
+    drawing, picture, table = paths
+    drawing.write_bytes(dxf_text(contours, properties, sheet=sheet).encode())
+    verify_file(drawing, region, properties)
+    check_surroundings(read_profile(drawing), sheet)
+    runs = drawn(contour_runs(contours), sheet)
+    picture.write_bytes(svg_text(runs, (SIZE, SIZE), TITLE).encode())
+    table.write_bytes(coupon_csv().encode())
+    return paths
+
+
+def _labels() -> tuple[Stroke, ...]:
+    """Names in the waste over each frame; a title that shows which way x runs."""
+    names = [strokes(f.name, (f.corner[0], f.corner[1] + f.outer[1] + 1.2), LETTER) for f in FRAMES]
+    title = strokes(f"{TITLE} - X", (8.0, 4.0), LETTER)
+    x, y = 44.5, 4.0 + LETTER / 2
+    tip = (x + 8, y)
+    arrow = (((x, y), tip), ((x + 6.5, y + 1), tip, (x + 6.5, y - 1)))
+    return (*(stroke for name in names for stroke in name), *title, *arrow)
+
+
+# The coupon's filled-in table: read where it can be read in one way, or refused.
+
+
+MOST_BYTES = 1_000_000
+LONGEST = 10_000.0
+"""mm."""
+SEPARATORS = (",", ";", "\t")
+NUMBERS = ("nominal_mm", "measured_mm")
+INSTRUMENT = "instrument"
+"""An optional column: the instrument of the measurement."""
+KINDS: dict[str, Kind] = {"outer": "outer", "window": "window", "piece": "outer"}
+"""Last words of a feature; a piece fell out of a window."""
+_NUMBER = re.compile(r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)", re.ASCII)
+_WHOLE = re.compile(r"\d+", re.ASCII)
+
+
+def read_measurements(path: Path, instrument: str = "") -> list[Measurement]:
+    """The filled rows of a table with the coupon's columns; ``#`` begins a remark.
+
+    ``instrument`` applies to all sizes, unless a column of that name states it row by row. Columns
+    are separated by commas, semicolons or tabs; numbers have a decimal point or comma. A
+    spreadsheet that separates columns by semicolons leaves our commas in its first cell; that is
+    read too. Raises DesignError, also if decimal commas and column separators cannot be
+    distinguished.
+    """
+    lines = [
+        (f"{path}, line {number}", line)
+        for number, line in enumerate(table_text(path).splitlines(), start=1)
+        if line.strip(' ,;\t"') and not line.lstrip(' "').startswith("#")
+    ]
+    separator, names = _header(path, lines[0] if lines else ("", ""))
+    measurements = []
+    for where, line in lines[1:]:
+        cells = _row(line, separator, len(names), where)
+        _refuse_two_ways(cells, names, separator, where)
+        row = dict(zip(names, cells, strict=False))
+        if row["measured_mm"]:
+            measurements.append(_measurement(row, where, instrument))
+    return measurements
+
+
+def table_text(path: Path) -> str:
+    """The text of a filled-in table. Raises DesignError if the file is not a table."""
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise DesignError(
+                f"{path} is larger than {MOST_BYTES:,} bytes; give the table that was filled in"
+            )
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise DesignError(f"{path} is not a text file in UTF-8; save it as CSV") from None
+
+
+def _header(path: Path, first: tuple[str, str]) -> tuple[str, list[str]]:
+    """Return the separator of the columns, and their names in small letters."""
+    where, line = first
+    separator = max(SEPARATORS, key=line.count)
+    names = [name.lower() for name in row_cells(line, separator, where)]
+    while names and not names[-1]:
+        names.pop()
+    for column in COLUMNS:
+        if names.count(column) != 1:
+            many = "two columns" if column in names else "no column"
+            raise DesignError(
+                f"{path} has {many} {column}; keep the columns {', '.join(COLUMNS)}, once each"
+            )
+    return separator, names
+
+
+def _row(line: str, separator: str, count: int, where: str) -> list[str]:
+    """The cells of a row: separated like the header, or with the last one after a semicolon."""
+    cells = row_cells(line, separator, where)
+    if separator != "," or ";" not in line:
+        return cells
+    parted = row_cells(line, ";", where)
+    while len(parted) > 1 and not parted[-1]:
+        parted.pop()
+    if len(parted) == count:
+        return parted
+    first = row_cells(parted[0], ",", where)
+    if len(parted) == 2 and len(first) == count and not first[-1]:
+        return [*first[:-1], parted[1]]
+    return cells
+
+
+def row_cells(line: str, separator: str, where: str) -> list[str]:
+    """The cells of a row of a table, blanks round them removed. Raises DesignError."""
+    try:
+        row: Iterator[list[str]] = csv.reader([line], delimiter=separator, strict=True)
+        return [cell.strip() for cell in next(row)]
+    except csv.Error:
+        raise DesignError(f"{where} has a quotation mark without its other; remove it") from None
+
+
+def _refuse_two_ways(cells: list[str], names: list[str], separator: str, where: str) -> None:
+    """Raises DesignError for a row that fits the header not at all, or in more than one way."""
+    remedy = (
+        "; write decimal points, or part the columns by semicolons where commas are decimal"
+        if separator == ","
+        else "; fill in one cell a column"
+    )
+    while len(cells) > len(names) and not cells[-1]:
+        cells = cells[:-1]
+    if len(cells) != len(names):
+        raise DesignError(
+            f"{where} has {len(cells)} cells where the header has {len(names)}{remedy}"
+        )
+    if separator != ",":
+        return
+    for place, name in enumerate(names[:-1]):
+        after = names[place + 1]
+        is_split = name in NUMBERS and after not in NUMBERS and _WHOLE.fullmatch(cells[place])
+        if is_split and _WHOLE.fullmatch(cells[place + 1]):
+            raise DesignError(
+                f"{where} may say {cells[place]} or {cells[place]},{cells[place + 1]} for "
+                f"{name}{remedy}"
+            )
+
+
+def _measurement(row: dict[str, str], where: str, instrument: str) -> Measurement:
+    words = row["feature"].lower().split()
+    axis = row["axis"].lower()
+    kinds = {KINDS[word] for word in words if word in KINDS}
+    if len(kinds) != 1:
+        raise DesignError(f"{where}: feature must end in outer, window or piece")
+    (kind,) = kinds
+    used = row.get(INSTRUMENT, "").lower() or instrument
+    if used and used not in RESOLUTIONS:
+        allowed = ", ".join(RESOLUTIONS)
+        raise DesignError(f"{where}: instrument is {used[:40]!r}; it must be one of {allowed}")
+    if axis not in ("x", "y"):
+        raise DesignError(f"{where}: axis must be x or y")
+    nominal, measured = (_size(row[name], name, where) for name in NUMBERS)
+    return Measurement(kind, "x" if axis == "x" else "y", nominal, measured, where, used)
+
+
+def _size(text: str, column: str, where: str) -> float:
+    if _NUMBER.fullmatch(text) is None:
+        raise DesignError(
+            f"{where}: {column} is {text[:40]!r}, not a number; write it in mm, for example 23.9"
+        )
+    size = float(text.replace(",", "."))
+    if not 0 < size <= LONGEST:
+        raise DesignError(
+            f"{where}: {column} is {text[:40]}; it must be a size in mm, above 0 and at most "
+            f"{LONGEST:g}"
+        )
+    return size

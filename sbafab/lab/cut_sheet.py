@@ -1,0 +1,168 @@
+"""The cut file that a picture is compared with: its pieces, each with the names of its patterns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.nest import TURNS
+from sbafab.errors import DesignError, OutputError
+from sbafab.folders.as_cut import path_in_folder
+from sbafab.folders.manifest import JobManifest, Manifest, is_job, read_claims, read_job
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.region import Region
+
+SPACING = 1.0
+"""Default distance between cuts, for a file without one, mm."""
+SAME_SIZE = 1e-4
+"""Largest difference in area (mm2) and length (mm) between congruent pieces."""
+
+
+@dataclass(frozen=True)
+class SheetShape:
+    """A piece of a pattern: ``name`` is the pattern, such as P05."""
+
+    name: str
+    region: Region
+
+
+@dataclass(frozen=True)
+class DrawnSheet:
+    """Contours of a cut file as the beam runs, mm.
+
+    ``places``: the pieces at their cut positions, named by their patterns. ``shapes``: every piece
+    of the folder, any of them may lie in a place. ``pins``: x, y and diameter of the pins of a
+    sheet. ``kerf`` is the file's kerf compensation.
+    """
+
+    name: str
+    places: tuple[SheetShape, ...]
+    shapes: tuple[SheetShape, ...]
+    pins: tuple[tuple[float, float, float], ...]
+    spacing: float
+    kerf: str
+    film: str
+
+    @property
+    def bounds(self) -> Bounds:
+        return Region(tuple(c for place in self.places for c in place.region.contours)).bounds
+
+
+def read_cut_sheet(source: Path, name: str | None) -> DrawnSheet:
+    """Return the sheet or layer ``name`` of an output folder, or a cut file given by its path.
+
+    Raises DesignError if the folder has no such file, OutputError if a file is corrupt.
+    """
+    if source.suffix.lower() == ".dxf":
+        return _sheet(source.stem, source, (), SPACING, ())
+    claims: Manifest | JobManifest = read_job(source) if is_job(source) else read_claims(source)
+    sheets = {Path(sheet.file).stem: sheet for sheet in claims.sheets}
+    layers = dict(_layers(source, claims))
+    name = _chosen(name, [*sheets, *layers])
+    shapes = tuple(_shapes(layers))
+    if name not in sheets:
+        return _sheet(name, layers[name][1], shapes, SPACING, ())
+    sheet = sheets[name]
+    path = path_in_folder(source, sheet.file)
+    pins = tuple((pin.x, pin.y, pin.diameter) for pin in sheet.pins)
+    return _sheet(name, path, shapes, sheet.spacing, pins)
+
+
+def _chosen(name: str | None, names: Sequence[str]) -> str:
+    listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    if name is None:
+        if len(names) == 1:
+            return names[0]
+        raise DesignError(f"--sheet is missing; name the cut file in the picture: {listed}")
+    stem = Path(name).name.removesuffix(".dxf")
+    if stem not in names:
+        raise DesignError(f"--sheet is {name[:60]!r}, which the folder has not; it has {listed}")
+    return stem
+
+
+def _layers(folder: Path, claims: Manifest | JobManifest) -> Iterator[tuple[str, tuple[str, Path]]]:
+    """Yield the name of each layer's cut file with its pattern and path."""
+    if isinstance(claims, JobManifest):
+        for design in claims.designs:
+            inner = path_in_folder(folder, design.folder)
+            for name, (pattern, path) in _layers(inner, read_claims(inner)):
+                yield f"{design.name}/{name}", (f"{design.name} {pattern}", path)
+        return
+    for layer in claims.layers:
+        if layer.file is not None:
+            path = path_in_folder(folder, layer.file)
+            yield path.stem, (layer.pattern, path)
+
+
+def _shapes(layers: dict[str, tuple[str, Path]]) -> Iterator[SheetShape]:
+    """Yield the pieces of every pattern once."""
+    patterns = dict(reversed(layers.values()))
+    for pattern, path in sorted(patterns.items()):
+        pieces = {piece.key: piece for piece in read_profile(path).region.pieces}
+        yield from (SheetShape(pattern, piece) for piece in pieces.values())
+
+
+def _sheet(
+    name: str,
+    path: Path,
+    shapes: tuple[SheetShape, ...],
+    spacing: float,
+    pins: tuple[tuple[float, float, float], ...],
+) -> DrawnSheet:
+    drawing = read_profile(path)
+    if not drawing.region.contours:
+        raise OutputError(f"{path.name} holds no piece; give a sheet or layer with parts")
+    named: list[SheetShape] = []
+    unnamed: list[SheetShape] = []
+    for piece in drawing.region.pieces:
+        matches = [shape for shape in shapes if _is_congruent(piece, shape.region)]
+        if not matches:
+            matches = [SheetShape(f"part {len(unnamed) + 1}", piece)]
+            unnamed += matches
+        label = ", ".join(dict.fromkeys(shape.name for shape in matches))
+        named.append(SheetShape(label, piece))
+    properties = drawing.properties
+    return DrawnSheet(
+        name=name,
+        places=tuple(named),
+        shapes=(*shapes, *unnamed),
+        pins=pins,
+        spacing=spacing,
+        kerf=properties.get("KERF_WIDTH", "none"),
+        film=properties.get("MATERIAL", ""),
+    )
+
+
+def _is_congruent(piece: Region, shape: Region) -> bool:
+    """Return True if a piece is a shape shifted and turned by quarter turns."""
+    if len(piece.contours) != len(shape.contours):
+        return False
+    if abs(piece.area - shape.area) > SAME_SIZE:
+        return False
+    lying = _marks(piece)
+    return any(_agree(lying, _marks(shape.turned(90.0 * turn))) for turn in TURNS)
+
+
+def _marks(region: Region) -> list[Point]:
+    """The ends and middles of the edges from the middle of the box, and centres of circles, mm."""
+    low_x, low_y, high_x, high_y = region.bounds
+    x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
+    points = [
+        point
+        for contour in region.contours
+        for point in (
+            [contour.circle[0]]
+            if contour.circle is not None
+            else [p for edge in contour.edges for p in (edge.start, edge.at(0.5))]
+        )
+    ]
+    return [(px - x, py - y) for px, py in points]
+
+
+def _agree(points: Sequence[Point], others: Sequence[Point]) -> bool:
+    """Return True if each point is within 2 um of one of the others."""
+    if len(points) != len(others):
+        return False
+    return all(min(abs(x - u) + abs(y - v) for u, v in others) < 2e-3 for x, y in points)

@@ -1,0 +1,298 @@
+"""Inspect a picture of a cut sheet against its cut file.
+
+``inspect_picture`` reads, registers, measures and names; the result is written as JSON, as a table
+of sizes that ``sbafab kerf`` reads, and as a picture with the deviations.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from sbafab.documents import Document, attribute
+from sbafab.errors import DesignError
+from sbafab.lab.coupon import COLUMNS, INSTRUMENT, Value, student_t
+from sbafab.lab.cut_sheet import DrawnSheet
+from sbafab.lab.edges import EdgeFit, fitted
+from sbafab.lab.picture import ScanPicture, outlines
+from sbafab.lab.pieces import PieceFinding, piece_findings
+from sbafab.lab.registration import SMALLEST, Content, Location, PointArray, locate
+from sbafab.lab.scale import Reference, Scale, scale_of
+from sbafab.spreadsheet import csv_text
+
+FEWEST = 100
+"""Least number of samples for a kerf."""
+FINEST = 0.02
+"""Standard uncertainty of an edge from grey levels and their rounding, in pixels."""
+LARGEST_KERF = 1.0
+"""Shown in mm."""
+HARMLESS = ("sound", "moved", "turned")
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """Measurements of a cut sheet from a picture.
+
+    ``kerf`` mm, twice the distance of the film's edge inside the beam's path. ``rms`` and
+    ``within_95`` mm: deviations of edges from the drawn ones apart from kerf, scale and the pieces'
+    displacements. ``pixel`` and ``blur`` mm in the picture.
+    """
+
+    sheet: DrawnSheet
+    picture: ScanPicture
+    location: Location
+    fit: EdgeFit
+    scale: Scale
+    kerf: Value
+    rms: float
+    within_95: float
+    pixel: float
+    pieces: tuple[PieceFinding, ...]
+
+    @property
+    def amiss(self) -> list[PieceFinding]:
+        """The places that do not hold their piece as drawn."""
+        return [piece for piece in self.pieces if piece.verdict != "sound"]
+
+    @property
+    def failed(self) -> bool:
+        """True if a piece is missing, wrong, or too poorly visible to tell."""
+        return any(piece.verdict not in HARMLESS for piece in self.pieces)
+
+    @property
+    def edges(self) -> int:
+        """Number of measured samples on edges."""
+        return int((self.fit.weights > 0).sum())
+
+
+class InspectionDocument(Document, schema="sbafab/inspection@1"):
+    """An inspection; lengths in mm."""
+
+    sheet: str = attribute("sheet.name")
+    film: str = attribute("sheet.film")
+    picture: str = attribute("picture.path.name")
+    picture_sha256: str = attribute("picture.sha256")
+    shows: Content = attribute("location.content")
+    from_below: bool = attribute("location.from_below")
+    kerf: Value
+    kerf_in_file: str = attribute("sheet.kerf")
+    scale: Scale
+    edges: int
+    rms: float
+    within_95: float
+    pixel: float
+    blur: float = attribute("fit.blur")
+    failed: bool
+    pieces: list[PieceFinding]
+
+
+def inspect_picture(
+    picture: ScanPicture,
+    sheet: DrawnSheet,
+    reference: Reference,
+    is_camera: bool = False,
+    is_light: bool = True,
+) -> Inspection:
+    """Return the inspection of a sheet in a picture.
+
+    ``is_camera``: taken with perspective. ``is_light``: film is lighter than its background. Raises
+    DesignError if the picture does not show the sheet, or too little of it.
+    """
+    measured = outlines(picture)
+    size = picture.pixels.shape[0], picture.pixels.shape[1]
+    location = locate(sheet, measured, size, reference.pixels_per_mm, is_light, is_camera)
+    fit = fitted(picture, sheet, location, is_camera)
+    known = fit.weights > 0
+    if known.sum() < FEWEST:
+        raise DesignError(
+            f"{picture.path.name} shows {int(known.sum())} places on edges of {sheet.name}, and "
+            f"{FEWEST} are needed; scan at a higher resolution, or more of the sheet"
+        )
+    scale = scale_of(picture, sheet, fit, measured, reference)
+    pixel = 1 / math.sqrt(math.prod(fit.warp.pixels_per_mm(np.array(fit.warp.centre))))
+    residuals = np.abs(fit.residuals[known])
+    return Inspection(
+        sheet=sheet,
+        picture=picture,
+        location=location,
+        fit=fit,
+        scale=scale,
+        kerf=_kerf(picture, fit, pixel),
+        rms=math.sqrt(float((residuals**2).mean())),
+        within_95=float(np.percentile(residuals, 95)),
+        pixel=pixel,
+        pieces=tuple(piece_findings(picture, sheet, location, fit, measured)),
+    )
+
+
+def _kerf(picture: ScanPicture, fit: EdgeFit, pixel: float) -> Value:
+    kerf = -2 * fit.offset
+    uncertainty = 2 * math.hypot(fit.uncertainty, FINEST * pixel)
+    half = student_t(fit.degrees) * uncertainty
+    if not -half <= kerf <= LARGEST_KERF:
+        raise DesignError(
+            f"{picture.path.name}: the film reads {-kerf:.3f} mm larger than it is drawn; if it is "
+            "darker than what it lies on, give --paper light"
+            if kerf < 0
+            else f"{picture.path.name}: a kerf of {kerf:.2f} mm is none; check --sheet and --dpi"
+        )
+    return Value(kerf, uncertainty, half)
+
+
+MOST_NOTE = 400
+"""Most characters of a note in a lab's file."""
+
+
+def history(inspection: Inspection) -> dict[str, Any]:
+    """Return an entry of a device's history, as ``sbafab record --history`` reads it."""
+    sound = len(inspection.pieces) - len(inspection.amiss)
+    picture = inspection.picture
+    note = (
+        f"{inspection.sheet.name} {picture.path.name[:60]} sha256 {picture.sha256}: {sound} of "
+        f"{len(inspection.pieces)} pieces as drawn"
+    )
+    for piece in inspection.amiss:
+        note += f"; {piece.name} at x {piece.x:.1f}, y {piece.y:.1f} {piece.verdict}"
+    if len(note) > MOST_NOTE:
+        note = note[: MOST_NOTE - 4] + " ..."
+    entry: dict[str, Any] = {"item": inspection.sheet.film or "film", "note": note}
+    if inspection.kerf.value > 0:
+        entry["kerf_mm"] = round(inspection.kerf.value, 4)
+    return {"entry": [entry]}
+
+
+# The table of sizes for ``sbafab kerf``.
+
+
+FACING = 0.985
+"""Cosine of the largest angle between a side and the axis that it bounds."""
+
+
+def sizes_csv(inspection: Inspection) -> str:
+    """Return the sizes of all sound contours along x and y, in the columns of a coupon's table."""
+    remark = f"# {inspection.picture.path.name} sha256 {inspection.picture.sha256}\n"
+    return remark + csv_text([(*COLUMNS, INSTRUMENT), *_sizes(inspection)])
+
+
+def _sizes(inspection: Inspection) -> Iterator[tuple[str, str, str, str, str]]:
+    is_skeleton = inspection.location.content == "skeleton"
+    number = 0
+    for place, finding in zip(inspection.sheet.places, inspection.pieces, strict=True):
+        for contour in place.region.contours:
+            if contour.is_hole and (is_skeleton or -contour.area < SMALLEST):
+                continue
+            kind = "window" if contour.is_hole or is_skeleton else "outer"
+            for axis, scale in ((0, inspection.scale.x), (1, inspection.scale.y)):
+                low, high = contour.bounds[axis], contour.bounds[axis + 2]
+                gain = _gain(inspection.fit, number, axis, (low, high))
+                if finding.verdict == "sound" and gain is not None:
+                    measured = (high - low + (gain if kind == "outer" else -gain)) * scale
+                    feature = f"{place.name} {kind}"
+                    yield feature, "xy"[axis], f"{high - low:.4f}", f"{measured:.4f}", "scanner"
+            number += 1
+
+
+def _gain(fit: EdgeFit, contour: int, axis: int, ends: tuple[float, float]) -> float | None:
+    """Return the total extent of film beyond both ends of a contour along an axis, mm."""
+    mine = (fit.samples.contours == contour) & (fit.weights > 0)
+    room = 0.05 + 0.02 * (ends[1] - ends[0])
+    places, faces = fit.samples.points[:, axis], np.abs(fit.samples.normals[:, axis]) > FACING
+    gains = [fit.outside[mine & faces & (np.abs(places - end) < room)] for end in ends]
+    return None if min(map(len, gains)) == 0 else float(sum(gain.mean() for gain in gains))
+
+
+# The picture with deviations.
+
+
+SHOWN_SIDE = 1600
+"""Longer side of the picture in the drawing, pixels."""
+STEPS = (-0.05, -0.02, -0.01, 0.01, 0.02, 0.05)
+"""Step between the colours, mm."""
+COLOURS = ("#2166ac", "#67a9cf", "#b9d9ea", "#4daf4a", "#fdcf9c", "#ef8a62", "#b2182b")
+"""From film too small to film too large, distinct for the colour blind too."""
+UNSEEN = "#ff00ff"
+
+
+def drawing(inspection: Inspection) -> str:
+    """Return an SVG: the picture, its edges coloured by deviation, faulty pieces named."""
+    rows, columns = inspection.picture.pixels.shape
+    factor = SHOWN_SIDE / max(rows, columns)
+    width, height = columns * factor, rows * factor
+    size = max(12.0, width / 90)
+    image = _embedded(inspection.picture)
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} '
+        f'{height + 4 * size:.0f}" font-family="sans-serif" font-size="{size:.0f}">',
+        f"<title>{escape(inspection.sheet.name)}: {escape(inspection.picture.path.name)}</title>",
+        '<rect width="100%" height="100%" fill="white"/>',
+        f'<image width="{width:.0f}" height="{height:.0f}" href="{image}"/>',
+        *_coloured(inspection, factor),
+        *_named(inspection, factor, size),
+        *_legend(size, height),
+        "</svg>\n",
+    ]
+    return "\n".join(lines)
+
+
+def _embedded(picture: ScanPicture) -> str:
+    from PIL import Image
+
+    image = Image.fromarray(np.clip(picture.pixels, 0, 255).astype(np.uint8))
+    image.thumbnail((SHOWN_SIDE, SHOWN_SIDE))
+    data = io.BytesIO()
+    image.save(data, "JPEG", quality=70)
+    return f"data:image/jpeg;base64,{base64.b64encode(data.getvalue()).decode()}"
+
+
+def _coloured(inspection: Inspection, factor: float) -> Iterator[str]:
+    """Yield lines along the measured edges, each of one colour."""
+    fit = inspection.fit
+    measured = np.isfinite(fit.outside) & (fit.weights > 0)
+    kinds = np.where(measured, np.digitize(fit.residuals, STEPS), len(COLOURS))
+    at = (fit.warp(fit.samples.points) + 0.5) * factor
+    contours = fit.samples.contours
+    cuts = np.nonzero((np.diff(contours) != 0) | (np.diff(kinds) != 0))[0] + 1
+    for run in np.split(np.arange(len(at)), cuts):
+        last = run[-1] + 1
+        # Up to the next sample, so that colours are continuous.
+        ends = [*run, last] if last < len(at) and contours[last] == contours[run[0]] else list(run)
+        colour = (*COLOURS, UNSEEN)[kinds[run[0]]]
+        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in at[ends])
+        yield f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2"/>'
+
+
+def _named(inspection: Inspection, factor: float, size: float) -> Iterator[str]:
+    for piece in inspection.amiss:
+        (x, y) = (inspection.fit.warp(_row(piece.x, piece.y))[0] + 0.5) * factor
+        for line, text in enumerate((piece.name, piece.verdict)):
+            yield (
+                f'<text x="{x:.0f}" y="{y + line * 1.1 * size:.0f}" text-anchor="middle" '
+                f'fill="#e6007e" stroke="white" stroke-width="{size / 5:.1f}" '
+                f'paint-order="stroke" font-weight="bold">{escape(text)}</text>'
+            )
+
+
+def _row(x: float, y: float) -> PointArray:
+    return np.array([(x, y)])
+
+
+def _legend(size: float, height: float) -> Iterator[str]:
+    texts = [
+        f"under {STEPS[0]:g}",
+        *(f"{low:g} to {high:g}" for low, high in zip(STEPS, STEPS[1:], strict=False)),
+        f"over {STEPS[-1]:g} mm",
+        "no such edge",
+    ]
+    head = "Film beyond the drawn edge, apart from kerf, scale and the piece's own place"
+    yield f'<text x="{size:.0f}" y="{height + 1.4 * size:.0f}">{head}:</text>'
+    for k, (colour, text) in enumerate(zip((*COLOURS, UNSEEN), texts, strict=True)):
+        x, y = size + k * 9.5 * size, height + 2.9 * size
+        yield f'<rect x="{x:.0f}" y="{y - 0.8 * size:.0f}" width="{size:.0f}" height="{size:.0f}" '
+        yield f'fill="{colour}"/><text x="{x + 1.4 * size:.0f}" y="{y:.0f}">{escape(text)}</text>'

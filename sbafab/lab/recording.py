@@ -1,0 +1,270 @@
+"""Record built actuators from values and files, find their rows, write them as CSV and JSON."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from sbafab.actuators import build as laminate_of
+from sbafab.assemblies.build import Assembled, assemble
+from sbafab.assemblies.files import load
+from sbafab.design.files import Change
+from sbafab.design.identity import kit_of
+from sbafab.design.records import Design
+from sbafab.errors import DesignError, OutputError
+from sbafab.folders.swap import replace_text
+from sbafab.lab.builds import RecordedDesign, promised, recorded_sha256
+from sbafab.lab.coupon import row_cells, table_text
+from sbafab.lab.records import (
+    DeviceEntry,
+    HistoryDocument,
+    HistoryEntry,
+    LabRow,
+    Record,
+    Row,
+    columns,
+    row_of,
+)
+from sbafab.lab.store import Contents, Lab
+from sbafab.pressing.schedule import schedule
+from sbafab.reports.traveller.record_sheet import TESTS_TABLE, RecordTable, record_tables
+from sbafab.spreadsheet import csv_text
+from sbafab.version import GENERATOR
+
+
+def built_from(source: str | Path | Design, changes: Sequence[Change] = ()) -> Design | Assembled:
+    """Return the design or assembly of a template, a file or a run's folder."""
+    if isinstance(source, Design):
+        return source.with_(*changes) if changes else source
+    resolved = Path(source) / "design.toml"
+    loaded = load(resolved if resolved.is_file() else source, changes)
+    return loaded if isinstance(loaded, Design) else assemble(loaded)
+
+
+def record(
+    lab: Lab, built: Design | Assembled, rows: Sequence[Row], is_again: bool = False
+) -> list[Row]:
+    """Store rows about built devices, with the design's predictions; all or none.
+
+    Results get the design's kit. ``is_again``: store as new attempts of repaired and retested
+    devices. Raises DesignError, OutputError.
+    """
+    designs = [built] if isinstance(built, Design) else [part.design for part in built.designs]
+    kit = ", ".join(dict.fromkeys(kit_of(design).name for design in designs))
+    rows = [_with_kit(row, kit) for row in rows]
+    sha256 = recorded_sha256(built)
+    known = lab.contents().builds.get(sha256) if lab.path.exists() else None
+    build = promised(built) if known is None or known.generator != GENERATOR else None
+    return lab.add(sha256, build, rows, is_again)
+
+
+def _with_kit(row: Row, kit: str) -> Row:
+    is_result = isinstance(row, Record) and not row.kit
+    return row.model_copy(update={"kit": kit}) if is_result else row
+
+
+def record_sheet(built: Design | Assembled) -> tuple[RecordTable, ...]:
+    """Return the tables of the record page of a design; for an assembly, its tests."""
+    if not isinstance(built, Design):
+        return (TESTS_TABLE,)
+    laminate = laminate_of(built)
+    return record_tables(built, laminate, schedule(laminate, built))
+
+
+# Rows from values, and from files: all or none.
+
+
+def entries_of(values: Mapping[str, Any], where: str = "") -> list[HistoryEntry]:
+    """Return one history entry per serial of ``values``, by column.
+
+    Serials are a list, or a text with commas between them. Raises DesignError.
+    """
+    serials = values.get("serial") or ""
+    if not isinstance(serials, list | tuple):
+        serials = re.split(r"\s*,\s*", str(serials).strip(" ,"))
+    return [
+        row_of(HistoryEntry, {**values, "serial": serial}, where)
+        for serial in dict.fromkeys(map(str, serials))
+    ]
+
+
+def read_batch(path: Path) -> list[Record]:
+    """Return a result for each row of a batch's filled-in table.
+
+    Its columns are a subset of a Record's. Several errors share one cell, separated by blanks.
+    Raises DesignError with the line.
+    """
+    records = [row_of(Record, row, where) for where, row in _csv_rows(path)]
+    if not records:
+        raise DesignError(
+            f"{path} has no result; its first line names columns ({', '.join(columns(Record))}), "
+            "and each row below is an actuator"
+        )
+    return records
+
+
+def read_history(path: Path, defaults: Mapping[str, Any]) -> list[HistoryEntry]:
+    """Return the history entries of a file, with ``defaults`` for values that it omits.
+
+    A CSV file has one row per entry; its columns are a subset of a HistoryEntry's. TOML and JSON
+    have a list ``entry``, and beside it values shared by all entries. Photographs are looked up
+    beside the file. Raises DesignError with the line or the entry.
+    """
+    rows = _csv_rows(path) if path.suffix.lower() == ".csv" else _table_rows(path)
+    entries: list[HistoryEntry] = []
+    for where, row in rows:
+        values = {**defaults, **{name: v for name, v in row.items() if v not in ("", None)}}
+        if values.get("photograph"):
+            values["photograph"] = str(path.parent / str(values["photograph"]))
+        entries += entries_of(values, where)
+    if not entries:
+        raise DesignError(f"{path} holds no entry; fill in a row")
+    return entries
+
+
+def _csv_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the filled rows below the header, with their places; ``#`` begins a comment.
+
+    Columns are separated by commas, semicolons or tabs; with the latter two, decimal commas work.
+    """
+    lines = [
+        (f"{path}, line {number}", line)
+        for number, line in enumerate(table_text(path).splitlines(), start=1)
+        if line.strip(' ,;\t"') and not line.lstrip(' "').startswith("#")
+    ]
+    if not lines:
+        return
+    separator = max(",;\t", key=lines[0][1].count)
+    names = [name.lower() for name in row_cells(lines[0][1], separator, lines[0][0])]
+    named = [name for name in names if name]
+    if len(set(named)) != len(named):
+        raise DesignError(f"{path} names a column twice; keep one of each")
+    for where, line in lines[1:]:
+        cells = row_cells(line, separator, where)
+        while len(cells) > len(names) and not cells[-1]:
+            cells.pop()
+        if len(cells) != len(names):
+            raise DesignError(
+                f"{where} has {len(cells)} cells where the header has {len(names)}; write decimal "
+                "points, or part columns by semicolons"
+            )
+        yield where, {name: cell for name, cell in zip(names, cells, strict=True) if name or cell}
+
+
+_PARSERS: Mapping[str, Callable[[str], Any]] = {".toml": tomllib.loads, ".json": json.loads}
+
+
+def _table_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the tables of the list ``entry``, merged with the shared values, with their places."""
+    parser = _PARSERS.get(path.suffix.lower())
+    if parser is None:
+        raise DesignError(f"{path} ends in none of .csv, {', '.join(_PARSERS)}; save it as one")
+    text = table_text(path)
+    try:
+        table = parser(text)
+    except (ValueError, RecursionError) as error:
+        raise DesignError(f"{path} cannot be read: {error}") from None
+    rows = table.get("entry") if isinstance(table, dict) else None
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise DesignError(f"{path} needs a list of tables called entry, a table an entry")
+    common = {name: value for name, value in table.items() if name != "entry"}
+    for number, row in enumerate(rows, start=1):
+        yield f"{path}, entry {number}", {**common, **row}
+
+
+def matching(
+    text: str, serial: str, stored: Sequence[Row], builds: Mapping[str, RecordedDesign]
+) -> list[Row]:
+    """Return the rows of the design whose hash (eight digits or more of it) the text holds.
+
+    Rows of other designs of the same actuator are included. Otherwise the text is a serial, a
+    design's name or a row's number; ``serial``, if given, filters these rows.
+    """
+    text = text.strip()
+    hashes = re.findall(r"\b[0-9a-f]{8,64}\b", text.lower())
+    actuators = {
+        build.actuator
+        for build in builds.values()
+        if any(h.startswith(part) for part in hashes for h in (build.sha256, build.actuator))
+    }
+    matches = [row for row in stored if builds[row.design_sha256].actuator in actuators]
+    if not matches:
+        matches = [
+            row
+            for row in stored
+            if text in (row.serial, builds[row.design_sha256].name, row.number)
+        ]
+    return [row for row in matches if serial in ("", row.serial)]
+
+
+# Writing rows. The same rows give the same bytes.
+
+
+HEAD = ("row", "recorded", "design", "design_sha256", "attempt", "corrects", "withdrawn")
+CSV_COLUMNS = tuple(dict.fromkeys((*HEAD, *columns(HistoryEntry), "expired", *columns(Record))))
+
+
+def write_history(contents: Contents, path: Path) -> int:
+    """Write rows as CSV or JSON, by the file's suffix, atomically; return the number of devices.
+
+    Raises DesignError for another suffix, and OutputError.
+    """
+    writers = {".csv": csv_history, ".json": json_history}
+    writer = writers.get(path.suffix.lower())
+    if writer is None:
+        raise DesignError(f"{path} ends in none of {', '.join(writers)}; choose one of them")
+    devices = _devices(contents)
+    save_text(path, writer(devices, contents.builds))
+    return len(devices)
+
+
+def save_text(path: Path, text: str) -> None:
+    """Write a temporary file and swap it in. Raises OutputError."""
+    try:
+        replace_text(path, text)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}") from None
+
+
+def _devices(contents: Contents) -> list[Sequence[LabRow]]:
+    """Return the rows of each device, entries first, in order of work; sorted by design, serial."""
+    rows: dict[tuple[str, str], list[LabRow]] = defaultdict(list)
+    for row in (*contents.entries, *contents.records):
+        build = contents.builds[row.design_sha256]
+        rows[build.actuator, row.serial].append(row)
+    return sorted(
+        rows.values(),
+        key=lambda rows: (contents.builds[rows[0].design_sha256].name, rows[0].serial),
+    )
+
+
+def json_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, RecordedDesign]) -> str:
+    """Return a document with the rows grouped by device."""
+    listed = []
+    for rows in devices:
+        build = builds[rows[0].design_sha256]
+        head = {"design": build.name, "actuator_sha256": build.actuator}
+        records = [row for row in rows if isinstance(row, Record)]
+        entries = [row for row in rows if isinstance(row, HistoryEntry)]
+        listed.append(DeviceEntry.read(rows[0], **head, records=records, entries=entries))
+    document = HistoryDocument.of(None, devices=listed)
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def csv_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, RecordedDesign]) -> str:
+    """Return a table with one row per row of each device."""
+    cells = [_cells(row, builds[rows[0].design_sha256].name) for rows in devices for row in rows]
+    return csv_text([CSV_COLUMNS, *([each.get(c) for c in CSV_COLUMNS] for each in cells)])
+
+
+def _cells(row: LabRow, design: str) -> dict[str, Any]:
+    head = {name: getattr(row, name) for name in ("recorded", "design_sha256", "attempt")}
+    corrects = None if row.corrects is None else f"{row.SIGN}{row.corrects}"
+    marks = {"row": row.number, "design": design, "corrects": corrects}
+    expired = {"expired": int(row.is_expired)} if isinstance(row, HistoryEntry) else {}
+    return {**head, **marks, "withdrawn": int(row.withdrawn), **row.cells, **expired}

@@ -1,0 +1,138 @@
+"""Scans of known kerf, scale, tilt, perspective, blur, noise, light and dust, measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+from sbafab.errors import DesignError
+from sbafab.lab.cut_sheet import read_cut_sheet
+from sbafab.lab.inspection import Inspection, inspect_picture
+from sbafab.lab.picture import read_picture
+from sbafab.lab.scale import Reference
+from tests.lab.conftest import cut
+from tests.lab.scans import Camera, Change, render, save
+from tests.quick import few
+
+EDGE = 0.02
+"""mm within which each edge is to be found."""
+
+
+def inspected(
+    folder: Path,
+    tmp_path: Path,
+    camera: Camera,
+    change: Change | None = None,
+    sheet: str = "TPE_1",
+    is_photo: bool = False,
+) -> Inspection:
+    drawn = folder / "sheets" / f"{sheet}.dxf"
+    path = save(render(drawn, camera, change), tmp_path / "scan.png", camera.dpi)
+    dpi = None if is_photo else (camera.dpi, camera.dpi)
+    return inspect_picture(
+        read_picture(path), read_cut_sheet(folder, sheet), Reference(dpi), is_photo
+    )
+
+
+def check(inspection: Inspection, camera: Camera) -> None:
+    """Check kerf, its interval, scale, every edge and that no piece is found amiss."""
+    fit = inspection.fit
+    assert inspection.kerf.value == pytest.approx(camera.kerf, abs=0.005)
+    low, high = inspection.kerf.interval
+    assert low <= camera.kerf <= high
+    # Film ends half the kerf inside the path; what is farther off is dust, a few places at most.
+    errors = np.abs(fit.outside + camera.kerf / 2)
+    assert np.mean(errors < EDGE) > 0.985
+    assert np.sqrt(np.mean(np.square(errors[fit.weights > 0]))) < EDGE / 2
+    assert [piece for piece in inspection.pieces if piece.verdict != "sound"] == []
+
+
+def random_camera(seed: int) -> Camera:
+    random = np.random.default_rng(seed)
+    return Camera(
+        kerf=random.uniform(0.06, 0.2),
+        dpi=1200.0 if seed % 5 == 3 else 600.0,
+        scale=(random.uniform(0.998, 1.002), random.uniform(0.998, 1.002)),
+        tilt=random.uniform(-5, 5),
+        blur=random.uniform(1, 2),
+        noise=random.uniform(1, 8),
+        light=random.uniform(0, 0.4),
+        specks=int(random.integers(0, 80)),
+        film=random.uniform(150, 220),
+        paper=random.uniform(20, 60),
+        seen_from_below=bool(random.integers(2)),
+        skeleton=bool(random.integers(2)),
+        moved=random.choice([0.0, 0.0, 0.15]),
+        seed=seed,
+    )
+
+
+@pytest.mark.parametrize("seed", few(range(20), 2, long=6))
+def test_a_scan_is_measured(seed: int, folder: Path, tmp_path: Path) -> None:
+    camera = random_camera(seed)
+    # Pieces that fell out of a skeleton move no window.
+    camera = replace(camera, moved=0.0) if camera.skeleton else camera
+    inspection = inspected(folder, tmp_path, camera)
+    check(inspection, camera)
+    assert inspection.location.content == ("skeleton" if camera.skeleton else "pieces")
+    if not camera.moved:
+        scale = inspection.scale
+        assert (scale.x, scale.y) == pytest.approx(camera.scale, abs=2e-4)
+
+
+@pytest.mark.parametrize(("keystone", "barrel"), few([(0.03, 0.004), (0.06, -0.004)], 1, names=2))
+def test_a_photograph_is_measured(
+    keystone: float, barrel: float, folder: Path, tmp_path: Path
+) -> None:
+    camera = Camera(dpi=500, keystone=keystone, barrel=barrel, tilt=-3, blur=1.5, specks=20)
+    inspection = inspected(folder, tmp_path, camera, is_photo=True)
+    check(inspection, camera)
+    assert inspection.scale.reference.startswith("none")
+
+
+@pytest.mark.parametrize("seed", few(range(50), 1, long=9))
+def test_a_clean_sheet_gives_no_alarm(seed: int, folder: Path, lobed: Path, tmp_path: Path) -> None:
+    of = lobed if seed % 5 == 4 else folder
+    sheet = ("PTFE_1", "TPE_1")[seed % 2]
+    camera = replace(random_camera(100 + seed), dpi=300.0, skeleton=False, moved=0.0)
+    inspection = inspected(of, tmp_path, camera, sheet=sheet)
+    assert inspection.amiss == []
+    assert not inspection.failed
+
+
+def test_dust_is_no_opening(folder: Path, tmp_path: Path) -> None:
+    inspection = inspected(folder, tmp_path, Camera(dpi=400, specks=300, seed=4))
+    assert not inspection.failed
+
+
+PINS = ((32.0, 14.0, 3.0), (32.0, 34.0, 3.0), (54.0, 24.0, 2.0))
+"""Centre and diameter in mm, among the parts."""
+
+
+def test_the_pins_of_a_sheet_give_the_scale(tmp_path: Path) -> None:
+    """Film that has shrunk by 0.2 % between pins that have not, in a picture of unknown scale."""
+    pins = str([list(pin) for pin in PINS])
+    folder = cut(tmp_path, "1dof-10mm", "--set", f"sheets.tpe.pins={pins}")
+    camera = Camera(dpi=600, tilt=2, noise=2)
+
+    def shrunk(pieces: list[Any]) -> list[Any]:
+        middle = shapely.MultiPolygon(pieces).envelope.centroid
+        smaller = [shapely.affinity.scale(each, 0.998, 0.998, origin=middle) for each in pieces]
+        discs = [shapely.Point(x, y).buffer((d + camera.kerf) / 2, 64) for x, y, d in PINS]
+        return smaller + discs
+
+    path = save(render(folder / "sheets" / "TPE_1.dxf", camera, shrunk), tmp_path / "p.png", None)
+    sheet = read_cut_sheet(folder, "TPE_1")
+    inspection = inspect_picture(read_picture(path), sheet, Reference(pins=True), False)
+    assert inspection.scale.reference == "3 pins"
+    assert inspection.scale.x == pytest.approx(0.998, abs=2e-4)
+    # Without one of them the scale is not known: no pin is there, or the picture ends before it.
+    for x, y in ((75.2, 26.0), (60.0, 60.0)):
+        hidden = replace(sheet, pins=(*PINS[:2], (x, y, 2.0)))
+        with pytest.raises(DesignError, match=f"the pin at x {x:g}, y {y:g} mm is not seen"):
+            inspect_picture(read_picture(path), hidden, Reference(pins=True), False)
