@@ -7,7 +7,9 @@ from pathlib import Path
 
 from docs.scripts.rule_pictures import pair
 from sbafab.assemblies.checks import CHECKS
-from sbafab.rules.deck import AS_BUILT, EXPLAINED, rule_names
+from sbafab.catalogue import names
+from sbafab.design.sections import rule_names
+from sbafab.rules.deck import EXPLAINED
 from sbafab.rules.sentences import Explanation
 
 HEAD = """# Rules in pictures
@@ -33,7 +35,7 @@ def write(folder: Path) -> None:
     parts.append("\n## Between the parts of an assembly\n")
     parts += [_short(CHECKS)]
     parts.append("\n## On a folder\n\nThe rules above are run on what the files will cut, and:\n")
-    parts += [_short(AS_BUILT)]
+    parts += [_short(names("folders"))]
     (folder / "rules.md").write_text("\n".join(parts), encoding="utf-8")
 
 

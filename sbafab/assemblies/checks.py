@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sbafab.assemblies.build import Assembled, PlacedPart, about_axis, inlet_of
-from sbafab.assemblies.records import AssemblyRules, Base, CheckName, Cup, Line, Magnet, Tube
+from sbafab.assemblies.records import AssemblyRules, Base, Cup, Line, Magnet, Tube
 from sbafab.assemblies.shapes import face, placed_surface
 from sbafab.design.records import Design, Discs
 from sbafab.geometry.region import Region, rectangle
@@ -25,7 +25,7 @@ from sbafab.rules.sentences import Clause, say
 
 
 def _judged(
-    rule: CheckName,
+    rule: str,
     verdict: Verdict | bool,
     limit: float,
     measured: float | None,
@@ -481,7 +481,7 @@ def _meet(a: Surface, b: Surface) -> bool:
 # All checks, by stable names.
 
 
-CHECKS: Mapping[CheckName, Callable[[Assembled], Iterator[Finding]]] = {
+CHECKS: Mapping[str, Callable[[Assembled], Iterator[Finding]]] = {
     "tube-match": tube_match,
     "inlet-match": inlet_match,
     "line-clearance": line_clearance,
@@ -492,11 +492,6 @@ CHECKS: Mapping[CheckName, Callable[[Assembled], Iterator[Finding]]] = {
     "lumen-brace": lumen_brace,
     "supply-tubes": supply_tubes,
 }
-
-AT_MOST: frozenset[CheckName] = frozenset(
-    ("tube-match", "inlet-match", "collision", "aperture", "lumen-pass", "supply-tubes")
-)
-"""Checks with an upper limit; all others have a lower limit."""
 
 
 def run_checks(assembled: Assembled) -> tuple[Finding, ...]:

@@ -7,11 +7,12 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
+from sbafab import catalogue
 from sbafab.actuators import load_design, records
 from sbafab.assemblies.build import Assembled, PlacedPart, design_source
-from sbafab.assemblies.records import KINDS, AnyPart, Assembly, CheckName
+from sbafab.assemblies.records import KINDS, AnyPart, Assembly
 from sbafab.design.files import (
     ASSEMBLY,
     Change,
@@ -45,7 +46,7 @@ def load(
             case ["parts", name, "design"] if source := data["parts"][name].get("design"):
                 if isinstance(design_source(str(source), Path()), Path):
                     data["parts"][name]["design"] = str(Path(str(source)).absolute())
-    return assembly_of(add_waivers(data, waivers, get_args(CheckName)), path)
+    return assembly_of(add_waivers(data, waivers, catalogue.names("assemblies")), path)
 
 
 def load_text(text: str, path: Path) -> Design | Assembly:

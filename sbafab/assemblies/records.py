@@ -7,10 +7,11 @@ Lengths are mm, angles degrees.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
+from sbafab import catalogue
 from sbafab.design.sections import (
     NAME_PATTERN,
     PART_PATTERN,
@@ -25,17 +26,6 @@ from sbafab.design.toml_table import Section
 from sbafab.design.units import Length, LengthOrZero, Millimetres
 
 Seat = Literal["top", "bottom", "start", "end", "outside", "lumen", "inlet"]
-CheckName = Literal[
-    "tube-match",
-    "inlet-match",
-    "line-clearance",
-    "seat",
-    "collision",
-    "aperture",
-    "lumen-pass",
-    "lumen-brace",
-    "supply-tubes",
-]
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 Shift = Annotated[float, Millimetres(-1000, 1000)]
 PartName = Annotated[str, Field(pattern=PART_PATTERN)]
@@ -194,7 +184,7 @@ class Deploy(Section):
 
 
 def _waivable() -> tuple[str, ...]:
-    return (*get_args(CheckName), *rule_names())
+    return (*catalogue.names("assemblies"), *rule_names())
 
 
 class AssemblyRules(Section):

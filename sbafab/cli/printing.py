@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
+from sbafab import catalogue
 from sbafab.cli.exit import print_error
 from sbafab.cli.progress import QUIET, is_requested, print_result
-from sbafab.rules.deck import AS_BUILT
 from sbafab.rules.finding import Finding, counted, decisive
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ def print_lines(findings: Sequence[Finding], verbose: bool = False) -> None:
     """Print a line for each rule's decisive finding; ``verbose``: for all, with their messages."""
     from rich.text import Text
 
-    out = console()
+    out, of_folders = console(), catalogue.names("folders")
     shown = findings if verbose else list(decisive(findings).values())
     wide = max((len(finding.rule) for finding in shown), default=0)
     out.print(Text(f"{'rule':{wide}}  verdict  {'measured':>13}  {'limit':>14}", style="bold"))
@@ -184,7 +184,7 @@ def print_lines(findings: Sequence[Finding], verbose: bool = False) -> None:
         line.append(f"{finding.verdict:7}", style=COLOURS[finding.verdict])
         measured = short_figure(finding.measured, _unit(finding))
         is_empty = finding.measured is finding.limit is None
-        if finding.verdict == "pass" and is_empty and finding.rule not in AS_BUILT:
+        if finding.verdict == "pass" and is_empty and finding.rule not in of_folders:
             measured = "not compared"
         line.append(f"  {measured:>13}  {limit_text(finding):>14}")
         line.rstrip()
@@ -259,29 +259,16 @@ def limit_text(finding: Finding) -> str:
     """Return a limit behind ">=" if it is a lower one, behind "<=" if it is an upper one."""
     if finding.limit is None:
         return "no target" if finding.rule in SHARE_OF else ""
-    sense = "<=" if _is_upper_limit(finding.rule) else ">="
+    # What prints no findings loads neither rules nor numpy.
+    from sbafab.rules.deck import AT_MOST
+
+    sense = "<=" if finding.rule in AT_MOST else ">="
     return f"{sense} {short_figure(finding.limit, _unit(finding))}"
 
 
 def _unit(finding: Finding) -> str:
     """Return the unit of a finding's figures; a share's is a per cent sign and its denominator."""
     return f"% {SHARE_OF[finding.rule]}" if finding.rule in SHARE_OF else finding.unit
-
-
-def _is_upper_limit(rule: str) -> bool:
-    """Return True if the rule's limit is the largest permitted value."""
-    # What prints no findings loads neither rules nor numpy.
-    from sbafab.rules.deck import AT_MOST, rule_names
-    from sbafab.rules.nets import NETLIST
-
-    if rule == NETLIST:
-        return True
-    if rule in rule_names():
-        return rule in AT_MOST
-    # A design has no checks between parts.
-    from sbafab.assemblies.checks import AT_MOST as BETWEEN_PARTS
-
-    return rule in BETWEEN_PARTS
 
 
 def short_figure(value: float | None, unit: str) -> str:

@@ -7,7 +7,7 @@ import re
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from sbafab import plugins
+from sbafab import catalogue, plugins
 from sbafab.design.films import UNCALIBRATED, KerfWidth, Sheet
 from sbafab.design.recipes import MachineName, Recipe
 from sbafab.design.toml_table import Section, writable
@@ -162,29 +162,9 @@ NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
 PART_PATTERN = r"^[A-Za-z][A-Za-z0-9_-]{0,31}$"
 
 
-RuleName = Literal[
-    "bond-width",
-    "mask-overhang",
-    "facing-films",
-    "sealing",
-    "nets",
-    "channel-clear",
-    "tube-fit",
-    "piece-count",
-    "pin-holes",
-    "pin-fit",
-    "film-limits",
-    "press-fit",
-    "pressure-rating",
-    "registration-nominal",
-    "registration-worst-case",
-    "registration-yield",
-]
-
-
 def rule_names() -> tuple[str, ...]:
     """Return the names of all rules, with rules of installed packages last."""
-    return (*get_args(RuleName), *(entry.name for entry in plugins.installed(plugins.RULES)))
+    return (*catalogue.names("rules"), *(entry.name for entry in plugins.installed(plugins.RULES)))
 
 
 def name_of(names: Callable[[], Sequence[str]]) -> tuple[AfterValidator, Any]:

@@ -1,6 +1,6 @@
 """The rule deck: all rules in the order they are reported, and the functions that run them.
 
-A rule is a file in this folder with a ``RULE``, whose name is in ``RuleName``, in order; or an
+A rule is a file in this folder with a ``RULE`` and a table in ``sentences.toml``, in order; or an
 entry point of an installed package. A rule that cannot be loaded is an error: no design passes
 without it.
 """
@@ -8,11 +8,9 @@ without it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import get_args
 
-from sbafab import plugins
+from sbafab import catalogue, plugins
 from sbafab.design.records import Design
-from sbafab.design.sections import RuleName
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.plugins import Plugins
@@ -21,9 +19,9 @@ from sbafab.rules.finding import Finding, marked
 from sbafab.rules.limits import lowered
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Rule
-from sbafab.rules.sentences import WORDS, Explanation, catalogue, explained
+from sbafab.rules.sentences import Explanation, explained
 
-OWN = {name: f"sbafab.rules.{name.replace('-', '_')}:RULE" for name in get_args(RuleName)}
+OWN = {name: f"sbafab.rules.{name.replace('-', '_')}:RULE" for name in catalogue.names("rules")}
 
 
 RULES: tuple[Rule, ...] = ()
@@ -31,9 +29,6 @@ for _name, _rule in Plugins(plugins.RULES, "rule", Rule, OWN).items():
     if _rule.name != _name:
         raise DesignError(f"rule {_name} of an installed package calls itself {_rule.name}")
     RULES += (_rule,)
-
-AT_MOST = frozenset(rule.name for rule in RULES if rule.at_most)
-"""Rules whose limit is the largest value allowed."""
 
 
 def run_deck(
@@ -60,14 +55,17 @@ def has_failed(findings: Iterable[Finding]) -> bool:
     return any(finding.verdict == "fail" for finding in findings)
 
 
-def rule_names() -> tuple[str, ...]:
-    return tuple(rule.name for rule in RULES)
-
-
-AS_BUILT = ("file-integrity", "manifest-claims", "as-designed")
-"""The checks on a folder, beside the rules on what it will cut."""
-
 EXPLAINED: Mapping[str, Explanation] = {rule.name: rule.explanation for rule in RULES} | {
-    name: explained(name) for name in catalogue() if name not in (WORDS, *get_args(RuleName))
+    name: explained(name)
+    for group in ("assemblies", "folders", "netlists")
+    for name in catalogue.names(group)
 }
 """Explanations of all rules and checks by name, for ``sbafab explain`` and the reference pages."""
+
+AT_MOST = frozenset(
+    (
+        *(rule.name for rule in RULES if rule.at_most),
+        *(name for name, explanation in EXPLAINED.items() if explanation.at_most),
+    )
+)
+"""Rules and checks whose limit is the largest value allowed."""

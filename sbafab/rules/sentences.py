@@ -1,4 +1,4 @@
-"""The catalogue of all that rules and checks say, by id, in ``sentences.toml``, and how it is told.
+"""What rules and checks say, by the ids of the catalogue, and how it is told.
 
 A finding holds the id of its sentence and the facts that fill it; nothing but a reader reads it.
 """
@@ -6,13 +6,11 @@ A finding holds the id of its sentence and the facts that fill it; nothing but a
 from __future__ import annotations
 
 import string
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
 from typing import Any, NamedTuple
 
+from sbafab.catalogue import catalogue
 from sbafab.laminate.laminate import Layer
 from sbafab.rules.limits import at
 
@@ -26,13 +24,15 @@ FAIL, REMEDY = "-fail", "-remedy"
 class Explanation:
     """The condition that ``holds`` if a rule passes, ``why`` it matters, how to ``mend`` it.
 
-    ``keys`` of a design file set the limit or the measured value.
+    ``keys`` of a design file set the limit or the measured value. ``at_most``: the limit of a check
+    is the largest value allowed; of a rule its ``Rule`` says it.
     """
 
     holds: str
     why: str
     mend: str
     keys: tuple[str, ...] = ()
+    at_most: bool = False
 
 
 class Clause(NamedTuple):
@@ -52,17 +52,11 @@ class Clause(NamedTuple):
         return say(self.id, **{**dict(self.facts), **facts})
 
 
-@cache
-def catalogue() -> Mapping[str, Any]:
-    """Return the tables of all rules and checks, by name, in their order."""
-    file = resources.files("sbafab.rules") / "sentences.toml"
-    return tomllib.loads(file.read_text(encoding="utf-8"))
-
-
 def explained(name: str) -> Explanation:
     """Return the explanation of a rule or check."""
     table = catalogue()[name]
-    return Explanation(table["holds"], table["why"], table["mend"], tuple(table["keys"]))
+    keys, at_most = tuple(table["keys"]), table.get("at_most", False)
+    return Explanation(table["holds"], table["why"], table["mend"], keys, at_most)
 
 
 def is_said(sentence: str) -> bool:

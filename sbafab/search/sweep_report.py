@@ -20,13 +20,13 @@ from typing import IO, Any, NamedTuple
 
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
+from sbafab.design.sections import rule_names
 from sbafab.errors import OutputError
 from sbafab.markup import environment
 from sbafab.models.intervals import factors_of
 from sbafab.models.paper import CALIBRATED_MODELS, counterpart
 from sbafab.models.quantity import ANYWHERE, Conditions, FigureKey, Quantity
 from sbafab.reports.charts import ChartBars, ChartCurve, ChartSpecks, Panel, chart_svg
-from sbafab.rules.deck import rule_names
 from sbafab.search.trials import SweepRow
 from sbafab.search.vary import Values, Varied, format_value
 from sbafab.spreadsheet import write_rows

@@ -20,8 +20,9 @@ from sbafab.cli.check import file_states, watch_source
 from sbafab.cli.explain import design_keys
 from sbafab.cli.printing import limit_text
 from sbafab.design.files import key_paths
+from sbafab.design.sections import rule_names
 from sbafab.models.figures import FLAGS
-from sbafab.rules.deck import EXPLAINED, rule_names
+from sbafab.rules.deck import EXPLAINED
 from sbafab.rules.finding import Finding, Place
 from tests.cli.conftest import Run
 

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from sbafab.design.sections import rule_names
 from sbafab.errors import DesignError
 from sbafab.folders.as_cut import CutPart
 from sbafab.folders.differences import CLAIMS, DESIGNED, INTEGRITY
-from sbafab.rules.deck import rule_names
 from tests.faults.catalogue import FAULTS, KINDS, TEMPLATES, Goods, caught_by, cell
 from tests.faults.record import PAPER, Fault
 from tests.faults.specimen import LEFT_OUT, failing, quick, unabridged

@@ -16,11 +16,11 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.cli import main
 from sbafab.cutting.kerf import in_chords
+from sbafab.design.sections import rule_names
 from sbafab.errors import OutputError
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.offset import grow, shrink
-from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
 from tests.folders.doctoring import Doctor
 

@@ -10,9 +10,9 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.cutting.properties import Curves, DxfProfile
+from sbafab.design.sections import rule_names
 from sbafab.folders.check import check_folder, read_folder
 from sbafab.folders.run import RunRequest, generate
-from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
 from tests.quick import few
 

@@ -20,9 +20,9 @@ from ezdxf.document import Drawing
 
 from sbafab.actuators import load_design
 from sbafab.cutting.properties import Curves, DxfProfile
+from sbafab.design.sections import rule_names
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import RunRequest, generate
-from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
 from tests.folders.doctoring import Doctor
 from tests.quick import few

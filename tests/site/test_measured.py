@@ -17,7 +17,8 @@ from docs.scripts.nesting import most_rectangles
 from docs.scripts.rates import WORDS
 from docs.scripts.tables import SUMMARIES, Table
 from sbafab.cli import COMMANDS
-from sbafab.rules.deck import EXPLAINED, rule_names
+from sbafab.design.sections import rule_names
+from sbafab.rules.deck import EXPLAINED
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from sbafab import api
+from sbafab.design.sections import rule_names
 from sbafab.errors import DesignError
 from sbafab.models import map_range
-from sbafab.rules.deck import rule_names
 from sbafab.studio import jobs
 from sbafab.studio.app import design_in, packed
 from sbafab.studio.editing import edited
