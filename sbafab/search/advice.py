@@ -7,9 +7,10 @@ seed, so that it does not rest on the draws it was chosen by.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, get_args
 
 from sbafab.actuators import build
 from sbafab.design.records import REGISTRATIONS, Design
@@ -26,17 +27,27 @@ MOST_STEPS = 128
 FEW_STEPS = 10
 """0.1 mm, a cutting error: by so much bond and overhang grow before plate or pins change."""
 CHECK_SEED = SEED + 1
+MOST_CHECKED = 5
+"""Best trials whose other rules are checked, where none reaches the target."""
 BOND, OVERHANG = "bond.width", "mask.overhang"
 METHOD, SEQUENCE = "registration.method", "registration.sequence"
 PLATE, PIN_ERROR = "registration.plate_made_by", "registration.pin_error"
 TARGET = "rules.target_yield"
-
-
+WORST_CASE, PIN_FIT = "registration-worst-case", "pin-fit"
+"""Other rules that may be mended: by more steps, by a better plate."""
 OTHERWISE = {
     "channel-pin": 'registration.method = "ears" pins every film',
     "ears": "smaller registration.hand_turn and registration.hand_placement do",
 }
 """The remedy if bond and overhang reach no yield, by registration method."""
+
+
+def _good(share: Share) -> str:
+    low, high = share.interval
+    return (
+        f"{share.value:.2%} of {share.builds} random builds are good (95 % interval {low:.2%} to "
+        f"{high:.2%})"
+    )
 
 
 @dataclass(frozen=True)
@@ -55,8 +66,6 @@ class Advice:
 
     @property
     def sentence(self) -> str:
-        if self.share is not None and self.bond is None:
-            return self._as_drawn(self.share)
         if self.share is None:
             remedy = OTHERWISE.get(self.method, OTHERWISE["ears"])
             return (
@@ -64,44 +73,38 @@ class Advice:
                 f"reach a yield of {self.target:.4g} with registration.method = "
                 f'"{self.method}": {remedy}.'
             )
-        low, high = self.share.interval
-        return (
-            f"A yield of {self.target:.4g} needs bond.width = {self.bond:.2f} and mask.overhang = "
-            f"{self.overhang:.2f} at least; built so, another seed gives {self.share.value:.2%} "
-            f"good builds of {self.share.builds} (95 % interval {low:.2%} to {high:.2%})."
-        )
-
-    def _as_drawn(self, share: Share) -> str:
-        low, high = share.interval
-        reached = "reaches" if low >= self.target else "does not reach"
-        text = (
-            f"As drawn it {reached} a yield of {self.target:.4g}: {share.value:.2%} of "
-            f"{share.builds} random builds are good (95 % interval {low:.2%} to {high:.2%})"
-        )
-        if low >= self.target:
-            return f"{text}."
-        return (
-            f"{text}. Its layers are drawn, so no key makes bonds and overhangs wider: draw them "
-            "wider where registration-worst-case finds the least, or place and cut more exactly "
+        if self.bond is not None:
+            return (
+                f"A yield of {self.target:.4g} needs bond.width = {self.bond:.2f} and "
+                f"mask.overhang = {self.overhang:.2f} at least; built so, by another seed "
+                f"{_good(self.share)}."
+            )
+        is_reached = self.share.interval[0] >= self.target
+        reached = "reaches" if is_reached else "does not reach"
+        mend = (
+            " Its layers are drawn, so no key makes bonds and overhangs wider: draw them wider "
+            "where registration-worst-case finds the least, or place and cut more exactly "
             "(registration.plate_made_by, registration.hand_placement, registration.seam_error)."
         )
+        text = f"As drawn it {reached} a yield of {self.target:.4g}: {_good(self.share)}."
+        return text if is_reached else text + mend
 
 
 def advise(design: Design, target: float, progress: Progress = ignore_progress) -> Advice:
-    """The smallest bond and overhang whose interval of 95 % lies at or above ``target``, from the
-    rules' limits on.
+    """Return the smallest bond and overhang, from the rules' limits on, whose interval of 95 % lies
+    at or above ``target``.
     """
+    method = design.registration.method
     if not design.uses(BOND):
-        share = simulate(build(design), design, CHECK_SEED).whole
-        return Advice(target, design.registration.method, share=share)
-    rules = design.rules
-    start = {BOND: rules.bond_width, OVERHANG: rules.mask_overhang}
+        return Advice(target, method, share=simulate(build(design), design, CHECK_SEED).whole)
+    start = {BOND: design.rules.bond_width, OVERHANG: design.rules.mask_overhang}
     trials = _Trials(design, start, target, progress)
     least = _smallest(trials, MOST_STEPS)
     if least is None:
-        return Advice(target, design.registration.method)
-    lengths = trials.lengths(least.steps)
-    return Advice(target, design.registration.method, lengths[BOND], lengths[OVERHANG], least.share)
+        return Advice(target, method)
+    lengths = trials.lengths(least)
+    share = trials.share(least, CHECK_SEED)
+    return Advice(target, method, lengths[BOND], lengths[OVERHANG], share)
 
 
 # A design changed as little as a yield needs.
@@ -133,24 +136,16 @@ class YieldDesign:
             return self._too_high()
         if self.share is None:
             return f"{self.given.name} fails other rules, so that nothing was changed for its yield"
-        low, high = self.share.interval
-        reached = (
-            f"{self.share.value:.2%} of {self.share.builds} random builds are good (95 % interval "
-            f"{low:.2%} to {high:.2%})"
-        )
         if not self.changes:
-            return f"Nothing to change for a yield of {self.target:.4g}: {reached}"
-        return f"Changed for a yield of {self.target:.4g}: {_said(self.changes)}; {reached}"
+            return f"Nothing to change for a yield of {self.target:.4g}: {_good(self.share)}"
+        changes = _format(self.changes)
+        return f"Changed for a yield of {self.target:.4g}: {changes}; {_good(self.share)}"
 
     def _too_high(self) -> str:
         reached = "no change that was tried can be built and passes the other rules"
         if self.best is not None:
-            low, high = self.best.interval
-            by = f" with {_said(self.best_changes)}" if self.best_changes else " as it is"
-            reached = (
-                f"the best reached is {self.best.value:.2%} of {self.best.builds} random builds "
-                f"(95 % interval {low:.2%} to {high:.2%}){by}"
-            )
+            by = f"with {_format(self.best_changes)}" if self.best_changes else "as it is"
+            reached = f"at best, {by}, {_good(self.best)}"
         free = f", or do not --set {', '.join(self.fixed)}" if self.fixed else ""
         return (
             f"{self.given.name} does not reach a yield of {self.target:.4g}, and nothing was "
@@ -159,7 +154,7 @@ class YieldDesign:
         )
 
 
-def _said(changes: Mapping[str, Any]) -> str:
+def _format(changes: Mapping[str, Any]) -> str:
     return ", ".join(f"{key} = {value}" for key, value in changes.items())
 
 
@@ -185,36 +180,37 @@ def reach_yield(
     and overhang up to 1.28 mm wider. Of bond and overhang the least that is enough. The design
     passes every other rule; one that fails another rule as it is given is returned unchanged.
     """
-    asked = design.with_({TARGET: target})
-    free = (key for key in (BOND, OVERHANG) if key not in fixed and asked.uses(key))
-    start = {key: value_of(asked, key) for key in free}
-    as_given = _Trials(asked, start, target, progress)
-    if as_given.broken(AS_GIVEN) - {WORST_CASE, PIN_FIT}:
-        return YieldDesign(target, design, asked)
-    share = as_given.share(AS_GIVEN)
-    enough = share is not None and share.interval[0] >= target
-    if enough and not as_given.broken(AS_GIVEN):
-        return YieldDesign(target, design, asked, share=share)
+    targeted = design.with_({TARGET: target})
+    free = (key for key in (BOND, OVERHANG) if key not in fixed and targeted.uses(key))
+    start = {key: value_of(targeted, key) for key in free}
+    as_given = _Trials(targeted, start, target, progress)
+    broken = as_given.broken(AS_GIVEN)
+    if broken - {WORST_CASE, PIN_FIT}:
+        return YieldDesign(target, design, targeted)
+    if as_given.is_enough(AS_GIVEN) and not broken:
+        return YieldDesign(target, design, targeted, share=as_given.share(AS_GIVEN))
     tried: dict[tuple[str, ...], _Trials] = {}
-    for words, most in _ways(asked, fixed):
+    for words, most in _ways(targeted, fixed):
         name = tuple(words.values())
         if name not in tried:
             try:
-                changed = asked.with_(words)
+                changed = targeted.with_(words)
             except DesignError:
                 continue
             tried[name] = _Trials(changed, start, target, progress)
-        least = _smallest(tried[name], most if start else 0)
+        trials = tried[name]
+        least = _smallest(trials, most if start else 0)
         if least is not None:
-            changes = _changes(asked, {**tried[name].lengths(least.steps), **words})
-            return YieldDesign(target, design, asked.with_(changes), changes, least.share)
-    best, best_changes = _best(asked, tried.values())
+            changes = _changes(targeted, {**trials.lengths(least), **words})
+            share = trials.share(least, CHECK_SEED)
+            return YieldDesign(target, design, targeted.with_(changes), changes, share)
+    best, best_changes = _best(targeted, tried.values())
     useful = tuple(key for key in (BOND, OVERHANG, METHOD, SEQUENCE, PLATE) if key in fixed)
     return YieldDesign(target, design, None, best=best, best_changes=best_changes, fixed=useful)
 
 
 def _changes(design: Design, values: Mapping[str, Any]) -> dict[str, Any]:
-    """The values that a design does not have."""
+    """Return the values that a design does not have."""
     return {key: value for key, value in values.items() if value != value_of(design, key)}
 
 
@@ -241,12 +237,14 @@ def _ways(design: Design, fixed: Collection[str]) -> Iterator[tuple[dict[str, st
 
 
 def _best(design: Design, tried: Iterable[_Trials]) -> tuple[Share | None, Mapping[str, Any]]:
-    """The best share that passes the other rules, with its changes; of equal ones the first."""
+    """Return the best share that passes the other rules, with its changes; of equal ones the
+    first.
+    """
     every = [
         (share, trials, steps)
         for trials in tried
-        for steps, share in trials.shares.items()
-        if share is not None
+        for (steps, seed), share in trials.shares.items()
+        if share is not None and seed == SEED
     ]
     every.sort(key=lambda entry: -entry[0].value)
     for share, trials, steps in every[:MOST_CHECKED]:
@@ -259,34 +257,16 @@ def _best(design: Design, tried: Iterable[_Trials]) -> tuple[Share | None, Mappi
 # Bond and overhang by steps, each tried once.
 
 
-MOST_CHECKED = 5
-"""Best trials whose other rules are checked, where none reaches the target."""
-Outcome = Literal["short", "reached", "impossible"]
-
-
-class Steps(NamedTuple):
-    """Steps by which bond and overhang are wider than at the start."""
-
-    bond: int
-    overhang: int
-
-
-AS_GIVEN = Steps(0, 0)
-WORST_CASE = "registration-worst-case"
-"""The only other rule that more steps may mend."""
-PIN_FIT = "pin-fit"
-"""A rule that a better plate may mend."""
-
-
-class _Least(NamedTuple):
-    """The least steps that are enough, and their share by another seed."""
-
-    steps: Steps
-    share: Share
+Steps = tuple[int, int]
+"""Steps by which bond and overhang are wider than at the start."""
+AS_GIVEN = (0, 0)
 
 
 class _Trials:
-    """A design with steps more of bond and overhang; of lengths without a ``start`` none."""
+    """A design with wider bond and overhang, of which those without a ``start`` stay.
+
+    ``shares`` of good builds by steps and seed; None if the design cannot be built.
+    """
 
     def __init__(
         self, design: Design, start: Mapping[str, float], target: float, progress: Progress
@@ -295,94 +275,75 @@ class _Trials:
         self.start = start
         self.target = target
         self.progress = progress
-        self.shares: dict[Steps, Share | None] = {}
+        self.shares: dict[tuple[Steps, int], Share | None] = {}
 
     def lengths(self, steps: Steps) -> dict[str, float]:
-        """Bond and overhang in mm, by key."""
-        by_key = {BOND: steps.bond, OVERHANG: steps.overhang}
+        """Return bond and overhang in mm, by key."""
+        by_key = dict(zip((BOND, OVERHANG), steps, strict=True))
         return {key: round(length + by_key[key] * STEP, 6) for key, length in self.start.items()}
 
-    def _changed(self, steps: Steps) -> Design:
-        return self.design.with_(self.lengths(steps))
-
-    def counted(self, steps: Steps, seed: int) -> Share | None:
-        """The share of good builds; None if such a design cannot be built."""
-        try:
-            design = self._changed(steps)
-            laminate = build(design)
-        except DesignError:
-            return None
-        return simulate(laminate, design, seed).whole
-
-    def share(self, steps: Steps) -> Share | None:
-        """The share by the seed of the rule, counted once."""
-        if steps not in self.shares:
+    def share(self, steps: Steps, seed: int = SEED) -> Share | None:
+        """Return the share of good builds, counted once."""
+        steps = steps[0] * (BOND in self.start), steps[1] * (OVERHANG in self.start)
+        if (steps, seed) not in self.shares:
             # The number of trials is not known in advance.
-            self.progress(
-                f"bond and overhang that reach the yield, trial {len(self.shares) + 1}", 0, 0
-            )
-            self.shares[steps] = self.counted(steps, SEED)
-        return self.shares[steps]
+            trial = f"bond and overhang that reach the yield, trial {len(self.shares) + 1}"
+            self.progress(trial, 0, 0)
+            try:
+                design = self.design.with_(self.lengths(steps))
+                share = simulate(build(design), design, seed).whole
+            except DesignError:
+                share = None
+            self.shares[steps, seed] = share
+        return self.shares[steps, seed]
+
+    def is_enough(self, steps: Steps, seed: int = SEED) -> bool:
+        share = self.share(steps, seed)
+        return share is not None and share.interval[0] >= self.target
+
+    def is_short(self, steps: Steps) -> bool:
+        """Return True if the design can be built and does not reach the target."""
+        return self.share(steps) is not None and not self.is_enough(steps)
 
     def broken(self, steps: Steps) -> set[str]:
-        """The rules that the design fails, but for the one that limits the yield."""
-        design = self._changed(steps)
+        """Return the rules that the design fails, but for the one that limits the yield."""
+        design = self.design.with_(self.lengths(steps))
         rules = design.rules.model_copy(update={"target_yield": None})
-        untargeted = design.model_copy(update={"rules": rules})
-        findings = run_deck(build(design), untargeted)
+        findings = run_deck(build(design), design.model_copy(update={"rules": rules}))
         return {finding.rule for finding in findings if finding.verdict == "fail"}
 
-    def outcome(self, bond: int, overhang: int) -> Outcome:
-        steps = Steps(bond * (BOND in self.start), overhang * (OVERHANG in self.start))
-        share = self.share(steps)
-        if share is None:
-            return "impossible"
-        return "reached" if share.interval[0] >= self.target else "short"
 
-
-def _smallest(trials: _Trials, most: int) -> _Least | None:
-    """The least bond and overhang, up to ``most`` steps, whose interval lies above the target.
+def _smallest(trials: _Trials, most: int) -> Steps | None:
+    """Return the least bond and overhang, up to ``most`` steps, whose interval lies above the
+    target.
 
     First both grow by the same amount until the target is reached; then the overhang, and after it
     the bond, is taken back as far as the target allows. Neither can then be smaller by itself.
     Where the other seed falls short, or the worst case does, both grow by one step more.
     """
-    both = _least(lambda steps: trials.outcome(steps, steps), most)
-    if both is None:
+    both = _least(lambda steps: trials.is_short((steps, steps)), most)
+    if both is None or not trials.is_enough((both, both)):
         return None
-    overhang = _least(lambda steps: trials.outcome(both, steps), most, both) or 0
-    bond = _least(lambda steps: trials.outcome(steps, overhang), most, both) or 0
+    overhang = _least(lambda steps: trials.is_short((both, steps)), both) or 0
+    bond = _least(lambda steps: trials.is_short((steps, overhang)), both) or 0
     for more in range(most - max(bond, overhang) + 1):
-        steps = Steps(bond + more, overhang + more)
-        share = trials.counted(steps, CHECK_SEED)
-        if share is None:
+        steps = bond + more, overhang + more
+        if trials.share(steps, CHECK_SEED) is None:
             return None
-        broken = trials.broken(steps) if share.interval[0] >= trials.target else {WORST_CASE}
+        is_enough = trials.is_enough(steps, CHECK_SEED)
+        broken = trials.broken(steps) if is_enough else {WORST_CASE}
         if not broken:
-            return _Least(steps, share)
+            return steps
         if broken != {WORST_CASE}:
             return None
     return None
 
 
-def _least(
-    outcome: Callable[[int], Outcome], most: int, sufficient: int | None = None
-) -> int | None:
-    """The fewest steps that are not short, if they reach; ``sufficient`` steps are known to.
-
-    With more steps a design goes from short to reached, and may become impossible.
-    """
-    if outcome(0) == "reached":
-        return 0
-    short, enough = 0, min(8, most) if sufficient is None else sufficient
-    while sufficient is None and outcome(enough) == "short":
+def _least(is_short: Callable[[int], bool], most: int) -> int | None:
+    """Return the fewest steps, up to ``most``, that are not short; None if all are."""
+    short, enough = -1, 0
+    while is_short(enough):
         if enough >= most:
             return None
-        short, enough = enough, min(2 * enough, most)
-    while enough - short > 1:
-        middle = (short + enough) // 2
-        if outcome(middle) == "short":
-            short = middle
-        else:
-            enough = middle
-    return enough if outcome(enough) == "reached" else None
+        short, enough = enough, min(max(8, 2 * enough), most)
+    return short + 1 + bisect_left(range(short + 1, enough), True, key=lambda n: not is_short(n))
