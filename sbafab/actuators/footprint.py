@@ -16,9 +16,9 @@ from sbafab.actuators.stacking import (
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point, unit
-from sbafab.geometry.nearby import boxes_meet
 from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.region import Region, union
+from sbafab.geometry.spatial_index import boxes_meet
 from sbafab.laminate.laminate import Chamber, Inlet, Laminate
 
 EARS: tuple[tuple[str, Holder], ...] = (

@@ -23,8 +23,8 @@ from sbafab.cutting.verify import TOLERANCE
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to, left_turn, meeting_points
-from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Region
+from sbafab.geometry.spatial_index import EdgeIndex, widened
 
 CORNER = math.radians(10)
 """A turn from edge to edge by more is a corner."""

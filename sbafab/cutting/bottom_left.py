@@ -27,8 +27,8 @@ from sbafab.cutting.nest import (
 )
 from sbafab.geometry.contour import ticks
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point, distance_to
+from sbafab.geometry.lazy_numpy import np
 from sbafab.geometry.offset import grow
-from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region, disc
 
 if TYPE_CHECKING:

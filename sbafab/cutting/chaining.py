@@ -17,8 +17,8 @@ from sbafab.geometry.edges import (
     meeting_points,
     same_support,
 )
-from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Region
+from sbafab.geometry.spatial_index import close_pairs, widened
 
 CLEAR = 10 * EPSILON
 """mm between two circles from which on they surely do not touch."""

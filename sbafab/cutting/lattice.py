@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 from sbafab.cutting.nest import TURNS, Turn, placed
 from sbafab.geometry.contour import run_chords
 from sbafab.geometry.edges import Bounds, Point, unit
+from sbafab.geometry.lazy_numpy import np
 from sbafab.geometry.offset import grow
-from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from typing import NamedTuple
 from sbafab.cutting.nest import Nest, Stock
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to, line_circle, meeting_points
-from sbafab.geometry.nearby import close_pairs, widened
 from sbafab.geometry.region import Region, disc
+from sbafab.geometry.spatial_index import close_pairs, widened
 
 SLACK = 1e-6
 """mm by which a distance may fall short of the spacing: rounding."""

@@ -10,7 +10,7 @@ from itertools import pairwise
 from sbafab.design.sections import Laser
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.on_demand import np
+from sbafab.geometry.lazy_numpy import np
 from sbafab.geometry.region import Region
 
 ORIGIN: Point = (0.0, 0.0)

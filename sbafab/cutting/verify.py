@@ -13,7 +13,7 @@ from sbafab.cutting.properties import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENC
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Edge, Line, Point, distance_to
-from sbafab.geometry.on_demand import np
+from sbafab.geometry.lazy_numpy import np
 from sbafab.geometry.region import Region
 
 TOLERANCE = 0.001

@@ -19,8 +19,8 @@ from sbafab.design.files import sentence
 from sbafab.errors import DesignError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, Line, Point, meeting_points
-from sbafab.geometry.nearby import close_pairs
 from sbafab.geometry.region import Region
+from sbafab.geometry.spatial_index import close_pairs
 from sbafab.laminate.films import Film
 from sbafab.laminate.joints import FaceBond, Fold, Net, Port, Seam, SeamKind, SeamTool
 from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin, Role

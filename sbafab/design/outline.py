@@ -30,8 +30,8 @@ from sbafab.geometry.arcs import FitError
 from sbafab.geometry.arrangement import split_edges
 from sbafab.geometry.contour import Contour, in_reading_order, tidy
 from sbafab.geometry.edges import EPSILON, Point, meeting_points
-from sbafab.geometry.nearby import close_pairs
 from sbafab.geometry.region import Region, centroid
+from sbafab.geometry.spatial_index import close_pairs
 
 if TYPE_CHECKING:
     pass

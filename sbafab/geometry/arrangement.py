@@ -24,7 +24,7 @@ from sbafab.geometry.edges import (
     meeting_points,
     turns_round,
 )
-from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
+from sbafab.geometry.spatial_index import EdgeIndex, close_pairs, widened
 
 ASLANT = 0.7548776662466927
 """Slope of a line on which few points of a drawing share a projection."""

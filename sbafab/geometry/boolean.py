@@ -27,7 +27,7 @@ from sbafab.geometry.edges import (
     from_end_to_end,
     meeting_points,
 )
-from sbafab.geometry.nearby import close_pairs, widened
+from sbafab.geometry.spatial_index import close_pairs, widened
 
 Result = TypeVar("Result")
 Membership = Callable[[int], bool]

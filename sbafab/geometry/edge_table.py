@@ -8,7 +8,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
-from sbafab.geometry.on_demand import np
+from sbafab.geometry.lazy_numpy import np
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -24,8 +24,8 @@ from sbafab.geometry.edges import (
     left_turn,
     meeting_points,
 )
-from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
 from sbafab.geometry.region import Region, enclosed, union
+from sbafab.geometry.spatial_index import EdgeIndex, close_pairs, widened
 
 CUSP = 3.0
 """Radians: a path that turns by more is treated as turning back on itself."""

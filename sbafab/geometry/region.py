@@ -35,7 +35,7 @@ from sbafab.geometry.edges import (
     meeting_points,
     unit,
 )
-from sbafab.geometry.nearby import EdgeIndex, close_pairs
+from sbafab.geometry.spatial_index import EdgeIndex, close_pairs
 
 if TYPE_CHECKING:
     import shapely

@@ -26,10 +26,10 @@ from sbafab.geometry.edges import (
     left_turn,
     meeting_points,
 )
-from sbafab.geometry.nearby import EdgeIndex, widened
+from sbafab.geometry.lazy_numpy import np
 from sbafab.geometry.offset import Kerf, Lost, shrink, widths
-from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region, centroid
+from sbafab.geometry.spatial_index import EdgeIndex, widened
 
 SHORTER = 1e-9
 """mm by which a segment must be shorter than another to be the narrowest."""

@@ -13,8 +13,8 @@ from sbafab.geometry.arrangement import DIGIT, Piece, by_owner, overlay
 from sbafab.geometry.boolean import chains_of, grouped
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal, line_circle
-from sbafab.geometry.nearby import EdgeIndex, widened
 from sbafab.geometry.region import Region, disc, union
+from sbafab.geometry.spatial_index import EdgeIndex, widened
 from sbafab.laminate.laminate import LOOSE, Interface, Laminate, Layer
 from sbafab.rules.limits import TOLERANCE
 

@@ -17,8 +17,8 @@ from sbafab.design.records import Design
 from sbafab.design.sections import Registration
 from sbafab.geometry.contour import nanometres
 from sbafab.geometry.edges import Point
-from sbafab.geometry.nearby import boxes_meet
 from sbafab.geometry.region import Region, centroid
+from sbafab.geometry.spatial_index import boxes_meet
 from sbafab.laminate.assembly import AssemblyStep, laying
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import LOOSE, Laminate

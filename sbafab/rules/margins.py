@@ -21,8 +21,8 @@ from sbafab.geometry.edge_table import (
     touching,
 )
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Point, left_normal
-from sbafab.geometry.facing_places import facing_places, sampled
-from sbafab.geometry.on_demand import np
+from sbafab.geometry.lazy_numpy import np
+from sbafab.geometry.overlap_pairs import overlap_pairs, sampled
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width
 from sbafab.laminate.joints import Seam
@@ -202,7 +202,7 @@ def bond_places(
     ``widest`` is the largest slack of any interface with the same bond; ``profiles`` are those of
     ``layers`` films and masks, by seat, and of seams.
     """
-    narrow = facing_places(bond, widest, SHARP, least)
+    narrow = overlap_pairs(bond, widest, SHARP, least)
     if slack < widest:
         narrow = narrow.at(narrow.value <= least.value + slack)
     off = narrow.end - narrow.start

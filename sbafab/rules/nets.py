@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
-from sbafab.geometry.on_demand import np
+from sbafab.geometry.lazy_numpy import np
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_width
 from sbafab.laminate.joints import Net

@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Edge, Line, Point, meeting_points
-from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region
+from sbafab.geometry.spatial_index import widened
 from sbafab.geometry.width import TOUCH, Width
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Interface, Laminate

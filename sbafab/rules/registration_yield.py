@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.design.records import Design
 from sbafab.design.sections import Registration
-from sbafab.geometry.on_demand import np
+from sbafab.geometry.lazy_numpy import np
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict, judged
 from sbafab.rules.freedoms import Freedom, Freedoms

@@ -14,9 +14,9 @@ from itertools import combinations
 from typing import Final, NamedTuple
 
 from sbafab.geometry.edges import Arc, Edge, Point, distance_to
-from sbafab.geometry.nearby import boxes_meet, widened
 from sbafab.geometry.offset import dragged, grow, shortened, shrink, swept
 from sbafab.geometry.region import Region, rectangle, union
+from sbafab.geometry.spatial_index import boxes_meet, widened
 from sbafab.laminate.folding import lies_on
 from sbafab.laminate.joints import Seam, SeamTool
 from sbafab.laminate.laminate import Interface, Laminate

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 
 from sbafab.design.records import Design
 from sbafab.geometry.edges import Line, Point
-from sbafab.geometry.nearby import EdgeIndex, boxes_meet
 from sbafab.geometry.region import Region, strip
+from sbafab.geometry.spatial_index import EdgeIndex, boxes_meet
 from sbafab.geometry.width import Width
 from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from sbafab.geometry.cache import cached
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point, left_normal
+from sbafab.geometry.lazy_numpy import np
 from sbafab.geometry.offset import shrink
-from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import Final
 
 from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
-from sbafab.geometry.facing_places import facing_places
+from sbafab.geometry.overlap_pairs import overlap_pairs
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_width
 from sbafab.laminate.laminate import Interface
@@ -104,7 +104,7 @@ class VoidEdges:
         slack = max(self.left(least).value, widest) + self.most - least.value
         if not self.seams and not widest:
             return
-        places = facing_places(void, max(0.0, slack), 0.0, least)
+        places = overlap_pairs(void, max(0.0, slack), 0.0, least)
         for number in places.value.argsort(kind="stable").tolist():
             (x, y), (u, v) = places.start[:, number].tolist(), places.end[:, number].tolist()
             place = Width(float(places.value[number]), (x, y), (u, v))

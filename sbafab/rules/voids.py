@@ -14,8 +14,8 @@ from typing import Final, Literal, NamedTuple
 
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Edge, Line, Point, distance_to
-from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region, rectangle, union
+from sbafab.geometry.spatial_index import widened
 from sbafab.laminate.folding import lies_on
 from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer

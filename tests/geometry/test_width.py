@@ -11,7 +11,7 @@ import shapely
 
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point
-from sbafab.geometry.facing_places import facing_places
+from sbafab.geometry.overlap_pairs import overlap_pairs
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union
 from sbafab.geometry.width import Width, inscribed_disc, least_gap, least_width
 from tests.quick import few
@@ -254,7 +254,7 @@ FRAME = rectangle((0.0, 0.0), (10.0, 6.0)) - rectangle((1.0, 1.5), (9.0, 4.0))
 
 
 def facing_pairs(region: Region, slack: float) -> list[Width]:
-    places = facing_places(region, slack, 90.0)
+    places = overlap_pairs(region, slack, 90.0)
     ends = zip(places.start.T.tolist(), places.end.T.tolist(), places.value.tolist(), strict=True)
     return [Width(value, tuple(start), tuple(end)) for start, end, value in ends]
 

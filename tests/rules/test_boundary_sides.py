@@ -10,8 +10,8 @@ import pytest
 from sbafab.geometry.contour import circle
 from sbafab.geometry.edge_table import EdgeTable
 from sbafab.geometry.edges import Arc, Edge, Line, Point
-from sbafab.geometry.nearby import EdgeIndex
 from sbafab.geometry.region import disc, polygon, rectangle, union
+from sbafab.geometry.spatial_index import EdgeIndex
 from sbafab.rules.boundary import beside, edges_along, outward_reach
 from sbafab.rules.margins import Rays, first_met
 from sbafab.rules.voids import _gap

@@ -1,4 +1,4 @@
-"""Facing places: segments square on edges that are barely longer than the shortest one."""
+"""Overlap pairs: segments square on edges that are barely longer than the shortest one."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sbafab.geometry.edge_table import (
     touching,
 )
 from sbafab.geometry.edges import Arc, Edge, Point
-from sbafab.geometry.on_demand import np
+from sbafab.geometry.lazy_numpy import np
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import ASIDE, TOUCH, Gathered, Width, boundary_of, least_of, search
 
@@ -52,22 +52,22 @@ NEAR = 10 * TOUCH
 """mm from the ends of a segment within which an edge does not cross it."""
 
 
-class FacingPlaces(NamedTuple):
+class OverlapPairs(NamedTuple):
     """Segments square on edges at both ends, each once: x and y of both ends, and their lengths."""
 
     start: Floats
     end: Floats
     value: Floats
 
-    def at(self, some: Bools) -> FacingPlaces:
+    def at(self, some: Bools) -> OverlapPairs:
         """Return the places of a mask."""
-        return FacingPlaces(self.start[:, some], self.end[:, some], self.value[some])
+        return OverlapPairs(self.start[:, some], self.end[:, some], self.value[some])
 
 
 @cached
-def facing_places(
+def overlap_pairs(
     region: Region, slack: float, sharp: float, least: Width | None = None
-) -> FacingPlaces:
+) -> OverlapPairs:
     """Return the places of a region that are at most ``slack`` mm wider than the narrowest.
 
     They include places where edges are square on each other, and samples along nearly parallel
@@ -79,7 +79,7 @@ def facing_places(
     if least is None or least.value == 0.0:
         ends = [] if least is None else [(*least.start, *least.end)]
         columns = columns_of(ends, 4)
-        return FacingPlaces(columns[:2], columns[2:], np.zeros(len(ends)))
+        return OverlapPairs(columns[:2], columns[2:], np.zeros(len(ends)))
     gathered = Gathered(boundary, least.value + slack)
     search(gathered)
     offered = columns_of([(*p, *q) for p, q in gathered.offered], 4)
@@ -88,7 +88,7 @@ def facing_places(
     first = _first_of_each(p, q)
     p, q = p.take(first, axis=1), q.take(first, axis=1)
     clear = _clear(p, q, gathered)
-    return FacingPlaces(p, q, _length(q - p)).at(clear)
+    return OverlapPairs(p, q, _length(q - p)).at(clear)
 
 
 def _from_samples(sides: SideTable, within: float) -> tuple[Floats, Floats]:

@@ -1,8 +1,4 @@
-"""NumPy, imported at the first use of one of its names.
-
-Only the registration rules need it; reading a drawing, ``--help`` and a page that runs Python in a
-browser work without it.
-"""
+"""NumPy, imported at the first use of one of its names: the help of commands need not wait."""
 
 from __future__ import annotations
 

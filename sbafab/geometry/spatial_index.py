@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from sbafab.geometry.edges import Bounds, Edge, Point, distance_to
-from sbafab.geometry.on_demand import np
+from sbafab.geometry.lazy_numpy import np
 
 FEW_BOXES = 100
 """Number of boxes up to which a sweep is faster than arrays."""

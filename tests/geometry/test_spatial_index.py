@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sbafab.geometry import edge_table, nearby
+from sbafab.geometry import edge_table, spatial_index
 from sbafab.geometry.edge_table import touching
 from sbafab.geometry.edges import Bounds, Edge, distance_to, edge_from_bulge
-from sbafab.geometry.nearby import EdgeIndex, close_pairs
+from sbafab.geometry.spatial_index import EdgeIndex, close_pairs
 
 # Whole numbers, so that many boxes touch at an edge or a corner.
 places = st.integers(0, 40).map(float)
@@ -36,8 +36,8 @@ def test_close_pairs_come_within_reach_however_they_are_found(
     assert {(min(pair), max(pair)) for pair in pairs} == expected
     assert len(pairs) == len(expected)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nearby, "FEW_BOXES", 0)
-        patch.setattr(nearby, "AT_ONCE", 10)
+        patch.setattr(spatial_index, "FEW_BOXES", 0)
+        patch.setattr(spatial_index, "AT_ONCE", 10)
         assert not listed or close_pairs(listed, reach) == pairs
 
 
