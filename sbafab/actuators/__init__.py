@@ -1,4 +1,8 @@
-"""Actuator families by name: each module holds a family's design record and builds its laminate."""
+"""Actuator families by name: each module holds a family's design record and builds its laminate.
+
+In: the tables of a design file. Out: a ``Design`` of its family (``load_design``), and of that
+the ``Laminate`` (``build``).
+"""
 
 from __future__ import annotations
 

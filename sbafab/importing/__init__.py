@@ -1,1 +1,5 @@
-"""Import designs of drawn layers from drawings, folders, laminates and circuits."""
+"""Import what other programs wrote as a design of drawn layers.
+
+In: a folder of drawings, a laminate.json, ParchMint, polygons or popupCAD. Out: an ``Imported``:
+``design.toml`` with the drawings of its layers.
+"""
