@@ -17,7 +17,8 @@ from pydantic import AfterValidator, Field, PlainSerializer, WithJsonSchema
 from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError
 from sbafab.laminate.assembly import folded_height
-from sbafab.models import paper, printed
+from sbafab.models import paper
+from sbafab.models.closed_forms import eq_4
 from sbafab.models.paper import Counterpart, CounterpartEntry
 from sbafab.models.quantity import (
     ANYWHERE,
@@ -551,7 +552,7 @@ def eq_4_ratios() -> tuple[float, float]:
     """Return the range of ratios of the paper's forces (Sec. 4.3) to virtual work on Eq. 4."""
     full = paper.FULL_SHARE * RADIUS
     ratios = [
-        measured.value / (chambers * paper.FORCE_KPA / 1000 * float(printed.rate(h, RADIUS)))
+        measured.value / (chambers * paper.FORCE_KPA / 1000 * float(eq_4(RADIUS).rate(h)))
         for chambers, forces in ((1, paper.FORCE_1DOF), (3, paper.FORCE_3DOF))
         for h, measured in zip([s * full for s in paper.HEIGHTS], forces, strict=True)
     ]

@@ -1,11 +1,10 @@
-"""Closed formulas: bend of parallel chambers, range of pressures, folded diameter, force by virtual
-work, inlet tubes, tip stiffness, and overall sizes.
+"""Ranges of pressures, folded diameter, force by virtual work, inlet tubes, tip stiffness, and
+overall sizes.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,45 +19,11 @@ from sbafab.laminate.laminate import (
     outline_diameter,
     overall_diameter,
 )
+from sbafab.models.closed_forms import cylinder_height, lens
 from sbafab.models.figures import USUAL_PRESSURES, Factors
 from sbafab.models.intervals import factors_of
-from sbafab.models.lens import fullest
 from sbafab.models.paper import BALLOONS, counterpart
 from sbafab.models.quantity import ANYWHERE, ModelId, Quantity
-
-
-class Bend(NamedTuple):
-    """Angle of the top (radians), direction in which it leans (radians from x), length of the axis
-    (mm), tip (..., 3) in mm, from the middle of the base.
-    """
-
-    angle: NDArray[np.float64]
-    towards: NDArray[np.float64]
-    length: NDArray[np.float64]
-    tip: NDArray[np.float64]
-
-
-def bend(lengths: ArrayLike, axes: ArrayLike) -> Bend:
-    """Return the bend of chambers with ``lengths`` (..., n) mm at ``axes`` (n, 2) mm, n >= 2.
-
-    Constant curvature: a plane through the chambers' ends, fitted if there are more than three,
-    gives the length on the axis and the gradient across it; the axis is then an arc. Valid to about
-    half a turn: past pi the tip would come down through the base.
-    """
-    places = np.asarray(axes, dtype=float)
-    to_plane = np.linalg.pinv(np.column_stack([np.ones(len(places)), places]))
-    plane = np.asarray(lengths, dtype=float) @ to_plane.T
-    length, across = plane[..., 0], plane[..., 1:]
-    angle = np.hypot(across[..., 0], across[..., 1])
-    # It leans away from the long side.
-    towards = np.arctan2(-across[..., 1], -across[..., 0])
-    safe = np.where(angle > 0, angle, 1.0)
-    # 2 sin^2(x/2) is 1 - cos x without its cancellation.
-    aside = np.where(angle > 0, length * 2 * np.sin(safe / 2) ** 2 / safe, 0.0)
-    up = np.where(angle > 0, length * np.sin(safe) / safe, length)
-    tip = np.stack([aside * np.cos(towards), aside * np.sin(towards), up], axis=-1)
-    return Bend(angle, towards, length, tip)
-
 
 # Pressures: gauge pressures in kPa, a vacuum below 0.
 
@@ -132,14 +97,6 @@ def force(pressure_kpa: ArrayLike, rate: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(np.asarray(pressure_kpa, dtype=float) * np.asarray(rate, dtype=float) / 1000)
 
 
-def work_uj(pressure_kpa: float, volume_ul: float) -> float:
-    """Return the work in uJ of air at constant pressure: 1 kPa x 1 ul = 1 uJ.
-
-    An upper bound of the integral of p dv up to that pressure.
-    """
-    return pressure_kpa * volume_ul
-
-
 # Tubes of inlet strips.
 
 
@@ -204,6 +161,10 @@ def sizes(design: Design, laminate: Laminate, factors: Factors | None = None) ->
     measured on the films without tabs and ears. The thickness is the sum of the films as bought,
     the folded height the sum after the press, which diameters round the tube contain twice. The
     default ``factors`` come from the design's calibration. Raises DesignError if it is unknown.
+
+    Of oblong pockets round a tube, the reached diameter is that of lenses at their largest volume,
+    to rely on, and the inflated one that of cylinders, the clearance to provide: 27.29 and 28.06
+    for the paper's, its films as bought, which says about 28 (Sec. 2.1).
     """
     height = (factors or factors_of(design)).folded(laminate).height
     low_x, low_y, high_x, high_y = laminate.bounds
@@ -213,18 +174,20 @@ def sizes(design: Design, laminate: Laminate, factors: Factors | None = None) ->
         "width": high_x - low_x,
         "length": high_y - low_y,
     }
-    form = design.form
-    if form.wrap is not None:
-        sizes_mm["pitch"] = form.wrap.pitch
-        sizes_mm["deflated_diameter"] = deflated_diameter(form.wrap, height)
-        reached = reached_diameter(form, laminate.balloons, height)
-        inflated = inflated_diameter(form, laminate.balloons, height)
-        if reached is not None and inflated is not None:
-            sizes_mm |= {"reached_diameter": reached, "inflated_diameter": inflated}
-    else:
+    wrap, pockets = design.form.wrap, design.form.pockets
+    if wrap is None:
         if not laminate.outline.is_empty:
             sizes_mm["outline_diameter"] = outline_diameter(laminate)
         sizes_mm["overall_diameter"] = overall_diameter(laminate)
+        return sizes_mm
+    flat = deflated_diameter(wrap, height)
+    sizes_mm |= {"pitch": wrap.pitch, "deflated_diameter": flat}
+    if isinstance(pockets, Slots):
+        reached = lens(pockets.width, pockets.run).largest_stroke
+        sizes_mm["reached_diameter"] = flat + 2 * laminate.balloons * reached
+        sizes_mm["inflated_diameter"] = flat + 2 * laminate.balloons * cylinder_height(
+            pockets.width
+        )
     return sizes_mm
 
 
@@ -233,32 +196,6 @@ def deflated_diameter(wrap: Wrap, height: float) -> float:
     bought the paper's is 15.33 (Sec. 2.1).
     """
     return wrap.tube_diameter + 2 * height
-
-
-def reached_diameter(form: Form, balloons: int, height: float) -> float | None:
-    """Return the diameter in mm of the tube with SBAs at their largest volume, their flat laminate
-    of a height in mm: the reach to rely on.
-
-    None without a tube, or for pockets of another shape. Balloons are lenses of two arcs
-    (``models.lens``); the paper's, its films as bought, reach 27.29, about 28 (Sec. 2.1).
-    """
-    if not isinstance(form.pockets, Slots) or form.wrap is None:
-        return None
-    rise = fullest(form.pockets.width, form.pockets.run).stroke
-    return deflated_diameter(form.wrap, height) + 2 * balloons * rise
-
-
-def inflated_diameter(form: Form, balloons: int, height: float) -> float | None:
-    """Return the diameter in mm of the tube with SBAs as wide as can be: the clearance to provide.
-
-    None without a tube, or for pockets of another shape. A flat pocket of width w whose films do
-    not stretch becomes a cylinder of diameter 2 w / pi where its ends do not hold it back: 28.06
-    for the paper's, its films as bought, about 28 (Sec. 2.1).
-    """
-    if not isinstance(form.pockets, Slots) or form.wrap is None:
-        return None
-    rise = 2 * form.pockets.width / math.pi
-    return deflated_diameter(form.wrap, height) + 2 * balloons * rise
 
 
 def size_phrases(

@@ -20,10 +20,9 @@ from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import FoldedHeight
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, PAPER_TPE, film_name
 from sbafab.laminate.laminate import Laminate
-from sbafab.models import lens, parabola, printed
+from sbafab.models.closed_forms import PocketModel, eq_4, eqs_1_to_3, lens, within
 from sbafab.models.figures import Factors, Model
 from sbafab.models.paper import FULL_SHARE, VALID, VALID_RADIUS
-from sbafab.models.parabola import within
 from sbafab.models.quantity import ModelId
 
 if TYPE_CHECKING:
@@ -80,47 +79,34 @@ def round_stack(radii: Sequence[float]) -> tuple[Kinematics, Kinematics]:
     first, third = sum(radii), sum(radius**3 for radius in radii)
     scale = third / len(radii)
 
-    def scaled(model: Model, stroke: Law, volume: Law, rate: Law, most: float) -> Kinematics:
+    def scaled(model: Model, pocket: PocketModel) -> Kinematics:
         return Kinematics(
             model,
-            float(volume(np.asarray(most))) * scale,
-            most * first,
-            lambda v: stroke(v / scale) * first,
-            lambda h: volume(h / first) * scale,
-            lambda h: rate(h / first) * third / first,
-            _in_series(radii, rate, most) if len(set(radii)) > 1 else None,
+            pocket.largest_volume * scale,
+            pocket.largest_stroke * first,
+            lambda v: pocket.stroke(v / scale) * first,
+            lambda h: pocket.volume(h / first) * scale,
+            lambda h: pocket.rate(h / first) * third / first,
+            _in_series(radii, pocket) if len(set(radii)) > 1 else None,
         )
 
-    by_eq_4 = scaled(
-        Model(ModelId.EQ_4, "Sec. 3.1, h the stroke of one balloon", _eq_4_trust(max(radii))),
-        lambda v: printed.stroke(v, 1.0),
-        lambda h: printed.volume(h, 1.0),
-        lambda h: printed.rate(h, 1.0),
-        printed.largest_stroke(1.0),
+    by_eq_4 = Model(ModelId.EQ_4, "Sec. 3.1, h the stroke of one balloon", _eq_4_trust(max(radii)))
+    by_eqs_1_to_3 = Model(
+        ModelId.EQS_1_TO_3,
+        "Sec. 3.1, solved for two halves",
+        "geometric regime only: films that do not stretch, wrinkle or have a neck ring; "
+        "3/4 of Eq. 4's volume and force at small strokes",
     )
-    by_eqs_1_to_3 = scaled(
-        Model(
-            ModelId.EQS_1_TO_3,
-            "Sec. 3.1, solved for two halves",
-            "geometric regime only: films that do not stretch, wrinkle or have a neck ring; "
-            "3/4 of Eq. 4's volume and force at small strokes",
-        ),
-        lambda v: parabola.balloon_stroke(v, 1.0),
-        lambda h: parabola.balloon_volume(h, 1.0),
-        lambda h: parabola.balloon_rate(h, 1.0),
-        2 * parabola.fullest(1.0).height,
-    )
-    return by_eq_4, by_eqs_1_to_3
+    return scaled(by_eq_4, eq_4(1.0)), scaled(by_eqs_1_to_3, eqs_1_to_3(1.0))
 
 
-def _in_series(radii: Sequence[float], rate: Law, most: float) -> Law:
-    """Return force over pressure by stroke of unlike balloons that carry the same force.
-
-    ``rate`` is dv/dh of a balloon of radius 1 up to the stroke ``most``.
+def _in_series(radii: Sequence[float], pocket: PocketModel) -> Law:
+    """Return force over pressure by stroke of unlike balloons that carry the same force; ``pocket``
+    is of radius 1.
     """
-    share = np.linspace(0.0, most, SAMPLES)
+    share = np.linspace(0.0, pocket.largest_stroke, SAMPLES)
     # A formula may rise again past the full state; a balloon does not.
-    falling = np.minimum.accumulate(rate(share))
+    falling = np.minimum.accumulate(pocket.rate(share))
     force = np.linspace(0.0, min(radii) ** 2 * falling[0], SAMPLES)
     stroke = sum(r * np.interp(force / r**2, falling[::-1], share[::-1]) for r in radii)
     by_stroke = np.asarray(stroke)[::-1]
@@ -129,7 +115,7 @@ def _in_series(radii: Sequence[float], rate: Law, most: float) -> Law:
 
 def slot_stack(width: float, run: float, balloons: int) -> tuple[Kinematics]:
     """Return the lens of two arcs for oblong pockets of a width and straight run (mm)."""
-    most = lens.fullest(width, run)
+    pocket = lens(width, run)
     model = Model(
         ModelId.LENS_STROKE,
         "films of constant length, ends as spherical caps",
@@ -138,11 +124,11 @@ def slot_stack(width: float, run: float, balloons: int) -> tuple[Kinematics]:
     return (
         Kinematics(
             model,
-            most.volume,
-            most.stroke * balloons,
-            lambda v: lens.stroke(v, width, run) * balloons,
-            lambda h: lens.volume(h / balloons, width, run),
-            lambda h: lens.rate(h / balloons, width, run),
+            pocket.largest_volume,
+            pocket.largest_stroke * balloons,
+            lambda v: pocket.stroke(v) * balloons,
+            lambda h: pocket.volume(h / balloons),
+            lambda h: pocket.rate(h / balloons),
         ),
     )
 

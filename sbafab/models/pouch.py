@@ -28,7 +28,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sbafab.models.parabola import BISECTIONS, inverse, within
+from sbafab.models.closed_forms import inverse, last_positive, within
 
 MOTOR = "pouch motor"
 HINGE = "pouch hinge"
@@ -103,12 +103,8 @@ def moment(pressure: float, bend: ArrayLike, length: float, width: float) -> NDA
 @cache
 def free_bend() -> float:
     """Return the bend in rad at which the moment is 0: of any pouch, at any pressure."""
-    low, high = 1.0, math.pi / 2
-    for _ in range(BISECTIONS):
-        t = (low + high) / 2
-        is_pulling = math.sin(t + float(bent(t)) / 2) > t / 2
-        low, high = (t, high) if is_pulling else (low, t)
-    return float(bent(low))
+    pull = last_positive(lambda t: math.sin(t + float(bent(t)) / 2) - t / 2, 1.0, math.pi / 2)
+    return float(bent(pull))
 
 
 def _angle_at(bend: NDArray[np.float64]) -> NDArray[np.float64]:

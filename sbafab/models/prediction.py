@@ -21,6 +21,7 @@ from sbafab.laminate.assembly import FoldedHeight
 from sbafab.laminate.burst import NOT_BURST, burst
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models import elastic, mechanisms, paper
+from sbafab.models.closed_forms import bend, eqs_1_to_3, paraboloid_radius
 from sbafab.models.drawn_pockets import (
     bounded,
     flat_forces,
@@ -44,7 +45,6 @@ from sbafab.models.figures import (
 )
 from sbafab.models.formulas import (
     LOBES,
-    bend,
     folded_diameter,
     force,
     is_near_burst,
@@ -55,7 +55,6 @@ from sbafab.models.formulas import (
     second_moments,
     sizes,
     tip_stiffness,
-    work_uj,
 )
 from sbafab.models.intervals import (
     PAPER_3DOF,
@@ -71,7 +70,6 @@ from sbafab.models.kinematics import actuator as actuator_of
 from sbafab.models.mechanisms import mechanism_figures
 from sbafab.models.paper import BURST as BURST_MEASURED
 from sbafab.models.paper import Counterpart, counterpart
-from sbafab.models.parabola import fullest
 from sbafab.models.pneumatics import seconds
 from sbafab.models.quantity import (
     OF_STACK,
@@ -133,8 +131,8 @@ def strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure |
         yield Figure(Quantity.LARGEST_VOLUME, k.largest_volume, k.model)
         yield Figure(Quantity.LARGEST_STROKE, k.largest_stroke, k.model)
     if actuator.radii:
-        widest = max(actuator.radii)
-        drawn_in = 2 * fullest(widest).radius
+        widest = eqs_1_to_3(max(actuator.radii))
+        drawn_in = 2 * paraboloid_radius(widest.largest_volume, widest.largest_stroke)
         by_eqs_1_to_3 = actuator.kinematics[-1].model
         yield Figure(Quantity.BALLOON_DIAMETER, drawn_in, by_eqs_1_to_3)
     for volume in request.volumes_ul:
@@ -225,7 +223,7 @@ def power(actuator: Actuator, request: PredictionRequest, mass_g: float | None) 
         "elastic balloon gives",
     )
     for pressure in request.pressures_kpa:
-        work = work_uj(pressure, whole) / 1000
+        work = pressure * whole / 1000
         yield Figure(Quantity.WORK_BOUND, work, bound, Conditions(kpa=pressure))
     if request.pressures_kpa and mass_g is not None:
         yield _power_density(actuator, request, whole, mass_g)

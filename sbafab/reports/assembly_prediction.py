@@ -17,10 +17,10 @@ from sbafab.assemblies.shapes import placed_surface
 from sbafab.design.records import Discs, Slots
 from sbafab.meshing.surface import Surface
 from sbafab.models.balloons import balloons_of
+from sbafab.models.closed_forms import cylinder_height, lens
 from sbafab.models.elastic import free_rise
 from sbafab.models.formulas import is_near_burst, is_the_papers_3dof, refuse_beyond_burst, sizes
 from sbafab.models.intervals import factors_of
-from sbafab.models.lens import fullest, rate
 from sbafab.models.paper import counterpart
 from sbafab.models.quantity import ANYWHERE, Conditions, ModelId, Quantity
 from sbafab.models.stack import Stack, stack
@@ -276,7 +276,8 @@ def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
     tube = form.wrap.tube_diameter if form.wrap is not None else 2 * (placed.radius or 0.0)
     balloons = laminate.balloons
     deflated = tube + 2 * factors_of(design).folded(laminate).height
-    rise, widest = fullest(pockets.width, pockets.run).stroke, 2 * pockets.width / math.pi
+    pocket, widest = lens(pockets.width, pockets.run), cylinder_height(pockets.width)
+    rise = pocket.largest_stroke
     free, most = (deflated + 2 * balloons * high for high in (rise, widest))
     lumen = assembled.assembly.deploy.lumen_diameter
     free_grip = Grip(placed.name, deflated, free, most, lumen)
@@ -286,7 +287,7 @@ def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
     if not 0 < room <= rise:
         return free_grip
     # 1 kPa mm2 is 1 mN.
-    push = float(rate(room, pockets.width, pockets.run)) / 1000
+    push = float(pocket.rate(room)) / 1000
     return free_grip._replace(room=room, push=push)
 
 

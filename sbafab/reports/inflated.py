@@ -21,7 +21,7 @@ from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import Surface
 from sbafab.models.balloon import inflate
-from sbafab.models.parabola import inverse
+from sbafab.models.closed_forms import inverse
 from sbafab.models.pneumatics import FLUIDS, Line
 
 if TYPE_CHECKING:
@@ -272,8 +272,8 @@ def gripping(placed: PlacedSba, deflated: float, height: float) -> Surface:
     """Return balloons ``height`` mm high each on the tangents of their tube, in the part's own
     frame; ``deflated`` is the diameter in mm over the flat films.
 
-    Across, a film is an arc that keeps its pocket's width (the lens of ``models.lens``); towards
-    the pocket's round ends the lens shrinks with its chord.
+    Across, a film is an arc that keeps its pocket's width (the lens of ``models.closed_forms``);
+    towards the pocket's round ends the lens shrinks with its chord.
     """
     pockets = placed.made.design.form.pockets
     assert isinstance(pockets, Slots)

@@ -9,8 +9,9 @@ import numpy as np
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.assembly import FoldedHeight
-from sbafab.models import paper, parabola, printed
+from sbafab.models import paper
 from sbafab.models.balloons import balloons_of
+from sbafab.models.closed_forms import eq_4, eqs_1_to_3
 from sbafab.models.elastic import air_time, pose_bent_by, time_to_fill
 from sbafab.models.figures import Factors, Prediction, PredictionRequest
 from sbafab.models.formulas import modulus
@@ -187,10 +188,10 @@ def strokes() -> Iterator[Row]:
             error,
             None,
             "Eq. 4",
-            f"an error, not a stroke; Eq. 4 gives {float(printed.stroke(volume, 5)):.3f} mm there, "
-            f"Eqs. 1-3 {float(parabola.balloon_stroke(volume, 5)):.3f}; {fluids[fluid]}",
+            f"an error, not a stroke; Eq. 4 gives {float(eq_4(5.0).stroke(volume)):.3f} mm there, "
+            f"Eqs. 1-3 {float(eqs_1_to_3(5.0).stroke(volume)):.3f}; {fluids[fluid]}",
         )
-    most = parabola.fullest(2.5)
+    most = eqs_1_to_3(2.5)
     yield Row(
         "end of the geometric regime, d = 5",
         exact(0.95, "kPa", "Sec. 4.2"),
@@ -201,7 +202,7 @@ def strokes() -> Iterator[Row]:
     yield Row(
         "stroke of one balloon at full actuation",
         exact(1.2, "mm", "Sec. 4.6"),
-        most.height,
+        most.largest_stroke / 2,
         "Eqs. 1-3, one half at its largest volume, h as the paper counts it",
         "an upper end that no stated pressure belongs to; 15 of them are 19.9 mm, the paper's "
         '"almost 2 cm" (Sec. 4.2)',
@@ -209,7 +210,7 @@ def strokes() -> Iterator[Row]:
     yield Row(
         "the same",
         exact(1.2, "mm", "Sec. 4.6"),
-        2 * most.height,
+        most.largest_stroke,
         "Eqs. 1-3, two halves at their largest volume",
         "as above, with both halves; likely neck rings and wrinkles, which no parabola has, hold a "
         "full balloon back",
@@ -217,14 +218,14 @@ def strokes() -> Iterator[Row]:
     yield Row(
         "height of the 3-DoF of 15 balloons",
         paper.FULL_HEIGHT,
-        paper.BALLOONS * most.height,
+        paper.BALLOONS * most.largest_stroke / 2,
         "Eqs. 1-3, one half each at its largest volume",
         "as above; `predict` takes the paper's 17.5 itself as the reference height, and says so",
     )
     yield Row(
         "volume at which the SOFA model starts, a balloon (about)",
         exact(19, "ul", "Sec. 4.2"),
-        2 * most.volume,
+        most.largest_volume,
         "Eqs. 1-3, largest volume",
         "19.04 is the Mylar balloon's limit, 1.2185 l^3; a parabola of constant length holds less",
     )
@@ -497,7 +498,7 @@ def fuller() -> Iterator[Row]:
     (balloon,) = set(balloons_of(design, build(design), Factors()))
     shapes = free_shapes(balloon, np.geomspace(0.01, 20.0, 60))
     for fluid, volume, error in paper.VALID:
-        expected = float(printed.stroke(volume, paper.VALID_RADIUS))
+        expected = float(eq_4(paper.VALID_RADIUS).stroke(volume))
         yield Row(
             f"stroke of a balloon of d = 10 with {volume:g} ul of {fluid}, Fig. 7a",
             paper.Measured(round(expected, 3), error.value, "mm", "Sec. 4.2"),

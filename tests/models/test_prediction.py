@@ -12,10 +12,10 @@ import pytest
 import sbafab
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
-from sbafab.models import parabola, printed
 from sbafab.models.balloon import inflate
 from sbafab.models.balloons import balloons_of
 from sbafab.models.calibrated import load_calibration
+from sbafab.models.closed_forms import eq_4, eqs_1_to_3
 from sbafab.models.drawn_pockets import FLAT_PLATES
 from sbafab.models.figures import Factors, Prediction
 from sbafab.models.kinematics import actuator, round_stack, slot_stack
@@ -44,7 +44,7 @@ def test_3dof_forces_are_three_times_one_balloon_s(three: Prediction) -> None:
     assert by_eq_4 == pytest.approx(flat * 2 / 3)
     assert by_eqs_1_to_3 == pytest.approx(flat / 2)
     held = three.value("blocked_force", "work-on-eq-4", kpa=100, share=0.75)
-    assert held == pytest.approx(3 * 0.1 * float(printed.rate(0.75 * 17.5 / 15, 2.5)))
+    assert held == pytest.approx(3 * 0.1 * float(eq_4(2.5).rate(0.75 * 17.5 / 15)))
 
 
 def test_the_papers_height_stands_beside_its_own_actuator_alone(three: Prediction) -> None:
@@ -141,9 +141,9 @@ def test_mass_of_a_lone_balloon_by_hand() -> None:
 def test_strokes_at_a_volume_by_both_models() -> None:
     found = sbafab.predict("1dof-5mm", volumes_ul=[5.0])
     by_eq_4 = found.value("volume_stroke", "eq-4", volume=5)
-    assert by_eq_4 == pytest.approx(6 * float(printed.stroke(5.0, 2.5)), rel=1e-9)
+    assert by_eq_4 == pytest.approx(6 * float(eq_4(2.5).stroke(5.0)), rel=1e-9)
     by_eqs_1_to_3 = found.value("volume_stroke", "eqs-1-to-3", volume=5)
-    assert by_eqs_1_to_3 == pytest.approx(6 * float(parabola.balloon_stroke(5.0, 2.5)), rel=1e-9)
+    assert by_eqs_1_to_3 == pytest.approx(6 * float(eqs_1_to_3(2.5).stroke(5.0)), rel=1e-9)
 
 
 def test_between_the_two_limits_eq_4_is_left_out_with_its_range() -> None:
@@ -300,10 +300,10 @@ def test_a_verdict_says_stroke_bend_force_and_what_is_left_out(three: Prediction
     assert [line.quantity for line in lines][:4] == ["stroke", "stroke", "bend", "force"]
     assert len(lines) < 8
     force = next(line for line in lines if line.quantity == "force")
-    eq_4 = three.value("blocked_force", "work-on-eq-4", kpa=100, share=0)
+    by_eq_4 = three.value("blocked_force", "work-on-eq-4", kpa=100, share=0)
     # Sec. 4.3: the farthest of the six are 0.64 N (1-DoF, 75 %) and 4.87 N (3-DoF, flat).
-    alone = 0.1 * float(printed.rate(0.75 * 17.5 / 15, 2.5))
-    assert f"{eq_4 * 0.64 / alone:.3g} to 4.87 N" in force.note
+    alone = 0.1 * float(eq_4(2.5).rate(0.75 * 17.5 / 15))
+    assert f"{by_eq_4 * 0.64 / alone:.3g} to 4.87 N" in force.note
     left = [line for line in lines if line.quantity == "left out"]
     assert {name for line in left for name in line.figure.split(", free")} >= {
         left.name.split(", free")[0] for left in three.left_out
@@ -370,8 +370,8 @@ def test_tapered_stack_is_the_sum_of_its_balloons() -> None:
     for k in round_stack(radii):
         # At equal height over radius, each balloon by its own formula.
         u = 0.3
-        law = printed.volume if k.model.name == "Eq. 4" else parabola.balloon_volume
-        each = [float(law(u * radius, radius)) for radius in radii]
+        pocket = eq_4 if k.model.name == "Eq. 4" else eqs_1_to_3
+        each = [float(pocket(radius).volume(u * radius)) for radius in radii]
         stroke = u * sum(radii)
         assert float(k.volume(stroke)) == pytest.approx(sum(each) / 3)
         assert float(k.stroke(sum(each) / 3)) == pytest.approx(stroke)
@@ -383,17 +383,17 @@ def test_tapered_stack_is_the_sum_of_its_balloons() -> None:
 def test_unlike_balloons_carry_one_force_by_the_equations_too() -> None:
     """Flat, a stack pushes as its smallest balloon; farther out strokes at one force add up."""
     radii = (6.0, 3.0, 2.9)
-    for k, rate in zip(round_stack(radii), (printed.rate, parabola.balloon_rate), strict=True):
-        assert float(k.push(0.0)) == pytest.approx(float(rate(0.0, 2.9)))
+    for k, pocket in zip(round_stack(radii), (eq_4, eqs_1_to_3), strict=True):
+        assert float(k.push(0.0)) == pytest.approx(float(pocket(2.9).rate(0.0)))
     by_eqs_1_to_3 = round_stack(radii)[1]
     small = 1.5
-    force = float(parabola.balloon_rate(small, 2.9))
+    force = float(eqs_1_to_3(2.9).rate(small))
     stroke = small
     for radius in radii[:2]:
-        low, high = 0.0, 2 * parabola.fullest(radius).height
+        low, high = 0.0, eqs_1_to_3(radius).largest_stroke
         for _ in range(60):
             middle = (low + high) / 2
-            is_more = float(parabola.balloon_rate(middle, radius)) > force
+            is_more = float(eqs_1_to_3(radius).rate(middle)) > force
             low, high = (middle, high) if is_more else (low, middle)
         stroke += low
     assert float(by_eqs_1_to_3.push(stroke)) == pytest.approx(force, rel=1e-3)

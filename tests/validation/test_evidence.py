@@ -9,7 +9,8 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.errors import DesignError
-from sbafab.models import paper, printed
+from sbafab.models import paper
+from sbafab.models.closed_forms import eq_4
 from sbafab.validation.files import (
     COLUMNS,
     evidence_ids,
@@ -85,7 +86,7 @@ def test_strokes_of_figure_7a_are_eq_4_within_its_largest_error(name: str) -> No
     curve = load_evidence("paper").curve(name)
     volume, largest = OF_FIGURE_7A[name]
     assert max(curve.x) == volume
-    assert curve.y == pytest.approx(printed.stroke(curve.x, 5.0), abs=5.1e-4)
+    assert curve.y == pytest.approx(eq_4(5.0).stroke(curve.x), abs=5.1e-4)
     assert curve.errors == pytest.approx([largest / math.sqrt(3)] * len(curve.y))
 
 

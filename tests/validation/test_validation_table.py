@@ -8,8 +8,8 @@ import pytest
 
 from docs.scripts.tables import table
 from docs.scripts.validate import PATH, validation
-from sbafab.models import parabola, printed
 from sbafab.models.calibrated import load_calibration
+from sbafab.models.closed_forms import eq_4, eqs_1_to_3
 from sbafab.models.unknowns import UNKNOWNS
 
 MEASURED = (
@@ -119,10 +119,10 @@ def test_comparison_of_eq_4_in_the_documentation() -> None:
     assert len(table) == 5
     for share, h, by_eqs, by_eq_4, ratio, slopes in [map(float, row) for row in table]:
         assert h == pytest.approx(2.5 * share)
-        assert by_eqs == pytest.approx(float(parabola.volume(h, 2.5)), abs=6e-4)
-        assert by_eq_4 == pytest.approx(float(printed.volume(h, 2.5)), abs=6e-4)
+        assert by_eqs == pytest.approx(float(eqs_1_to_3(2.5).volume(2 * h)) / 2, abs=6e-4)
+        assert by_eq_4 == pytest.approx(float(eq_4(2.5).volume(h)), abs=6e-4)
         assert ratio == pytest.approx(by_eq_4 / by_eqs, abs=1e-3)
-        exact = float(printed.rate(h, 2.5) / parabola.rate(h, 2.5))
+        exact = float(eq_4(2.5).rate(h) / eqs_1_to_3(2.5).rate(2 * h))
         assert slopes == pytest.approx(exact, abs=6e-3)
 
 

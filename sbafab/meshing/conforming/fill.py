@@ -23,8 +23,7 @@ from sbafab.meshing.conforming.crossing import crossing, crossing_clause
 from sbafab.meshing.conforming.layup import FormedFilm, Layup, bodies, flat
 from sbafab.meshing.conforming.mesh import integrals
 from sbafab.meshing.conforming.plane import MISSING, Plane
-from sbafab.models.lens import fullest as fullest_slot
-from sbafab.models.parabola import fullest
+from sbafab.models.closed_forms import eqs_1_to_3, lens
 
 # The lift of one film: Poisson's equation on the triangles of a pocket.
 
@@ -225,15 +224,15 @@ def _largest(
     """
     ends = _round_ends(interface, places[0])
     if len(ends) == 1:
-        return 2 * fullest(ends[0][1]).volume
+        return eqs_1_to_3(ends[0][1]).largest_volume
     if len(ends) == 2:
         (first, radius), (last, _) = ends
-        return fullest_slot(2 * radius, math.dist(first, last)).volume
+        return lens(2 * radius, math.dist(first, last)).largest_volume
     offsets = stack.plane.points[fixed][:, None] - np.array(places)
     half = float(np.linalg.norm(offsets, axis=2).min())
     disc = math.pi * half**2 / 2
     wider = float(even.volumes[0] / even.shapes[0].max()) / disc
-    return 2 * fullest(half).volume * wider / len(places) / share
+    return eqs_1_to_3(half).largest_volume * wider / len(places) / share
 
 
 def _round_ends(interface: Interface, centre: Point) -> list[tuple[Point, float]]:
