@@ -335,8 +335,8 @@ def _read_part(assembly: Assembly, name: str, part: Sba) -> Design:
         data.setdefault("name", path.stem)
         _keep_outline(data, part, assembly.folder)
         _keep_kit(data, part, assembly)
-        own = data.get("rules")
-        waived = own.get("waive") if isinstance(own, dict) else None
+        rules_table = data.get("rules")
+        waived = rules_table.get("waive") if isinstance(rules_table, dict) else None
         rules = [r for r in assembly.rules.waive if r in rule_names() and r not in (waived or ())]
         return validated(add_waivers(data, rules), records(), path.parent)
     except DesignError as error:

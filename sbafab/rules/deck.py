@@ -47,7 +47,9 @@ def run_deck(
 def run_rule(rule: Rule, measures: Measures) -> list[Finding]:
     """Return the findings of a rule; failures the user waived and lowered limits are marked."""
     weak, waived = lowered(measures.design, rule.name), rule.name in measures.design.rules.waive
-    return [marked(found, weak, "the design" if waived else "") for found in rule.check(measures)]
+    return [
+        marked(finding, weak, "the design" if waived else "") for finding in rule.check(measures)
+    ]
 
 
 def has_failed(findings: Iterable[Finding]) -> bool:

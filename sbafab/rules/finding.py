@@ -76,8 +76,8 @@ class Finding:
     @property
     def message(self) -> str:
         """The finding in one sentence."""
-        said = self.says if isinstance(self.says, str) else tell(self.says, self._facts)
-        text = ": ".join(filter(None, (self.remedy, said)))
+        sentence = self.says if isinstance(self.says, str) else tell(self.says, self._facts)
+        text = ": ".join(filter(None, (self.remedy, sentence)))
         if self.lowered:
             text += f"; limits lowered: {', '.join(self.lowered)}"
         waived = f"waived by {self.waived_by}" if self.waived_by else ""

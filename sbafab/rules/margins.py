@@ -241,12 +241,12 @@ def overhang_places(
     rays = Rays.of([edge for edge, _ in near])
     ray, value, end = first_met(rays, _profile(mask).table, within)
     feet = [edge.nearest(reach.at) for edge, reach in near]
-    own = (
+    reached = (
         (reach.value, *p, *reach.at, *(-x for x in left_normal(edge, p)))
         for p, (edge, reach) in zip(feet, near, strict=True)
     )
     rows = value[None], rays.start.take(ray, axis=1), end, rays.outward.take(ray, axis=1)
-    columns = np.concatenate([columns_of(own, 7), np.concatenate(rows)], axis=1)
+    columns = np.concatenate([columns_of(reached, 7), np.concatenate(rows)], axis=1)
     order = np.concatenate([np.arange(len(near)), rays.edge.take(ray)]).argsort(kind="stable")
     seats = list(enumerate(profiles))
     places = _owned(columns[:, order], seats[:2], seats[2:])
@@ -288,7 +288,7 @@ def narrow_places(
     for first, loss, bond in zip(firsts, losses, bonds, strict=True):
         slack = 0.0 if bond is None else loss
         widest[first.whole_bond] = max(slack, widest.get(first.whole_bond, 0.0))
-    found = []
+    margin_groups = []
     for number, first in enumerate(firsts):
         places: dict[MarginKind, Places] = {}
         films = tuple(layer.profile for layer in (first.below, first.above, *first.masks))
@@ -307,8 +307,8 @@ def narrow_places(
         )
         if free and not first.contact.is_empty:
             places["overhang"] = overhang_places(first.mask, free, loss, films)
-        found.append(MarginGroup(groups[number], places))
-    return found
+        margin_groups.append(MarginGroup(groups[number], places))
+    return margin_groups
 
 
 # Owners of the edges at both ends of places.
@@ -495,14 +495,16 @@ def margins_of(groups: Sequence[MarginGroup], moves: Freedoms) -> list[Margins]:
 def _between(group: MarginGroup, quantity: MarginKind, number: int, moves: Freedoms) -> Margins:
     places, layers = group.places[quantity], seated(group.first)
     (numbers,) = (places.between == number).nonzero()
-    own, owners = places.at(numbers), places.owners[number]
+    between, owners = places.at(numbers), places.owners[number]
     acting = list(relative_freedoms(owners, layers, moves))
     levers = np.zeros((len(acting), len(numbers)))
     for row, (freedom, sign) in enumerate(acting):
         if freedom.centre is not None:
-            (x, y), p = freedom.centre, own.ends[sign > 0]
-            levers[row] = sign * ((p[0] - x) * own.normal[1] - (p[1] - y) * own.normal[0])
-    return Margins(group, quantity, owners, numbers, own.nominal, own.normal, acting, levers)
+            (x, y), p = freedom.centre, between.ends[sign > 0]
+            levers[row] = sign * ((p[0] - x) * between.normal[1] - (p[1] - y) * between.normal[0])
+    return Margins(
+        group, quantity, owners, numbers, between.nominal, between.normal, acting, levers
+    )
 
 
 def relative_freedoms(
@@ -513,6 +515,6 @@ def relative_freedoms(
     ``layers`` are the interface's layers, by seat.
     """
     start, end = (moves[Part(layers[owner.seat], owner.piece)] for owner in owners)
-    for own, other, sign in ((start, end, -1.0), (end, start, 1.0)):
-        shared = set(map(id, other))
-        yield from ((freedom, sign) for freedom in own if id(freedom) not in shared)
+    for ways, theirs, sign in ((start, end, -1.0), (end, start, 1.0)):
+        shared = set(map(id, theirs))
+        yield from ((freedom, sign) for freedom in ways if id(freedom) not in shared)

@@ -138,12 +138,12 @@ def connectivity(laminate: Laminate, design: Design, faults: bool = True) -> Con
     """
     read = _Reading(laminate)
     owners = tuple(tuple(sorted(read.owners.get(part, ()))) for part in read.parts)
-    found: list[NetFault] = []
+    differing: list[NetFault] = []
     if faults:
-        found += [*read.opens(), *read.shorts(), *read.leaks()]
-        found += [*read.dead_ends(design.rules.longest_dead_end), *read.strays()]
+        differing += [*read.opens(), *read.shorts(), *read.leaks()]
+        differing += [*read.dead_ends(design.rules.longest_dead_end), *read.strays()]
     narrow = tuple(read.narrow(design)) if faults else ()
-    return Connectivity(read.cavities, owners, read.groups(), tuple(found), narrow)
+    return Connectivity(read.cavities, owners, read.groups(), tuple(differing), narrow)
 
 
 def netlist_findings(
@@ -155,8 +155,8 @@ def netlist_findings(
     ports and of chambers must.
     """
     placed = {port.name for port in netlist.ports}
-    own = (port for port in laminate.ports if port.name not in placed)
-    ports = (*own, *netlist.ports)
+    ports_drawn = (port for port in laminate.ports if port.name not in placed)
+    ports = (*ports_drawn, *netlist.ports)
     names = {chamber.name for chamber in laminate.chambers} | {port.name for port in ports}
     nets = tuple(
         Net(name, tuple(member for member in members if member in names))
@@ -164,18 +164,18 @@ def netlist_findings(
     )
     read = connectivity(replace(laminate, ports=ports, nets=nets), design)
     comparison = compare(read.groups, netlist.nets)
-    said = [_missing(name, names) for name in comparison.missing]
-    said += [
+    differences = [_missing(name, names) for name in comparison.missing]
+    differences += [
         (fault.where, say("netlist.fault", fault=fault.says))
         for fault in read.faults
         if fault.kind in ("open", "short", "leak")
     ]
-    verdict: Verdict = "fail" if said else "pass"
-    count = float(bool(said))
-    said = said or [(Place(), say("netlist.joined", nets=len(comparison.matched)))]
+    verdict: Verdict = "fail" if differences else "pass"
+    count = float(bool(differences))
+    differences = differences or [(Place(), say("netlist.joined", nets=len(comparison.matched)))]
     return [
         Finding(NETLIST, verdict, 0.0, count, "differences", where, says.also(file=file))
-        for where, says in said
+        for where, says in differences
     ]
 
 
@@ -265,10 +265,10 @@ class _Reading:
                 yield _Terminal(member, label, beside, inlet.mouth, inlet.width, False, ())
         gaps = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
         for chamber in laminate.chambers:
-            held = [(n, gap) for n, gap in enumerate(gaps, 1) if chamber.is_in(n)]
-            for balloon, gap in held if chamber.name == member else ():
+            levels = [(n, gap) for n, gap in enumerate(gaps, 1) if chamber.is_in(n)]
+            for balloon, gap in levels if chamber.name == member else ():
                 label = say("nets.pocket", member=member)
-                if len(held) > 1:
+                if len(levels) > 1:
                     label = say("nets.pocket-in", member=member, balloon=balloon)
                 layers = _layers(gap)
                 for p in chamber.centres:
@@ -379,13 +379,13 @@ class _Reading:
     def strays(self) -> Iterator[NetFault]:
         """Yield closed voids outside all nets, and chamber interfaces' voids that open outside."""
         is_open = {self.part_of[void] for void in self.graph.joins.get(OUTSIDE, {})}
-        seen: set[int] = set()
+        visited: set[int] = set()
         for number, cavity, gap, names in self.of_net():
             part = self.parts[number]
             # A slit between balloons, or a flap outside a seam.
             is_slit = part in is_open and not (gap.kind == "chamber" and gap.pressed)
-            if not (cavity.is_open_film or names or part in seen or is_slit):
-                seen.add(part)
+            if not (cavity.is_open_film or names or part in visited or is_slit):
+                visited.add(part)
                 yield self._fault("stray", (), gap, middle(cavity.region), say("nets.stray"))
 
     # Widths and places.
@@ -429,7 +429,7 @@ class _Reading:
         return axis.centre(int(np.abs(axis.points - complex(*start)).argmax()))
 
     def _of_part(self, part: int) -> list[int]:
-        return [number for number, own in enumerate(self.parts) if own == part]
+        return [number for number, home in enumerate(self.parts) if home == part]
 
     def _gap_between(self, part: int, main: int) -> _Cut:
         """The place where two parts of a net most likely should be joined.
@@ -463,10 +463,10 @@ class _Reading:
         )
         mouths = [(v, voids) for v, voids in self.graph.joins.items() if v.kind == "mouth"]
         for mouth, voids in mouths if not firsts & seconds else ():
-            own = [void for void in voids if walled[void] in seconds]
-            if own and len(own) < len(voids):
+            behind = [void for void in voids if walled[void] in seconds]
+            if behind and len(behind) < len(voids):
                 chamber = self.laminate.inlets[mouth.level].chamber
-                return self.cavity_of[own[0]], voids[own[0]], chamber
+                return self.cavity_of[behind[0]], voids[behind[0]], chamber
         return None
 
     def _bridge(self, part: int, first: str, second: str) -> tuple[int, Point]:
@@ -513,7 +513,7 @@ class _Reading:
                 if n in numbers
             ]
             for node in nodes:
-                links.setdefault(node, []).extend(other for other in nodes if other != node)
+                links.setdefault(node, []).extend(linked for linked in nodes if linked != node)
         return links
 
 
@@ -546,8 +546,8 @@ def _overlaps(a: Cavity, b: Cavity) -> list[_Cut]:
     lower = min(a.interface, b.interface)
     cuts = []
     for piece in without_slivers(a.region & b.region).pieces:
-        left = [len(without_slivers(cavity.region - piece).pieces) for cavity in (a, b)]
-        cost = 2 * _across(piece) if min(left) > 1 else 0.0
+        remains = [len(without_slivers(cavity.region - piece).pieces) for cavity in (a, b)]
+        cost = 2 * _across(piece) if min(remains) > 1 else 0.0
         cuts.append(_Cut(cost, 0.0, lower, middle(piece), True))
     return cuts
 
@@ -585,9 +585,9 @@ def _openings(
 ) -> Iterable[Finding]:
     """Yield the channel that takes most pressure to open; a warning if its pressure is unknown."""
     limit = design.rules.channels_open_at_kpa
-    known = [(place.pressure, place) for place in narrow if place.pressure is not None]
-    if known:
-        pressure, worst = max(known, key=lambda row: row[0])
+    modelled = [(place.pressure, place) for place in narrow if place.pressure is not None]
+    if modelled:
+        pressure, worst = max(modelled, key=lambda row: row[0])
         interface = laminate.interfaces[worst.interface - 1]
         facts = {
             "net": worst.net,
@@ -601,7 +601,7 @@ def _openings(
         measured = pressure if math.isfinite(pressure) else None
         sentence = "opens" if worst.left > 0 else "closes"
         yield judged(NAME, good, limit, measured, "kPa", place, sentence, **facts)
-    if len(known) < len(narrow):
+    if len(modelled) < len(narrow):
         unknown = next(place for place in narrow if place.pressure is None)
         facts = {"as_drawn": unknown.width.value, "left": unknown.left}
         where = Place(unknown.interface, (), *unknown.width.middle)

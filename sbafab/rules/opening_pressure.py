@@ -56,11 +56,11 @@ def hardest_place(
     worst; without elastic constants of either it is the narrowest place. A model, not measured.
     """
     places = edges.narrow_places(void)
-    narrowest, left = min(places, key=lambda place: place[1].value, default=(None, None))
-    if narrowest is None or left is None:
+    narrowest, remaining = min(places, key=lambda place: place[1].value, default=(None, None))
+    if narrowest is None or remaining is None:
         return None
     sides = [_Side.of(laminate, interface, step, void) for step in (-1, 1)]
-    worst = OpeningPlace(narrowest, left.value, _pressure(sides, left))
+    worst = OpeningPlace(narrowest, remaining.value, _pressure(sides, remaining))
     if worst.pressure is None or math.isinf(worst.pressure):
         return worst
 
@@ -70,20 +70,20 @@ def hardest_place(
         return min((load for load in loads if load is not None), default=math.inf)
 
     # Pressures fall with the fourth power of the width: wider places open more easily.
-    harder = most(left.value) / worst.pressure
-    widest = left.value * (harder**0.25 if math.isfinite(harder) else WIDEST)
-    if widest - left.value <= TOUCH:
+    harder = most(remaining.value) / worst.pressure
+    widest = remaining.value * (harder**0.25 if math.isfinite(harder) else WIDEST)
+    if widest - remaining.value <= TOUCH:
         return worst
     bonded = [region for side in sides for region in side.bonded]
     walls = _split(void, bonded, widest + edges.most)
-    for width, left in edges.narrow_places(walls, widest):
-        if most(left.value) <= worst.pressure:
+    for width, remaining in edges.narrow_places(walls, widest):
+        if most(remaining.value) <= worst.pressure:
             continue
-        pressure = _pressure(sides, left)
+        pressure = _pressure(sides, remaining)
         if pressure is None:
-            return OpeningPlace(width, left.value, None)
+            return OpeningPlace(width, remaining.value, None)
         if pressure > worst.pressure:
-            worst = OpeningPlace(width, left.value, pressure)
+            worst = OpeningPlace(width, remaining.value, pressure)
     return worst
 
 
@@ -178,10 +178,10 @@ def _split(void: Region, parts: Sequence[Region], reach: float) -> Region:
             ]
             room = TOUCH / edge.length
             shares = sorted(edge.parameter(edge.nearest(p)) for p in points)
-            kept = [
+            cuts = [
                 t for before, t in pairwise([0.0, *shares]) if t - before > room and t < 1 - room
             ]
-            marks = [edge.start, *map(edge.at, kept), edge.end]
+            marks = [edge.start, *map(edge.at, cuts), edge.end]
             edges += [edge.part(a, b) for a, b in pairwise(marks)]
         contours.append(Contour(tuple(edges)))
     return Region(tuple(contours))

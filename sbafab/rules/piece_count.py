@@ -16,13 +16,13 @@ def check(measures: Measures) -> list[Finding]:
     laminate = measures.laminate
     counts = {name: len(layers[0].profile.pieces) for name, layers in laminate.patterns.items()}
     worst = max(laminate.layers, key=lambda layer: abs(counts[layer.pattern] - layer.pieces))
-    count, wanted = counts[worst.pattern], worst.pieces
-    if count == wanted:
+    count, expected = counts[worst.pattern], worst.pieces
+    if count == expected:
         return [judged(NAME, True, 0.0, 0.0, "pieces", Place(), "whole")]
     smallest = min(worst.profile.pieces, key=lambda piece: piece.area, default=None)
     place = Place(None, (worst.index,), *(middle(smallest) if smallest else ()))
-    sentence, off = "more" if count > wanted else "fewer", float(abs(count - wanted))
-    facts = {"layer": layer_name(worst), "count": count, "wanted": wanted}
+    sentence, off = "more" if count > expected else "fewer", float(abs(count - expected))
+    facts = {"layer": layer_name(worst), "count": count, "wanted": expected}
     return [judged(NAME, False, 0.0, off, "pieces", place, sentence, **facts)]
 
 

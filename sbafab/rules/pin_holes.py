@@ -45,9 +45,9 @@ RULE = Rule(NAME, check, explained(NAME), at_most=True)
 
 def _idle(laminate: Laminate) -> Iterator[_Miss]:
     """Yield the pins that no layer has a hole for."""
-    held = {pin for layer, *_ in laminate.patterns.values() for pin in laminate.pins_holding(layer)}
+    used = {pin for layer, *_ in laminate.patterns.values() for pin in laminate.pins_holding(layer)}
     for pin in laminate.pins:
-        if pin not in held:
+        if pin not in used:
             yield _Miss(pin.centre, None, "idle", {"pin": pin.name})
 
 

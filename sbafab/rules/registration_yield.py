@@ -176,14 +176,14 @@ def short_margins(margins: Margins, design: Design) -> ShortMargins | None:
 
 
 def short_builds(
-    asked: ShortMargins, first: Indices, cutting: float, numbers: Floats
+    short: ShortMargins, first: Indices, cutting: float, numbers: Floats
 ) -> tuple[Indices, Indices]:
     """Return in which interfaces and builds one of the margins comes short.
 
     ``first`` are the numbers of the first row of each error, a column for each interface;
     ``numbers`` are from 0 to 1, a row for each error and a column for each build.
     """
-    room, (margins, _, _, signs) = asked.room, asked
+    room, (margins, _, _, signs) = short.room, short
     moves = list(zip(margins.moves, margins.levers, first[2:], strict=True))
     cuts = sum(
         sign * cutting * (2 * numbers[row] - 1) for sign, row in zip(signs, first, strict=False)
@@ -225,7 +225,7 @@ def simulate(
     """Return the yield of random builds of a laminate; the same seed gives the same shares."""
     measures = measures or Measures(laminate, design)
     indices = sorted({gap.index for group in measures.groups for gap in group.interfaces})
-    asked, drawn_rows = _drawn(measures)
+    shortfalls, drawn_rows = _drawn(measures)
     total = first_builds = design.rules.yield_builds or _quick_number(len(indices))
     short_of = np.zeros(len(indices), dtype=np.intp)
     whole = drawn_builds = 0
@@ -235,12 +235,12 @@ def simulate(
         builds = min(BATCH, total - drawn_builds)
         numbers = generator.random((drawn_rows, builds))
         is_short = np.zeros((len(indices), builds), dtype=bool)
-        for margins, first in asked:
+        for margins, first in shortfalls:
             interface, build = short_builds(
                 margins, first, design.registration.cutting_error, numbers
             )
-            own = [gap.index for gap in margins.margins.group.interfaces]
-            is_short[np.searchsorted(indices, own)[interface], build] = True
+            of_group = [gap.index for gap in margins.margins.group.interfaces]
+            is_short[np.searchsorted(indices, of_group)[interface], build] = True
         short_of += np.count_nonzero(is_short, axis=1)
         whole += int(np.count_nonzero(is_short.any(axis=0)))
         drawn_builds += builds
@@ -260,16 +260,20 @@ def _drawn(measures: Measures) -> tuple[list[tuple[ShortMargins, Indices]], int]
     count = 0
     drawn: list[tuple[ShortMargins, Indices]] = []
     for group in measures.groups:
-        found = (short_margins(m, measures.design) for m in measures.margins if m.group is group)
+        candidates = (
+            short_margins(m, measures.design) for m in measures.margins if m.group is group
+        )
         every = sorted(
-            filter(None, found), key=lambda s: (s.margins.quantity, s.margins.numbers[0])
+            filter(None, candidates), key=lambda s: (s.margins.quantity, s.margins.numbers[0])
         )
         errors = list(dict.fromkeys(error for short in every for error in short.errors))
         felt = [_renamed(errors, group.first, gap, measures.moves) for gap in group.interfaces]
-        for error in (error for own in felt for error in own):
+        for error in (error for errors_felt in felt for error in errors_felt):
             if rows.setdefault(error, count) == count:
                 count += 2 if isinstance(error, Freedom) and error.centre is None else 1
-        first = np.array([[rows[error] for error in own] for own in felt], dtype=np.intp).T
+        first = np.array(
+            [[rows[error] for error in errors_felt] for errors_felt in felt], dtype=np.intp
+        ).T
         place = {error: number for number, error in enumerate(errors)}
         drawn += [(short, first[[place[error] for error in short.errors]]) for short in every]
     return drawn, count

@@ -210,19 +210,21 @@ def _closing(
         edges = VoidEdges.of(interface, design)
         region = graph.pieces[void]
         inlets = [inlet for inlet in laminate.inlets if inlet.chamber in names]
-        held = [
+        inside = [
             c for chamber in laminate.chambers if chamber.name in names for c in chamber.centres
         ]
-        held += [i.mouth for i in inlets if mouth_of(laminate.inlets.index(i)) in graph.joins[void]]
-        for place, left in edges.narrow_places(region) if edges.seams else ():
-            if left.value > 0 or not _parts(region, place, held):
+        inside += [
+            i.mouth for i in inlets if mouth_of(laminate.inlets.index(i)) in graph.joins[void]
+        ]
+        for place, remaining in edges.narrow_places(region) if edges.seams else ():
+            if remaining.value > 0 or not _parts(region, place, inside):
                 continue
             facts = {"whose": [*names], "as_drawn": place.value, "edges": edges.causes()}
             yield _Offence("closing", void.level, place.middle, facts)
             break
 
 
-def _parts(region: Region, place: Width, held: Sequence[Point]) -> bool:
+def _parts(region: Region, place: Width, inside: Sequence[Point]) -> bool:
     """Return True if points of a void lie on both sides of a place across it."""
     (x, y), (u, v) = place.start, place.end
     dx, dy = (CUT * (u - x) / place.value, CUT * (v - y) / place.value)
@@ -233,7 +235,7 @@ def _parts(region: Region, place: Width, held: Sequence[Point]) -> bool:
         off = [0.0 if _holds(part, p) else part.distance_to_edge(p) for part in parts]
         return off.index(min(off))
 
-    homes = {home(p) for p in held}
+    homes = {home(p) for p in inside}
     return len(homes) > 1
 
 

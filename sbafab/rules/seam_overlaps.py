@@ -118,13 +118,17 @@ class _Seams(NamedTuple):
         bare = self.gap.contact - self.gap.mask
         # A roller's ends are square: of two seams the other is moved along its path.
         numbered = sorted(enumerate(self.gap.seams), key=lambda pair: pair[1].tool == "roller")
-        for (a, seam), (b, other) in combinations(numbered, 2):
-            if not boxes_meet(seam.region.bounds, other.region.bounds):
+        for (a, seam), (b, partner) in combinations(numbered, 2):
+            if not boxes_meet(seam.region.bounds, partner.region.bounds):
                 continue
-            reach = max(seam.width + other.width, self.error(seam.tool) + self.error(other.tool))
-            for piece in (seam.region & other.region & bare).pieces:
-                if self._is_needed(piece, (seam, other)):
-                    body = other.region & _swath(_edges_near(piece, other, reach), other.width)
+            reach = max(
+                seam.width + partner.width, self.error(seam.tool) + self.error(partner.tool)
+            )
+            for piece in (seam.region & partner.region & bare).pieces:
+                if self._is_needed(piece, (seam, partner)):
+                    body = partner.region & _swath(
+                        _edges_near(piece, partner, reach), partner.width
+                    )
                     yield Overlap(a, b, *_depth(seam, body, piece, reach), middle(piece))
 
     def edge_bonds(self) -> Iterator[EdgeBond]:

@@ -156,8 +156,8 @@ def _on_hole(port: Port, laminate: Laminate, design: Design) -> Iterator[_HoleFi
         cut = 2 * (reach + design.registration.cutting_error) + kerf
         drawn = {"as_drawn": 2 * reach}
         yield _HoleFit(layer, port, port.tube_diameter, cut, "covered", drawn)
-    others = Region(tuple(other for other in layer.profile.contours if other is not hole))
-    film = others.distance_to_edge(port.at) - reach
+    remaining = Region(tuple(contour for contour in layer.profile.contours if contour is not hole))
+    film = remaining.distance_to_edge(port.at) - reach
     yield _HoleFit(layer, port, film, design.rules.bond_width, "film", {})
 
 
@@ -198,8 +198,8 @@ def _along_run(inlet: Inlet, interface: Interface, design: Design) -> Iterator[_
     rims = interface.contact.index if interface.pressed else EdgeIndex(())
     widths, bonds = [], []
     for edge in sides:
-        others = EdgeIndex([other for other in run.edges if other is not edge])
-        across, outward = outward_reach(edge.reversed(), others), outward_reach(edge, rims)
+        facing = EdgeIndex([side for side in run.edges if side is not edge])
+        across, outward = outward_reach(edge.reversed(), facing), outward_reach(edge, rims)
         widths += [(across.value, across.at, edge.nearest(across.at))] if across else []
         bonds += [outward] if outward else []
     if widths:

@@ -102,11 +102,11 @@ def void_graph(laminate: Laminate) -> VoidGraph:
     for interface in laminate.interfaces:
         gap = _gap(interface.unbonded, interface.contact, frame, interface.fold_lines)
         missing = _voids("gap", interface.index, gap.missing, frame)
-        held = chambers.get(interface.index)
+        names = chambers.get(interface.index)
         inlets = {
             number: inlet
             for number, inlet in enumerate(laminate.inlets)
-            if held is not None and (inlet.chamber in held or inlet.chamber not in named)
+            if names is not None and (inlet.chamber in names or inlet.chamber not in named)
         }
         layers = {interface.below.index, interface.above.index}
         folds = [Line(*f.line) for f in laminate.folds if {f.lower, f.upper} == layers]
@@ -349,12 +349,12 @@ def cavities(laminate: Laminate, graph: VoidGraph) -> tuple[Cavity, ...]:
     patterns = {interface.index: interface.pattern for interface in laminate.interfaces}
     parts = {**graph.pieces, **graph.gaps}
     rows: list[Cavity] = []
-    seen: set[Void] = set()
+    visited: set[Void] = set()
     for void in parts:
-        if void in seen:
+        if void in visited:
             continue
         group = _beside(graph, void, parts)
-        seen.update(group)
+        visited.update(group)
         key = (patterns[void.level], *(part[::2] for part in group))
         if key not in regions:
             regions[key] = union(parts[part] for part in group)
