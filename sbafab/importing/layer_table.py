@@ -6,11 +6,10 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
+from typing import Annotated, Any, NoReturn, TypeVar
 
 from pydantic import Field
 
@@ -23,22 +22,20 @@ from sbafab.design.records import without_none
 from sbafab.design.toml_table import Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
-from sbafab.geometry.region import Region, polygon, union
+from sbafab.geometry.region import Region, union
 from sbafab.importing.popupcad import SUFFIX, cad_layer
 from sbafab.importing.records import (
     LAYERS,
     Imported,
     file_name,
+    json_of,
     key_name,
     loaded,
-    not_json,
     read_text,
+    region_of,
     yaml_of,
 )
 from sbafab.laminate.laminate import Role
-
-if TYPE_CHECKING:
-    import shapely
 
 CHAMBERS, KIT = "chambers.csv", "kit.toml"
 MOUTH = ("mouth_x", "mouth_y", "angle", "width")
@@ -254,10 +251,7 @@ def _geometries(path: Path, text: str) -> list[list[str]]:
 
 def _document(path: Path, text: str) -> Any:
     if path.suffix.lower() == ".json":
-        try:
-            return json.loads(text)
-        except (ValueError, RecursionError) as error:
-            raise not_json(path, error) from None
+        return json_of(path, text)
     yaml = yaml_of(path)
     # Objects of foldable_robotics are read as plain ones; no others are created.
     loader: Any = type("Loader", (yaml.SafeLoader,), {})
@@ -286,8 +280,4 @@ def _parts(path: Path, layer: str, number: int, text: str) -> Iterator[Region]:
                 "polygons; make it one, or leave it out"
             )
         if not piece.is_empty:
-            yield _ring(piece.exterior) - union(map(_ring, piece.interiors))
-
-
-def _ring(ring: shapely.LinearRing) -> Region:
-    return polygon([(float(x), float(y)) for x, y, *_ in ring.coords[:-1]])
+            yield region_of(piece)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache, reduce
 from itertools import pairwise
@@ -23,7 +24,7 @@ from sbafab.errors import DesignError
 from sbafab.geometry.edges import Line, Point, meeting_points
 from sbafab.geometry.offset import grow, swept
 from sbafab.geometry.region import Region, disc, polygon, union
-from sbafab.importing.records import LAYERS, MOST_NAMED, loaded, read_text, yaml_of
+from sbafab.importing.records import LAYERS, MOST_NAMED, loaded, read_text, region_of, yaml_of
 
 SUFFIX = ".cad"
 MOST_BYTES = 20_000_000
@@ -38,8 +39,6 @@ VERTICES = ("ShapeVertex", "DrawnPoint")
 OLD_UNIT = 1000.0
 """Units per mm in the first form of vertices."""
 OLD_PLACES = ("_pos", "__pos", "_Vertex__pos")
-AREAS = frozenset({"GenericPoly", "GenericCircle", "GenericTwoPointRect"})
-LINES = frozenset({"GenericLine", "GenericPolyline"})
 
 
 # Reading: objects as records.
@@ -53,19 +52,14 @@ class CadRecord:
     values: dict[Any, Any] = field(default_factory=dict)
     items: list[Any] = field(default_factory=list)
 
-    def need(self, key: str, place: str, kind: type | tuple[type, ...] = object) -> Any:
-        """Return an attribute of this type. Raises DesignError with the place."""
-        value = self.values.get(key)
-        if key not in self.values or not isinstance(value, kind):
-            raise DesignError(f"{place} has no {key} that can be read; save the design again")
-        return value
+    def __getitem__(self, key: str) -> Any:
+        """Return an attribute. Raises DesignError if it is missing."""
+        if key not in self.values:
+            raise DesignError(f"has no {key}; save the design again")
+        return self.values[key]
 
-    def links(self, group: str, key: str, place: str) -> list[Any]:
-        """Return the links of an operation under a key of a group; empty if it has none."""
-        row = self.need(group, place, dict).get(key) or ()
-        if not isinstance(row, list | tuple):
-            raise DesignError(f"{place} has no list of {key} in {group}; save the design again")
-        return [*row]
+    def get(self, key: str) -> Any:
+        return self.values.get(key)
 
 
 def _records(path: Path, text: str) -> Any:
@@ -96,6 +90,21 @@ def _records(path: Path, text: str) -> Any:
     return loaded(path, text, loader, "popupCAD")
 
 
+@contextmanager
+def _at(place: str) -> Iterator[None]:
+    """Add the place to an error, and make one of what a damaged object raises.
+
+    A message that begins with a comma or colon continues the place.
+    """
+    try:
+        yield
+    except DesignError as error:
+        text = str(error)
+        raise DesignError(place + text if text[0] in ",:" else f"{place} {text}") from None
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+        raise DesignError(f"{place} is damaged; save the design again") from None
+
+
 # Geometry of a layer: areas, and lines and points that offsets widen into areas.
 
 
@@ -118,45 +127,35 @@ def _joined(flats: Iterable[Flat]) -> Flat:
     return Flat(union([flat.region for flat in flats]), lines, points)
 
 
-def _combined(function: str, a: Flat, b: Flat, place: str) -> Flat:
+def _within(flat: Flat, region: Region, inside: bool = True) -> Flat:
+    """The lines, cut, and points that are in a region, or outside it."""
+    kept = []
+    for line in flat.lines:
+        stops = {p for edge in region.edges for p in meeting_points(line, edge)}
+        ends = sorted({line.start, line.end, *stops}, key=line.parameter)
+        for piece in (Line(start, end) for start, end in pairwise(ends)):
+            if piece.length > SAME and region.contains(piece.at(0.5)) == inside:
+                kept.append(piece)
+    points = tuple(point for point in flat.points if region.contains(point) == inside)
+    return Flat(Region(), tuple(kept), points)
+
+
+def _combined(function: str, a: Flat, b: Flat) -> Flat:
     """Combine two layers with a boolean function. Lines are cut at the other layer's edges."""
     if function == "union":
         return _joined([a, b])
     if any(meeting_points(line, other) for line in a.lines for other in b.lines):
         raise DesignError(
-            f"{place} takes the {function} of lines that meet, which is not read; widen them first"
+            f"takes the {function} of lines that meet, which is not read; widen them first"
         )
     if function == "intersection":
-        lines = (*_cut(a.lines, b.region, True), *_cut(b.lines, a.region, True))
-        points = (*_sifted(a.points, b.region, True), *_sifted(b.points, a.region, True))
-        return Flat(a.region & b.region, lines, points)
-    rest = Flat(
-        a.region - b.region,
-        _cut(a.lines, b.region, False),
-        _sifted(a.points, b.region, False),
-    )
-    if function == "difference":
-        return rest
+        return _joined([Flat(a.region & b.region), _within(a, b.region), _within(b, a.region)])
+    rest = _within(a, b.region, False)._replace(region=a.region - b.region)
     if function == "symmetric_difference":
-        return _joined([rest, _combined("difference", b, a, place)])
-    raise DesignError(f"{place}: its function {shown(function)} is not known")
-
-
-def _cut(lines: Iterable[Line], region: Region, inside: bool) -> tuple[Line, ...]:
-    """The parts of lines inside a region, or outside it."""
-    kept = []
-    for line in lines:
-        stops = {p for edge in region.edges for p in meeting_points(line, edge)}
-        ends = sorted({line.start, line.end, *stops}, key=line.parameter)
-        for start, end in pairwise(ends):
-            middle = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
-            if math.dist(start, end) > SAME and region.contains(middle) == inside:
-                kept.append(Line(start, end))
-    return tuple(kept)
-
-
-def _sifted(points: Iterable[Point], region: Region, inside: bool) -> tuple[Point, ...]:
-    return tuple(point for point in points if region.contains(point) == inside)
+        return _joined([rest, _combined("difference", b, a)])
+    if function != "difference":
+        raise DesignError(f"has a function {shown(function)} that is not known")
+    return rest
 
 
 def _offset(flat: Flat, distance: float) -> Flat:
@@ -171,377 +170,327 @@ def _offset(flat: Flat, distance: float) -> Flat:
 # Shapes of sketches.
 
 
-def _number(value: Any, place: str) -> float:
+def _number(value: Any) -> float:
     if not isinstance(value, int | float) or isinstance(value, bool):
-        raise DesignError(f"{place} has {shown(value)} for a number; save the design again")
+        raise DesignError(f"has {shown(value)} for a number; save the design again")
     if not abs(value) <= FARTHEST:
-        raise DesignError(f"{place} has {value:g} mm, where at most {FARTHEST:g} is allowed")
+        raise DesignError(f"has {value:g} mm, where at most {FARTHEST:g} is allowed")
     return float(value)
 
 
-def _vertex(vertex: Any, place: str) -> Point:
+def _vertex(vertex: CadRecord) -> Point:
     """The position of a vertex, in any of the forms that popupCAD has saved."""
-    kind = vertex.kind if isinstance(vertex, CadRecord) else ""
-    unit, pair = 1.0, None
-    if kind.removesuffix("_1") in VERTICES and vertex.items:
-        unit, pair = 1.0 if kind.endswith("_1") else OLD_UNIT, vertex.items[1:3]
-    elif kind in VERTICES or kind == "BaseVertex":
-        old = next((key for key in OLD_PLACES if vertex.values.get(key) is not None), None)
-        unit = 1.0 if old is None else OLD_UNIT
-        pair = vertex.values.get("_position" if old is None else old)
-    if not isinstance(pair, list | tuple) or len(pair) != 2:
-        raise DesignError(f"{place} has a vertex that cannot be read; save the design again")
-    return _number(pair[0], place) / unit, _number(pair[1], place) / unit
+    if vertex.items:
+        unit, (x, y) = 1.0 if vertex.kind.endswith("_1") else OLD_UNIT, vertex.items[1:3]
+    else:
+        old = next((key for key in OLD_PLACES if vertex.get(key) is not None), None)
+        unit, (x, y) = (1.0, vertex["_position"]) if old is None else (OLD_UNIT, vertex[old])
+    return _number(x) / unit, _number(y) / unit
 
 
-def _points(vertices: Any, place: str) -> list[Point]:
+def _points(vertices: Iterable[CadRecord]) -> list[Point]:
     """The positions of vertices, without consecutive repeats."""
-    if not isinstance(vertices, list | tuple):
-        raise DesignError(f"{place} has no list of vertices; save the design again")
     points: list[Point] = []
-    for vertex in vertices:
-        point = _vertex(vertex, place)
+    for point in map(_vertex, vertices):
         if not points or math.dist(points[-1], point) > SAME:
             points.append(point)
     return points
 
 
-def _is_construction(shape: Any) -> bool:
-    if not isinstance(shape, CadRecord):
-        return False
-    if shape.kind.startswith("DrawnPoint") and len(shape.items) > 3:
-        return bool(shape.items[3])
-    return bool(shape.values.get("construction", False))
+def _is_point(shape: CadRecord) -> bool:
+    return shape.kind.startswith("DrawnPoint")
 
 
-def _shape(shape: Any, place: str) -> Flat:
+def _is_construction(shape: CadRecord) -> bool:
+    return bool(shape.items[3] if _is_point(shape) and shape.items else shape.get("construction"))
+
+
+def _shape(shape: CadRecord) -> Flat:
     """A shape of a sketch. Raises DesignError if it is not supported or crosses itself."""
-    kind = shape.kind if isinstance(shape, CadRecord) else str(type(shape).__name__)
-    if kind.startswith("DrawnPoint"):
-        return Flat(points=(_vertex(shape, place),))
-    if kind not in AREAS | LINES:
-        raise DesignError(f"{place} is a {kind}, which is not read; draw its outline")
-    points = _points(shape.need("exterior", place), place)
+    if _is_point(shape):
+        return Flat(points=(_vertex(shape),))
+    if shape.kind not in SHAPES:
+        raise DesignError(f"is a {shape.kind}, which is not read; draw its outline")
+    points = _points(shape["exterior"])
     if len(points) < 2:
-        raise DesignError(f"{place} is a {kind} of {len(points)} points; remove it")
-    if kind in LINES:
-        return Flat(lines=tuple(Line(a, b) for a, b in pairwise(points)))
-    if kind == "GenericCircle":
-        return Flat(disc(points[0], math.dist(*points[:2])))
-    if kind == "GenericTwoPointRect":
-        (x, y), (u, v), *_ = points
-        if min(abs(x - u), abs(y - v)) <= SAME:
-            raise DesignError(f"{place} is a rectangle without area; remove it")
-        return Flat(polygon([(x, y), (x, v), (u, v), (u, y)]))
-    holes = shape.values.get("interiors") or []
-    if not isinstance(holes, list | tuple):
-        raise DesignError(f"{place} has no list of interiors; save the design again")
-    return Flat(_polygon(points, [_points(hole, place) for hole in holes], place))
+        raise DesignError(f"is a {shape.kind} of {len(points)} points; remove it")
+    return SHAPES[shape.kind](points, shape)
 
 
-def _polygon(outer: Sequence[Point], holes: Sequence[Sequence[Point]], place: str) -> Region:
+def _lines(points: Sequence[Point], shape: CadRecord) -> Flat:
+    return Flat(lines=tuple(Line(a, b) for a, b in pairwise(points)))
+
+
+def _circle(points: Sequence[Point], shape: CadRecord) -> Flat:
+    return Flat(disc(points[0], math.dist(*points[:2])))
+
+
+def _rectangle(points: Sequence[Point], shape: CadRecord) -> Flat:
+    (x, y), (u, v), *_ = points
+    if min(abs(x - u), abs(y - v)) <= SAME:
+        raise DesignError("is a rectangle without area; remove it")
+    return Flat(polygon([(x, y), (x, v), (u, v), (u, y)]))
+
+
+def _polygon(points: Sequence[Point], shape: CadRecord) -> Flat:
     import shapely
 
-    rings = [_open(outer), *map(_open, holes)]
-    if min(map(len, rings)) < 3:
-        raise DesignError(f"{place} is a polygon of fewer than three points; remove it")
-    drawn = shapely.Polygon(rings[0], rings[1:])
+    drawn = shapely.Polygon(points, [_points(hole) for hole in shape.get("interiors") or ()])
     if not drawn.is_valid:
         reason = shapely.is_valid_reason(drawn)
-        raise DesignError(f"{place} is a polygon with {reason}; draw it without that")
-    return polygon(rings[0]) - union(map(polygon, rings[1:]))
+        raise DesignError(f"is a polygon with {reason}; draw it without that")
+    return Flat(region_of(drawn))
 
 
-def _open(ring: Sequence[Point]) -> Sequence[Point]:
-    is_closed = len(ring) > 1 and math.dist(ring[0], ring[-1]) <= SAME
-    return ring[:-1] if is_closed else ring
+SHAPES: Mapping[str, Callable[[Sequence[Point], CadRecord], Flat]] = {
+    "GenericLine": _lines,
+    "GenericPolyline": _lines,
+    "GenericCircle": _circle,
+    "GenericTwoPointRect": _rectangle,
+    "GenericPoly": _polygon,
+}
+"""The supported shapes of several points, by class name."""
 
 
 # The design, with its operations in order.
 
 
-@dataclass(frozen=True)
-class CadLayer:
-    """A layer of a design: its material's name, and thickness in mm (None if not stated)."""
-
-    material: str
-    thickness: float | None
+Sketch = list[tuple[str, CadRecord]]
+"""Shapes, each with its place after that of its operation."""
 
 
-@dataclass(frozen=True, eq=False)
 class CadDesign:
-    """A design: layers bottom to top, sketches and other designs by id, operations in order.
+    """A design: layers bottom to top with their material, operations in order with their places.
 
-    ``stacks`` are the results of operations, by index; ``remarks`` name what was interpreted.
+    ``remarks`` name what was interpreted.
     """
 
-    place: str
-    layers: tuple[CadLayer, ...]
-    layer_numbers: Mapping[Any, int]
-    sketches: Mapping[Any, Any]
-    operations: Sequence[CadRecord]
-    subdesigns: Mapping[Any, Any]
-    depth: int = 0
-    stacks: dict[int, CadLayers] = field(default_factory=dict)
-    remarks: dict[str, None] = field(default_factory=dict)
-    placed: dict[Any, CadDesign] = field(default_factory=dict)
+    def __init__(self, root: CadRecord, place: str, depth: int = 0) -> None:
+        if getattr(root, "kind", "") != "Design":
+            raise DesignError(f"{place} holds no design of popupCAD; save it again")
+        self.place, self.root, self.depth = place, root, depth
+        self.remarks: dict[str, None] = {}
+        self._here = place
+        self._stacks: dict[int, CadLayers] = {}
+        with _at(place):
+            definition = root.get("_layerdef") or root["_Design__layerdef"]
+            self.layers: list[CadRecord] = [*definition["layers"]]
+            self.numbers = {row["id"]: number for number, row in enumerate(self.layers)}
+            self.operations: list[CadRecord] = [*root["operations"]]
+            self.ids = [operation.get("id") for operation in self.operations]
+            self.places = [
+                f"{place}, operation {number} ({operation.get('customname') or operation.kind})"
+                for number, operation in enumerate(self.operations, 1)
+            ]
 
-    def named(self, index: int) -> str:
-        """Return an operation's place: its number, and its name or class."""
-        operation = self.operations[index]
-        name = operation.values.get("customname") or operation.kind
-        return f"{self.place}, operation {index + 1} ({name})"
+    def remark(self, text: str) -> None:
+        """Add a remark on the operation that is run."""
+        self.remarks[self._here + text] = None
 
-    def index_of(self, reference: Any, place: str) -> int:
+    def index_of(self, reference: Any) -> int:
         """Return the index of the operation that a link names. Raises DesignError."""
-        pair = reference if isinstance(reference, list | tuple) else (reference, 0)
-        ids = [operation.values.get("id") for operation in self.operations]
-        if len(pair) != 2 or pair[0] not in ids:
-            raise DesignError(f"{place} takes an operation that is not there; save it again")
-        index = ids.index(pair[0])
-        if pair[1] != 0 and self.operations[index].kind in OPERATIONS:
-            raise DesignError(f"{place} takes output {pair[1]} of operation {index + 1}: it has 0")
+        identity, output = reference if isinstance(reference, list | tuple) else (reference, 0)
+        if identity not in self.ids:
+            raise DesignError("takes an operation that is not there; save it again")
+        index = self.ids.index(identity)
+        if output != 0 and self.operations[index].kind in OPERATIONS:
+            raise DesignError(f"takes output {output} of operation {index + 1}: it has 0")
         return index
-
-    def layer_indices(self, operation: CadRecord, key: str, place: str) -> list[int]:
-        """Return the indices of the layers that an operation links. Raises DesignError."""
-        links = operation.need(key, place, (list, tuple))
-        if not all(_is_id(link) and link in self.layer_numbers for link in links):
-            raise DesignError(f"{place} names a layer that is not there; save the design again")
-        return [self.layer_numbers[link] for link in links]
-
-    def linked_sketch(self, operation: CadRecord, key: str, place: str) -> list[tuple[str, Any]]:
-        """Return the shapes of the first sketch linked by an operation under a key."""
-        return self.sketch(_first(operation.links("sketch_links", key, place)), place)
-
-    def sketch(self, identity: Any, place: str) -> list[tuple[str, Any]]:
-        """Return the shapes of a sketch without construction lines, each with its place."""
-        sketch = self.sketches.get(identity) if _is_id(identity) else None
-        if not isinstance(sketch, CadRecord):
-            raise DesignError(f"{place} takes a sketch that is not there; save the design again")
-        shapes = sketch.need("operationgeometry", f"{place}, its sketch", list)
-        named = f"{place}, sketch {sketch.values.get('_basename', identity)}"
-        return [
-            (f"{named}, shape {number}", shape)
-            for number, shape in enumerate(shapes, 1)
-            if not _is_construction(shape)
-        ]
 
     def stack(self, index: int) -> CadLayers:
         """Return the result of an operation. Raises DesignError at the first unsupported one."""
-        for number in sorted(self.needed(index) - self.stacks.keys()):
-            operation, place = self.operations[number], self.named(number)
-            if operation.kind not in OPERATIONS:
-                raise DesignError(
-                    f"{place}: operations of class {operation.kind} are not read; take one before "
-                    "it, or save the laminate as DXF in popupCAD"
-                )
-            self.stacks[number] = OPERATIONS[operation.kind](self, operation, place)
-        return self.stacks[index]
+        for number in sorted(self.needed(index) - self._stacks.keys()):
+            operation, self._here = self.operations[number], self.places[number]
+            with _at(self._here):
+                if operation.kind not in OPERATIONS:
+                    raise DesignError(
+                        f": operations of class {operation.kind} are not read; take one before "
+                        "it, or save the laminate as DXF in popupCAD"
+                    )
+                self._stacks[number] = OPERATIONS[operation.kind](self, operation)
+        return self._stacks[index]
 
     def needed(self, index: int) -> set[int]:
         """Return the indices of an operation and its dependencies. Raises DesignError."""
         needed = {index}
         for number in range(index, -1, -1):
             if number in needed:
-                needed |= self._parents(number)
+                with _at(self.places[number]):
+                    links = (self.operations[number].get("operation_links") or {}).values()
+                    parents = {self.index_of(reference) for row in links for reference in row}
+                    if parents and max(parents) >= number:
+                        raise DesignError(
+                            f"takes operation {max(parents) + 1}, which is not before it"
+                        )
+                needed |= parents
         return needed
 
-    def _parents(self, index: int) -> set[int]:
-        """The operations whose layers this one uses; all must come before it."""
-        place = self.named(index)
-        links = self.operations[index].values.get("operation_links")
-        rows = links.values() if isinstance(links, dict) else ()
-        references = [ref for row in rows if isinstance(row, list | tuple) for ref in row]
-        parents = {self.index_of(reference, place) for reference in references}
-        later = next((parent for parent in parents if parent >= index), None)
-        if later is not None:
-            raise DesignError(f"{place} takes operation {later + 1}, which is not before it")
-        return parents
-
-    def parents(self, operation: CadRecord, key: str, place: str) -> list[CadLayers]:
+    def parents(self, operation: CadRecord, key: str) -> list[CadLayers]:
         """Return the results of the operations of a link."""
-        links = operation.links("operation_links", key, place)
-        return [self.stacks[self.index_of(ref, place)] for ref in links]
+        links = operation["operation_links"].get(key) or ()
+        return [self._stacks[self.index_of(reference)] for reference in links]
 
-    def parent(self, operation: CadRecord, place: str, key: str = "parent") -> CadLayers:
-        """Return the result of the operation that this one changes. Raises DesignError."""
-        stacks = self.parents(operation, key, place)
-        if not stacks:
-            raise DesignError(f"{place} takes no operation; save the design again")
-        return stacks[0]
+    def parent(self, operation: CadRecord, key: str = "parent") -> CadLayers:
+        """Return the result of the operation that this one changes."""
+        return self.parents(operation, key)[0]
 
     def spread(self, flats: Mapping[int, Flat]) -> CadLayers:
-        """Return a stack with these layers, all empty."""
+        """Return a stack with these layers by index; layers outside are dropped, others empty."""
         return tuple(flats.get(index, Flat()) for index in range(len(self.layers)))
 
+    def on_layers(self, flat: Flat, operation: CadRecord, key: str) -> CadLayers:
+        """Return a stack with one geometry on the layers that an operation links."""
+        return self.spread({self.numbers[link]: flat for link in operation[key]})
 
-def _is_id(value: Any) -> bool:
-    return isinstance(value, int | str)
+    def linked_sketch(self, operation: CadRecord, key: str) -> Sketch:
+        """Return the first sketch linked by an operation under a key."""
+        return self.sketch(next(iter(operation["sketch_links"].get(key) or ()), None))
+
+    def sketch(self, identity: Any) -> Sketch:
+        """Return the shapes of a sketch without construction lines."""
+        sketch = self.root["sketches"].get(identity)
+        if sketch is None:
+            raise DesignError("takes a sketch that is not there; save the design again")
+        return [
+            (f", sketch {sketch.get('_basename') or identity}, shape {number}", shape)
+            for number, shape in enumerate(sketch["operationgeometry"], 1)
+            if not _is_construction(shape)
+        ]
 
 
-def _first(links: Sequence[Any]) -> Any:
-    return links[0] if links else None
+def _drawn(shapes: Sketch) -> Flat:
+    flats = []
+    for place, shape in shapes:
+        with _at(place):
+            flats.append(_shape(shape))
+    return _joined(flats)
 
 
-def _sketched(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
-    shapes = design.linked_sketch(operation, "sketch", place)
-    flat = _joined(_shape(shape, where) for where, shape in shapes)
-    return design.spread(dict.fromkeys(design.layer_indices(operation, "layer_links", place), flat))
+def _sketched(design: CadDesign, operation: CadRecord) -> CadLayers:
+    flat = _drawn(design.linked_sketch(operation, "sketch"))
+    return design.on_layers(flat, operation, "layer_links")
 
 
-def _laminates(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
-    function = operation.need("function", place, str)
-    nothing = design.spread({})
-    first = design.parents(operation, "unary", place) or [nothing]
-    second = design.parents(operation, "binary", place) or [nothing]
+def _laminates(design: CadDesign, operation: CadRecord) -> CadLayers:
+    nothing = [design.spread({})]
+    first = design.parents(operation, "unary") or nothing
+    second = design.parents(operation, "binary") or nothing
+    function = operation["function"]
+    by_layer = zip(zip(*first, strict=True), zip(*second, strict=True), strict=True)
+    return tuple(_of_rows(function, ours, theirs) for ours, theirs in by_layer)
+
+
+def _of_rows(function: str, first: Sequence[Flat], second: Sequence[Flat]) -> Flat:
+    """Combine all of the first row; for a difference, its union and that of the second row."""
     if function in ("union", "intersection"):
-        return reduce(lambda a, b: _by_layer(function, a, b, place), first)
-    a, b = (tuple(map(_joined, zip(*row, strict=True))) for row in (first, second))
-    return _by_layer(function, a, b, place)
+        return reduce(lambda a, b: _combined(function, a, b), first)
+    return _combined(function, _joined(first), _joined(second))
 
 
-def _by_layer(function: str, a: CadLayers, b: CadLayers, place: str) -> CadLayers:
-    return tuple(_combined(function, one, two, place) for one, two in zip(a, b, strict=True))
-
-
-def _layers(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
-    function = operation.need("function", place, str)
-    stack = design.parent(operation, place)
-    rows = [
-        [stack[index] for index in design.layer_indices(operation, key, place)]
+def _layers(design: CadDesign, operation: CadRecord) -> CadLayers:
+    stack = design.parent(operation)
+    first, second = (
+        [stack[design.numbers[link]] for link in operation.get(key) or ()]
         for key in ("unary_layer_links", "pair_layer_links")
-    ]
-    output = design.layer_indices(operation, "output_layer_links", place)
-    if function in ("union", "intersection"):
-        rows = rows[:1]
-    if not all(rows):
-        raise DesignError(f"{place} takes no layer; save the design again")
-    if len(rows) == 1:
-        flat = reduce(lambda a, b: _combined(function, a, b, place), rows[0])
-    else:
-        flat = _combined(function, _joined(rows[0]), _joined(rows[1]), place)
-    return design.spread(dict.fromkeys(output, flat))
+    )
+    flat = _of_rows(operation["function"], first, second)
+    return design.on_layers(flat, operation, "output_layer_links")
 
 
-def _values(operation: CadRecord, place: str) -> tuple[float, int]:
-    """A distance in mm, and popupCAD's number of chords per quarter circle."""
-    values = [_number(v, place) for v in operation.need("values", place, (list, tuple))]
-    if len(values) != 2:
-        raise DesignError(f"{place} has {len(values)} values and not two; save the design again")
-    return values[0], max(1, int(values[1]))
-
-
-def _widened(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
-    distance, chords = _values(operation, place)
+def _widened(design: CadDesign, operation: CadRecord) -> CadLayers:
+    distance, chords = map(_number, operation["values"])
+    chords = max(1, int(chords))
     sagitta = abs(distance) * (1 - math.cos(math.pi / 4 / chords))
-    design.remarks[
-        f"{place}: true arcs, where popupCAD lays {chords} chords in a quarter of a circle, up to "
+    design.remark(
+        f": true arcs, where popupCAD lays {chords} chords in a quarter of a circle, up to "
         f"{sagitta:.2g} mm inside them"
-    ] = None
-    return tuple(_offset(flat, distance) for flat in design.parent(operation, place))
+    )
+    return tuple(_offset(flat, distance) for flat in design.parent(operation))
 
 
-def _cleaned(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
-    distance, _ = _values(operation, place)
-    stack = design.parent(operation, place)
+def _cleaned(design: CadDesign, operation: CadRecord) -> CadLayers:
+    distance, _ = map(_number, operation["values"])
+    stack = design.parent(operation)
     for step in (-distance, 2 * distance, -distance):
         stack = tuple(_offset(flat, step) for flat in stack)
     return stack
 
 
-def _shifted(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
-    stack = design.parent(operation, place)
-    if operation.values.get("flip"):
-        stack = stack[::-1]
-    shift = operation.need("shift", place, int)
-    if operation.values.get("rotate"):
-        # Rotate a list by ``shift``; a shift beyond its length changes nothing.
-        order = [*range(len(stack))]
-        return design.spread(dict(zip(order[shift:] + order[:shift], stack, strict=False)))
-    return _moved(design, stack, shift)
+def _shifted(design: CadDesign, operation: CadRecord) -> CadLayers:
+    stack = design.parent(operation)
+    if not operation.get("rotate"):
+        return _moved(design, operation, stack)
+    # Rotate a list by ``shift``; a shift beyond its length changes nothing.
+    order, shift = [*range(len(stack))], int(operation["shift"])
+    flipped = stack[::-1] if operation.get("flip") else stack
+    return design.spread(dict(zip(order[shift:] + order[:shift], flipped, strict=False)))
 
 
-def _moved(design: CadDesign, stack: CadLayers, shift: int) -> CadLayers:
-    """Move a stack up or down by a number of layers; layers that end up outside are dropped."""
-    return design.spread({number + shift: flat for number, flat in enumerate(stack)})
+def _moved(design: CadDesign, operation: CadRecord, stack: CadLayers) -> CadLayers:
+    """Turn a stack over and move it up or down by layers, as the operation says."""
+    shift = int(operation["shift"])
+    flipped = stack[::-1] if operation.get("flip") else stack
+    return design.spread({number + shift: flat for number, flat in enumerate(flipped)})
 
 
-def _transformed(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
-    stack = design.parent(operation, place, "from")
-    source = design.linked_sketch(operation, "sketch_from", place)
-    return _placed(design, operation, place, stack, source)
+def _transformed(design: CadDesign, operation: CadRecord) -> CadLayers:
+    source = design.linked_sketch(operation, "sketch_from")
+    return _placed(design, operation, design.parent(operation, "from"), source)
 
 
-def _placed_design(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
-    identity = _first(operation.links("design_links", "subdesign", place))
-    part = design.subdesigns.get(identity) if _is_id(identity) else None
-    if not isinstance(part, CadRecord) or design.depth >= DEEPEST:
-        raise DesignError(f"{place} takes a design that is not there; save the design again")
-    if identity not in design.placed:
-        name = part.values.get("_basename", identity)
-        design.placed[identity] = _design(part, f"{place}, design {name}", design.depth + 1)
-    part_design = design.placed[identity]
-    index = part_design.index_of(operation.need("subopref", place), place)
-    stack = part_design.stack(index)
-    design.remarks.update(part_design.remarks)
-    source = part_design.sketch(operation.values.get("sub_sketch_id"), place)
-    return _placed(design, operation, place, stack, source)
+def _placed_design(design: CadDesign, operation: CadRecord) -> CadLayers:
+    identity = operation["design_links"]["subdesign"][0]
+    root = (design.root.get("subdesigns") or {}).get(identity)
+    if root is None or design.depth >= DEEPEST:
+        raise DesignError("takes a design that is not there; save the design again")
+    part = CadDesign(root, f", design {root.get('_basename') or identity}", design.depth + 1)
+    stack = part.stack(part.index_of(operation["subopref"]))
+    for remark in part.remarks:
+        design.remark(remark)
+    return _placed(design, operation, stack, part.sketch(operation["sub_sketch_id"]))
 
 
-def _placed(
-    design: CadDesign,
-    operation: CadRecord,
-    place: str,
-    stack: CadLayers,
-    source: Sequence[tuple[str, Any]],
-) -> CadLayers:
+def _placed(design: CadDesign, operation: CadRecord, stack: CadLayers, source: Sketch) -> CadLayers:
     """Copy a stack from the first shape of a sketch to each shape of another one."""
-    targets = design.linked_sketch(operation, "sketch_to", place)
-    if not source:
-        raise DesignError(f"{place} is laid from a sketch without a line; save the design again")
     first = _two_points(*source[0])
     copies = []
-    for where, shape in targets:
-        if isinstance(shape, CadRecord) and shape.kind.startswith("DrawnPoint"):
-            design.remarks[f"{where}: a point has no direction; nothing is laid there"] = None
-            continue
-        copies.append(_similar(operation, first, _two_points(where, shape), place, stack))
+    for place, shape in design.linked_sketch(operation, "sketch_to"):
+        if _is_point(shape):
+            design.remark(f"{place}: a point has no direction; nothing is laid there")
+        else:
+            copies.append(_similar(operation, first, _two_points(place, shape), stack))
     laid = tuple(_joined(flats) for flats in zip(*copies, strict=True)) or design.spread({})
-    shift = operation.need("shift", place, int)
-    return _moved(design, laid[::-1] if operation.values.get("flip") else laid, shift)
+    return _moved(design, operation, laid)
 
 
-def _two_points(place: str, shape: Any) -> tuple[Point, Point]:
-    points = _points(shape.need("exterior", place), place) if isinstance(shape, CadRecord) else []
-    if len(points) < 2:
-        raise DesignError(f"{place} is no line to lay a design by; draw one")
-    return points[0], points[1]
+def _two_points(place: str, shape: CadRecord) -> Sequence[Point]:
+    with _at(place):
+        points = _points(shape["exterior"])
+        if len(points) < 2:
+            raise DesignError("is no line to lay a design by; draw one")
+    return points[:2]
 
 
 def _similar(
-    operation: CadRecord,
-    first: tuple[Point, Point],
-    second: tuple[Point, Point],
-    place: str,
-    stack: CadLayers,
+    operation: CadRecord, first: Sequence[Point], second: Sequence[Point], stack: CadLayers
 ) -> CadLayers:
     """Move, rotate and scale a stack so that one line maps to another."""
     ratio = math.dist(*second) / math.dist(*first)
     along, across = (
-        _number(operation.values.get(f"scale{axis}"), place)
-        if operation.values.get(f"transformtype_{axis}") == "custom"
+        _number(operation[f"scale{axis}"])
+        if operation.get(f"transformtype_{axis}") == "custom"
         else ratio
         for axis in "xy"
     )
     is_even = math.isclose(abs(along), abs(across), rel_tol=1e-9)
-    if not along * across or (not is_even and any(map(_has_arcs, stack))):
+    has_arcs = any(not isinstance(edge, Line) for flat in stack for edge in flat.region.edges)
+    if not along * across or (has_arcs and not is_even):
         raise DesignError(
-            f"{place} scales arcs by {along:g} along its line and {across:g} across it, and "
-            "ellipses are not read; give both the same scale"
+            f"scales arcs by {along:g} along its line and {across:g} across it, and ellipses are "
+            "not read; give both the same scale"
         )
     start, end = complex(*first[0]), complex(*second[0])
-    ours, theirs = (complex(b[0] - a[0], b[1] - a[1]) for a, b in (first, second))
+    ours, theirs = complex(*first[1]) - start, complex(*second[1]) - end
 
     def point(p: Point) -> Point:
         step = (complex(*p) - start) * abs(ours) / ours
@@ -560,10 +509,6 @@ def _similar(
     )
 
 
-def _has_arcs(flat: Flat) -> bool:
-    return not all(isinstance(edge, Line) for edge in flat.region.edges)
-
-
 def _stretched(region: Region, point: Callable[[Point], Point]) -> Region:
     """A region of straight edges under an affine map, given by its effect on points."""
     rings = [polygon([point(edge.start) for edge in c.edges]) for c in region.outers]
@@ -571,24 +516,18 @@ def _stretched(region: Region, point: Callable[[Point], Point]) -> Region:
     return union(rings) - union(holes)
 
 
-def _frozen(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
+def _frozen(design: CadDesign, operation: CadRecord) -> CadLayers:
     """The saved result of a frozen operation."""
-    generic = operation.values.get("generic")
-    geoms = generic.values.get("geoms") if isinstance(generic, CadRecord) else generic
-    if not isinstance(geoms, dict):
-        raise DesignError(f"{place} holds no layers; freeze it again")
+    geometry = operation["generic"]
     flats = {}
-    for material, shapes in geoms.items():
-        identity = material.values.get("id") if isinstance(material, CadRecord) else None
-        if identity not in design.layer_numbers or not isinstance(shapes, list):
-            raise DesignError(f"{place} has a layer that is not there; freeze it again")
-        number = design.layer_numbers[identity]
-        where = f"{place}, layer {number + 1}, shape"
-        flats[number] = _joined(_shape(s, f"{where} {n}") for n, s in enumerate(shapes, 1))
+    for material, shapes in getattr(geometry, "values", {}).get("geoms", geometry).items():
+        number = design.numbers[material["id"]]
+        places = (f", layer {number + 1}, shape {n}" for n in range(1, len(shapes) + 1))
+        flats[number] = _drawn([*zip(places, shapes, strict=True)])
     return design.spread(flats)
 
 
-OPERATIONS: Mapping[str, Callable[[CadDesign, CadRecord, str], CadLayers]] = {
+OPERATIONS: Mapping[str, Callable[[CadDesign, CadRecord], CadLayers]] = {
     "SimpleSketchOp": _sketched,
     "LaminateOperation2": _laminates,
     "LayerOp2": _layers,
@@ -602,40 +541,12 @@ OPERATIONS: Mapping[str, Callable[[CadDesign, CadRecord, str], CadLayers]] = {
 """The supported operations, by class name."""
 
 
-def _design(root: Any, place: str, depth: int = 0) -> CadDesign:
-    if not isinstance(root, CadRecord) or root.kind != "Design":
-        raise DesignError(f"{place} holds no design of popupCAD; save it again")
-    definition = root.values.get("_layerdef") or root.values.get("_Design__layerdef")
-    rows = definition.values.get("layers") if isinstance(definition, CadRecord) else None
-    if not isinstance(rows, list) or not all(isinstance(row, CadRecord) for row in rows):
-        raise DesignError(f"{place} has no list of layers; save it again")
-    operations = root.need("operations", place, list)
-    if not all(isinstance(operation, CadRecord) for operation in operations):
-        raise DesignError(f"{place} has an operation that is no object; save it again")
-    subdesigns = root.values.get("subdesigns")
-    return CadDesign(
-        place,
-        tuple(_layer(row) for row in rows),
-        {row.need("id", place, (int, str)): index for index, row in enumerate(rows)},
-        root.need("sketches", place, dict),
-        operations,
-        subdesigns if isinstance(subdesigns, dict) else {},
-        depth,
-    )
-
-
-def _layer(row: CadRecord) -> CadLayer:
-    thickness = row.values.get("thickness")
-    is_number = isinstance(thickness, int | float) and not isinstance(thickness, bool)
-    return CadLayer(str(row.values.get("name") or row.kind), thickness if is_number else None)
-
-
 # A layer of an operation, as a table row names it.
 
 
 @lru_cache(maxsize=4)
 def _read(path: Path, text: str) -> CadDesign:
-    return _design(_records(path, text), path.name)
+    return CadDesign(_records(path, text), path.name)
 
 
 def cad_design(path: Path) -> CadDesign:
@@ -657,30 +568,30 @@ def cad_layer(path: Path, layer: str) -> tuple[Region, list[str]]:
         raise DesignError(
             f"{path.name} has no layer {shown(number)}; its layers are 1 to {count}, bottom to top"
         )
-    flat, there = design.stack(index)[int(number) - 1], design.layers[int(number) - 1]
-    where = f"{design.named(index)}, layer {number}"
+    flat, film = design.stack(index)[int(number) - 1], design.layers[int(number) - 1]
+    where = f"{design.places[index]}, layer {number}"
     remarks = [*design.remarks]
-    loose = len(_cut(flat.lines, flat.region, False)), len(_sifted(flat.points, flat.region, False))
-    if any(loose):
-        remarks.append(f"{where}: {loose[0]} lines and {loose[1]} points have no area, and no cut")
+    loose = _within(flat, flat.region, False)
+    if loose.lines or loose.points:
+        counts = f"{len(loose.lines)} lines and {len(loose.points)} points"
+        remarks.append(f"{where}: {counts} have no area, and no cut")
     if flat.region.is_empty:
         raise DesignError(f"{where} holds no area; leave its row out")
     touch = crossing(flat.region.edges)
     if touch is not None:
-        x, y = touch
         raise DesignError(
-            f"{where} has contours that touch at x {x:.4f}, y {y:.4f}; draw them apart there, or "
-            "join them"
+            f"{where} has contours that touch at x {touch[0]:.4f}, y {touch[1]:.4f}; draw them "
+            "apart there, or join them"
         )
-    thickness = "" if there.thickness is None else f", {there.thickness:g} mm"
-    remarks.append(
-        f"{where}: {there.material}{thickness} there; the table and the kit say its film"
-    )
+    thickness = film.get("thickness")
+    thick = f", {thickness:g} mm" if isinstance(thickness, int | float) else ""
+    material = film.get("name") or film.kind
+    remarks.append(f"{where}: {material}{thick} there; the table and the kit say its film")
     return flat.region, remarks
 
 
 def _operation(design: CadDesign, name: str, layer: str) -> int:
-    names = [operation.values.get("customname") for operation in design.operations]
+    names = [operation.get("customname") for operation in design.operations]
     if name.isdecimal() and 1 <= int(name) <= len(names):
         return int(name) - 1
     if not name or names.count(name) != 1:
@@ -695,18 +606,17 @@ def refuse_alone(path: Path) -> NoReturn:
     """Refuse a design that is imported without a table of its layers."""
     design = cad_design(path)
     unread = [
-        f"{index + 1} ({operation.kind})"
-        for index, operation in enumerate(design.operations)
+        f"{number} ({operation.kind})"
+        for number, operation in enumerate(design.operations, 1)
         if operation.kind not in OPERATIONS
     ]
     last = next((n for n in range(len(design.operations), 0, -1) if _is_read(design, n - 1)), None)
-    which = "OPERATION" if last is None else f"{last}"
     of = "" if last is None else f" for operation {last}, the last that rests on what is read"
     more = "" if len(unread) <= MOST_NAMED else f" and {len(unread) - MOST_NAMED} more"
     strange = f"; operations that are not read: {', '.join(unread[:MOST_NAMED])}{more}"
     raise DesignError(
         f"{path} holds {len(design.layers)} layers and not what they are for; write {LAYERS} "
-        f'beside it, with a row "{path.name},ROLE,{which}/NUMBER" a layer under '
+        f'beside it, with a row "{path.name},ROLE,{last or "OPERATION"}/NUMBER" a layer under '
         f'"file,role,layer"{of}, and import the folder{strange if unread else ""}'
     )
 

@@ -10,12 +10,16 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab.actuators import build, load_design
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
+from sbafab.geometry.region import Region, polygon, union
 from sbafab.laminate.laminate import Laminate
+
+if TYPE_CHECKING:
+    import shapely
 
 LAYERS = "layers.csv"
 """The table of layers in a folder of drawings."""
@@ -69,16 +73,6 @@ def _inline(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def not_json(path: Path, error: ValueError | RecursionError) -> DesignError:
-    """Return the error of a file that is not valid JSON, with the line and column at fault."""
-    where = "its lists and objects are nested too deep"
-    if isinstance(error, json.JSONDecodeError):
-        where = f"line {error.lineno} column {error.colno}: {error.msg.lower()}"
-    elif isinstance(error, ValueError):
-        where = "a number in it is too long"
-    return DesignError(f"{path} is not valid JSON: {where}; correct it, or save it again")
-
-
 def file_name(text: str, fallback: str = "import") -> str:
     """Return a text as a design's name: letters, digits, dot, dash and underscore, up to 64."""
     name = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-._")[:64]
@@ -123,6 +117,19 @@ def read_text(path: Path, most_bytes: int) -> str:
     return text
 
 
+def json_of(path: Path, text: str) -> Any:
+    """Return the content of a JSON file's text. Raises DesignError with the place at fault."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno} column {error.colno}: {error.msg.lower()}"
+    except RecursionError:
+        where = "its lists and objects are nested too deep"
+    except ValueError:
+        where = "a number in it is too long"
+    raise DesignError(f"{path} is not valid JSON: {where}; correct it, or save it again")
+
+
 def yaml_of(path: Path) -> Any:
     """Return PyYAML. Raises DesignError if the extra is not installed."""
     try:
@@ -142,6 +149,15 @@ def loaded(path: Path, text: str, loader: Any, what: str) -> Any:
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         line = " ".join(str(error).split())
         raise DesignError(f"{path} is no YAML of {what}: {line}; save it again") from None
+
+
+def region_of(drawn: shapely.Polygon) -> Region:
+    """Return a polygon of shapely as a region."""
+    outer, *holes = (
+        polygon([(float(x), float(y)) for x, y, *_ in ring.coords[:-1]])
+        for ring in (drawn.exterior, *drawn.interiors)
+    )
+    return outer - union(holes)
 
 
 # Out: all or nothing, never over an existing file.

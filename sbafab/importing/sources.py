@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +12,7 @@ from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
 from sbafab.importing.layer_table import MOST_OF_POLYGONS, import_table, refuse_without_table
 from sbafab.importing.parchmint import import_parchmint
 from sbafab.importing.popupcad import SUFFIX, refuse_alone
-from sbafab.importing.records import LAYERS, Imported, not_json, read_text
+from sbafab.importing.records import LAYERS, Imported, json_of, read_text
 
 
 class SourceFormat(NamedTuple):
@@ -32,19 +31,11 @@ def import_source(source: Path) -> tuple[str, Imported]:
         if entry.matches(source):
             return entry.name, entry.read(source)
     if source.suffix.lower() == ".json":
-        _refuse_broken_json(source)
+        json_of(source, read_text(source, MOST_OF_POLYGONS))
     what = "folder" if source.is_dir() else "file"
     raise DesignError(
         f"{source} is a {what} of no format that is imported: " + "; ".join(f.name for f in FORMATS)
     )
-
-
-def _refuse_broken_json(source: Path) -> None:
-    """Raises DesignError if the file is not valid JSON."""
-    try:
-        json.loads(read_text(source, MOST_OF_POLYGONS))
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise not_json(source, error) from None
 
 
 def _holds(mark: str) -> Callable[[Path], bool]:

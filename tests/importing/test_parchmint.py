@@ -244,7 +244,7 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any], Any], None], object, str]] = 
     "text": (
         at("components", 0, "x-span"),
         "wide",
-        "components[0].x-span is 'wide', which is no n",
+        "components.0.x-span = 'wide' must be a number",
     ),
     "unrouted": (
         at("connections", 2, "paths"),
@@ -255,7 +255,7 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any], Any], None], object, str]] = 
     "no point": (
         at("connections", 0, "paths", 0, "wayPoints", 1),
         [3],
-        "connections[0].paths[0].wayPoints[1] is no point of two numbers",
+        "connections.0.paths.0.wayPoints.1 is a list without value 2",
     ),
 }
 

@@ -404,7 +404,7 @@ UNREAD: dict[str, tuple[list[str], str]] = {
     "a sketch": ([drawn(1, 77)], "operation 1 (SimpleSketchOp) takes a sketch that is not there"),
     "no list": (
         [drawn(1, 1).replace("sketch: [1]", "sketch: 1")],
-        "operation 1 (SimpleSketchOp) has no list of sketch in sketch_links",
+        "operation 1 (SimpleSketchOp) is damaged; save the design again",
     ),
     "a crossing": ([drawn(1, 32)], "sketch bow, shape 1 is a polygon with Self-intersection[2 2]"),
     "a touch": (
