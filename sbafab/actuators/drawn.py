@@ -24,9 +24,9 @@ from sbafab.actuators.shapes import (
 from sbafab.actuators.stacking import CutFilm, channel_pin, layers
 from sbafab.design.files import hint, shown
 from sbafab.design.outline import read_drawing
+from sbafab.design.polylines import polyline
 from sbafab.design.records import Design, Drawn, Form, Free, Mechanism, MechanismKind, Wrap, card
 from sbafab.design.sections import NAME_PATTERN
-from sbafab.design.strands import polyline
 from sbafab.design.toml_table import Section, writable
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError, SbafabError

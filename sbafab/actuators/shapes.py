@@ -16,7 +16,7 @@ from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
 from sbafab.design.files import hint, shown
 from sbafab.design.outline import read_drawing, refuse_crossings
-from sbafab.design.strands import Strand, polyline
+from sbafab.design.polylines import Polyline, polyline
 from sbafab.design.toml_table import Section
 from sbafab.design.units import LONGEST, Length, Millimetres
 from sbafab.errors import DesignError
@@ -270,7 +270,7 @@ def marks_of(vertices: Sequence[tuple[float, ...]]) -> list[Mark]:
     return marks
 
 
-def _simple_loop(key: str, vertices: Sequence[Mark]) -> Strand:
+def _simple_loop(key: str, vertices: Sequence[Mark]) -> Polyline:
     """Return the closed loop through x, y and bulge of each corner. Raises DesignError."""
     corners = [(x, y) for x, y, _ in vertices]
     if any(start == end for start, end in pairwise([*corners, corners[0]])):

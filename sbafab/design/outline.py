@@ -1,25 +1,25 @@
 """Drawings of the user: the outline of a pocket, or the contours of whole layers.
 
-A DXF or SVG file holds strands, chains of edges, whose ends make loops. All coordinates are mm.
+A DXF or SVG file holds polylines, chains of edges, whose ends make loops. All coordinates are mm.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from sbafab.design.files import listed, shown
 from sbafab.design.laminate_file import read_laminate
-from sbafab.design.outline_svg import svg_strands
-from sbafab.design.strands import (
+from sbafab.design.outline_dxf import dxf_polylines
+from sbafab.design.outline_svg import svg_polylines
+from sbafab.design.polylines import (
     JOIN,
-    MOST_OF_ENTITY,
-    Strand,
-    Traced,
+    MOST_EDGES,
+    Polyline,
     counted,
-    dxf_strands,
     is_closed,
     joined,
     sealed,
@@ -29,15 +29,12 @@ from sbafab.errors import DesignError
 from sbafab.geometry.arcs import FitError
 from sbafab.geometry.arrangement import split_edges
 from sbafab.geometry.contour import Contour, in_reading_order, tidy
-from sbafab.geometry.edges import EPSILON, Point, meeting_points
+from sbafab.geometry.edges import EPSILON, Point, box_round, meeting_points
 from sbafab.geometry.region import Region, centroid
 from sbafab.geometry.spatial_index import close_pairs
 
-if TYPE_CHECKING:
-    pass
-
-
 MOST_BYTES = 2_000_000
+MOST_OUTLINE_EDGES = 500
 LARGEST = 150.0
 SMALLEST = 1.0
 """Bounds of the outline's extent, in mm."""
@@ -74,47 +71,71 @@ def understood(path: Path) -> Outline:
 @lru_cache(maxsize=4)
 def _understood(path: Path, content: bytes) -> Outline:
     """The outline of a file with this content; cached, as a run needs it more than once."""
-    strands, scale = traced(path)
-    region, moved = _on_its_axis(_checked(sealed(_one_loop(list(counted(strands))))))
+    polylines, scale = _traced(path)
+    loops = closed_loops(list(counted(polylines, MOST_OUTLINE_EDGES)))
+    if len(loops) > 1:
+        raise DesignError(f"holds {len(loops)} closed paths; keep only the pocket's outline")
+    region = _inside(sealed(loops[0]))
+    shift = ""
+    if not _surrounds(region, (0.0, 0.0)):
+        x, y = centroid(region)
+        if not _surrounds(region, (x, y)):
+            raise DesignError(
+                "has its centroid outside itself, so the chamber's axis has no place; draw it "
+                "round (0, 0)"
+            )
+        # The printed shift is the one applied.
+        region, shift = region.moved(-round(x, 6), -round(y, 6)), ", centred on its centroid"
     low_x, low_y, high_x, high_y = region.bounds
     size = f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
     # Without the file's name: the design is the same wherever its drawing is stored.
-    return Outline(region, f"drawn outline: {size}, {scale}{moved}")
+    return Outline(region, f"drawn outline: {size}, {scale}{shift}")
 
 
 def content(path: Path) -> bytes:
     """Return the content of a drawing. Raises DesignError if it cannot be read, or is too large."""
     try:
-        is_file = path.is_file()
-        size = path.stat().st_size if is_file else 0
-        text = path.read_bytes() if is_file and size <= MOST_BYTES else b""
+        if not path.is_file():
+            raise DesignError("does not exist as a file; check its path")
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise DesignError(f"has {size:,} bytes, where at most {MOST_BYTES:,} are allowed")
+        return path.read_bytes()
+    except DesignError:
+        raise
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise DesignError(f"cannot be read ({reason}); check its path") from None
-    if not is_file:
-        raise DesignError("does not exist as a file; check its path")
-    if size > MOST_BYTES:
-        raise DesignError(f"has {size:,} bytes, where at most {MOST_BYTES:,} are allowed")
-    return text
 
 
-def traced(path: Path, layer: str | None = None, is_plot: bool = False) -> Traced:
-    """Return the strands of a DXF or SVG file, or of one of its layers. Raises DesignError.
+def _traced(
+    path: Path, layer: str | None = None, is_plot: bool = False
+) -> tuple[Iterator[Polyline], str]:
+    """Return the polylines of a DXF or SVG file, or of one of its layers, and its unit as text.
 
     ``is_plot``: layers of a DXF file that are not plotted count only if named.
     """
     # Each reader loads its own library, only for the format needed.
     if path.suffix.lower() == ".dxf":
-        return dxf_strands(path, layer, is_plot)
+        return dxf_polylines(path, layer, is_plot)
     if path.suffix.lower() == ".svg":
-        return svg_strands(path, layer)
+        return svg_polylines(path, layer)
     raise DesignError("is neither .dxf nor .svg; export it as one of them")
 
 
-def closed_loops(strands: list[Strand]) -> list[Strand]:
-    """Return the loops that strands close to. Raises DesignError if one is open or doubled."""
-    _refuse_doubles(strands)
-    loops, opens = joined(strands)
+def closed_loops(polylines: list[Polyline]) -> list[Polyline]:
+    """Return the loops that polylines close to. Raises DesignError if one is open or doubled."""
+    drawn = set()
+    for edge in (edge for chain in polylines for edge in chain):
+        x, y = edge.at(0.5)
+        ends = sorted((round(px, 4), round(py, 4)) for px, py in (edge.start, edge.end))
+        key = (*ends, round(x, 4), round(y, 4))
+        if key in drawn:
+            raise DesignError(
+                f"draws an edge twice, at x {x:.4f}, y {y:.4f}; delete one of the two"
+            )
+        drawn.add(key)
+    loops, opens = joined(polylines)
     if opens:
         gap, (x, y) = widest_gap(opens)
         raise DesignError(
@@ -128,65 +149,28 @@ def closed_loops(strands: list[Strand]) -> list[Strand]:
     return loops
 
 
-def _one_loop(strands: list[Strand]) -> Strand:
-    loops = closed_loops(strands)
-    if len(loops) > 1:
-        raise DesignError(f"holds {len(loops)} closed paths; keep only the pocket's outline")
-    return loops[0]
-
-
-def _refuse_doubles(strands: list[Strand]) -> None:
-    drawn = set()
-    for strand in strands:
-        for edge in strand:
-            x, y = edge.at(0.5)
-            ends = sorted((round(px, 4), round(py, 4)) for px, py in (edge.start, edge.end))
-            key = (*ends, round(x, 4), round(y, 4))
-            if key in drawn:
-                raise DesignError(
-                    f"draws an edge twice, at x {x:.4f}, y {y:.4f}; delete one of the two"
-                )
-            drawn.add(key)
-
-
-def _checked(loop: Strand) -> Region:
+def _inside(loop: Polyline) -> Region:
     """The region inside a loop, if it is a simple one of sensible size."""
-    if not loop:
-        raise DesignError("encloses no area; draw the outline of a pocket")
-    low_x, low_y, high_x, high_y = Contour(loop).bounds
-    width, height = high_x - low_x, high_y - low_y
-    if max(width, height) > LARGEST or min(width, height) < SMALLEST:
-        raise DesignError(
-            f"measures {width:.4g} x {height:.4g} mm, where {SMALLEST:g} to {LARGEST:g} is "
-            "allowed; check its units"
-        )
-    refuse_crossings(loop)
-    contour = tidy(loop)
+    if loop:
+        low_x, low_y, high_x, high_y = Contour(loop).bounds
+        width, height = high_x - low_x, high_y - low_y
+        if max(width, height) > LARGEST or min(width, height) < SMALLEST:
+            raise DesignError(
+                f"measures {width:.4g} x {height:.4g} mm, where {SMALLEST:g} to {LARGEST:g} is "
+                "allowed; check its units"
+            )
+        refuse_crossings(loop)
+    contour = tidy(loop) if loop else None
     if contour is None:
         raise DesignError("encloses no area; draw the outline of a pocket")
     return Region((contour.reversed() if contour.is_hole else contour,))
-
-
-def _on_its_axis(region: Region) -> tuple[Region, str]:
-    """The region around the chamber's axis at (0, 0), and the description of its shift."""
-    if _surrounds(region, (0.0, 0.0)):
-        return region, ""
-    x, y = centroid(region)
-    if not _surrounds(region, (x, y)):
-        raise DesignError(
-            "has its centroid outside itself, so the chamber's axis has no place; draw it round "
-            "(0, 0)"
-        )
-    # The printed shift is the one applied.
-    x, y = round(x, 6), round(y, 6)
-    return region.moved(-x, -y), ", centred on its centroid"
 
 
 def _surrounds(region: Region, p: Point) -> bool:
     return region.contains(p) and region.distance_to_edge(p) >= EPSILON
 
 
-def refuse_crossings(loop: Strand) -> None:
+def refuse_crossings(loop: Polyline) -> None:
     """Raises DesignError if a closed loop crosses or touches itself."""
     p = crossing(loop)
     if p is not None:
@@ -195,7 +179,7 @@ def refuse_crossings(loop: Strand) -> None:
         )
 
 
-def crossing(loop: Strand) -> Point | None:
+def crossing(loop: Polyline) -> Point | None:
     """Return a place where edges of closed loops cross or touch, except at shared ends."""
     # A tangle is reported at its first crossing: there may be one for every two edges.
     for i, j in close_pairs([edge.bounds for edge in loop], EPSILON):
@@ -243,12 +227,16 @@ def read_drawing(path: Path, layer: str | None = None) -> Region:
 @lru_cache(maxsize=64)
 def _drawn(path: Path, content: bytes, layer: str | None) -> Region:
     """The region of a file with this content; cached, as a run needs it more than once."""
-    strands = list(counted(traced(path, layer, is_plot=True).strands, MOST_OF_ENTITY))
-    loops = [sealed(loop) for loop in closed_loops(strands)]
+    polylines, _ = _traced(path, layer, is_plot=True)
+    loops = [sealed(loop) for loop in closed_loops(list(counted(polylines, MOST_EDGES)))]
     for loop in loops:
         refuse_crossings(loop)
-    if len(loops) > 1:
-        _refuse_meetings(loops)
+    p = crossing(tuple(edge for loop in loops for edge in loop)) if len(loops) > 1 else None
+    if p is not None:
+        raise DesignError(
+            f"has contours that cross or touch each other at x {p[0]:.4f}, y {p[1]:.4f}; draw them "
+            "apart, or join them"
+        )
     contours = []
     for loop in loops:
         contour = tidy(loop)
@@ -258,26 +246,13 @@ def _drawn(path: Path, content: bytes, layer: str | None) -> Region:
                 f"has a contour without area at x {x:.4f}, y {y:.4f}; delete it, or check the units"
             )
         contours.append(contour)
-    _refuse_extent(contours)
-    return nested(contours)
-
-
-def _refuse_meetings(loops: list[Strand]) -> None:
-    p = crossing(tuple(edge for loop in loops for edge in loop))
-    if p is not None:
-        raise DesignError(
-            f"has contours that cross or touch each other at x {p[0]:.4f}, y {p[1]:.4f}; draw them "
-            "apart, or join them"
-        )
-
-
-def _refuse_extent(contours: list[Contour]) -> None:
-    low_x, low_y, high_x, high_y = Region(tuple(contours)).bounds
+    low_x, low_y, high_x, high_y = box_round([contour.bounds for contour in contours])
     if max(high_x - low_x, high_y - low_y) > LARGEST_DRAWING:
         raise DesignError(
             f"measures {high_x - low_x:.4g} x {high_y - low_y:.4g} mm, where at most "
             f"{LARGEST_DRAWING:g} is allowed; check its units"
         )
+    return nested(contours)
 
 
 def nested(contours: list[Contour]) -> Region:
@@ -316,6 +291,3 @@ def _profile(path: Path, content: bytes, layer: str | None) -> Region:
     if layer not in profiles:
         raise DesignError(f"has no pattern {shown(layer)}; there are {listed(profiles)}")
     return profiles[layer]
-
-
-# The strands of a DXF drawing: what its model space holds, in mm.

@@ -1,4 +1,4 @@
-"""The strands of a plain SVG drawing, in mm and with y upward.
+"""The polylines of a plain SVG drawing, in mm and with y upward.
 
 Paths and basic shapes are read, in groups, with their transforms. Elements, attributes and styles
 that do not change a shape are listed here; a drawing with any other is refused.
@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 from xml.etree import ElementTree
 
-from sbafab.design.strands import Strand, Traced, nothing_on, place, refuse_more_than_limit
+from sbafab.design.polylines import Polyline, nothing_on, place, refuse_more_than_limit
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import bezier, elliptical_arc, fit_arcs
 from sbafab.geometry.edges import EPSILON, Edge, Line, Point
-
-if TYPE_CHECKING:
-    from svgelements import Matrix
 
 PLAIN = (
     "save it as plain SVG: paths and basic shapes in groups, numbers without units, clones "
@@ -33,8 +30,9 @@ NUMBER = r"(?>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _NUMBER = re.compile(NUMBER, re.ASCII)
 
 
-def svg_strands(path: Path, layer: str | None = None) -> Traced:
-    """Return every path and basic shape that is drawn, transforms applied. Raises DesignError.
+def svg_polylines(path: Path, layer: str | None = None) -> tuple[Iterator[Polyline], str]:
+    """Return every path and basic shape that is drawn, transforms applied, and the size of its unit
+    as text. Raises DesignError.
 
     Only shapes in the group with the label or id ``layer`` count if it is given.
 
@@ -44,8 +42,8 @@ def svg_strands(path: Path, layer: str | None = None) -> Traced:
     root = _root(path)
     if layer is not None:
         _keep_layer(root, layer)
-    page = page_of(root)
-    return Traced(_strands(list(_drawn(root)), page.scale), page.description)
+    scale, words = _unit(root)
+    return _polylines(list(_drawn(root)), scale), words
 
 
 # Numbers, paths and transforms as SVG 2 writes them: the library reads damaged ones in its own way.
@@ -115,40 +113,21 @@ _PAGE_SIZE = re.compile(rf"({NUMBER})(mm|cm|in|pt|pc|px|%|)", re.ASCII)
 _FIT = re.compile(r"x(?:Min|Mid|Max)Y(?:Min|Mid|Max)(?:\s+meet)?", re.ASCII)
 
 
-class Page(NamedTuple):
-    """``scale``: mm per user unit; ``physical``: the page has a size in mm, cm or the like."""
-
-    scale: float
-    physical: bool
-
-    @property
-    def description(self) -> str:
-        """Size of a unit as text."""
-        if not self.physical:
-            return "read at 1 mm a unit, for the page has no size in mm"
-        inch = ", 96 units an inch" if self.scale == MM_PER_PIXEL else ""
-        return f"read at {self.scale:.6g} mm a unit{inch}"
-
-
-def page_of(root: ElementTree.Element) -> Page:
-    """Return the page by width, height and viewBox. Raises DesignError."""
+def _unit(root: ElementTree.Element) -> tuple[float, str]:
+    """Return mm per user unit by width, height and viewBox, and as text. Raises DesignError."""
     if not _FIT.fullmatch(root.get("preserveAspectRatio", "xMidYMid").strip(WHITE)):
         raise DesignError("has a preserveAspectRatio that stretches or crops it; remove that")
-    sizes = {key: _page_size(root, key) for key in ("width", "height")}
+    sizes = [_page_size(root, key) for key in ("width", "height")]
     view = _view(root)
-    units = {unit for _, unit in sizes.values()}
+    units = {unit for _, unit in sizes}
     if not units & set(PER_PIXEL):
-        return Page(1.0, physical=False)
+        return 1.0, "read at 1 mm a unit, for the page has no size in mm"
     if "%" in units:
         raise DesignError("gives only one of width and height in mm; give both")
-    if view is None:
-        return Page(MM_PER_PIXEL, physical=True)
-    ratios = [
-        pixels / span
-        for (pixels, _), span in zip(sizes.values(), view, strict=True)
-        if pixels is not None
-    ]
-    return Page(min(ratios) * MM_PER_PIXEL, physical=True)
+    ratios = [size / span for (size, _), span in zip(sizes, view or (), strict=False) if size]
+    if view is None or min(ratios) == 1:
+        return MM_PER_PIXEL, f"read at {MM_PER_PIXEL:.6g} mm a unit, 96 units an inch"
+    return min(ratios) * MM_PER_PIXEL, f"read at {min(ratios) * MM_PER_PIXEL:.6g} mm a unit"
 
 
 def _page_size(root: ElementTree.Element, key: str) -> tuple[float | None, str]:
@@ -238,13 +217,6 @@ LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 LONGEST_TRANSFORM = 10_000
 
 
-class DrawnShape(NamedTuple):
-    """A shape and its transforms to the drawing's user units, the outermost first."""
-
-    element: ElementTree.Element
-    transform: str
-
-
 def local(element: ElementTree.Element) -> str:
     """Return an element's name without its namespace."""
     return str(element.tag).rpartition("}")[2]
@@ -285,8 +257,8 @@ def _refuse_sheet(text: str) -> None:
         raise DesignError(f"has {what[:40]} in a style sheet; {PLAIN}")
 
 
-def _drawn(root: ElementTree.Element) -> Iterator[DrawnShape]:
-    """Yield the drawn shapes, in order."""
+def _drawn(root: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, str]]:
+    """Yield the drawn shapes in order, each with its transforms, the outermost first."""
     space = root.tag.removesuffix("svg")
     # Outermost last, so that the next one is the last of the list.
     waiting = [(root, "")]
@@ -304,7 +276,7 @@ def _drawn(root: ElementTree.Element) -> Iterator[DrawnShape]:
         if len(outer) > LONGEST_TRANSFORM:
             raise DesignError("has a very long transform; apply it to the path")
         if name in SHAPES:
-            yield DrawnShape(element, outer)
+            yield element, outer
         else:
             waiting += [(inner, outer) for inner in reversed(element)]
 
@@ -334,19 +306,18 @@ def _keep_layer(root: ElementTree.Element, layer: str) -> None:
     groups = [element for element in root.iter() if local(element) in GROUPS]
     named = [group for group in groups if layer in (group.get(LABEL), group.get("id"))]
     if not named:
-        others = sorted({name for group in groups if (name := group.get(LABEL) or group.get("id"))})
-        raise nothing_on(layer, others)
+        names = (group.get(LABEL) or group.get("id") for group in groups)
+        raise nothing_on(layer, filter(None, names))
     holder_of = {child: element for element in root.iter() for child in element}
-    holders = set()
-    for group in named:
-        inner = group
-        while (holder := holder_of.get(inner)) is not None:
-            holders.add(holder)
-            inner = holder
-    for holder in holders.difference(named):
-        for child in list(holder):
-            if child not in holders and child not in named:
-                holder.remove(child)
+    kept = {*named}
+    holders = [*named]
+    for holder in holders:
+        if holder in holder_of:
+            holders.append(holder_of[holder])
+    kept.update(holders)
+    for holder in {*holders}.difference(named):
+        for child in [child for child in holder if child not in kept]:
+            holder.remove(child)
 
 
 # Shapes as strands, by the library.
@@ -355,7 +326,7 @@ def _keep_layer(root: ElementTree.Element, layer: str) -> None:
 SIZES = frozenset({"height", "r", "rx", "ry", "width"})
 
 
-def _strands(drawn: list[DrawnShape], scale: float) -> Iterator[Strand]:
+def _polylines(drawn: list[tuple[ElementTree.Element, str]], scale: float) -> Iterator[Polyline]:
     from svgelements import Matrix
 
     for element, transform in drawn:
@@ -369,7 +340,20 @@ def _strands(drawn: list[DrawnShape], scale: float) -> Iterator[Strand]:
             raise DesignError(
                 f"holds a <{local(element)}> that cannot be read; draw it again"
             ) from None
-        yield from _subpaths(segments, _Placement(matrix, scale))
+
+        def point(p: Any, matrix: Any = matrix) -> Point:
+            x, y = matrix.point_in_matrix_space(p)
+            return place(scale * x, -scale * y)
+
+        edges: list[Edge] = []
+        for segment in segments:
+            if type(segment).__name__ != "Move":
+                edges += _edges(segment, point)
+                refuse_more_than_limit(len(edges))
+            if type(segment).__name__ in ("Move", "Close"):
+                yield tuple(edges)
+                edges = []
+        yield tuple(edges)
 
 
 def _segments(element: ElementTree.Element) -> list[Any]:
@@ -414,34 +398,7 @@ def _path_data(text: str) -> str:
     return _UNLIKE.sub(r"\g<0>l0 0", _sound(_PATH, text, "<path> with d", DRAW_AGAIN))
 
 
-class _Placement(NamedTuple):
-    """The map from a shape's points to mm, by the shape's transform and the page's scale."""
-
-    matrix: Matrix
-    scale: float
-
-    def __call__(self, p: Any) -> Point:
-        x, y = self.matrix.point_in_matrix_space(p)
-        return place(self.scale * x, -self.scale * y)
-
-
-def _subpaths(segments: list[Any], point: _Placement) -> Iterator[Strand]:
-    """Yield a strand from every move to the next, or to where the path is closed."""
-    edges: list[Edge] = []
-    for segment in segments:
-        kind = type(segment).__name__
-        if kind != "Move":
-            edges += _edges(segment, point)
-            refuse_more_than_limit(len(edges))
-        if kind in ("Move", "Close"):
-            if edges:
-                yield tuple(edges)
-            edges = []
-    if edges:
-        yield tuple(edges)
-
-
-def _edges(segment: Any, point: _Placement) -> tuple[Edge, ...]:
+def _edges(segment: Any, point: Callable[[Any], Point]) -> tuple[Edge, ...]:
     kind = type(segment).__name__
     if segment.start is None or segment.end is None:
         return ()

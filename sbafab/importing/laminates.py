@@ -16,9 +16,9 @@ from sbafab.design.files import ASSEMBLY, checked, kit_names, listed, read_toml
 from sbafab.design.films import FILM_NAME, HOTTEST, Films
 from sbafab.design.laminate_file import FILE, laminate_json, read_laminate
 from sbafab.design.outline import OUTLINE, seam_layer
+from sbafab.design.polylines import is_closed
 from sbafab.design.records import Design, plain_tables, without_kit, without_none
 from sbafab.design.sections import Inlet as Inlets
-from sbafab.design.strands import is_closed
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Edge, Line, Point, unit
 from sbafab.importing.records import Imported, file_name, key_name

@@ -1,0 +1,140 @@
+"""Polylines: the chains of lines and arcs that a drawing holds, and how their ends join.
+
+All coordinates are mm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+
+from sbafab.errors import DesignError
+from sbafab.geometry.edges import EPSILON, Edge, Line, Point, edge_from_bulge
+
+Polyline = tuple[Edge, ...]
+
+JOIN = 0.001
+"""Largest gap between joined ends, mm."""
+MOST_EDGES = 5000
+"""Most edges of a whole drawing, or of one of its entities."""
+FARTHEST = 10_000.0
+"""No coordinate of a drawing may be larger, in mm."""
+
+
+def place(x: float, y: float) -> Point:
+    """A point of a drawing. Raises DesignError unless it is finite and of a sensible size."""
+    if not abs(x) <= FARTHEST or not abs(y) <= FARTHEST:
+        raise DesignError(
+            f"has a coordinate of x {x:g}, y {y:g} mm, where at most {FARTHEST:g} is allowed; "
+            "check its units"
+        )
+    return float(x), float(y)
+
+
+def nothing_on(layer: str, others: Iterable[str]) -> DesignError:
+    """Return the error for an empty layer, with the names of ``others`` that are not."""
+    names = ", ".join(sorted({*others}))
+    hint = f"paths lie on {names}" if names else "no layer has any"
+    return DesignError(f"has no paths on a layer {layer!r}; {hint}")
+
+
+def counted(polylines: Iterable[Polyline], most: int) -> Iterator[Polyline]:
+    """Yield the polylines; raises DesignError once they have more than ``most`` edges."""
+    total = 0
+    for chain in polylines:
+        total += len(chain)
+        refuse_more_than_limit(total, most)
+        yield chain
+
+
+def refuse_more_than_limit(edges: int, most: int = MOST_EDGES) -> None:
+    if edges > most:
+        raise DesignError(f"has more than {most} edges; draw the outline with fewer, longer curves")
+
+
+def polyline(vertices: Sequence[tuple[float, float, float]], closed: bool) -> Polyline:
+    """Lines and arcs through vertices of x, y and bulge."""
+    points = [(x, y) for x, y, _ in vertices]
+    ends = [*points[1:], *points[:1]] if closed else points[1:]
+    edges: list[Edge] = []
+    for start, end, (_, _, bulge) in zip(points, ends, vertices, strict=False):
+        if math.dist(start, end) <= EPSILON:
+            continue
+        stops, part = [start, end], bulge
+        if abs(bulge) > 1:
+            # More than half a turn, so two arcs: the apex stands off the chord's middle, to the
+            # right of an arc that runs counter-clockwise.
+            (x, y), (u, v) = start, end
+            stops[1:1] = [((x + u + bulge * (v - y)) / 2, (y + v - bulge * (u - x)) / 2)]
+            part = math.tan(math.atan(bulge) / 2)
+        edges += [edge_from_bulge(a, b, part) for a, b in pairwise(stops)]
+    return tuple(edges)
+
+
+def is_closed(chain: Polyline) -> bool:
+    return _near(chain[0].start, chain[-1].end)
+
+
+def joined(polylines: Iterable[Polyline]) -> tuple[list[Polyline], list[Polyline]]:
+    """Closed loops, and the remaining open polylines, after joining ends that meet."""
+    whole = [chain for chain in polylines if sum(edge.length for edge in chain) > JOIN]
+    loops = [chain for chain in whole if is_closed(chain)]
+    rest = [chain for chain in whole if not is_closed(chain)]
+    opens: list[Polyline] = []
+    while rest:
+        chain = _extended(rest.pop(0), rest)
+        if not is_closed(chain):
+            chain = _extended(_reversed(chain), rest)
+        (loops if is_closed(chain) else opens).append(chain)
+    return loops, opens
+
+
+def _reversed(chain: Polyline) -> Polyline:
+    return tuple(edge.reversed() for edge in reversed(chain))
+
+
+def _extended(chain: Polyline, rest: list[Polyline]) -> Polyline:
+    """The polyline extended by every one of ``rest`` that goes on, which is removed from it."""
+    while not is_closed(chain):
+        end = chain[-1].end
+        ends = (n for n, c in enumerate(rest) if _near(end, c[0].start) or _near(end, c[-1].end))
+        number = next(ends, None)
+        if number is None:
+            return chain
+        follower = rest.pop(number)
+        chain += follower if _near(end, follower[0].start) else _reversed(follower)
+    return chain
+
+
+def _near(a: Point, b: Point) -> bool:
+    return math.dist(a, b) <= JOIN
+
+
+def sealed(loop: Polyline) -> Polyline:
+    """The loop with exactly matching ends and no edge shorter than JOIN."""
+    edges: list[Edge] = []
+    here = loop[-1].end
+    for edge in loop:
+        if edge.length > 2 * JOIN or not _near(here, edge.end):
+            edges.append(_from(here, edge))
+            here = edge.end
+    if edges:
+        edges[0] = _from(here, edges[0])
+    return tuple(edges)
+
+
+def _from(start: Point, edge: Edge) -> Edge:
+    if edge.start == start:
+        return edge
+    if isinstance(edge, Line):
+        return Line(start, edge.end)
+    return edge_from_bulge(start, edge.end, edge.bulge)
+
+
+def widest_gap(opens: Sequence[Polyline]) -> tuple[float, Point]:
+    """The least distance from the first polyline's last end to another loose end, and that end."""
+    here = opens[0][-1].end
+    ends = [opens[0][0].start]
+    ends += [end for chain in opens[1:] for end in (chain[0].start, chain[-1].end)]
+    return min(math.dist(here, other_end) for other_end in ends), here
