@@ -74,7 +74,7 @@ class Params(JsonRow):
     valveRadius: Um | None = None  # noqa: N815
 
 
-class LayerRow(JsonRow):
+class CircuitLayer(JsonRow):
     """A layer; those of one group are below those of the next."""
 
     id: str
@@ -143,7 +143,7 @@ class CircuitFile(JsonRow):
     """A circuit."""
 
     name: str | None = None
-    layers: list[LayerRow]
+    layers: list[CircuitLayer]
     components: list[ComponentRow]
     connections: list[ConnectionRow]
     features: list[FeatureRow] | None = None
