@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import assembly, distinct_layers
@@ -19,13 +20,6 @@ from sbafab.rules.sentences import explained, layer_name
 NAME = "pin-holes"
 
 
-class _Miss(NamedTuple):
-    at: Point
-    layer: Layer | None
-    sentence: str
-    facts: dict[str, Any]
-
-
 def check(measures: Measures) -> list[Finding]:
     """Return the number of pins that miss a hole, meet film, or leave a layer loose."""
     laminate = measures.laminate
@@ -33,25 +27,27 @@ def check(measures: Measures) -> list[Finding]:
     if not misses:
         sentence = "clear" if laminate.pins else "no-pin"
         return [judged(NAME, True, 0.0, 0.0, "misses", Place(), sentence)]
-    p, layer, sentence, facts = misses[0]
-    place = Place(None, (layer.index,) if layer else (), *p)
-    if layer is not None:
-        facts = {**facts, "layer": layer_name(layer)}
-    return [judged(NAME, False, 0.0, float(len(misses)), "misses", place, sentence, **facts)]
+    return [replace(misses[0], measured=float(len(misses)))]
 
 
 RULE = Rule(NAME, check, explained(NAME), at_most=True)
 
 
-def _idle(laminate: Laminate) -> Iterator[_Miss]:
+def _miss(p: Point, layer: Layer | None, sentence: str, **facts: Any) -> Finding:
+    place = Place(None, (layer.index,) if layer else (), *p)
+    facts |= {"layer": layer_name(layer)} if layer else {}
+    return judged(NAME, False, 0.0, 1.0, "misses", place, sentence, **facts)
+
+
+def _idle(laminate: Laminate) -> Iterator[Finding]:
     """Yield the pins that no layer has a hole for."""
     used = {pin for layer, *_ in laminate.patterns.values() for pin in laminate.pins_holding(layer)}
     for pin in laminate.pins:
         if pin not in used:
-            yield _Miss(pin.centre, None, "idle", {"pin": pin.name})
+            yield _miss(pin.centre, None, "idle", pin=pin.name)
 
 
-def _unholed(laminate: Laminate) -> Iterator[_Miss]:
+def _unholed(laminate: Laminate) -> Iterator[Finding]:
     """Yield layers that lack a hole at a tooling pin although others of their kind have one."""
     for pin in tooling_pins(laminate):
         for roles in ON_ONE_PIN:
@@ -60,11 +56,11 @@ def _unholed(laminate: Laminate) -> Iterator[_Miss]:
                 if layers[0].role in roles:
                     holed[pin in laminate.pins_holding(layers[0])] += layers
             for layer in holed[False] if holed[True] else ():
-                facts = {"pin": pin.name, "other": holed[True][0].index}
-                yield _Miss(pin.centre, layer, "no-hole", facts)
+                like = holed[True][0].index
+                yield _miss(pin.centre, layer, "no-hole", pin=pin.name, other=like)
 
 
-def _loose(laminate: Laminate) -> Iterator[_Miss]:
+def _loose(laminate: Laminate) -> Iterator[Finding]:
     """Yield pieces that ears should hold, on too few pins in the step that lays them."""
     if laminate.registration != "ears":
         return
@@ -77,10 +73,10 @@ def _loose(laminate: Laminate) -> Iterator[_Miss]:
                 pins = [pin.name for pin in laminate.pins_in(piece) if pin in step.pins]
                 if len(pins) < needed:
                     facts = {"pin": pins, "step": step.number, "needed": needed}
-                    yield _Miss(middle(piece), layer, "on-one" if pins else "loose", facts)
+                    yield _miss(middle(piece), layer, "on-one" if pins else "loose", **facts)
 
 
-def _blocked(laminate: Laminate) -> Iterator[_Miss]:
+def _blocked(laminate: Laminate) -> Iterator[Finding]:
     """Yield layers with film at a tooling pin, in a step that lays a layer on it.
 
     The channels' pins have the channels' room, which channel-clear measures.
@@ -94,7 +90,7 @@ def _blocked(laminate: Laminate) -> Iterator[_Miss]:
             facts = {"pin": pin.name, "step": step.number, "other": laid and laid.index}
             for layer in distinct_layers(laminate, step.layers):
                 if pin not in laminate.pins_holding(layer) and _is_in_the_way(layer, pin):
-                    yield _Miss(pin.centre, layer, "blocked-laid" if laid else "blocked", facts)
+                    yield _miss(pin.centre, layer, "blocked-laid" if laid else "blocked", **facts)
 
 
 def _is_in_the_way(layer: Layer, pin: Pin) -> bool:

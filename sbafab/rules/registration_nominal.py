@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Point
@@ -20,39 +20,33 @@ from sbafab.rules.sentences import explained, layer_name
 NAME = "registration-nominal"
 
 
-class _Departure(NamedTuple):
-    value: float
-    at: Point
-    layers: tuple[int, ...]
-    sentence: str
-    facts: dict[str, Any]
-
-
 def check(measures: Measures) -> list[Finding]:
     """Return the largest departure of a hole from its axis or pin, or of an outline."""
-    laminate, limit = measures.laminate, TOLERANCE
+    laminate = measures.laminate
     departures = [*_off_axis(laminate), *_off_pins(laminate), *_off_outline(laminate)]
     if not departures:
-        return [judged(NAME, True, limit, None, "mm", Place(), "none")]
-    worst = max(departures, key=lambda departure: departure.value)
-    place, sentence, facts = Place(None, worst.layers, *worst.at), worst.sentence, worst.facts
-    good = worst.value <= limit + 1e-9
-    if good:
-        sentence, facts = "aligned", {"off": max(worst.value, 1e-6)}
-    return [judged(NAME, good, limit, worst.value, "mm", place, sentence, **facts)]
+        return [judged(NAME, True, TOLERANCE, None, "mm", Place(), "none")]
+    return [max(departures, key=lambda departure: departure.measured or 0.0)]
 
 
 RULE = Rule(NAME, check, explained(NAME), at_most=True)
 
 
-def _off_axis(laminate: Laminate) -> Iterator[_Departure]:
+def _departure(off: float, layers: tuple[int, ...], p: Point, says: str, **facts: Any) -> Finding:
+    good = off <= TOLERANCE + 1e-9
+    sentence = "aligned" if good else says
+    facts |= {"off": max(off, 1e-6)} if good else {}
+    return judged(NAME, good, TOLERANCE, off, "mm", Place(None, layers, *p), sentence, **facts)
+
+
+def _off_axis(laminate: Laminate) -> Iterator[Finding]:
     for channel in channels(laminate):
         for layer in channel.layers if channel.has_axis else ():
             centre = _opening_centre(layer, channel)
             if centre is not None:
-                facts = {"layer": layer_name(layer), "channel": channel.name}
-                off = math.dist(centre, channel.centre)
-                yield _Departure(off, centre, (layer.index,), "off-axis", facts)
+                off, of_layer = math.dist(centre, channel.centre), layer_name(layer)
+                facts = {"layer": of_layer, "channel": channel.name}
+                yield _departure(off, (layer.index,), centre, "off-axis", **facts)
 
 
 def _opening_centre(layer: Layer, channel: Channel) -> Point | None:
@@ -65,7 +59,7 @@ def _opening_centre(layer: Layer, channel: Channel) -> Point | None:
     return min(round_ones, key=lambda circle: circle[1])[0] if round_ones else None
 
 
-def _off_pins(laminate: Laminate) -> Iterator[_Departure]:
+def _off_pins(laminate: Laminate) -> Iterator[Finding]:
     """Tooling holes off their pin; one that a layer lacks is off by the pin's diameter."""
     for pin in tooling_pins(laminate):
         off = {name: _off_pin(layers[0], pin) for name, layers in laminate.patterns.items()}
@@ -75,8 +69,8 @@ def _off_pins(laminate: Laminate) -> Iterator[_Departure]:
             if 2 * holed > len(siblings):
                 for layer in siblings:
                     facts = {"layer": layer_name(layer), "pin": pin.name}
-                    value = off[layer.pattern]
-                    yield _Departure(value, pin.centre, (layer.index,), "off-pin", facts)
+                    value, index = off[layer.pattern], layer.index
+                    yield _departure(value, (index,), pin.centre, "off-pin", **facts)
 
 
 def _off_pin(layer: Layer, pin: Pin) -> float:
@@ -85,7 +79,7 @@ def _off_pin(layer: Layer, pin: Pin) -> float:
     return min([pin.diameter, *(math.dist(centre, pin.centre) for centre, _ in circles)])
 
 
-def _off_outline(laminate: Laminate) -> Iterator[_Departure]:
+def _off_outline(laminate: Laminate) -> Iterator[Finding]:
     for distinct in distinct_interfaces(laminate):
         interface = distinct.interface
         if interface.kind != "chamber" or interface.below.pattern == interface.above.pattern:
@@ -95,7 +89,7 @@ def _off_outline(laminate: Laminate) -> Iterator[_Departure]:
         )
         value, p = max(_farthest(below, above), _farthest(above, below), key=lambda entry: entry[0])
         pair = interface.below.index, interface.above.index
-        yield _Departure(value, p, pair, "off-outline", {"below": pair[0], "above": pair[1]})
+        yield _departure(value, pair, p, "off-outline", below=pair[0], above=pair[1])
 
 
 @cached

@@ -7,7 +7,8 @@ searched from each inlet.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
@@ -18,7 +19,7 @@ from sbafab.rules.boundary import middle
 from sbafab.rules.finding import Finding, Place, judged
 from sbafab.rules.measures import Measures, distinct_interfaces, place_in
 from sbafab.rules.rule import Rule
-from sbafab.rules.sentences import Clause, explained, layer_name, say
+from sbafab.rules.sentences import explained, layer_name, say
 from sbafab.rules.void_edges import VoidEdges
 from sbafab.rules.voids import (
     OUTSIDE,
@@ -33,19 +34,6 @@ from sbafab.rules.voids import (
 NAME = "sealing"
 CUT = 1e-4
 """mm: width of a cut across a void."""
-
-
-class _Offence(NamedTuple):
-    """A fault of one void: its sentence, its place, and its facts."""
-
-    sentence: str
-    interface: int | None
-    at: Point | None
-    facts: Mapping[str, Any]
-
-    @property
-    def says(self) -> Clause:
-        return say(f"{NAME}.{self.sentence}", interface=self.interface, at=self.at, **self.facts)
 
 
 def check(measures: Measures) -> list[Finding]:
@@ -65,15 +53,20 @@ def check(measures: Measures) -> list[Finding]:
     if not offences:
         sentence = "by-nets" if laminate.nets else "sealed"
         return [judged(NAME, True, 0.0, 0.0, "voids", Place(), sentence, count=len(owners))]
-    first, count = offences[0], len(offences)
-    gap = None if first.interface is None else laminate.interfaces[first.interface - 1]
-    place, says = place_in(gap, first.at) if gap else Place(), first.says
-    if count > 1:
-        says = say("sealing.more", first=says, more=count - 1)
-    return [Finding(NAME, "fail", 0.0, float(count), "voids", place, says)]
+    first, *further = offences
+    says = say("sealing.more", first=first.says, more=len(further)) if further else first.says
+    return [replace(first, measured=float(len(offences)), says=says)]
 
 
 RULE = Rule(NAME, check, explained(NAME), at_most=True)
+
+
+def _offence(sentence: str, interface: Interface | None, at: Point | None, **facts: Any) -> Finding:
+    """Return the fault of one void."""
+    index = None if interface is None else interface.index
+    place = place_in(interface, at) if interface else Place()
+    says = say(f"{NAME}.{sentence}", interface=index, at=at, **facts)
+    return Finding(NAME, "fail", 0.0, 1.0, "voids", place, says)
 
 
 def _owners(laminate: Laminate, graph: VoidGraph) -> dict[Void, frozenset[str]]:
@@ -131,7 +124,7 @@ def _holds(piece: Region, p: Point) -> bool:
 
 def _missing_pockets(
     laminate: Laminate, graph: VoidGraph, owners: dict[Void, frozenset[str]]
-) -> list[_Offence]:
+) -> list[Finding]:
     """Centres of a chamber without a pocket in a balloon."""
     pockets: dict[tuple[int, str], list[Region]] = {}
     for void, names in owners.items():
@@ -146,20 +139,20 @@ def _missing_pockets(
             pieces = pockets.get((interface.index, chamber.name), [])
             sentence = _seamed("no-pocket", interface)
             offences += [
-                _Offence(sentence, interface.index, centre, {"chamber": chamber.name})
+                _offence(sentence, interface, centre, chamber=chamber.name)
                 for centre in chamber.centres
                 if not any(_holds(piece, centre) for piece in pieces)
             ]
     if len(levels) != laminate.balloons:
-        facts = {"levels": len(levels), "balloons": laminate.balloons}
-        offences.append(_Offence("levels", None, None, facts))
+        count = len(levels)
+        offences.append(_offence("levels", None, None, levels=count, balloons=laminate.balloons))
     return offences
 
 
 def _wrong_reaches(
     laminate: Laminate, graph: VoidGraph, owners: dict[Void, frozenset[str]]
-) -> list[_Offence]:
-    offences: dict[Void, _Offence] = {}
+) -> list[Finding]:
+    offences: dict[Void, Finding] = {}
     fed: dict[Void, str] = {}
     for number, inlet in enumerate(laminate.inlets):
         came = graph.reached([mouth_of(number)])
@@ -167,7 +160,9 @@ def _wrong_reaches(
             if void in owners:
                 fed[void] = inlet.chamber
                 if owners[void] != {inlet.chamber} and void not in offences:
-                    offences[void] = _foreign(void, inlet.chamber, owners[void], graph, came)
+                    offences[void] = _foreign(
+                        void, inlet.chamber, owners[void], laminate, graph, came
+                    )
     for chamber in laminate.chambers:
         voids = [void for void, names in owners.items() if names == {chamber.name}]
         came = graph.reached(void for void in voids if void in fed)
@@ -189,21 +184,22 @@ def _foreign(
     void: Void,
     inlet: str,
     names: frozenset[str],
+    laminate: Laminate,
     graph: VoidGraph,
     came: Mapping[Void, Void | None],
-) -> _Offence:
+) -> Finding:
     before = came[void]
     assert before is not None
     p = graph.joins[before][void]
     if before.kind == "mouth" and len(graph.joins[before]) == 1:
         p = middle(graph.pieces[void])
-    facts = {"inlet": inlet, "whose": sorted(names) or "no chamber"}
-    return _Offence("foreign", void.level, p, facts)
+    whose = sorted(names) or "no chamber"
+    return _offence("foreign", laminate.interfaces[void.level - 1], p, inlet=inlet, whose=whose)
 
 
 def _closing(
     laminate: Laminate, graph: VoidGraph, owners: dict[Void, frozenset[str]], design: Design
-) -> Iterator[_Offence]:
+) -> Iterator[Finding]:
     """Yield a place of each pocket between seams that parts it when these lie off their paths."""
     for void, names in owners.items():
         interface = laminate.interfaces[void.level - 1]
@@ -220,7 +216,7 @@ def _closing(
             if remaining.value > 0 or not _parts(region, place, inside):
                 continue
             facts = {"whose": [*names], "as_drawn": place.value, "edges": edges.causes()}
-            yield _Offence("closing", void.level, place.middle, facts)
+            yield _offence("closing", interface, place.middle, **facts)
             break
 
 
@@ -239,7 +235,7 @@ def _parts(region: Region, place: Width, inside: Sequence[Point]) -> bool:
     return len(homes) > 1
 
 
-def _loose_films(laminate: Laminate) -> list[_Offence]:
+def _loose_films(laminate: Laminate) -> list[Finding]:
     """Pieces of film that nothing bonds to the balloon or sheet below."""
     offences = []
     for distinct in distinct_interfaces(laminate):
@@ -248,14 +244,14 @@ def _loose_films(laminate: Laminate) -> list[_Offence]:
         for piece in pieces:
             bond = gap.bond if len(pieces) == 1 else gap.bond & piece
             if bond.is_empty:
-                facts = {"layer": layer_name(gap.above)}
-                offences.append(_Offence(_seamed("loose", gap), gap.index, middle(piece), facts))
+                sentence, name = _seamed("loose", gap), layer_name(gap.above)
+                offences.append(_offence(sentence, gap, middle(piece), layer=name))
     return offences
 
 
 def _leak(
     chamber: Chamber, laminate: Laminate, graph: VoidGraph, came: dict[Void, Void | None]
-) -> tuple[Void, _Offence]:
+) -> tuple[Void, Finding]:
     """Pocket at which the path to the outside starts, and the fault where it leaves."""
     path = [OUTSIDE]
     while (before := came[path[-1]]) is not None:
@@ -279,14 +275,13 @@ def _leak(
         sentence, facts["wide"] = "leak-past-mouth", wide
     elif last.kind != "opening":
         sentence = _seamed("leak", laminate.interfaces[interface - 1])
-    return pocket, _Offence(sentence, interface, p, facts)
+    return pocket, _offence(sentence, laminate.interfaces[interface - 1], p, **facts)
 
 
-def _cut_off(void: Void, names: frozenset[str], laminate: Laminate, graph: VoidGraph) -> _Offence:
+def _cut_off(void: Void, names: frozenset[str], laminate: Laminate, graph: VoidGraph) -> Finding:
     interface = laminate.interfaces[void.level - 1]
     sentence = _seamed("cut-off" if names else "stray", interface)
-    facts = {"whose": sorted(names)}
-    return _Offence(sentence, void.level, middle(graph.pieces[void]), facts)
+    return _offence(sentence, interface, middle(graph.pieces[void]), whose=sorted(names))
 
 
 def _seamed(sentence: str, interface: Interface) -> str:

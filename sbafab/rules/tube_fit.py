@@ -22,7 +22,7 @@ from sbafab.geometry.region import Region, strip
 from sbafab.geometry.spatial_index import EdgeIndex, boxes_meet
 from sbafab.geometry.width import Width
 from sbafab.laminate.joints import Port
-from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer
+from sbafab.laminate.laminate import Inlet, Interface, Laminate
 from sbafab.rules.boundary import outward_reach
 from sbafab.rules.finding import Finding, Place, Verdict, judged
 from sbafab.rules.limits import TOLERANCE, holds
@@ -67,7 +67,7 @@ def check(measures: Measures) -> list[Finding]:
         findings.append(_of_inlets(fits, design))
         findings += _unlike(fits) if findings[0].verdict == "pass" else ()
     if on_holes:
-        findings.append(_of_holes(on_holes))
+        findings.append(min(on_holes, key=lambda fit: (fit.measured or 0.0) - (fit.limit or 0.0)))
     return findings or [judged(NAME, False, None, None, "mm", Place(), "no-inlet")]
 
 
@@ -113,25 +113,7 @@ def _unlike(fits: Sequence[_Fit]) -> Iterator[Finding]:
 # Ports that are holes of an outer film.
 
 
-class _HoleFit(NamedTuple):
-    """A measure of a tube on a hole: value and least value, mm, and the sentence that tells it."""
-
-    layer: Layer
-    port: Port
-    value: float
-    limit: float
-    sentence: str
-    facts: dict[str, Any]
-
-
-def _of_holes(fits: Sequence[_HoleFit]) -> Finding:
-    """Return the finding of the worst tube on a hole."""
-    layer, port, value, limit, sentence, facts = min(fits, key=lambda fit: fit.value - fit.limit)
-    place, good = Place(None, (layer.index,), *port.at), holds(value, limit)
-    return judged(NAME, good, limit, value, "mm", place, sentence, port=port.name, **facts)
-
-
-def _on_hole(port: Port, laminate: Laminate, design: Design) -> Iterator[_HoleFit]:
+def _on_hole(port: Port, laminate: Laminate, design: Design) -> Iterator[Finding]:
     """Yield the tube's overlap round the hole, and the width of film round it.
 
     Both are measured from the port's place, where the tube's middle is glued.
@@ -139,10 +121,15 @@ def _on_hole(port: Port, laminate: Laminate, design: Design) -> Iterator[_HoleFi
     ends = {layer.index: layer for layer in (laminate.tpe_layers[0], laminate.tpe_layers[-1])}
     beside = [ends[index] for index in (port.below, port.above) if index in ends]
     holes = [(layer, h) for layer in beside for h in layer.profile.holes if h.winding(port.at)]
-    if not holes:
-        yield _HoleFit(beside[0], port, 0.0, design.rules.bond_width, "no-hole", {})
+    layer, hole = holes[0] if holes else (beside[0], None)
+
+    def fit(value: float, limit: float, sentence: str, **facts: Any) -> Finding:
+        place, good = Place(None, (layer.index,), *port.at), holds(value, limit)
+        return judged(NAME, good, limit, value, "mm", place, sentence, port=port.name, **facts)
+
+    if hole is None:
+        yield fit(0.0, design.rules.bond_width, "no-hole")
         return
-    layer, hole = holes[0]
     # An arc counts as its whole circle.
     reach = max(
         max(math.dist(edge.start, port.at), math.dist(edge.end, port.at))
@@ -154,11 +141,10 @@ def _on_hole(port: Port, laminate: Laminate, design: Design) -> Iterator[_HoleFi
         is_known = design.kerf_widths.get(layer.film.material) is not None
         kerf = 0.0 if is_known else design.laser.unknown_kerf
         cut = 2 * (reach + design.registration.cutting_error) + kerf
-        drawn = {"as_drawn": 2 * reach}
-        yield _HoleFit(layer, port, port.tube_diameter, cut, "covered", drawn)
+        yield fit(port.tube_diameter, cut, "covered", as_drawn=2 * reach)
     remaining = Region(tuple(contour for contour in layer.profile.contours if contour is not hole))
     film = remaining.distance_to_edge(port.at) - reach
-    yield _HoleFit(layer, port, film, design.rules.bond_width, "film", {})
+    yield fit(film, design.rules.bond_width, "film")
 
 
 # Inlets between two films.
