@@ -18,9 +18,9 @@ from sbafab.cli.printing import (
     print_written,
 )
 from sbafab.errors import DesignError
+from sbafab.lab.edges import Reference
 from sbafab.lab.inspection import Inspection
 from sbafab.lab.picture import ScanPicture
-from sbafab.lab.scale import Reference
 
 MOST_LINES = 20
 """Pieces amiss that are printed; the files have all."""

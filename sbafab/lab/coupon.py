@@ -11,10 +11,9 @@ quadrature, Student's t for the interval.
 
 from __future__ import annotations
 
-import csv
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -35,6 +34,7 @@ from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, rectangle, union
+from sbafab.lab.tables import table_rows
 from sbafab.spreadsheet import csv_text
 
 MOST_DEGREES = 200
@@ -173,7 +173,7 @@ class Calibration:
 
 
 def calibrated(measurements: Sequence[Measurement], resolution: float | None = None) -> Calibration:
-    """The kerf from two sizes or more; ``resolution`` in mm is the instrument's least step.
+    """Return the kerf from two sizes or more; ``resolution`` in mm is the instrument's least step.
 
     By default it comes from RESOLUTIONS, the coarsest if several instruments were used. Raises
     DesignError for fewer sizes, if one of them is a slip, or if the kerf is implausible.
@@ -183,14 +183,14 @@ def calibrated(measurements: Sequence[Measurement], resolution: float | None = N
         resolution = max(steps, default=UNNAMED)
     _refuse_a_slip(measurements, resolution)
     overall = _estimate(measurements, resolution)
-    along = {axis: [m for m in measurements if m.axis == axis] for axis in ("x", "y")}
-    if min(map(len, along.values())) < 2:
+    along_x, along_y = ([m for m in measurements if m.axis == axis] for axis in ("x", "y"))
+    if min(len(along_x), len(along_y)) < 2:
         return Calibration(overall, None, None, None)
-    x, y = (_estimate(along[axis], resolution, f" along {axis}") for axis in ("x", "y"))
+    x = _estimate(along_x, resolution, " along x")
+    y = _estimate(along_y, resolution, " along y")
     uncertainty = math.hypot(x.kerf.uncertainty, y.kerf.uncertainty)
-    degrees = min(x.degrees, y.degrees)
-    difference = Value(x.kerf.value - y.kerf.value, uncertainty, student_t(degrees) * uncertainty)
-    return Calibration(overall, x, y, difference)
+    half = student_t(min(x.degrees, y.degrees)) * uncertainty
+    return Calibration(overall, x, y, Value(x.kerf.value - y.kerf.value, uncertainty, half))
 
 
 def _estimate(measurements: Sequence[Measurement], resolution: float, where: str = "") -> Estimate:
@@ -199,17 +199,17 @@ def _estimate(measurements: Sequence[Measurement], resolution: float, where: str
             f"sizes measured{where}: {len(measurements)}, and a kerf needs 2; fill in more rows"
         )
     estimate = _fitted(measurements, resolution)
-    if _is_other_unit(estimate):
-        assert estimate.scale is not None
+    kerf, scale = estimate.kerf.value, estimate.scale
+    if scale is not None and abs(scale.value - 1) > WORST_SCALE:
         raise DesignError(
-            f"the measured sizes{where} are about {estimate.scale.value:.3g} times the nominal "
-            "ones; give them in millimetres"
+            f"the measured sizes{where} are about {scale.value:.3g} times the nominal ones; give "
+            "them in millimetres"
         )
-    if not 0 <= estimate.kerf.value <= LARGEST:
-        kind = "negative" if estimate.kerf.value < 0 else f"over {LARGEST:g} mm"
+    if not 0 <= kerf <= LARGEST:
+        kind = "negative" if kerf < 0 else f"over {LARGEST:g} mm"
         raise DesignError(
-            f"the kerf{where} comes out as {estimate.kerf.value:.3f} mm, which is {kind}; check "
-            "the measurements, the unit and which rows are outers and windows"
+            f"the kerf{where} comes out as {kerf:.3f} mm, which is {kind}; check the measurements, "
+            "the unit and which rows are outers and windows"
         )
     worst = max(measurements, key=estimate.gap)
     if estimate.gap(worst) > LARGEST_SLIP:
@@ -220,29 +220,24 @@ def _estimate(measurements: Sequence[Measurement], resolution: float, where: str
     return estimate
 
 
-def _is_other_unit(estimate: Estimate) -> bool:
-    return estimate.scale is not None and abs(estimate.scale.value - 1) > WORST_SCALE
-
-
 def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> None:
-    """Raises DesignError naming the one size without which all others agree, if there is one.
+    """Raise DesignError naming the one size without which all others agree, if there is one.
 
     A slip of the pen shifts the common fit, so that kerf or unit would be blamed.
     """
-    if len(measurements) < 3:
-        return
-    middle = median(m.kerf for m in measurements)
-    by_distance = sorted(measurements, key=lambda m: -abs(m.kerf - middle))
+    middle = median(m.kerf for m in measurements) if measurements else 0.0
     slips: list[tuple[float, float, Measurement]] = []
-    for suspect in by_distance[:MOST_SUSPECTS]:
+    for suspect in sorted(measurements, key=lambda m: -abs(m.kerf - middle))[:MOST_SUSPECTS]:
         rest = [m for m in measurements if m is not suspect]
-        if suspect.instrument not in {size.instrument for size in rest}:
+        if len(rest) < 2 or suspect.instrument not in {size.instrument for size in rest}:
             continue
-        estimate = _fitted(rest, resolution)
-        spread = max(map(estimate.gap, rest))
-        is_sound = 0 <= estimate.kerf.value <= LARGEST and not _is_other_unit(estimate)
-        if is_sound and spread <= LARGEST_SLIP < estimate.gap(suspect):
-            slips.append((spread, estimate.gap(suspect), suspect))
+        off = _fitted(rest, resolution).gap(suspect)
+        try:
+            estimate = _estimate(rest, resolution)
+        except DesignError:
+            continue
+        if off > LARGEST_SLIP:
+            slips.append((max(map(estimate.gap, rest)), off, suspect))
     if slips:
         _, off, slip = min(slips, key=lambda entry: entry[0])
         raise DesignError(
@@ -252,51 +247,47 @@ def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> No
 
 
 def _fitted(measurements: Sequence[Measurement], resolution: float) -> Estimate:
-    """Kerf, offsets and scale by least squares, likely or not; from two sizes or more."""
+    """Return kerf, offsets and scale by least squares, likely or not; from two sizes or more."""
     instruments = sorted({size.instrument for size in measurements})
     count = len(measurements)
     nominal = np.array([size.nominal for size in measurements])
     departure = np.array([size.measured for size in measurements]) - nominal
-    columns = np.array([[size.sign] for size in measurements], dtype=float)
-    along_x = np.array([size.along_x for size in measurements], dtype=float)[:, None]
+    sign = np.array([float(size.sign) for size in measurements])
+    along_x = np.array([float(size.along_x) for size in measurements])
     is_read_by = [[size.instrument == name for name in instruments] for size in measurements]
     # The last two are small: with few sizes the fit is better if they are taken as 0.
     blocks = {
         "offsets": (np.array(is_read_by, dtype=float), 1),
-        "scale": (nominal[:, None], 1),
-        "kerf along x": (columns * along_x, FREE),
-        "scale along x": (nominal[:, None] * along_x, FREE),
+        "scale": (nominal, 1),
+        "kerf along x": (sign * along_x, FREE),
+        "scale along x": (nominal * along_x, FREE),
     }
-    # Where each cause that can be told stands among the columns.
-    places: dict[str, int] = {}
+    columns = sign[:, None]
+    # The columns of each cause that the sizes tell from the others.
+    places: dict[str, range] = {"kerf": range(1)}
     for cause, (block, free) in blocks.items():
-        wider = np.hstack([columns, block])
+        wider = np.column_stack([columns, block])
         if count - wider.shape[1] >= free and _are_apart(wider):
-            places[cause] = columns.shape[1]
+            places[cause] = range(columns.shape[1], wider.shape[1])
             columns = wider
     values = np.linalg.lstsq(columns, departure, rcond=None)[0]
     degrees = count - columns.shape[1]
     scatter = float(np.sum((departure - columns @ values) ** 2)) / degrees
     spread = np.linalg.inv(columns.T @ columns).diagonal()
     # No reading is better than the instrument, however well a few of them agree.
-    noise = max(scatter, resolution**2 / 12)
-    errors = np.sqrt(noise * spread).tolist()
+    errors = np.sqrt(max(scatter, resolution**2 / 12) * spread).tolist()
     errors[0] = math.hypot(errors[0], _left_by_rounding(scatter, resolution))
     t = student_t(degrees)
     fitted = [Value(v, u, t * u) for v, u in zip(values.tolist(), errors, strict=True)]
-    kerf_along_x, scale_along_x = (
-        fitted[places[cause]].value if cause in places else 0.0
-        for cause in ("kerf along x", "scale along x")
-    )
-    scale = fitted[places["scale"]] if "scale" in places else None
+    causes = {cause: [fitted[k] for k in at] for cause, at in places.items()}
     return Estimate(
         kerf=fitted[0],
-        scale=None if scale is None else replace(scale, value=1 + scale.value),
-        offsets=dict(zip(instruments, fitted[1:], strict=False)) if "offsets" in places else {},
+        scale=next((replace(s, value=1 + s.value) for s in causes.get("scale", ())), None),
+        offsets=dict(zip(instruments, causes.get("offsets", ()), strict=False)),
         count=count,
         degrees=degrees,
-        kerf_along_x=kerf_along_x,
-        scale_along_x=scale_along_x,
+        kerf_along_x=sum(each.value for each in causes.get("kerf along x", ())),
+        scale_along_x=sum(each.value for each in causes.get("scale along x", ())),
     )
 
 
@@ -439,142 +430,42 @@ def _labels() -> tuple[Stroke, ...]:
     return (*(stroke for name in names for stroke in name), *title, *arrow)
 
 
-# The coupon's filled-in table: read where it can be read in one way, or refused.
+# The coupon's filled-in table.
 
 
-MOST_BYTES = 1_000_000
 LONGEST = 10_000.0
 """mm."""
-SEPARATORS = (",", ";", "\t")
 NUMBERS = ("nominal_mm", "measured_mm")
 INSTRUMENT = "instrument"
 """An optional column: the instrument of the measurement."""
 KINDS: dict[str, Kind] = {"outer": "outer", "window": "window", "piece": "outer"}
 """Last words of a feature; a piece fell out of a window."""
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)", re.ASCII)
-_WHOLE = re.compile(r"\d+", re.ASCII)
 
 
 def read_measurements(path: Path, instrument: str = "") -> list[Measurement]:
-    """The filled rows of a table with the coupon's columns; ``#`` begins a remark.
+    """Return the filled rows of a table with the coupon's columns; ``#`` begins a remark.
 
-    ``instrument`` applies to all sizes, unless a column of that name states it row by row. Columns
-    are separated by commas, semicolons or tabs; numbers have a decimal point or comma. A
-    spreadsheet that separates columns by semicolons leaves our commas in its first cell; that is
-    read too. Raises DesignError, also if decimal commas and column separators cannot be
-    distinguished.
+    ``instrument`` applies to all sizes, unless a column of that name states it row by row. Raises
+    DesignError, also if decimal commas and column separators cannot be distinguished.
     """
-    lines = [
-        (f"{path}, line {number}", line)
-        for number, line in enumerate(table_text(path).splitlines(), start=1)
-        if line.strip(' ,;\t"') and not line.lstrip(' "').startswith("#")
-    ]
-    separator, names = _header(path, lines[0] if lines else ("", ""))
-    measurements = []
-    for where, line in lines[1:]:
-        cells = _row(line, separator, len(names), where)
-        _refuse_two_ways(cells, names, separator, where)
-        row = dict(zip(names, cells, strict=False))
-        if row["measured_mm"]:
-            measurements.append(_measurement(row, where, instrument))
-    return measurements
+    rows = table_rows(path, COLUMNS, NUMBERS)
+    return [_measurement(row, where, instrument) for where, row in rows if row["measured_mm"]]
 
 
-def table_text(path: Path) -> str:
-    """The text of a filled-in table. Raises DesignError if the file is not a table."""
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise DesignError(
-                f"{path} is larger than {MOST_BYTES:,} bytes; give the table that was filled in"
-            )
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise DesignError(f"{path} is not a text file in UTF-8; save it as CSV") from None
-
-
-def _header(path: Path, first: tuple[str, str]) -> tuple[str, list[str]]:
-    """Return the separator of the columns, and their names in small letters."""
-    where, line = first
-    separator = max(SEPARATORS, key=line.count)
-    names = [name.lower() for name in row_cells(line, separator, where)]
-    while names and not names[-1]:
-        names.pop()
-    for column in COLUMNS:
-        if names.count(column) != 1:
-            many = "two columns" if column in names else "no column"
-            raise DesignError(
-                f"{path} has {many} {column}; keep the columns {', '.join(COLUMNS)}, once each"
-            )
-    return separator, names
-
-
-def _row(line: str, separator: str, count: int, where: str) -> list[str]:
-    """The cells of a row: separated like the header, or with the last one after a semicolon."""
-    cells = row_cells(line, separator, where)
-    if separator != "," or ";" not in line:
-        return cells
-    parted = row_cells(line, ";", where)
-    while len(parted) > 1 and not parted[-1]:
-        parted.pop()
-    if len(parted) == count:
-        return parted
-    first = row_cells(parted[0], ",", where)
-    if len(parted) == 2 and len(first) == count and not first[-1]:
-        return [*first[:-1], parted[1]]
-    return cells
-
-
-def row_cells(line: str, separator: str, where: str) -> list[str]:
-    """The cells of a row of a table, blanks round them removed. Raises DesignError."""
-    try:
-        row: Iterator[list[str]] = csv.reader([line], delimiter=separator, strict=True)
-        return [cell.strip() for cell in next(row)]
-    except csv.Error:
-        raise DesignError(f"{where} has a quotation mark without its other; remove it") from None
-
-
-def _refuse_two_ways(cells: list[str], names: list[str], separator: str, where: str) -> None:
-    """Raises DesignError for a row that fits the header not at all, or in more than one way."""
-    remedy = (
-        "; write decimal points, or part the columns by semicolons where commas are decimal"
-        if separator == ","
-        else "; fill in one cell a column"
-    )
-    while len(cells) > len(names) and not cells[-1]:
-        cells = cells[:-1]
-    if len(cells) != len(names):
-        raise DesignError(
-            f"{where} has {len(cells)} cells where the header has {len(names)}{remedy}"
-        )
-    if separator != ",":
-        return
-    for place, name in enumerate(names[:-1]):
-        after = names[place + 1]
-        is_split = name in NUMBERS and after not in NUMBERS and _WHOLE.fullmatch(cells[place])
-        if is_split and _WHOLE.fullmatch(cells[place + 1]):
-            raise DesignError(
-                f"{where} may say {cells[place]} or {cells[place]},{cells[place + 1]} for "
-                f"{name}{remedy}"
-            )
-
-
-def _measurement(row: dict[str, str], where: str, instrument: str) -> Measurement:
-    words = row["feature"].lower().split()
-    axis = row["axis"].lower()
-    kinds = {KINDS[word] for word in words if word in KINDS}
+def _measurement(row: Mapping[str, str], where: str, instrument: str) -> Measurement:
+    kinds = {KINDS[word] for word in row["feature"].lower().split() if word in KINDS}
     if len(kinds) != 1:
         raise DesignError(f"{where}: feature must end in outer, window or piece")
-    (kind,) = kinds
     used = row.get(INSTRUMENT, "").lower() or instrument
     if used and used not in RESOLUTIONS:
         allowed = ", ".join(RESOLUTIONS)
         raise DesignError(f"{where}: instrument is {used[:40]!r}; it must be one of {allowed}")
+    axis = row["axis"].lower()
     if axis not in ("x", "y"):
         raise DesignError(f"{where}: axis must be x or y")
     nominal, measured = (_size(row[name], name, where) for name in NUMBERS)
-    return Measurement(kind, "x" if axis == "x" else "y", nominal, measured, where, used)
+    return Measurement(kinds.pop(), "x" if axis == "x" else "y", nominal, measured, where, used)
 
 
 def _size(text: str, column: str, where: str) -> float:

@@ -6,18 +6,20 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import shapely
+
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.nest import TURNS
 from sbafab.errors import DesignError, OutputError
 from sbafab.folders.as_cut import path_in_folder
 from sbafab.folders.manifest import JobManifest, Manifest, is_job, read_claims, read_job
-from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.edges import Bounds
 from sbafab.geometry.region import Region
 
 SPACING = 1.0
 """Default distance between cuts, for a file without one, mm."""
-SAME_SIZE = 1e-4
-"""Largest difference in area (mm2) and length (mm) between congruent pieces."""
+SAME_SIZE, SAME_EDGE = 1e-4, 2e-3
+"""Largest difference of congruent pieces in area, mm2, and of their edges, mm."""
 
 
 @dataclass(frozen=True)
@@ -137,32 +139,14 @@ def _sheet(
 
 def _is_congruent(piece: Region, shape: Region) -> bool:
     """Return True if a piece is a shape shifted and turned by quarter turns."""
-    if len(piece.contours) != len(shape.contours):
+    if len(piece.contours) != len(shape.contours) or abs(piece.area - shape.area) > SAME_SIZE:
         return False
-    if abs(piece.area - shape.area) > SAME_SIZE:
-        return False
-    lying = _marks(piece)
-    return any(_agree(lying, _marks(shape.turned(90.0 * turn))) for turn in TURNS)
+    lying = _centred(piece)
+    turned = (_centred(shape.turned(90.0 * turn)) for turn in TURNS)
+    return any(lying.hausdorff_distance(each) < SAME_EDGE for each in turned)
 
 
-def _marks(region: Region) -> list[Point]:
-    """The ends and middles of the edges from the middle of the box, and centres of circles, mm."""
+def _centred(region: Region) -> shapely.MultiPolygon:
+    """Return a region with the middle of its box at the origin."""
     low_x, low_y, high_x, high_y = region.bounds
-    x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
-    points = [
-        point
-        for contour in region.contours
-        for point in (
-            [contour.circle[0]]
-            if contour.circle is not None
-            else [p for edge in contour.edges for p in (edge.start, edge.at(0.5))]
-        )
-    ]
-    return [(px - x, py - y) for px, py in points]
-
-
-def _agree(points: Sequence[Point], others: Sequence[Point]) -> bool:
-    """Return True if each point is within 2 um of one of the others."""
-    if len(points) != len(others):
-        return False
-    return all(min(abs(x - u) + abs(y - v) for u, v in others) < 2e-3 for x, y in points)
+    return region.moved(-(low_x + high_x) / 2, -(low_y + high_y) / 2).shapely()

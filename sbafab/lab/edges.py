@@ -6,25 +6,29 @@ of radius r a blur of deviation s moves it by s^2 / 2r towards the centre, which
 
 All edges together give, by robust least squares, the map from the cut file to the picture, the
 offset of the film's edge outside the drawn one (half the kerf, negative) and the displacement of
-each piece.
+each piece. The true scale follows from the scanner's resolution, a bar, or the sheet's pins.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
+from sbafab.errors import DesignError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, left_turn
-from sbafab.geometry.region import Region
+from sbafab.geometry.region import Region, disc, polygon
 from sbafab.lab.cut_sheet import DrawnSheet
-from sbafab.lab.picture import ScanPicture
+from sbafab.lab.picture import PictureOutline, ScanPicture
 from sbafab.lab.registration import SMALLEST, Location, PointArray, Warp
+
+Numbers = NDArray[np.float64]
 
 STEP = 0.2
 """Spacing of samples, mm."""
@@ -63,89 +67,89 @@ class Samples:
 
     points: PointArray
     normals: PointArray
-    curvatures: NDArray[np.float64]
+    curvatures: Numbers
     contours: NDArray[np.int64]
     pieces: NDArray[np.int64]
 
-    def __len__(self) -> int:
-        return len(self.points)
+    def middles(self, count: int) -> PointArray:
+        """Return the mean place of the samples of each of ``count`` pieces, (count, 2) mm."""
+        sums = [np.bincount(self.pieces, each, count) for each in self.points.T]
+        return np.column_stack(sums) / self.numbers(count)[:, None]
+
+    def numbers(self, count: int) -> Numbers:
+        """Return the number of samples of each of ``count`` pieces, at least 1."""
+        return np.maximum(np.bincount(self.pieces, minlength=count), 1.0)
+
+    def moved(self, displacements: Numbers) -> Samples:
+        """Return the samples at displaced pieces: mm along x and y, radians about the middle."""
+        dx, dy, turns = displacements[self.pieces].T
+        middles = self.middles(len(displacements))[self.pieces] @ (1, 1j)
+        spin = np.exp(1j * turns)
+        points = middles + dx + 1j * dy + spin * (self.points @ (1, 1j) - middles)
+        normals = spin * (self.normals @ (1, 1j))
+        both = (np.column_stack([each.real, each.imag]) for each in (points, normals))
+        return replace(self, **dict(zip(("points", "normals"), both, strict=True)))
 
 
 def samples_of(regions: Sequence[Region], is_skeleton: bool) -> Samples:
     """Return samples on the edges of pieces; in a skeleton, the film is outside the outlines."""
     step = max(STEP, sum(c.length for r in regions for c in r.contours) / MOST_SAMPLES)
-    rows: list[tuple[float, ...]] = []
-    number = 0
-    for piece, region in enumerate(regions):
-        for contour in region.contours:
-            if contour.is_hole and (is_skeleton or -contour.area < SMALLEST):
-                continue
-            rows += [(*row, number, piece) for row in _along(contour, step)]
-            number += 1
+    shown = [
+        (piece, contour)
+        for piece, region in enumerate(regions)
+        for contour in region.contours
+        if not contour.is_hole or not (is_skeleton or -contour.area < SMALLEST)
+    ]
+    rows = [
+        (*row, number, piece)
+        for number, (piece, contour) in enumerate(shown)
+        for row in _along(contour, step)
+    ]
     table = np.array(rows, dtype=float).reshape(-1, 7)
     sign = -1.0 if is_skeleton else 1.0
-    return Samples(
-        points=table[:, :2],
-        normals=sign * table[:, 2:4],
-        curvatures=sign * table[:, 4],
-        contours=table[:, 5].astype(int),
-        pieces=table[:, 6].astype(int),
-    )
+    contours, pieces = table[:, 5:].astype(int).T
+    return Samples(table[:, :2], sign * table[:, 2:4], sign * table[:, 4], contours, pieces)
 
 
-def _along(contour: Contour, step: float) -> list[tuple[float, ...]]:
-    """Return x, y, outward normal and curvature of samples along a contour, away from its
-    corners.
-    """
-    rows: list[tuple[float, ...]] = []
+def _along(contour: Contour, step: float) -> Iterator[tuple[float, ...]]:
+    """Yield x, y, outward normal and curvature of samples along a contour, clear of corners."""
     edges = contour.edges
     for before, edge, after in zip(
         (edges[-1], *edges[:-1]), edges, (*edges[1:], edges[0]), strict=True
     ):
-        if isinstance(edge, Arc) and edge.radius < SHARPEST:
+        if _is_sharp(edge):
             continue
         start = CORNER if _is_corner(before, edge) else 0.0
         end = edge.length - (CORNER if _is_corner(edge, after) else 0.0)
-        count = max(1, math.floor((end - start) / step))
-        for k in range(count if end > start else 0):
+        count = max(1, math.floor((end - start) / step)) if end > start else 0
+        bend = (1.0 if edge.ccw else -1.0) / edge.radius if isinstance(edge, Arc) else 0.0
+        for k in range(count):
             point = edge.at((start + (k + 0.5) * (end - start) / count) / edge.length)
             ux, uy = edge.direction(point)
-            bend = 0.0
-            if isinstance(edge, Arc):
-                bend = (1.0 if edge.ccw else -1.0) / edge.radius
-            rows.append((*point, uy, -ux, bend))
-    return rows
+            yield *point, uy, -ux, bend
+
+
+def _is_sharp(edge: Edge) -> bool:
+    return isinstance(edge, Arc) and edge.radius < SHARPEST
 
 
 def _is_corner(before: Edge, after: Edge) -> bool:
-    sharp = any(isinstance(e, Arc) and e.radius < SHARPEST for e in (before, after))
-    return sharp or abs(left_turn(before, after)) > TURN
-
-
-class Crossings(NamedTuple):
-    """Distance per sample of the film's edge outside the drawn edge, mm; NaN if no edge is visible.
-
-    ``blur``: the deviation of the picture's blur, mm. ``contrast``: film less paper, grey levels.
-    """
-
-    outside: NDArray[np.float64]
-    blur: float
-    contrast: float
+    return _is_sharp(before) or _is_sharp(after) or abs(left_turn(before, after)) > TURN
 
 
 def crossings(
-    picture: ScanPicture,
-    warp: Warp,
-    samples: Samples,
-    reach: float,
-    expected: NDArray[np.float64] | float = 0.0,
-) -> Crossings:
-    """Return the film's edge along each normal, nearest to ``expected`` mm outside."""
+    picture: ScanPicture, warp: Warp, samples: Samples, reach: float, expected: float = 0.0
+) -> tuple[Numbers, float]:
+    """Return the distance of the film's edge outside each drawn edge, mm; NaN if none is visible.
+
+    Of several edges along a normal, the one nearest to ``expected`` mm outside. And the deviation
+    of the picture's blur, mm.
+    """
     from scipy.ndimage import gaussian_filter1d, map_coordinates, median_filter
 
-    step = 0.5 / max(warp.pixels_per_mm(np.array(warp.centre)))
+    step = 0.5 / float(np.hypot(*warp.axes.T).max())
     half = max(6, round(reach / step))
-    offsets: NDArray[np.float64] = np.arange(-half, half + 1, dtype=np.float64) * step
+    offsets: Numbers = np.arange(-half, half + 1, dtype=np.float64) * step
     places = samples.points[:, None, :] + offsets[None, :, None] * samples.normals[:, None, :]
     pixels = warp(places.reshape(-1, 2)).reshape(places.shape)
     levels = map_coordinates(
@@ -169,29 +173,18 @@ def crossings(
     # Smoothing is only across the edge, which does not move a curved edge.
     blur = float(np.median(known)) / 2 if len(known) else 0.0
     blur = math.sqrt(max(blur**2 - (SMOOTH * step) ** 2, 0.0))
-    outside += blur**2 / 2 * samples.curvatures
-    return Crossings(outside, blur, usual)
+    return outside + blur**2 / 2 * samples.curvatures, blur
 
 
-def _passing(
-    share: NDArray[np.float64],
-    level: float,
-    offsets: NDArray[np.float64],
-    expected: NDArray[np.float64] | float,
-) -> NDArray[np.float64]:
-    """Return the offset at which each row falls through a level, nearest to ``expected``, or
-    NaN.
-    """
-    above = share >= level
-    falls = above[:, :-1] & (share[:, 1:] < level)
+def _passing(share: Numbers, level: float, offsets: Numbers, expected: Numbers | float) -> Numbers:
+    """Return the offset where each row falls through a level, nearest to ``expected``, or NaN."""
+    falls = (share[:, :-1] >= level) & (share[:, 1:] < level)
     with np.errstate(divide="ignore", invalid="ignore"):
         part = (share[:, :-1] - level) / (share[:, :-1] - share[:, 1:])
-    at = offsets[:-1] + part * (offsets[1] - offsets[0])
-    centre = np.broadcast_to(np.asarray(expected, dtype=float), len(share))[:, None]
-    distance = np.where(falls, np.abs(at - np.nan_to_num(centre)), np.inf)
-    nearest = distance.argmin(axis=1)
-    rows = np.arange(len(share))
-    return np.where(np.isfinite(distance[rows, nearest]), at[rows, nearest], np.nan)
+    at = np.where(falls, offsets[:-1] + part * (offsets[1] - offsets[0]), np.nan)
+    centre = np.broadcast_to(np.nan_to_num(np.asarray(expected, dtype=float)), len(share))
+    distance = np.where(falls, np.abs(at - centre[:, None]), np.inf)
+    return np.take_along_axis(at, distance.argmin(axis=1)[:, None], axis=1)[:, 0]
 
 
 @dataclass(frozen=True)
@@ -202,22 +195,22 @@ class EdgeFit:
     drawn edge, at the displaced piece. Its common part is ``offset``; ``displacements`` (pieces, 3)
     are the displacements of pieces, mm along x and y and radians about their middle. A weight of 0
     in ``weights`` marks an outlier, not an edge of the piece. ``uncertainty``: the standard
-    uncertainty of ``offset`` from the scatter between pieces, with ``degrees`` of freedom.
+    uncertainty of ``offset`` from the scatter between pieces, with ``degrees`` of freedom. ``blur``
+    is the deviation of the picture's blur, mm.
     """
 
     samples: Samples
     warp: Warp
-    outside: NDArray[np.float64]
-    weights: NDArray[np.float64]
+    outside: Numbers
+    weights: Numbers
     offset: float
     uncertainty: float
     degrees: int
-    displacements: NDArray[np.float64]
+    displacements: Numbers
     blur: float
-    contrast: float
 
     @property
-    def residuals(self) -> NDArray[np.float64]:
+    def residuals(self) -> Numbers:
         """Residuals of the edges after the common offset, mm."""
         return self.outside - self.offset
 
@@ -231,59 +224,30 @@ def fitted(picture: ScanPicture, sheet: DrawnSheet, location: Location, is_camer
     warp = replace(location.warp, degree=degree, coefficients=empty)
     displacements = np.zeros((len(sheet.places), 3))
     looseness, offset = LOOSE, 0.0
-    fit: EdgeFit | None = None
     for reach in REACHES:
-        laid = moved(samples, displacements)
-        measured = crossings(picture, warp, laid, min(reach, 0.9 * sheet.spacing), offset)
-        fit = _solved(laid, warp, measured, displacements, looseness)
+        laid = samples.moved(displacements)
+        within = min(reach, 0.9 * sheet.spacing)
+        outside, blur = crossings(picture, warp, laid, within, offset)
+        fit = _solved(laid, warp, outside, displacements, looseness)
         warp, offset, displacements = fit.warp, fit.offset, fit.displacements
         looseness = max(TIGHT, 1.5 * float(np.median(np.abs(displacements[:, :2]))))
-    assert fit is not None
-    return replace(fit, samples=samples)
-
-
-def moved(samples: Samples, displacements: NDArray[np.float64]) -> Samples:
-    """Return the samples at the displaced pieces."""
-    shifts, turns = displacements[samples.pieces, :2], displacements[samples.pieces, 2]
-    middles = _middles(samples, len(displacements))[samples.pieces]
-    cosine, sine = np.cos(turns), np.sin(turns)
-    spin = np.stack([np.stack([cosine, -sine], 1), np.stack([sine, cosine], 1)], 1)
-    return replace(
-        samples,
-        points=middles + shifts + np.einsum("nij,nj->ni", spin, samples.points - middles),
-        normals=np.einsum("nij,nj->ni", spin, samples.normals),
-    )
-
-
-def _middles(samples: Samples, count: int) -> PointArray:
-    number = np.maximum(np.bincount(samples.pieces, minlength=count), 1)
-    return np.column_stack(
-        [np.bincount(samples.pieces, samples.points[:, k], count) / number for k in range(2)]
-    )
-
-
-def _rigid(samples: Samples, count: int) -> NDArray[np.float64]:
-    """Return the outward motion (n, 3) of each sample by x, y and turn of its piece."""
-    arm = samples.points - _middles(samples, count)[samples.pieces]
-    turn = arm[:, 0] * samples.normals[:, 1] - arm[:, 1] * samples.normals[:, 0]
-    return np.column_stack([samples.normals, turn])
+    return replace(fit, samples=samples, blur=blur)
 
 
 def _solved(
-    laid: Samples,
-    warp: Warp,
-    measured: Crossings,
-    displacements: NDArray[np.float64],
-    looseness: float,
+    laid: Samples, warp: Warp, outside: Numbers, displacements: Numbers, looseness: float
 ) -> EdgeFit:
     """Solve for the map, the offset and all displacements at once, by Tukey's weights."""
-    matrix, terms = _matrix(laid, warp, len(displacements))
-    strength = _strength(matrix, laid, displacements, terms)
-    before = np.concatenate([np.zeros(1 + 2 * terms), displacements.ravel()])
-    is_seen = np.isfinite(measured.outside)
-    outside = np.where(is_seen, measured.outside, 0.0)
+    matrix, arms = _matrix(laid, warp, len(displacements))
+    first = matrix.shape[1] - displacements.size
+    # All displacements are expected to be about equally small; a turn counts by the edge's motion.
+    strength = np.zeros(matrix.shape[1])
+    strength[first:] = np.column_stack([np.ones((len(arms), 2)), arms]).ravel()
+    before = np.concatenate([np.zeros(first), displacements.ravel()])
+    is_seen = np.isfinite(outside)
+    outside = np.where(is_seen, outside, 0.0)
     weights = is_seen.astype(float)
-    scale = float(np.median(np.abs(measured.outside[is_seen]))) if is_seen.any() else 1.0
+    scale = float(np.median(np.abs(outside[is_seen]))) if is_seen.any() else 1.0
     for _ in range(ROUNDS):
         weighted = matrix * weights[:, None]
         stiffness = strength * max(scale, 0.004) ** 2 * NEIGHBOURS / looseness**2
@@ -294,9 +258,10 @@ def _solved(
         bound = max(4.7 * scale, 0.02)
         inside = is_seen & (np.abs(residuals) < bound)
         weights = np.where(inside, (1 - (residuals / bound) ** 2) ** 2, 0.0)
-    pull = stiffness * (before + solution)
-    uncertainty, degrees = _of_offset(matrix, normal, weights * residuals, pull, laid)
-    change = solution[1 : 1 + 2 * terms].reshape(2, terms).T
+    towards = np.linalg.solve(normal, np.eye(len(normal))[0])
+    pull = (towards * stiffness * (before + solution))[first:].reshape(-1, 3).sum(axis=1)
+    uncertainty, degrees = _of_offset((matrix @ towards) * weights * residuals, pull, laid)
+    change = solution[1:first].reshape(2, -1).T
     return EdgeFit(
         samples=laid,
         warp=replace(warp, coefficients=warp.coefficients + change),
@@ -305,64 +270,160 @@ def _solved(
         offset=float(solution[0]),
         uncertainty=uncertainty,
         degrees=degrees,
-        displacements=displacements + solution[1 + 2 * terms :].reshape(-1, 3),
-        blur=measured.blur,
-        contrast=measured.contrast,
+        displacements=displacements + solution[first:].reshape(-1, 3),
+        blur=0.0,
     )
 
 
-def _matrix(laid: Samples, warp: Warp, count: int) -> tuple[NDArray[np.float64], int]:
-    """Return the outward motion of each sample by offset, map and displacements, and the map's
-    number of terms per axis.
+def _matrix(laid: Samples, warp: Warp, count: int) -> tuple[Numbers, Numbers]:
+    """Return the outward motion of each sample by the unknowns: offset, map, displacements.
+
+    And the mean square of the motion by a turn of each of ``count`` pieces, mm2.
     """
+    arm = laid.points - laid.middles(count)[laid.pieces]
+    turn = arm[:, 0] * laid.normals[:, 1] - arm[:, 1] * laid.normals[:, 0]
     monomials = warp.monomials(laid.points)
-    terms = monomials.shape[1]
-    matrix = np.zeros((len(laid), 1 + 2 * terms + 3 * count))
-    matrix[:, 0] = 1.0
-    matrix[:, 1 : 1 + terms] = monomials * laid.normals[:, :1]
-    matrix[:, 1 + terms : 1 + 2 * terms] = monomials * laid.normals[:, 1:]
-    rows = np.arange(len(laid))
-    for k, column in enumerate(_rigid(laid, count).T):
-        matrix[rows, 1 + 2 * terms + 3 * laid.pieces + k] = column
-    return matrix, terms
+    moves = np.zeros((len(laid.points), count, 3))
+    moves[np.arange(len(moves)), laid.pieces] = np.column_stack([laid.normals, turn])
+    by_map = [monomials * laid.normals[:, axis : axis + 1] for axis in (0, 1)]
+    arms = np.bincount(laid.pieces, turn**2, count) / laid.numbers(count)
+    offset = np.ones((len(moves), 1))
+    return np.hstack([offset, *by_map, moves.reshape(len(moves), -1)]), arms
 
 
-def _strength(
-    matrix: NDArray[np.float64], laid: Samples, displacements: NDArray[np.float64], terms: int
-) -> NDArray[np.float64]:
-    """Return the prior weight of each unknown: all displacements are expected to be about equally
-    small.
-
-    A turn counts by the motion of the edge.
-    """
-    count = len(displacements)
-    number = np.maximum(np.bincount(laid.pieces, minlength=count), 1)
-    arms = np.bincount(laid.pieces, _rigid(laid, count)[:, 2] ** 2, count) / number
-    strength = np.zeros(matrix.shape[1])
-    strength[1 + 2 * terms :] = np.column_stack([np.ones((count, 2)), arms]).ravel()
-    return strength
-
-
-def _of_offset(
-    matrix: NDArray[np.float64],
-    normal: NDArray[np.float64],
-    errors: NDArray[np.float64],
-    pull: NDArray[np.float64],
-    laid: Samples,
-) -> tuple[float, int]:
+def _of_offset(influence: Numbers, pull: Numbers, laid: Samples) -> tuple[float, int]:
     """Return the offset's standard uncertainty from the scatter between pieces, and its degrees.
 
     Errors within a piece are correlated and its displacement is one draw, so pieces are the
     clusters, or contours if pieces are few (cluster-robust sandwich estimate).
     """
-    towards = np.linalg.solve(normal, np.eye(len(normal))[0])
-    count = int(laid.pieces.max()) + 1
-    influence = (matrix @ towards) * errors
-    if count < FEW:
-        by_cluster = np.bincount(laid.contours, influence)
+    if len(pull) < FEW:
+        by_cluster: NDArray[Any] = np.bincount(laid.contours, influence)
     else:
-        shifts = (towards * pull)[-3 * count :].reshape(count, 3).sum(axis=1)
-        by_cluster = np.bincount(laid.pieces, influence, count) - shifts
+        by_cluster = np.bincount(laid.pieces, influence, len(pull)) - pull
     degrees = max(len(by_cluster) - 1, 1)
     spread = math.sqrt(float((by_cluster**2).sum()) * len(by_cluster) / degrees)
     return spread, degrees
+
+
+# The scale: the fit maps the cut file to the film, so a millimetre of the file is one of the film.
+# An independent length gives the true length of that millimetre.
+
+
+MILLIMETRES = 25.4
+"""An inch, mm."""
+NEAR_LENGTH = 0.05
+"""Largest relative error of a bar's length before it is measured."""
+BAR_FILL = 0.9
+"""Least share of its box that a bar fills."""
+LEAST_PINS = 2
+SEARCH = 0.45
+"""Search range around a drawn edge, mm."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """True over drawn lengths along x and y, and the reference."""
+
+    x: float
+    y: float
+    reference: str
+
+
+@dataclass(frozen=True)
+class Reference:
+    """``dpi`` along the picture's rows and columns; a ``bar`` of this length, mm; the ``pins``.
+
+    The first of bar, pins and dpi that is given is used; without any, the scale is 1.
+    """
+
+    dpi: tuple[float, float] | None = None
+    bar: float | None = None
+    pins: bool = False
+
+    @property
+    def pixels_per_mm(self) -> float | None:
+        return None if self.dpi is None else math.sqrt(self.dpi[0] * self.dpi[1]) / MILLIMETRES
+
+
+def scale_of(
+    picture: ScanPicture,
+    sheet: DrawnSheet,
+    fit: EdgeFit,
+    measured: Sequence[PictureOutline],
+    reference: Reference,
+) -> Scale:
+    """Return the film's scale by the reference. Raises DesignError if that is not visible."""
+    if reference.bar is not None:
+        scale = _by_bar(picture, sheet, fit, measured, reference.bar)
+        return Scale(scale, scale, f"the bar of {reference.bar:g} mm")
+    if reference.pins:
+        scale = _by_pins(picture, sheet, fit)
+        return Scale(scale, scale, f"{len(sheet.pins)} pins")
+    if reference.dpi is None:
+        return Scale(1.0, 1.0, "none: taken from the cut file")
+    x, y = np.hypot(*(fit.warp.axes / np.array(reference.dpi) * MILLIMETRES).T)
+    dpi = " x ".join(dict.fromkeys(f"{each:.0f}" for each in reference.dpi))
+    return Scale(float(x), float(y), f"{dpi} dpi")
+
+
+def _by_bar(
+    picture: ScanPicture,
+    sheet: DrawnSheet,
+    fit: EdgeFit,
+    measured: Sequence[PictureOutline],
+    length: float,
+) -> float:
+    parts = shapely.box(*sheet.bounds)
+    for outline in measured:
+        bar = shapely.transform(outline.polygon, fit.warp.inverse)
+        box = shapely.minimum_rotated_rectangle(bar)
+        a, b, c, d = shapely.get_coordinates(box)[:4]
+        if math.dist(a, b) < math.dist(b, c):
+            a, b, c, d = b, c, d, a
+        is_bar = abs(math.dist(a, b) / length - 1) < NEAR_LENGTH and bar.area > BAR_FILL * box.area
+        if is_bar and not parts.contains(bar.centroid):
+            samples = samples_of([polygon([(float(x), float(y)) for x, y in (a, b, c, d)])], False)
+            outside, _ = crossings(picture, fit.warp, samples, SEARCH)
+            axis = (b - a) / math.dist(a, b)
+            towards = samples.normals @ axis
+            along = samples.points @ axis + towards * outside
+            ends = [along[(s * towards > 0.9) & np.isfinite(outside)] for s in (1, -1)]
+            if min(map(len, ends)) == 0:
+                raise DesignError(
+                    "--bar: its ends are not seen; lay it on the paper with square ends"
+                )
+            return length / float(np.median(ends[0]) - np.median(ends[1]))
+    raise DesignError(
+        f"--bar is {length:g} mm, and no bar about that long lies beside the parts; lay a straight "
+        "bar with square ends on the paper, clear of the film and the picture's border"
+    )
+
+
+def _by_pins(picture: ScanPicture, sheet: DrawnSheet, fit: EdgeFit) -> float:
+    if len(sheet.pins) < LEAST_PINS:
+        raise DesignError(
+            f"--pins needs {LEAST_PINS} pins of {sheet.name} or more, and it has "
+            f"{len(sheet.pins)}; give --dpi or --bar"
+        )
+    drawn = np.array([(x, y) for x, y, _ in sheet.pins])
+    measured = np.array([_pin(picture, fit, pin) for pin in sheet.pins])
+    return math.sqrt(float(drawn.var(axis=0).sum() / measured.var(axis=0).sum()))
+
+
+def _pin(picture: ScanPicture, fit: EdgeFit, pin: tuple[float, float, float]) -> PointArray:
+    """Return the middle of a pin, mm of the cut file."""
+    x, y, diameter = pin
+    samples = samples_of([disc((x, y), diameter / 2)], False)
+    for _ in range(3):
+        outside, _ = crossings(picture, fit.warp, samples, SEARCH)
+        known = np.isfinite(outside)
+        if known.mean() < 0.8:
+            raise DesignError(
+                f"the pin at x {x:g}, y {y:g} mm is not seen; give --dpi or --bar, or a picture "
+                "with all pins"
+            )
+        columns = np.column_stack([samples.normals[known], np.ones(known.sum())])
+        shift = np.linalg.lstsq(columns, outside[known], rcond=None)[0][:2]
+        samples = replace(samples, points=samples.points + shift)
+    return np.asarray(samples.points.mean(axis=0))

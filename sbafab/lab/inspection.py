@@ -20,11 +20,10 @@ from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
 from sbafab.lab.coupon import COLUMNS, INSTRUMENT, Value, student_t
 from sbafab.lab.cut_sheet import DrawnSheet
-from sbafab.lab.edges import EdgeFit, fitted
+from sbafab.lab.edges import EdgeFit, Reference, Scale, fitted, scale_of
 from sbafab.lab.picture import ScanPicture, outlines
 from sbafab.lab.pieces import PieceFinding, piece_findings
 from sbafab.lab.registration import SMALLEST, Content, Location, PointArray, locate
-from sbafab.lab.scale import Reference, Scale, scale_of
 from sbafab.spreadsheet import csv_text
 
 FEWEST = 100
@@ -116,7 +115,7 @@ def inspect_picture(
             f"{FEWEST} are needed; scan at a higher resolution, or more of the sheet"
         )
     scale = scale_of(picture, sheet, fit, measured, reference)
-    pixel = 1 / math.sqrt(math.prod(fit.warp.pixels_per_mm(np.array(fit.warp.centre))))
+    pixel = 1 / fit.warp.pixels_per_mm
     residuals = np.abs(fit.residuals[known])
     return Inspection(
         sheet=sheet,
@@ -141,7 +140,7 @@ def _kerf(picture: ScanPicture, fit: EdgeFit, pixel: float) -> Value:
             f"{picture.path.name}: the film reads {-kerf:.3f} mm larger than it is drawn; if it is "
             "darker than what it lies on, give --paper light"
             if kerf < 0
-            else f"{picture.path.name}: a kerf of {kerf:.2f} mm is none; check --sheet and --dpi"
+            else f"{picture.path.name}: kerf {kerf:.2f} mm is implausible; check --sheet and --dpi"
         )
     return Value(kerf, uncertainty, half)
 

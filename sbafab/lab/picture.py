@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
@@ -27,7 +28,7 @@ ROUNDS = 3
 LEAST_CONTRAST = 12.0
 """Least difference in grey levels between film and paper."""
 FLATBED_DPI = range(150, 9601)
-"""Least credible resolution stated by a file: cameras write 72 or 96."""
+"""Credible resolutions of a scan: cameras write 72 or 96."""
 
 
 @dataclass(frozen=True)
@@ -39,23 +40,16 @@ class ScanPicture:
     sha256: str
     dpi: tuple[float, float] | None
 
-    @property
-    def centre(self) -> NDArray[np.float64]:
-        """The middle, as x and y in pixels."""
-        rows, columns = self.pixels.shape
-        return np.array([(columns - 1) / 2, (rows - 1) / 2])
-
 
 def read_picture(path: Path) -> ScanPicture:
     """Return the picture of a file that Pillow reads. Raises DesignError for other files."""
     from PIL import Image, ImageOps, UnidentifiedImageError
 
+    if not path.is_file():
+        raise DesignError(f"{path} is not a file; give the picture of the cut sheet")
+    if path.stat().st_size > MOST_BYTES:
+        raise DesignError(f"{path} is larger than {MOST_BYTES:,} bytes; scan in grey")
     try:
-        if not path.is_file():
-            raise DesignError(f"{path} is not a file; give the picture of the cut sheet")
-        if path.stat().st_size > MOST_BYTES:
-            raise DesignError(f"{path} is larger than {MOST_BYTES:,} bytes; scan in grey")
-        data = path.read_bytes()
         with Image.open(path) as image:
             columns, rows = image.size
             if columns * rows > MOST_PIXELS:
@@ -65,6 +59,7 @@ def read_picture(path: Path) -> ScanPicture:
                 )
             stated = image.info.get("dpi")
             grey = _grey(ImageOps.exif_transpose(image))
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
     except (UnidentifiedImageError, SyntaxError, ValueError, OSError) as error:
         if isinstance(error, DesignError):
             raise
@@ -75,7 +70,7 @@ def read_picture(path: Path) -> ScanPicture:
         raise DesignError(
             f"{path} is {columns} x {rows} pixels, too small to measure; scan at 600 dpi or more"
         )
-    return ScanPicture(path, grey, hashlib.sha256(data).hexdigest(), _resolution(stated))
+    return ScanPicture(path, grey, digest, _resolution(stated))
 
 
 def _grey(image: Any) -> Pixels:
@@ -96,14 +91,9 @@ def _resolution(stated: Any) -> tuple[float, float] | None:
 
 
 class PictureOutline(NamedTuple):
-    """A closed outline: its points (n, 2) as x and y in pixels, centroid, area in square pixels.
+    """A closed outline, x and y in pixels; its inside is lighter than its surroundings, or not."""
 
-    ``is_light``: True if its inside is lighter than its surroundings.
-    """
-
-    points: NDArray[np.float64]
-    centroid: NDArray[np.float64]
-    area: float
+    polygon: shapely.Polygon
     is_light: bool
 
 
@@ -121,14 +111,12 @@ def outlines(picture: ScanPicture) -> list[PictureOutline]:
     find_contours: Any = measure.find_contours
     results = []
     for contour in find_contours(reduced - level, 0.0):
-        if len(contour) < 8 or not np.array_equal(contour[0], contour[-1]):
-            continue
-        # A reduced pixel's centre is the middle of its block.
-        points = contour[:-1, ::-1] * factor + (factor - 1) / 2
-        area, centroid = moments(points)
-        if abs(area) > 12 * factor**2:
-            results.append(PictureOutline(points, centroid, abs(area), area > 0))
-    return sorted(results, key=lambda outline: -outline.area)
+        if len(contour) >= 8 and np.array_equal(contour[0], contour[-1]):
+            # A reduced pixel's centre is the middle of its block.
+            polygon = shapely.Polygon(contour[:, ::-1] * factor + (factor - 1) / 2)
+            if polygon.area > 12 * factor**2:
+                results.append(PictureOutline(polygon, polygon.exterior.is_ccw))
+    return sorted(results, key=lambda outline: -outline.polygon.area)
 
 
 def _reduced(pixels: Pixels, factor: int) -> Pixels:
@@ -138,58 +126,36 @@ def _reduced(pixels: Pixels, factor: int) -> Pixels:
     return np.asarray(blocks.mean(axis=(1, 3)), dtype=np.float32)
 
 
-def _level(reduced: Pixels, path: Path) -> NDArray[np.float32]:
+def _level(reduced: Pixels, path: Path) -> Pixels:
     """Return the threshold midway between film and paper, following uneven light."""
     from scipy.ndimage import gaussian_filter, map_coordinates
     from skimage import filters
 
-    smooth = gaussian_filter(reduced, 1.0)
     # Light changes slowly: a sample every few pixels suffices.
-    sparse = smooth[::SPARSE, ::SPARSE]
+    sparse = gaussian_filter(reduced, 1.0)[::SPARSE, ::SPARSE]
     threshold_otsu: Any = filters.threshold_otsu
-    level: Any = threshold_otsu(smooth)
-    width = max(sparse.shape) / 12
+    level: Any = threshold_otsu(sparse)
     for _ in range(ROUNDS):
         is_light = sparse > level
-        contrast = _contrast(sparse, is_light)
+        is_plain = is_light.all() or not is_light.any()
+        contrast = 0.0 if is_plain else np.median(sparse[is_light]) - np.median(sparse[~is_light])
         if contrast < LEAST_CONTRAST:
             raise DesignError(
                 f"{path}: film and paper differ by {contrast:.0f} of 255 grey levels, and "
                 f"{LEAST_CONTRAST:.0f} are needed; lay the film on black paper and scan again"
             )
-        light = _local_mean(sparse, is_light, width)
-        level = (light + _local_mean(sparse, ~is_light, width)) / 2
-    places = [np.arange(side) / SPARSE for side in reduced.shape]
-    grid = np.meshgrid(*places, indexing="ij", sparse=False)
-    return np.asarray(map_coordinates(level, grid, order=1, mode="nearest"), dtype=np.float32)
+        level = (_local_mean(sparse, is_light) + _local_mean(sparse, ~is_light)) / 2
+    places = np.meshgrid(*(np.arange(side) / SPARSE for side in reduced.shape), indexing="ij")
+    return np.asarray(map_coordinates(level, places, order=1, mode="nearest"), dtype=np.float32)
 
 
-def _contrast(smooth: Pixels, is_light: NDArray[np.bool_]) -> float:
-    if is_light.all() or not is_light.any():
-        return 0.0
-    return float(np.median(smooth[is_light]) - np.median(smooth[~is_light]))
-
-
-def _local_mean(values: Pixels, mask: NDArray[np.bool_], width: float) -> NDArray[np.float32]:
+def _local_mean(values: Pixels, mask: NDArray[np.bool_]) -> Pixels:
     """Return the mean of the values in a mask, weighted by distance; far away, the overall mean."""
     from scipy.ndimage import binary_erosion, gaussian_filter
 
+    width = max(values.shape) / 12
     inner = binary_erosion(mask)
     weights = (inner if inner.any() else mask).astype(np.float32)
     mean = float(values[weights > 0].mean())
-    # Far from the mask values tend to its overall mean.
     total = gaussian_filter(values * weights, width) + 1e-3 * mean
     return np.asarray(total / (gaussian_filter(weights, width) + 1e-3))
-
-
-def moments(points: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-    """Return signed area and centroid of a polygon; the area is positive counter-clockwise."""
-    origin = points[0]
-    x, y = (points - origin).T
-    after_x, after_y = np.roll(x, -1), np.roll(y, -1)
-    cross = x * after_y - after_x * y
-    area = float(cross.sum()) / 2
-    if area == 0:
-        return 0.0, points.mean(axis=0)
-    middle = np.array([((x + after_x) * cross).sum(), ((y + after_y) * cross).sum()])
-    return area, origin + middle / (6 * area)

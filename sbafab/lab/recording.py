@@ -19,7 +19,6 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
 from sbafab.folders.swap import replace_text
 from sbafab.lab.builds import RecordedDesign, promised, recorded_sha256
-from sbafab.lab.coupon import row_cells, table_text
 from sbafab.lab.records import (
     DeviceEntry,
     HistoryDocument,
@@ -31,6 +30,7 @@ from sbafab.lab.records import (
     row_of,
 )
 from sbafab.lab.store import Contents, Lab
+from sbafab.lab.tables import table_rows, table_text
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.record_sheet import TESTS_TABLE, RecordTable, record_tables
 from sbafab.spreadsheet import csv_text
@@ -99,7 +99,7 @@ def read_batch(path: Path) -> list[Record]:
     Its columns are a subset of a Record's. Several errors share one cell, separated by blanks.
     Raises DesignError with the line.
     """
-    records = [row_of(Record, row, where) for where, row in _csv_rows(path)]
+    records = [row_of(Record, row, where) for where, row in table_rows(path)]
     if not records:
         raise DesignError(
             f"{path} has no result; its first line names columns ({', '.join(columns(Record))}), "
@@ -115,7 +115,7 @@ def read_history(path: Path, defaults: Mapping[str, Any]) -> list[HistoryEntry]:
     have a list ``entry``, and beside it values shared by all entries. Photographs are looked up
     beside the file. Raises DesignError with the line or the entry.
     """
-    rows = _csv_rows(path) if path.suffix.lower() == ".csv" else _table_rows(path)
+    rows = table_rows(path) if path.suffix.lower() == ".csv" else _entry_tables(path)
     entries: list[HistoryEntry] = []
     for where, row in rows:
         values = {**defaults, **{name: v for name, v in row.items() if v not in ("", None)}}
@@ -127,39 +127,10 @@ def read_history(path: Path, defaults: Mapping[str, Any]) -> list[HistoryEntry]:
     return entries
 
 
-def _csv_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the filled rows below the header, with their places; ``#`` begins a comment.
-
-    Columns are separated by commas, semicolons or tabs; with the latter two, decimal commas work.
-    """
-    lines = [
-        (f"{path}, line {number}", line)
-        for number, line in enumerate(table_text(path).splitlines(), start=1)
-        if line.strip(' ,;\t"') and not line.lstrip(' "').startswith("#")
-    ]
-    if not lines:
-        return
-    separator = max(",;\t", key=lines[0][1].count)
-    names = [name.lower() for name in row_cells(lines[0][1], separator, lines[0][0])]
-    named = [name for name in names if name]
-    if len(set(named)) != len(named):
-        raise DesignError(f"{path} names a column twice; keep one of each")
-    for where, line in lines[1:]:
-        cells = row_cells(line, separator, where)
-        while len(cells) > len(names) and not cells[-1]:
-            cells.pop()
-        if len(cells) != len(names):
-            raise DesignError(
-                f"{where} has {len(cells)} cells where the header has {len(names)}; write decimal "
-                "points, or part columns by semicolons"
-            )
-        yield where, {name: cell for name, cell in zip(names, cells, strict=True) if name or cell}
-
-
 _PARSERS: Mapping[str, Callable[[str], Any]] = {".toml": tomllib.loads, ".json": json.loads}
 
 
-def _table_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _entry_tables(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield the tables of the list ``entry``, merged with the shared values, with their places."""
     parser = _PARSERS.get(path.suffix.lower())
     if parser is None:

@@ -56,7 +56,7 @@ TABLES = {
     "serial,leak\n": "has no result",
     "leak,burst_kpa\npass,3\n": "line 2: a result needs its serial",
     "serial,burst\nA1,3\n": "line 2: 'burst' is none of serial",
-    "serial,leak,leak\nA1,pass,pass\n": "names a column twice",
+    "serial,leak,leak\nA1,pass,pass\n": "has two columns leak; keep one",
     "serial,leak\nA1,maybe\n": "line 2: leak = 'maybe' must be '', 'pass' or 'fail'",
     "serial,leak\nA1,\n": "line 2: A1 has no result; give leak",
     "serial,burst_kpa\nA1,350,5\n": "line 2 has 3 cells where the header has 2",
