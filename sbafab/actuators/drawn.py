@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from sbafab.actuators import Family
 from sbafab.actuators.shapes import (
@@ -27,7 +26,7 @@ from sbafab.design.outline import read_drawing
 from sbafab.design.polylines import polyline
 from sbafab.design.records import Design, Drawn, Form, Free, Mechanism, MechanismKind, Wrap, card
 from sbafab.design.sections import NAME_PATTERN
-from sbafab.design.toml_table import Section, writable
+from sbafab.design.toml_table import NamedTables, Section, writable
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError, SbafabError
 from sbafab.geometry.edges import Edge, unit
@@ -195,15 +194,13 @@ class DrawnPort(Section):
     """A place of that gap, or a hole of the top or bottom film beside it, with a tube glued on."""
 
 
-class NamedNets(Section):
+class NamedNets(NamedTables):
     """The nets by name: ports and chambers that voids join, and that nothing else is joined to."""
 
-    model_config = ConfigDict(extra="allow")
+    what, names = "net", NAME_PATTERN
+    names_are = "of letters, digits, dots, - and _, 64 at most"
+    most = 500
     __pydantic_extra__: dict[str, Names] = Field(init=False)
-
-    @property
-    def by_name(self) -> Mapping[str, tuple[str, ...]]:
-        return self.__pydantic_extra__ or {}
 
 
 DRAWN = "drawn"
@@ -310,15 +307,13 @@ class DrawnDesign(Design):
         return bool(_nets(self))
 
     @property
-    def seamed_layers(self) -> frozenset[tuple[int, int]]:
-        return frozenset(seam.layers for seam in self.seams or ())
-
-    @property
-    def turned_layers(self) -> frozenset[int]:
-        return frozenset(number for number, row in enumerate(self.layers, start=1) if row.turned)
+    def chamber_gaps(self) -> dict[tuple[int, int], bool]:
+        """The gaps between films, by their layers: True for those with a chamber."""
+        return chamber_gaps(self.layer_roles, {seam.layers for seam in self.seams or ()})
 
     @property
     def stated_folds(self) -> tuple[Fold, ...]:
+        """The folds, their lines as they are drawn."""
         return tuple(Fold(*fold.layers, fold.line) for fold in self.folds or ())
 
     @property
@@ -365,7 +360,7 @@ def build(design: DrawnDesign) -> Laminate:
     _refuse(_faults(design))
     shapes = ShapeRegions(design.shapes.by_name, design.drawings)
     balloons = design.stack.balloons
-    numbers = balloon_numbers(design.layer_roles, design.seamed_layers)
+    numbers = balloon_numbers(design.layer_roles, design.chamber_gaps)
     cuts = [
         CutFilm(row.role, shapes.of(row.shape, f"layer {number}"), balloon, row.pieces)
         for number, (row, balloon) in enumerate(zip(design.layers, numbers, strict=True), start=1)
@@ -436,7 +431,7 @@ def _faults(design: DrawnDesign) -> Iterator[str]:
     yield from _faults_of_order(design.layer_roles)
     yield from _faults_of_joints(design)
     yield from _faults_of_nets(design)
-    count = sum(chamber_gaps(design.layer_roles, design.seamed_layers).values())
+    count = sum(design.chamber_gaps.values())
     if not count:
         yield (
             "layers has no gap with a chamber; lay a chamber-mask between two films, or bond them "
@@ -481,7 +476,7 @@ def _faults_of_names(design: DrawnDesign) -> Iterator[str]:
 def _faults_of_joints(design: DrawnDesign) -> Iterator[str]:
     """Yield folds, seams and ports that lie between no neighbouring films."""
     ports = design.ports or ()
-    pairs = chamber_gaps(design.layer_roles, design.seamed_layers)
+    pairs = design.chamber_gaps
     joints = [
         (f"fold of layers {f.lower} and {f.upper}", (f.lower, f.upper)) for f in design.stated_folds
     ]
@@ -532,8 +527,6 @@ def _faults_of_nets(design: DrawnDesign) -> Iterator[str]:
     names += [port.name for port in design.ports or ()]
     home: dict[str, str] = {}
     for net, members in _nets(design).items():
-        if not re.fullmatch(NAME_PATTERN, net):
-            yield f"nets.{net} is no name; take letters, digits, dots, - and _, 64 at most"
         for member in members:
             if member not in names:
                 remedy = hint(member, names)

@@ -6,18 +6,17 @@ Shapes may be made of others by name; several layers may use the same one.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from sbafab.design.files import hint, shown
 from sbafab.design.outline import read_drawing, refuse_crossings
 from sbafab.design.polylines import Polyline, polyline
-from sbafab.design.toml_table import Section
+from sbafab.design.toml_table import NamedTables, Section
 from sbafab.design.units import LONGEST, Length, Millimetres
 from sbafab.errors import DesignError
 from sbafab.geometry.contour import Mark, tidy
@@ -35,8 +34,6 @@ Vertex = Annotated[
 ]
 Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=200)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
-SHAPE_NAME = re.compile("[a-z][a-z0-9_-]{0,31}")
-MOST_SHAPES = 200
 
 NEEDS: Mapping[str, tuple[str, ...]] = {
     "disc": (),
@@ -144,27 +141,12 @@ class NamedShape(Section):
         return self
 
 
-class NamedShapes(Section):
+class NamedShapes(NamedTables):
     """The shapes by name, a table for each."""
 
-    model_config = ConfigDict(extra="allow")
+    what, names = "shape", "[a-z][a-z0-9_-]{0,31}"
+    names_are = "a small letter and up to 31 small letters, digits, - or _"
     __pydantic_extra__: dict[str, NamedShape] = Field(init=False)
-
-    @model_validator(mode="after")
-    def _names_can_be_written(self) -> Self:
-        if len(self.by_name) > MOST_SHAPES:
-            raise ValueError(f"has {len(self.by_name)} shapes; at most {MOST_SHAPES} may be")
-        for name in self.by_name:
-            if not SHAPE_NAME.fullmatch(name):
-                raise ValueError(
-                    f"has a shape named {shown(name)}; a name is a small letter and up to 31 small "
-                    "letters, digits, - or _"
-                )
-        return self
-
-    @property
-    def by_name(self) -> Mapping[str, NamedShape]:
-        return self.__pydantic_extra__ or {}
 
 
 def _entries(value: object) -> int:

@@ -50,7 +50,7 @@ class KerfDocument(Document, schema="sbafab/kerf@1"):
 
 def _film(context: click.Context, option: click.Parameter, name: str) -> str:
     """Return the name of a film; raises BadParameter for one that no film can have."""
-    if not FILM_NAME.fullmatch(name):
+    if not re.fullmatch(FILM_NAME, name):
         raise click.BadParameter(
             f"{name!r} is not the name of a film; give tpe, ptfe or a table of [films]"
         )

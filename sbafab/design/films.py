@@ -6,13 +6,12 @@ Lengths are mm.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from sbafab.design.toml_table import Section
+from sbafab.design.toml_table import NamedTables, Section
 from sbafab.design.units import (
     CELSIUS,
     DENSITIES,
@@ -36,9 +35,7 @@ from sbafab.laminate.films import (
 from sbafab.laminate.joints import BondProcess
 
 UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
-FILM_NAME = re.compile(r"[a-z][a-z0-9]{0,15}")
-MOST_FILMS = 20
-"""Further films, beside TPE and PTFE."""
+FILM_NAME = r"[a-z][a-z0-9]{0,15}"
 HOTTEST = 400.0
 """Highest temperature of any film, C."""
 Density = Annotated[float, Field(gt=0, le=20000), DENSITIES]
@@ -148,29 +145,23 @@ class FaceBonding(Section):
     """The bond that must be made before this one."""
 
 
-class FaceBondings(Section):
+class FaceBondings(NamedTables):
     """Faces that bond, a table for each pair; with any table, faces that are in none do not
     bond.
     """
 
-    model_config = ConfigDict(extra="allow")
+    what, names, names_are = "bond", FACE_PATTERN, "of small letters"
     __pydantic_extra__: dict[str, FaceBonding] = Field(init=False)
 
     @model_validator(mode="after")
     def _names_are_known(self) -> Self:
         for name, bond in self.by_name.items():
-            if not re.fullmatch(FACE_PATTERN, name):
-                raise ValueError(f"has a bond named {name[:40]!r}; a name is of small letters")
             if bond.after is not None and (bond.after == name or bond.after not in self.by_name):
                 raise ValueError(
                     f"has bond {name} after {bond.after[:40]!r}, which is no other bond of it; "
                     f"there are {', '.join(self.by_name)}"
                 )
         return self
-
-    @property
-    def by_name(self) -> Mapping[str, FaceBonding]:
-        return self.__pydantic_extra__ or {}
 
 
 OF_THE_PRODUCT = ("density", "melting_point", "modulus", "poisson")
@@ -268,31 +259,15 @@ class OtherFilm(Section):
         return self
 
 
-class Films(Section):
+class Films(NamedTables):
     """Films that the layers are cut from: TPE, PTFE, and further films, a table for each."""
 
-    model_config = ConfigDict(extra="allow")
+    what, names, most = "film", FILM_NAME, 20
+    names_are = 'a small letter and up to 15 small letters or digits, such as "tpu50"'
     __pydantic_extra__: dict[str, OtherFilm] = Field(init=False)
 
     tpe: TpeFilm = TpeFilm.model_construct()
     ptfe: PtfeFilm = PtfeFilm.model_construct()
-
-    @model_validator(mode="after")
-    def _names_can_be_written(self) -> Self:
-        for name in self.others:
-            if not FILM_NAME.fullmatch(name):
-                raise ValueError(
-                    f"has a film named {name[:40]!r}; a name is a small letter and up to 15 small "
-                    'letters or digits, such as "tpu50"'
-                )
-        if len(self.others) > MOST_FILMS:
-            raise ValueError(f"has {len(self.others)} further films; at most {MOST_FILMS} may be")
-        return self
-
-    @property
-    def others(self) -> Mapping[str, OtherFilm]:
-        """The films beside TPE and PTFE, by the names of their tables."""
-        return self.__pydantic_extra__ or {}
 
     @property
     def face_names(self) -> frozenset[str]:
@@ -306,55 +281,34 @@ class Films(Section):
         tpe, ptfe = self.tpe, self.ptfe
         limit = ptfe.temperature_limit
         films = {
-            "tpe": Film(
-                "TPE",
-                tpe.product,
-                tpe.thickness,
-                tpe.density,
-                tpe.melting_point,
-                limit,
-                elastic=_elastic(tpe),
-                faces=_faces(tpe),
-            ),
-            "ptfe": Film(
-                "PTFE",
-                ptfe.product,
-                ptfe.thickness,
-                ptfe.density,
-                limit,
-                limit,
-                "mask",
-                warning=PTFE_WARNING,
-            ),
+            "tpe": _film("tpe", tpe, tpe.melting_point, limit),
+            "ptfe": _film("ptfe", ptfe, limit, limit, "mask", warning=PTFE_WARNING),
         }
-        for name, film in self.others.items():
-            films[name] = Film(
-                material=material(name),
-                product=film.product,
-                thickness=film.thickness,
-                density=film.density,
-                softens_above=film.melting_point,
-                limit=HOTTEST if film.temperature_limit is None else film.temperature_limit,
-                kind=film.kind,
+        for name, film in self.by_name.items():
+            films[name] = _film(
+                name,
+                film,
+                film.melting_point,
+                HOTTEST if film.temperature_limit is None else film.temperature_limit,
+                film.kind,
                 warning=film.warning,
-                elastic=_elastic(film),
                 shade=sum(limits.kind == film.kind for limits in films.values()),
                 stays_solid=film.kind == "structural" and film.melting_point is None,
-                faces=_faces(film),
             )
         return films
 
 
-def _elastic(film: TpeFilm | OtherFilm) -> tuple[float, float] | None:
-    """Young's modulus in MPa and Poisson's ratio, if both are known."""
-    if film.modulus is None or film.poisson is None:
-        return None
-    return film.modulus, film.poisson
-
-
-def _faces(film: TpeFilm | OtherFilm) -> tuple[str, str] | None:
-    """Materials of the upper and the lower face, if stated."""
-    return None if film.faces is None else (film.faces.upper, film.faces.lower)
+def _film(
+    name: str, table: TpeFilm | PtfeFilm | OtherFilm, softens: float | None, *more: Any, **keys: Any
+) -> Film:
+    """The film of a table, with the elasticity and the faces that it states in full."""
+    if not isinstance(table, PtfeFilm):
+        if table.modulus is not None and table.poisson is not None:
+            keys["elastic"] = table.modulus, table.poisson
+        if table.faces is not None:
+            keys["faces"] = table.faces.upper, table.faces.lower
+    product, thickness, density = table.product, table.thickness, table.density
+    return Film(material(name), product, thickness, density, softens, *more, **keys)
 
 
 def without_other_products(table: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:

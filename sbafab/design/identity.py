@@ -62,7 +62,7 @@ BONDED = (
 
 def _films(design: Design) -> dict[str, list[object]]:
     """Films by table name: kind, product, thickness, and True if the kerf is measured."""
-    kerfs = {name: film.kerf for name, film in design.films.others.items()}
+    kerfs = {name: film.kerf for name, film in design.films.by_name.items()}
     kerfs |= {"tpe": design.laser.kerf_tpe, "ptfe": design.laser.kerf_ptfe}
     return {
         name: [film.kind, film.product, film.thickness, kerfs[name] != UNCALIBRATED]

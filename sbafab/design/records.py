@@ -64,7 +64,7 @@ from sbafab.geometry.offset import Kerf
 from sbafab.geometry.region import Region
 from sbafab.laminate.base_plate import PlateMachine, lone_pin_error, pin_error
 from sbafab.laminate.films import Material
-from sbafab.laminate.joints import FaceBond, Fold
+from sbafab.laminate.joints import FaceBond
 from sbafab.notebook import table_html
 
 if TYPE_CHECKING:
@@ -166,21 +166,6 @@ class Design(Section):
         return False
 
     @property
-    def seamed_layers(self) -> frozenset[tuple[int, int]]:
-        """Pairs of layers, by index, bonded by seams."""
-        return frozenset()
-
-    @property
-    def turned_layers(self) -> frozenset[int]:
-        """Layers, by index, that are laid upper face down."""
-        return frozenset()
-
-    @property
-    def stated_folds(self) -> tuple[Fold, ...]:
-        """Films folded into two layers."""
-        return ()
-
-    @property
     def stated_bonds(self) -> tuple[FaceBond, ...]:
         """Faces that bond, and the process; empty if not stated.
 
@@ -238,7 +223,7 @@ class Design(Section):
     def kerf_widths(self) -> dict[Material, Kerf | None]:
         """Full kerf width (or that along x and y) by material, None if not measured."""
         kerfs = {"TPE": self.laser.kerf_tpe, "PTFE": self.laser.kerf_ptfe}
-        kerfs |= {material(name): film.kerf for name, film in self.films.others.items()}
+        kerfs |= {material(name): film.kerf for name, film in self.films.by_name.items()}
         return {name: None if isinstance(kerf, str) else kerf for name, kerf in kerfs.items()}
 
     @property

@@ -549,10 +549,6 @@ class Sheets(Section):
     R12 by colours) or "epilog" (SVG with hairlines by colours)."""
 
 
-REMOVED_RULES = ("bridges", "scrap")
-"""Rules of registered sheets, which earlier design files may waive."""
-
-
 class Rules(Section):
     """Limits of the rule deck, and waivers."""
 
@@ -577,14 +573,6 @@ class Rules(Section):
     """Largest ratio of length to width of a branch of a net without a port; by default 2."""
     waive: tuple[Annotated[str, *name_of(rule_names)], ...] = Field(default=(), strict=False)
     """Rules whose failure does not stop the cut files; every file then says so."""
-
-    @field_validator("waive", mode="before")
-    @classmethod
-    def _without_removed_rules(cls, names: object) -> object:
-        # A removed rule needs no waiver.
-        if not isinstance(names, list | tuple):
-            return names
-        return [name for name in names if name not in REMOVED_RULES]
 
     @property
     def channels_open_at_kpa(self) -> float:

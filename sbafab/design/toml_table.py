@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
 
-from pydantic import ConfigDict, field_validator
+from pydantic import ConfigDict, field_validator, model_validator
 
 from sbafab.documents import Described
 
@@ -25,6 +27,37 @@ class Section(Described):
     @classmethod
     def _can_be_written(cls, value: object) -> object:
         return writable(value)
+
+
+class NamedTables(Section):
+    """A table whose keys are names that the user chooses; a record states their type as
+    ``__pydantic_extra__``.
+    """
+
+    model_config = ConfigDict(extra="allow")
+    what: ClassVar[str]
+    """The thing that a name names, for messages."""
+    names: ClassVar[str]
+    """Pattern of a name."""
+    names_are: ClassVar[str]
+    """The same in words."""
+    most: ClassVar[int] = 200
+
+    @model_validator(mode="after")
+    def _names_can_be_written(self) -> Self:
+        for name in self.by_name:
+            if not re.fullmatch(self.names, name):
+                raise ValueError(
+                    f"has a {self.what} named {name[:40]!r}; a name is {self.names_are}"
+                )
+        if len(self.by_name) > self.most:
+            count = len(self.by_name)
+            raise ValueError(f"has {count} {self.what}s; at most {self.most} may be")
+        return self
+
+    @property
+    def by_name(self) -> Mapping[str, Any]:
+        return self.__pydantic_extra__ or {}
 
 
 def writable(value: object) -> object:

@@ -189,7 +189,7 @@ def stocks(design: Design) -> dict[Material, Stock]:
 def _sheets(design: Design) -> dict[Material, tuple[str, Sheet]]:
     """The sheet of every film, by material, and the table that describes it."""
     sheets = {"TPE": ("sheets.tpe", design.sheets.tpe), "PTFE": ("sheets.ptfe", design.sheets.ptfe)}
-    others = design.films.others.items()
+    others = design.films.by_name.items()
     return sheets | {material(name): (f"films.{name}.sheet", film.sheet) for name, film in others}
 
 

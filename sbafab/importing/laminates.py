@@ -6,6 +6,7 @@ Shapes refer to patterns of the ``laminate.json`` beside the design, so no edge 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -289,7 +290,7 @@ def _film_tables(
     names: dict[str, str] = {}
     for film in dict.fromkeys(layer.film for layer in laminate.layers):
         name = film.material.lower()
-        if not FILM_NAME.fullmatch(name):
+        if not re.fullmatch(FILM_NAME, name):
             name = key_name(name, names.values(), "film").replace("-", "")[:16]
             remarks.append(f"film {film.material}: named {name.upper()} here")
         names[film.material] = name

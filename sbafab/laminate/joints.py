@@ -6,7 +6,7 @@ Lengths are mm, in the frame of the finished laminate. Layers are named by their
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -136,17 +136,15 @@ def chamber_gaps(
     return gaps
 
 
-def balloon_numbers(
-    roles: Sequence[str], seams: Collection[tuple[int, int]] = ()
-) -> list[int | None]:
-    """Return the balloon of every layer, counted from 1 at the bottom.
+def balloon_numbers(roles: Sequence[str], gaps: Mapping[tuple[int, int], bool]) -> list[int | None]:
+    """Return the balloon of every layer, counted from 1 at the bottom, by its ``chamber_gaps``.
 
     A film belongs to the chamber above it, or else to the one below. A sheet and a mask beside it
     belong to none.
     """
     numbers: list[int | None] = [None] * len(roles)
     count = 0
-    for (below, above), is_chamber in chamber_gaps(roles, seams).items():
+    for (below, above), is_chamber in gaps.items():
         count += is_chamber
         is_beside = not is_chamber and "sheet" in (roles[below - 1], roles[above - 1])
         for index in range(below, above):

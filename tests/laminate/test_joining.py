@@ -11,7 +11,7 @@ from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.films import Film
 from sbafab.laminate.joining import joinings
-from sbafab.laminate.joints import FaceBond, Fold, Seam, balloon_numbers
+from sbafab.laminate.joints import FaceBond, Fold, Seam, balloon_numbers, chamber_gaps
 from sbafab.laminate.laminate import Chamber, Laminate, Layer
 from sbafab.pressing.schedule import schedule
 
@@ -29,7 +29,7 @@ def laminate(*films: Film, turned: tuple[int, ...] = (), profile: Region = PLATE
     layers = tuple(
         Layer(i, role, film, profile, balloon, 0.1 * i, 1, film.material, i in turned)
         for i, (role, film, balloon) in enumerate(
-            zip(roles, films, balloon_numbers(roles), strict=True), start=1
+            zip(roles, films, balloon_numbers(roles, chamber_gaps(roles, ())), strict=True), start=1
         )
     )
     chamber = Chamber("a", ((0.0, 0.0),))
