@@ -14,8 +14,8 @@ from sbafab.cutting.verify import verify_file
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region, disc, polygon, rectangle, union
-from sbafab.laminate.assembly import PLATE_MARGIN
 from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.lay_up import PLATE_MARGIN
 
 PATH = "sheets/fixture.dxf"
 CHAMFER = 5.0

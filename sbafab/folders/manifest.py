@@ -25,10 +25,10 @@ from sbafab.folders.build import Build, warnings
 from sbafab.folders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, BatchSchema
 from sbafab.folders.swap import read_manifest
 from sbafab.geometry.offset import Kerf
-from sbafab.laminate.assembly import laying
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.joints import SeamKind, SeamTool
 from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, Role
+from sbafab.laminate.lay_up import lay_up_steps
 from sbafab.meshing.mesh_files import MeshFile
 from sbafab.models.formulas import sizes
 from sbafab.pressing.cycles import Runs
@@ -523,7 +523,7 @@ def _interface(interface: Interface) -> InterfaceClaim:
 
 
 def _seams(laminate: Laminate, is_cut: bool) -> tuple[SeamClaim, ...]:
-    steps = [(step.joining.seam, step.number) for step in laying(laminate) if step.joining]
+    steps = [(step.joining.seam, step.number) for step in lay_up_steps(laminate) if step.joining]
     return tuple(
         SeamClaim(
             name=seam.name,

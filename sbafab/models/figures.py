@@ -16,7 +16,7 @@ from pydantic import AfterValidator, Field, PlainSerializer, WithJsonSchema
 
 from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError
-from sbafab.laminate.assembly import folded_height
+from sbafab.laminate.lay_up import folded_height
 from sbafab.models import paper
 from sbafab.models.closed_forms import eq_4
 from sbafab.models.paper import Counterpart, CounterpartEntry
@@ -34,8 +34,8 @@ from sbafab.notebook import data_frame, table_html
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from sbafab.laminate.assembly import FoldedHeight
     from sbafab.laminate.laminate import Laminate
+    from sbafab.laminate.lay_up import FoldedHeight
 
 BY_DISC = "disc of equal area"
 """In the name of a model of discs that is applied to a drawn pocket."""

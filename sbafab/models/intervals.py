@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 from sbafab.design.records import Design, Discs, Form
-from sbafab.laminate.assembly import folded_height
 from sbafab.laminate.burst import RADIUS, Burst
 from sbafab.laminate.films import PAPER_BURST, PAPER_THICKNESS
 from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.lay_up import folded_height
 from sbafab.models.calibrated import (
     DESIGN_UNKNOWNS,
     SHARE,

@@ -17,9 +17,9 @@ import numpy as np
 from sbafab.design.records import Design, Discs, Form, Slots
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
-from sbafab.laminate.assembly import FoldedHeight
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, PAPER_TPE, film_name
 from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.lay_up import FoldedHeight
 from sbafab.models.closed_forms import PocketModel, eq_4, eqs_1_to_3, lens, within
 from sbafab.models.figures import Factors, Model
 from sbafab.models.paper import FULL_SHARE, VALID, VALID_RADIUS

@@ -17,9 +17,9 @@ from sbafab.actuators import build
 from sbafab.design.records import Design, Slots, Wrap
 from sbafab.errors import BeyondError, DesignError, GeometryError
 from sbafab.geometry.region import Region
-from sbafab.laminate.assembly import FoldedHeight
 from sbafab.laminate.burst import NOT_BURST, burst
 from sbafab.laminate.laminate import Laminate, film_mass
+from sbafab.laminate.lay_up import FoldedHeight
 from sbafab.models import elastic, mechanisms, paper
 from sbafab.models.closed_forms import bend, eqs_1_to_3, paraboloid_radius
 from sbafab.models.drawn_pockets import (

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 from sbafab.design.sections import Press
 from sbafab.errors import DesignError
-from sbafab.laminate.assembly import distinct_layers
 from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.lay_up import distinct_layers
 
 BASE_PLATE, UNDERLAY, RELEASE = "base plate", "underlay", "release film"
 LAMINATE, PAD = "laminate", "press pad"

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from sbafab.design.records import Design
 from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.laminate.assembly import PLATE_MARGIN, assembly, films_without_minutes
 from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.lay_up import PLATE_MARGIN, films_without_minutes, press_steps
 from sbafab.pressing.schedule import HANDLING_MINUTES, Schedule, minutes_closed
 
 APART = 5.0
@@ -131,7 +131,7 @@ def _copies_by_hours(design: Design, laminate: Laminate) -> int:
     press = design.press
     pressing = 0.0
     if not films_without_minutes(laminate, press.timed_films):
-        pressing = sum(minutes_closed(press, part.name) for part in assembly(laminate))
+        pressing = sum(minutes_closed(press, part.name) for part in press_steps(laminate))
     handling = 60 * CYCLE_HOURS - pressing
     return max(1, math.floor(handling / HANDLING_MINUTES + ROUNDING))
 

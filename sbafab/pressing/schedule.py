@@ -14,21 +14,21 @@ from sbafab.design.records import Design
 from sbafab.design.sections import Press
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
-from sbafab.laminate.assembly import (
-    AssemblyStep,
-    BondState,
-    StepName,
-    assembly,
-    distinct_layers,
-    films_without_minutes,
-    is_laid_by_hand,
-    laying,
-    pressed_layers,
-    stack_count,
-)
 from sbafab.laminate.films import FIRST, PAPER_PRODUCT, PAPER_THICKNESS, Film
 from sbafab.laminate.joints import PRESS, SeamKind, SeamTool
 from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.lay_up import (
+    BondState,
+    LayUpStep,
+    StepName,
+    distinct_layers,
+    films_without_minutes,
+    is_laid_by_hand,
+    lay_up_steps,
+    press_steps,
+    pressed_layers,
+    stack_count,
+)
 from sbafab.pressing import build_up
 from sbafab.pressing.build_up import (
     BASE_PLATE,
@@ -110,7 +110,7 @@ STATED_C = 135.0
 
 
 def _minutes_of_another_temperature(
-    laminate: Laminate, press: Press, parts: Sequence[AssemblyStep]
+    laminate: Laminate, press: Press, parts: Sequence[LayUpStep]
 ) -> Iterator[Caution]:
     """Yield the warning that the paper's minutes are used at a temperature other than the paper's.
 
@@ -308,7 +308,7 @@ def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,))
     """
     press = design.press
     refuse_temperature(laminate, press)
-    parts = assembly(laminate)
+    parts = press_steps(laminate)
     under, *smaller = (
         [build_up.footprint(laminate, part.layers, count) for part in parts]
         for count in dict.fromkeys(together)
@@ -363,7 +363,7 @@ def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,))
 def pins_by_step(laminate: Laminate, design: Design) -> list[tuple[PinSetting, ...]]:
     """Return the pins of every press step. Raises DesignError if pins or plate do not fit."""
     press, registration = design.press, design.registration
-    parts = assembly(laminate)
+    parts = press_steps(laminate)
     heights = [build_up.footprint(laminate, part.layers).height for part in parts]
     return settings_by_step(
         [
@@ -384,7 +384,7 @@ def plate_holes(laminate: Laminate, design: Design) -> dict[str, PinHole]:
     return pin_holes(pins_by_step(laminate, design))
 
 
-def _underlay(laminate: Laminate, part: AssemblyStep, press: Press) -> float:
+def _underlay(laminate: Laminate, part: LayUpStep, press: Press) -> float:
     """Return the thickness of the underlay of a step, mm; 0 if nothing is laid by hand."""
     return press.underlay_thickness if is_laid_by_hand(laminate, part) else 0.0
 
@@ -403,9 +403,7 @@ class _Setting(NamedTuple):
     minutes: float | None
 
 
-def _step(
-    laminate: Laminate, part: AssemblyStep, press: Press, setting: _Setting, after: str
-) -> Step:
+def _step(laminate: Laminate, part: LayUpStep, press: Press, setting: _Setting, after: str) -> Step:
     count = stack_count(laminate, part.layers)
     estimate = build_up.pressures(press, setting.pad, setting.under)
     title = STEPS[part.name][count > 1]
@@ -442,7 +440,7 @@ def _step(
     )
 
 
-def _size(laminate: Laminate, part: AssemblyStep) -> tuple[float, float]:
+def _size(laminate: Laminate, part: LayUpStep) -> tuple[float, float]:
     """Return the extent along x and y, mm, of the films of a step, tabs and ears included."""
     profiles = [layer.profile for layer in distinct_layers(laminate, part.layers)]
     low_x, low_y, high_x, high_y = zip(*(profile.bounds for profile in profiles), strict=True)
@@ -471,7 +469,7 @@ def _items(press: Press, setting: _Setting, size: tuple[float, float]) -> Iterat
     yield BuildUpPart(PAD, pad, setting.pad, press.platen)
 
 
-def _instructions(part: AssemblyStep, count: int) -> str:
+def _instructions(part: LayUpStep, count: int) -> str:
     """Return the instructions of a step that makes ``count`` stacks beside each other."""
     pins = [pin.name for pin in part.pins]
     stacks = ", then ".join(layers_in_words(stack) for stack in part.stacks if stack)
@@ -492,7 +490,7 @@ def _instructions(part: AssemblyStep, count: int) -> str:
 
 def seam_steps(laminate: Laminate) -> Iterator[SeamStep]:
     """Yield the seams of a laminate, in the order in which they are made."""
-    for step in laying(laminate):
+    for step in lay_up_steps(laminate):
         seam = None if step.joining is None else step.joining.seam
         if step.joining is None or seam is None:
             continue
@@ -535,7 +533,7 @@ STAND_OUT = (
 
 def fold_steps(laminate: Laminate) -> Iterator[FoldStep]:
     """Yield the folds of a laminate, in order."""
-    for step in laying(laminate):
+    for step in lay_up_steps(laminate):
         fold = None if step.joining is None else step.joining.fold
         if step.joining is None or fold is None:
             continue
@@ -577,7 +575,7 @@ PRESSURES_TRIED = (70.0, 200.0)
 
 
 def refuse_temperature(laminate: Laminate, press: Press) -> None:
-    parts, pressed = assembly(laminate), pressed_layers(laminate)
+    parts, pressed = press_steps(laminate), pressed_layers(laminate)
     if not pressed:
         return
     for film in dict.fromkeys(layer.film for layer in pressed):
@@ -615,7 +613,7 @@ def refuse_temperature(laminate: Laminate, press: Press) -> None:
         )
 
 
-def _refuse_bonds(laminate: Laminate, press: Press, parts: Sequence[AssemblyStep]) -> None:
+def _refuse_bonds(laminate: Laminate, press: Press, parts: Sequence[LayUpStep]) -> None:
     """Raises DesignError if the press is too cold for its bonds, or too hot for seams in it."""
     for gap in laminate.interfaces:
         ends = {gap.below.index, gap.above.index}
@@ -643,7 +641,7 @@ def _refuse_bonds(laminate: Laminate, press: Press, parts: Sequence[AssemblyStep
 def _cautions(
     laminate: Laminate,
     design: Design,
-    parts: Sequence[AssemblyStep],
+    parts: Sequence[LayUpStep],
     steps: Sequence[Step],
 ) -> Iterator[Caution]:
     press, registration = design.press, design.registration
@@ -715,7 +713,7 @@ def _unknown_films(laminate: Laminate, press: Press) -> Iterator[Caution]:
 
 
 def _other_temperatures(
-    laminate: Laminate, press: Press, parts: Sequence[AssemblyStep]
+    laminate: Laminate, press: Press, parts: Sequence[LayUpStep]
 ) -> Iterator[Caution]:
     """Yield warnings of a temperature without stated minutes, or at which no one has pressed."""
     if not films_without_minutes(laminate, press.timed_films):
@@ -727,7 +725,7 @@ def _other_temperatures(
         )
 
 
-def _unpinned(laminate: Laminate, part: AssemblyStep) -> list[int]:
+def _unpinned(laminate: Laminate, part: LayUpStep) -> list[int]:
     """Return the layers that join in a step, or in a bonded stack, without a pin."""
     pinned = {
         layer.pattern

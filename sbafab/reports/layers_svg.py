@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 from sbafab.geometry.edges import Bounds, Point, box_round
 from sbafab.geometry.region import chain_data, coord, path_data
-from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import ink
 from sbafab.laminate.folding import lies_on
 from sbafab.laminate.joints import Fold, Seam
 from sbafab.laminate.laminate import Laminate, Layer, Pin
+from sbafab.laminate.lay_up import pins_when_added
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import (
     Circle,

@@ -21,9 +21,9 @@ from sbafab.cutting.seam_files import shift_words
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point, box_round
 from sbafab.geometry.region import Region, coord, disc, rectangle, union
-from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers, laying
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.lay_up import LayUpStep, distinct_layers, lay_up_steps, press_steps
 from sbafab.pressing.cycles import Runs, serial
 from sbafab.pressing.schedule import joined_words, layers_in_words
 from sbafab.reports.traveller.shapes import Bed, beds
@@ -407,7 +407,7 @@ def _laminate(page: PdfPage, laminate: Laminate, outlines: Sequence[Guide], at: 
 def guides(laminate: Laminate) -> tuple[Guide, ...]:
     """Return everything laid by hand in any step, equal outlines once, in order of steps."""
     shapes: dict[tuple[object, bool], tuple[Region, list[Layer], list[int]]] = {}
-    parts = assembly(laminate)
+    parts = press_steps(laminate)
     # A whole stack that is laid down again has no edge to align to.
     for step in (part for part in parts if part.adds):
         for bed in beds(parts, step):
@@ -429,7 +429,7 @@ def guides(laminate: Laminate) -> tuple[Guide, ...]:
     )
 
 
-def _loose(laminate: Laminate, step: AssemblyStep, bed: Bed) -> Iterator[Layer]:
+def _loose(laminate: Laminate, step: LayUpStep, bed: Bed) -> Iterator[Layer]:
     """The layers with visible edges where a part without a pin lies in the step."""
     layers = distinct_layers(laminate, bed.layers)
     pinned = [layer for layer in layers if set(step.pins) & set(laminate.pins_holding(layer))]
@@ -460,7 +460,7 @@ def seams_pdf(
     Paths are at the seams, also for tools with ``offsets``, which a line of text says.
     """
     steps: dict[tuple[int, ...], list[tuple[int, Seam]]] = {}
-    for step in laying(laminate):
+    for step in lay_up_steps(laminate):
         if step.joining is not None and step.joining.seam is not None:
             steps.setdefault(step.layers, []).append((step.number, step.joining.seam))
     pages = [
@@ -614,7 +614,7 @@ def _laid(laminate: Laminate) -> Iterator[tuple[str, list[TrayPart]]]:
     Folded halves are one part, with the half that is laid first.
     """
     taken: set[int] = set()
-    for step in laying(laminate):
+    for step in lay_up_steps(laminate):
         cut_with = [laminate.cut_with(laminate.layer(index)) for index in step.adds]
         roots = [laminate.layer(i) for i in dict.fromkeys(cut_with) if i not in taken]
         taken.update(cut_with)

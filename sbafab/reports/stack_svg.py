@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Interval, coord, section
-from sbafab.laminate.assembly import assembly
 from sbafab.laminate.films import ink
 from sbafab.laminate.laminate import Interface, Laminate, Layer, Pin
+from sbafab.laminate.lay_up import press_steps
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import BOND, length
 
@@ -224,7 +224,7 @@ def _stands(laminate: Laminate, pin: Pin) -> tuple[Sequence[tuple[int, int]], Se
         if pin in laminate.pins_holding(layers[0])
         for layer in layers
     }
-    steps = [step for step in assembly(laminate) if pin in step.pins]
+    steps = [step for step in press_steps(laminate) if pin in step.pins]
     spans = [
         (min(joined), max(joined)) for step in steps if (joined := pinned.intersection(step.layers))
     ]

@@ -1,6 +1,6 @@
 """Freedoms: the distance each layer may lie off its place once the laminate is assembled.
 
-Layers come together in the steps of the assembly. A body is a piece of a layer, or all pieces that
+Layers come together in the steps of the lay-up. A body is a piece of a layer, or all pieces that
 an earlier step has joined. Two pins locate a body to within the pin error and the play in its
 holes; on one pin it may also turn; a body without pins is placed by hand on the film below it.
 """
@@ -19,9 +19,9 @@ from sbafab.geometry.contour import nanometres
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, centroid
 from sbafab.geometry.spatial_index import boxes_meet
-from sbafab.laminate.assembly import AssemblyStep, laying
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import LOOSE, Laminate
+from sbafab.laminate.lay_up import LayUpStep, lay_up_steps
 from sbafab.rules.limits import error_on_pins
 
 
@@ -108,7 +108,7 @@ def lay_up(laminate: Laminate) -> list[Laid]:
     shapes = _Shapes(laminate)
     bodies = [[part] for layer in laminate.layers for part in shapes.parts(layer.index)]
     laid: list[Laid] = []
-    for step in laying(laminate):
+    for step in lay_up_steps(laminate):
         layers = frozenset(step.layers)
         present = sorted(body for body in bodies if body[0].layer in layers)
         pins_of_bodies = [shapes.pins(body, step) for body in present]
@@ -158,7 +158,7 @@ def _of_seam(
     """Freedoms of a seam: the upper film's, since its path is laid on that film, and its tool's."""
     films = laminate.layer(seam.above).profile.pieces
     under = next((n for n, film in enumerate(films) if not (film & seam.region).is_empty), 0)
-    steps = (s.number for s in laying(laminate) if s.joining and s.joining.seam is seam)
+    steps = (s.number for s in lay_up_steps(laminate) if s.joining and s.joining.seam is seam)
     most, layer = design.registration.error_of_seam(seam.tool), seam_part(seam).layer
     step = next(steps, seam.order)
     off = Freedom(step, layer, seam.below, seam.above, 0, most, seam=seam.name)
@@ -215,7 +215,7 @@ class _Shapes:
     def _region(self, part: Part) -> Region:
         return self.pieces[part.layer][part.piece]
 
-    def pins(self, body: Iterable[Part], step: AssemblyStep) -> dict[Point, float]:
+    def pins(self, body: Iterable[Part], step: LayUpStep) -> dict[Point, float]:
         """Centres of the step's pins that hold a part of the body, and its play on each, mm."""
         play: dict[str, float] = {}
         for part in body if step.pins else ():

@@ -11,9 +11,9 @@ from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Edge, Point
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_width
-from sbafab.laminate.assembly import assembly
 from sbafab.laminate.folding import lies_on
 from sbafab.laminate.laminate import Interface, Laminate
+from sbafab.laminate.lay_up import press_steps
 from sbafab.rules.boundary import Facing, Reach, edges_along, facing_films, outward_reach
 from sbafab.rules.finding import Place
 from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
@@ -58,7 +58,7 @@ class Measures:
     def facing(self) -> tuple[Facing, ...]:
         """Films that face each other past others, and that a closing of the press would weld."""
         laminate = self.laminate
-        pressed = [set(step.layers) for step in assembly(laminate)]
+        pressed = [set(step.layers) for step in press_steps(laminate)]
         return tuple(
             pair
             for pair in facing_films(laminate)

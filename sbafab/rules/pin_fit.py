@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from sbafab.design.records import Design
-from sbafab.laminate.assembly import assembly, distinct_layers
 from sbafab.laminate.base_plate import pin_deviations
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
+from sbafab.laminate.lay_up import distinct_layers, press_steps
 from sbafab.rules.finding import Finding, Place, judged
 from sbafab.rules.limits import TOLERANCE, error_on_pins
 from sbafab.rules.measures import Measures
@@ -81,7 +81,7 @@ def _fits(laminate: Laminate, design: Design) -> Iterator[_Fit]:
     """Every pin in every pattern that hangs on it in a step."""
     visited = set()
     on_pins = error_on_pins(design, laminate)
-    for step in assembly(laminate):
+    for step in press_steps(laminate):
         for layer in distinct_layers(laminate, step.adds):
             for pin in step.pins:
                 if (layer.pattern, pin) in visited:
@@ -107,7 +107,7 @@ def _threaded(laminate: Laminate, pin: Pin) -> int:
     """Number of layers on the pin in the step that lays most of them."""
     counts = [
         sum(pin in laminate.pins_holding(laminate.layer(index)) for index in step.adds)
-        for step in assembly(laminate)
+        for step in press_steps(laminate)
         if pin in step.pins
     ]
     return max(counts, default=0)

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from sbafab.geometry.edges import Point
-from sbafab.laminate.assembly import assembly, distinct_layers
 from sbafab.laminate.laminate import Laminate, Layer, Pin
+from sbafab.laminate.lay_up import distinct_layers, press_steps
 from sbafab.rules.boundary import middle
 from sbafab.rules.channel_clear import ON_ONE_PIN, tooling_pins
 from sbafab.rules.finding import Finding, Place, judged
@@ -65,7 +65,7 @@ def _loose(laminate: Laminate) -> Iterator[Finding]:
     if laminate.registration != "ears":
         return
     masks = [layer.index for layer in laminate.layers if layer.role == "chamber-mask"]
-    for step in assembly(laminate):
+    for step in press_steps(laminate):
         for layer in distinct_layers(laminate, step.adds):
             # An upper chamber mask has its bore's pin alone.
             needed = 1 if layer.role == "chamber-mask" and layer.index != masks[0] else 2
@@ -81,7 +81,7 @@ def _blocked(laminate: Laminate) -> Iterator[Finding]:
 
     The channels' pins have the channels' room, which channel-clear measures.
     """
-    for step in assembly(laminate):
+    for step in press_steps(laminate):
         added = distinct_layers(laminate, step.adds)
         for pin in tooling_pins(laminate):
             laid = next((layer for layer in added if pin in laminate.pins_holding(layer)), None)

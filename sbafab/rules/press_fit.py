@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from sbafab.geometry.edges import Bounds
-from sbafab.laminate.assembly import films_without_minutes
+from sbafab.laminate.lay_up import films_without_minutes
 from sbafab.rules.finding import Finding, Place, judged
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.measures import Measures

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sbafab.actuators import build, load_design
-from sbafab.laminate.assembly import FoldedHeight
+from sbafab.laminate.lay_up import FoldedHeight
 from sbafab.models import paper
 from sbafab.models.balloons import balloons_of
 from sbafab.models.closed_forms import eq_4, eqs_1_to_3

@@ -14,8 +14,8 @@ from sbafab.errors import DesignError
 from sbafab.folders.build import make_build
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, disc
-from sbafab.laminate.assembly import assembly
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.lay_up import press_steps
 
 DESIGNS = [
     ("1dof-5mm", []),
@@ -112,14 +112,14 @@ def test_two_pins_hold_every_bottom_mask_whenever_it_is_laid(
     name: str, assignments: list[str]
 ) -> None:
     laminate = eared(name, assignments)
-    first = assembly(laminate)[0]
+    first = press_steps(laminate)[0]
     for mask in bottom_masks(laminate):
         names = [pin.name for pin in laminate.pins_in(mask)]
         assert len(names) >= 2
         assert any(name.startswith("strip") for name in names)
         assert {pin.name for pin in first.pins}.issuperset(names)
     tails = {pin.name for pin in laminate.pins if pin.name.startswith("strip")}
-    for step in assembly(laminate):
+    for step in press_steps(laminate):
         # No pin is in molten TPE.
         laid = first.layers[0] in step.layers and step.bond == "flash"
         assert ({pin.name for pin in step.pins} >= tails) == laid

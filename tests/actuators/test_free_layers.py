@@ -14,8 +14,8 @@ import tomli_w
 from sbafab.actuators import build, load_design
 from sbafab.design.files import template_text
 from sbafab.errors import DesignError
-from sbafab.laminate.assembly import assembly
 from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.lay_up import press_steps
 from sbafab.rules.deck import run_deck
 from tests.designs import PAPER
 
@@ -112,7 +112,7 @@ def test_sheets_masks_and_films_stack_in_any_order(tmp_path: Path) -> None:
     assert [layer.balloon for layer in laminate.layers] == [None, 1, 1, 1, 1, 1]
     assert failing(laminate) == set()
     assert laminate.interfaces[1].gap == pytest.approx(2 * laminate.layers[2].film.thickness)
-    steps = assembly(laminate)
+    steps = press_steps(laminate)
     added = sorted(index for step in steps for index in step.adds)
     assert added == [layer.index for layer in laminate.layers]
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import shapely
 
-from sbafab.laminate.assembly import assembly
+from sbafab.laminate.lay_up import press_steps
 from sbafab.reports.drawing import text_width
 from sbafab.reports.prints import seams_pdf
 from sbafab.reports.traveller.acceptance import straight_run
@@ -180,7 +180,7 @@ def test_the_underlay_is_laid_where_it_has_a_line() -> None:
 )
 def test_names_in_the_top_view_are_apart(design: tuple[str, ...]) -> None:
     _, laminate = built(*design)
-    parts = assembly(laminate)
+    parts = press_steps(laminate)
     known = {thing.name for thing in (*laminate.pins, *laminate.chambers)}
     for part in parts:
         drawn = plan(laminate, part, beds(parts, part), "plan")

@@ -21,8 +21,8 @@ from docs.scripts.gallery import FIGURES, figures_of, numbers_of
 from sbafab.assemblies.files import load
 from sbafab.design.files import template_names
 from sbafab.design.records import Design
-from sbafab.laminate.assembly import pressed_layers
 from sbafab.laminate.burst import burst
+from sbafab.laminate.lay_up import pressed_layers
 from sbafab.models.figures import Figure, Prediction
 from sbafab.models.formulas import size_phrases, sizes
 from sbafab.models.intervals import factors_of

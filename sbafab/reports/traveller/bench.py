@@ -13,10 +13,10 @@ from sbafab.assemblies.build import Assembled
 from sbafab.cutting.fixture import plate_corner, whole_plate
 from sbafab.design.identity import adhesive_for
 from sbafab.design.sections import HoldDown
-from sbafab.laminate.assembly import films_without_minutes
 from sbafab.laminate.base_plate import HOLE_PROCESSES, for_a_cnc_mill, most_play, pin_error
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, Film
 from sbafab.laminate.joints import SeamTool
+from sbafab.laminate.lay_up import films_without_minutes
 from sbafab.pressing.dowels import push_out
 from sbafab.pressing.plate_heating import MELTING, PATIENCE, START
 from sbafab.pressing.schedule import plate_holes

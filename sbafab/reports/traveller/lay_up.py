@@ -10,8 +10,8 @@ from typing import NamedTuple
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
-from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.lay_up import LayUpStep, distinct_layers
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.traveller.shapes import Bed
 
@@ -161,7 +161,7 @@ def lip(region: Region, reference: Region) -> Lip | None:
     return Lip(round(usual, 2) + 0.0, near == len(distances))
 
 
-def places(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed]) -> tuple[PiecePlace, ...]:
+def places(laminate: Laminate, step: LayUpStep, lying: Sequence[Bed]) -> tuple[PiecePlace, ...]:
     """Return the places of everything laid on a sheet by hand; empty for steps without a sheet."""
     sheet = laminate.layers[0]
     if step.pins or sheet.role != "sheet" or sheet.index not in step.layers:

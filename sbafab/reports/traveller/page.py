@@ -13,8 +13,8 @@ from string import ascii_uppercase
 from typing import Any
 
 from sbafab.design.identity import cited, cure_hours, departures, tube_name
-from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.lay_up import pins_when_added
 from sbafab.models.formulas import sizes
 from sbafab.pressing.cycles import batch_times
 from sbafab.pressing.schedule import joined_words, layers_in_words

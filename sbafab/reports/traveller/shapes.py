@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region, coord, path_data
-from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.films import Film, Ink, ink
 from sbafab.laminate.laminate import Inlet, Laminate, Layer
+from sbafab.laminate.lay_up import LayUpStep, distinct_layers
 from sbafab.markup import escape, quoteattr
 from sbafab.reports import drawing as draw
 
@@ -223,7 +223,7 @@ class Bed:
     made_in: int | None
 
 
-def beds(steps: Sequence[AssemblyStep], step: AssemblyStep) -> tuple[Bed, ...]:
+def beds(steps: Sequence[LayUpStep], step: LayUpStep) -> tuple[Bed, ...]:
     """Return the stacks of a step, lowest first."""
     before = [earlier for earlier in steps if earlier.number < step.number]
     stacks = []

@@ -15,8 +15,8 @@ from sbafab.cutting.fixture import shown
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import coord, section
-from sbafab.laminate.assembly import AssemblyStep, distinct_layers, stack_count
 from sbafab.laminate.laminate import Inlet, Laminate, Layer, Pin
+from sbafab.laminate.lay_up import LayUpStep, distinct_layers, stack_count
 from sbafab.pressing.build_up import BASE_PLATE, PAD, RELEASE, UNDERLAY
 from sbafab.pressing.dowels import PinSetting, push_out
 from sbafab.pressing.schedule import Step
@@ -144,7 +144,7 @@ def _view(bounds: Bounds) -> _View:
     return _View(bounds, min(WIDEST / (high_x - low_x), TALLEST / (high_y - low_y)))
 
 
-def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: str) -> str:
+def plan(laminate: Laminate, step: LayUpStep, lying: tuple[Bed, ...], name: str) -> str:
     """Return the step from above; earlier stacks grey, new layers in their film's colour."""
     plate = shown(laminate)
     low_x, low_y, high_x, high_y = laminate.bounds
@@ -205,7 +205,7 @@ def _arrow(inlet: Inlet, reach: float, view: _View) -> tuple[Point, Point]:
     return (x + 0.8 * u, y + 0.8 * v), (x + 4.0 * u, y + 4.0 * v)
 
 
-def _datum(view: _View, step: AssemblyStep, has_plate: bool) -> list[str]:
+def _datum(view: _View, step: LayUpStep, has_plate: bool) -> list[str]:
     """Return the cross at the actuator's axis, as in every cut file, unless a pin stands there, and
     its words under the picture.
     """
@@ -290,7 +290,7 @@ class _Tilted:
         return self.ground - self.gap * (place + self.plate)
 
 
-def exploded(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed], name: str) -> str:
+def exploded(laminate: Laminate, step: LayUpStep, lying: Sequence[Bed], name: str) -> str:
     """Return the step's layers one above the other, lowest first, with numbers and patterns.
 
     They are drawn from the front and above, so that outlines and tabs show the orientation of each.

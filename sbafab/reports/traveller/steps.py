@@ -12,9 +12,15 @@ from typing import Any, Literal, NamedTuple
 
 from sbafab.geometry.edges import Arc
 from sbafab.geometry.region import Region
-from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers, laying, stack_count
 from sbafab.laminate.films import FIRST
 from sbafab.laminate.laminate import Inlet, Layer
+from sbafab.laminate.lay_up import (
+    LayUpStep,
+    distinct_layers,
+    lay_up_steps,
+    press_steps,
+    stack_count,
+)
 from sbafab.pressing.build_up import PAD
 from sbafab.pressing.cycles import cycle_name
 from sbafab.pressing.dowels import PinSetting
@@ -71,7 +77,7 @@ class PressPage:
     """A press step as its page, and its row on the first page, show it."""
 
     work: Work
-    part: AssemblyStep
+    part: LayUpStep
     step: Step
 
     @property
@@ -80,7 +86,7 @@ class PressPage:
 
     @cached_property
     def beds(self) -> tuple[Bed, ...]:
-        return beds(laying(self.work.laminate), self.part)
+        return beds(lay_up_steps(self.work.laminate), self.part)
 
     @cached_property
     def things(self) -> Things:
@@ -94,7 +100,7 @@ class PressPage:
     def left_out(self) -> list[tuple[tuple[int, ...], int]]:
         """The stacks of earlier steps that bond nothing, and the numbers of those steps."""
         laminate = self.work.laminate
-        loose = {p.layers: p.number for p in assembly(laminate) if _is_loose(self.work, p)}
+        loose = {p.layers: p.number for p in press_steps(laminate) if _is_loose(self.work, p)}
         return [(stack, loose[stack]) for stack in self.part.stacks if stack in loose]
 
     @property
@@ -227,7 +233,7 @@ class PressPage:
 
 def step_pages(work: Work) -> list[PressPage]:
     """Return the press steps in order."""
-    steps = zip(assembly(work.laminate), work.schedule.steps, strict=True)
+    steps = zip(press_steps(work.laminate), work.schedule.steps, strict=True)
     return [PressPage(work, part, step) for part, step in steps]
 
 
@@ -241,7 +247,7 @@ def step_rows(work: Work) -> list[PressPage | SeamStep | FoldStep]:
     return [rows[number] for number in sorted(rows)]
 
 
-def _is_loose(work: Work, part: AssemblyStep) -> bool:
+def _is_loose(work: Work, part: LayUpStep) -> bool:
     """Return True for a flash bond of one drawn film and masks without pins."""
     films = [index for index in part.layers if not work.laminate.layer(index).is_mask]
     is_held = part.bond != "flash" or bool(part.pins) or len(films) > 1
@@ -269,7 +275,7 @@ def every_step(work: Work) -> dict[str, Any]:
         "is_pinned": turns_over(work),
         "masks_on_pins": {
             bool(part.pins)
-            for part in assembly(work.laminate)
+            for part in press_steps(work.laminate)
             if any(layer.is_mask for layer in distinct_layers(work.laminate, part.adds))
         },
         "patience": PATIENCE,

@@ -1,5 +1,5 @@
-"""Assembly steps: the stacks laid on each other in each closing of the press, and its pins; the
-height of the films after the press.
+"""Steps of the lay-up: the stacks laid on each other in each closing of the press, and its pins;
+the height of the films after the press.
 
 The paper's four steps (Sec. 2), except those with nothing to press. Ears also register layers in
 full bonds: a flash bond on the pins comes first, then the full bond without pins.
@@ -26,7 +26,7 @@ PLATE_MARGIN = 6.0
 
 
 @dataclass(frozen=True)
-class AssemblyStep:
+class LayUpStep:
     """One closing of the press, or a seam, steps counted from 1.
 
     ``stacks`` lie on each other, lowest first, and ``adds`` are their layers that are new in this
@@ -47,7 +47,7 @@ class AssemblyStep:
         return tuple(index for stack in self.stacks for index in stack)
 
 
-def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
+def press_steps(laminate: Laminate) -> tuple[LayUpStep, ...]:
     """Return the steps of a laminate, bottom balloon first.
 
     Flash bonds hold layers in place on their pins. With channel pins full bonds are pressed without
@@ -59,7 +59,7 @@ def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     return stored(laminate, "_steps", _steps)
 
 
-def laying(laminate: Laminate) -> tuple[AssemblyStep, ...]:
+def lay_up_steps(laminate: Laminate) -> tuple[LayUpStep, ...]:
     """Return all steps in which layers are laid on each other: presses, seams and folds, in order.
 
     A seam or fold has no pins, and is labelled as a flash bond.
@@ -67,10 +67,10 @@ def laying(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     return stored(laminate, "_laying", _laying)
 
 
-def _laying(laminate: Laminate) -> tuple[AssemblyStep, ...]:
+def _laying(laminate: Laminate) -> tuple[LayUpStep, ...]:
     if is_only_pressed(laminate):
-        return assembly(laminate)
-    steps: list[AssemblyStep] = []
+        return press_steps(laminate)
+    steps: list[LayUpStep] = []
     for joining in joinings(laminate):
         is_pressed = joining.process == PRESS
         adds = tuple(body[0] for body in joining.bodies if len(body) == 1)
@@ -86,9 +86,9 @@ def _laying(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     return tuple(steps)
 
 
-def _steps(laminate: Laminate) -> tuple[AssemblyStep, ...]:
+def _steps(laminate: Laminate) -> tuple[LayUpStep, ...]:
     if not is_only_pressed(laminate):
-        steps = laying(laminate)
+        steps = lay_up_steps(laminate)
         return tuple(step for step in steps if step.joining and step.joining.process == PRESS)
     plans = _plans(laminate, tuple(layer.index for layer in laminate.layers))
     if laminate.registration == "ears" and not laminate.pins_in_full_bonds:
@@ -144,12 +144,12 @@ def _tacked(plan: _Plan) -> tuple[_Plan, ...]:
     return plan._replace(name=tack, bond="flash"), plan._replace(stacks=(whole,), adds=())
 
 
-def _step(number: int, plan: _Plan, laminate: Laminate) -> AssemblyStep:
+def _step(number: int, plan: _Plan, laminate: Laminate) -> LayUpStep:
     layers = [index for stack in plan.stacks for index in stack]
     is_eared = laminate.registration == "ears" and laminate.pins_in_full_bonds
     pins = _pins_in(laminate, layers) if plan.bond == "flash" or is_eared else ()
     stacks = tuple(stack for stack in plan.stacks if stack)
-    return AssemblyStep(number, plan.name, plan.bond, stacks, plan.adds, pins)
+    return LayUpStep(number, plan.name, plan.bond, stacks, plan.adds, pins)
 
 
 def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Pin, ...]:
@@ -165,7 +165,7 @@ def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Pin, ...]:
 
 def pressed_layers(laminate: Laminate) -> list[Layer]:
     """Return the layers that are pressed in some step."""
-    pressed = {index for step in assembly(laminate) for index in step.layers}
+    pressed = {index for step in press_steps(laminate) for index in step.layers}
     return [layer for layer in laminate.layers if layer.index in pressed]
 
 
@@ -223,7 +223,7 @@ def folded_height(laminate: Laminate, factor: float, product: str) -> FoldedHeig
     return FoldedHeight(laminate.thickness - molten, molten, factor, tuple(unknown))
 
 
-def is_laid_by_hand(laminate: Laminate, step: AssemblyStep) -> bool:
+def is_laid_by_hand(laminate: Laminate, step: LayUpStep) -> bool:
     """Return True if a layer, or an earlier stack, is placed by hand, without a pin.
 
     A whole stack that is laid down again needs no alignment.
@@ -249,7 +249,7 @@ def pins_when_added(laminate: Laminate) -> dict[int, tuple[Pin, ...]]:
     }
     return {
         index: tuple(pin for pin in fitting[laminate.layer(index).pattern] if pin in step.pins)
-        for step in laying(laminate)
+        for step in lay_up_steps(laminate)
         for index in step.adds
     }
 
