@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -38,9 +38,7 @@ if TYPE_CHECKING:
 SCHEMA = "sbafab/assembly-predict@1"
 """Id of a prediction of an assembly as JSON."""
 GRAVITY = 9.80665
-MARBLE_G = 1.2
-"""Mass of the marble that the paper's brace lifts, g (Sec. 5)."""
-STACK = ModelId.ELASTIC_STACK.words
+MARBLE_G = 1.2  # the paper's brace lifts this marble (Sec. 5)
 LENS = f"{ModelId.LENS.words}, virtual work p dV/dh"
 STATIC = "statics"
 IN_THE_LUMEN = (
@@ -145,29 +143,24 @@ def predict_assembly(
     actuators = [placed for placed in assembled.parts if isinstance(placed, PlacedSba)]
     for placed in actuators:
         refuse_beyond_burst(placed.made.laminate, pressure_kpa)
-    figures: list[AssemblyFigure] = []
-    touches: list[Touch] = []
-    bent: list[BentTouch] = []
+    found: list[AssemblyFigure | Touch | BentTouch] = []
     left_out: list[str] = []
     scene = _Scene(assembled, pressure_kpa)
     for placed in actuators:
         pause()
         hold = grip(assembled, placed)
         if hold is not None:
-            figures += _grip_figures(hold, placed.made.design.form.stacks, pressure_kpa, load_g)
+            found += _grip_figures(hold, placed.made.design.form.stacks, pressure_kpa, load_g)
             if hold.push is None:
                 left_out.append(f"{placed.name}, {', '.join(IN_THE_LUMEN)}: {hold.why_none}")
         elif placed.name in scene.stacks:
-            figures += _arm_figures(placed, scene.stacks[placed.name], pressure_kpa, load_g)
-            touches += scene.touches(placed)
+            found += _arm_figures(placed, scene.stacks[placed.name], pressure_kpa, load_g)
+            found += scene.touches(placed)
             pause()
-            for outcome in scene.bends(placed, pause):
-                if isinstance(outcome, BentTouch):
-                    bent.append(outcome)
-                else:
-                    figures.append(outcome)
+            found += scene.bends(placed, pause)
         else:
             left_out.append(f"{placed.name}: no model knows the form of a drawn pocket outline")
+    figures = [item for item in found if isinstance(item, AssemblyFigure)]
     if assembled.assembly.name not in PAPERS:
         figures = [replace(figure, paper="") for figure in figures]
     return AssemblyPrediction(
@@ -175,9 +168,9 @@ def predict_assembly(
         pressure_kpa,
         load_g,
         tuple(figures),
-        tuple(touches),
+        tuple(item for item in found if isinstance(item, Touch)),
         tuple(left_out),
-        tuple(bent),
+        tuple(item for item in found if isinstance(item, BentTouch)),
         tuple(p.name for p in actuators if is_near_burst(p.made.laminate, pressure_kpa)),
     )
 
@@ -188,46 +181,52 @@ def _arm_figures(
     """Yield height, reach, bend and load of an actuator with round pockets."""
     design, laminate = placed.made.design, placed.made.laminate
     is_papers = is_the_papers_3dof(design.form, laminate)
-
-    def figure(
-        name: str,
-        value: float,
-        unit: str,
-        quantity: Quantity,
-        at: Conditions,
-        paper: str = "",
-        model: ModelId = ModelId.ELASTIC_STACK,
-    ) -> AssemblyFigure:
-        """Return a figure with the measured value beside that of a design's own prediction."""
-        by = ModelId.FILMS if quantity is Quantity.FOLDED_HEIGHT else model
-        beside = counterpart(design.form, quantity, at, by, arm.calibration, is_papers)
-        measured = beside.sentence() if beside else ""
-        return AssemblyFigure(placed.name, name, value, unit, model.words, paper, measured)
-
-    at, alone = Conditions(kpa=pressure), Conditions(kpa=pressure, chambers=1)
+    kpa, bent, blocked = (
+        Conditions(kpa=pressure, **more) for more in ({}, {"chambers": 1}, {"share": 0.75})
+    )
     every = (pressure,) * arm.chambers
     free, flat = arm.pose(every), arm.flat_height
     # As in a design's own prediction: the stack's maps are approximate.
     stroke = free_rise(Counter(balloons_of(design, laminate, factors_of(design))), pressure).stroke
-    paper = "about 1 (Sec. 6)"
-    yield figure("height, flat", flat, "mm", Quantity.FOLDED_HEIGHT, ANYWHERE, paper)
-    high, paper, balloon = flat + stroke, "about 20 (Sec. 5)", ModelId.ELASTIC_BALLOON
-    yield figure("height, inflated", high, "mm", Quantity.FREE_HEIGHT, at, paper, balloon)
     push = arm.pose(every, plate=flat + 0.75 * stroke).force
-    blocked = Conditions(kpa=pressure, share=0.75)
-    yield figure("push at 75 % of its stroke", push, "N", Quantity.BLOCKED_FORCE, blocked)
+    on_stack = ModelId.ELASTIC_STACK
+    rows: list[tuple[str, float, str, Quantity, Conditions, str, ModelId]] = [
+        (
+            "height, flat",
+            flat,
+            "mm",
+            Quantity.FOLDED_HEIGHT,
+            ANYWHERE,
+            "about 1 (Sec. 6)",
+            on_stack,
+        ),
+        (
+            *("height, inflated", flat + stroke, "mm", Quantity.FREE_HEIGHT, kpa),
+            *("about 20 (Sec. 5)", ModelId.ELASTIC_BALLOON),
+        ),
+        ("push at 75 % of its stroke", push, "N", Quantity.BLOCKED_FORCE, blocked, "", on_stack),
+    ]
     if arm.chambers > 1:
         single = arm.pose((pressure, *(0.0,) * (arm.chambers - 1)))
-        yield figure("bend by one chamber", single.bend, "deg", Quantity.BEND, alone)
         aside = float(np.hypot(*single.tip[:2]))
-        yield figure("maximum lateral tip displacement", aside, "mm", Quantity.ASIDE, alone)
+        words = "maximum lateral tip displacement"
+        rows += [
+            ("bend by one chamber", single.bend, "deg", Quantity.BEND, bent, "", on_stack),
+            (words, aside, "mm", Quantity.ASIDE, bent, "", on_stack),
+        ]
     if load_g > 0:
         hung = arm.pose(every, tip_load=(load_g * 1e-3 * GRAVITY, 0.0, 0.0), near=free)
         sag = float(np.linalg.norm(hung.tip - free.tip))
         paper = "lifts 1.2 g (Sec. 5)" if load_g == MARBLE_G else ""
         words = f"sag of the tip, {load_g:g} g across it"
         # Sag is load over stiffness.
-        yield figure(words, sag, "mm", Quantity.HELD_STIFFNESS, at, paper)
+        rows.append((words, sag, "mm", Quantity.HELD_STIFFNESS, kpa, paper, on_stack))
+    for words, value, unit, quantity, at, paper, model in rows:
+        # The measured value beside a figure is that of a design's own prediction.
+        by = ModelId.FILMS if quantity is Quantity.FOLDED_HEIGHT else model
+        beside = counterpart(design.form, quantity, at, by, arm.calibration, is_papers)
+        measured = beside.sentence() if beside else ""
+        yield AssemblyFigure(placed.name, words, value, unit, model.words, paper, measured)
 
 
 # A radial actuator in the assembly's lumen.
@@ -267,10 +266,9 @@ class Grip(NamedTuple):
 
 
 def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
-    """Return hold of a radial actuator in the assembly's lumen; None for other forms."""
+    """Return the hold of a radial actuator in the assembly's lumen; None for other forms."""
     design, laminate = placed.made.design, placed.made.laminate
-    form = design.form
-    pockets = form.pockets
+    form, pockets = design.form, design.form.pockets
     if not isinstance(pockets, Slots):
         return None
     tube = form.wrap.tube_diameter if form.wrap is not None else 2 * (placed.radius or 0.0)
@@ -280,19 +278,18 @@ def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
     rise = pocket.largest_stroke
     free, most = (deflated + 2 * balloons * high for high in (rise, widest))
     lumen = assembled.assembly.deploy.lumen_diameter
-    free_grip = Grip(placed.name, deflated, free, most, lumen)
-    if lumen is None:
-        return free_grip
-    room = (lumen - deflated) / 2 / balloons
+    room = 0.0 if lumen is None else (lumen - deflated) / 2 / balloons
     if not 0 < room <= rise:
-        return free_grip
+        return Grip(placed.name, deflated, free, most, lumen)
     # 1 kPa mm2 is 1 mN.
     push = float(pocket.rate(room)) / 1000
-    return free_grip._replace(room=room, push=push)
+    return Grip(placed.name, deflated, free, most, lumen, room, push)
 
 
-def _grip_figures(hold: Grip, stacks: int, pressure: float, load_g: float) -> list[AssemblyFigure]:
-    """Diameter of a radial actuator, and the hold of its stacks in the assembly's lumen."""
+def _grip_figures(
+    hold: Grip, stacks: int, pressure: float, load_g: float
+) -> Iterator[AssemblyFigure]:
+    """Yield diameters of a radial actuator, and the hold of its stacks in the assembly's lumen."""
     widest = "about 28 (Sec. 2.1)"
     rows = [
         ("diameter, deflated", hold.deflated, "mm", "tube and films", "15.33 (Sec. 2.1)"),
@@ -308,7 +305,7 @@ def _grip_figures(hold: Grip, stacks: int, pressure: float, load_g: float) -> li
             needed = load_g * 1e-3 * GRAVITY / (stacks * force)
             words = f"{friction} that holds {load_g:g} g along the lumen"
             rows.append((words, needed, "", STATIC, ""))
-    return [AssemblyFigure(hold.part, *row) for row in rows]
+    yield from (AssemblyFigure(hold.part, *row) for row in rows)
 
 
 # Contacts and clearances between parts, of arms upright and bent by some of their chambers.
@@ -317,44 +314,16 @@ def _grip_figures(hold: Grip, stacks: int, pressure: float, load_g: float) -> li
 # other actuator is inflated; parts on the arm move with its tip.
 
 
-FARTHEST = 10.0
-"""Clearances are computed up to this distance, mm."""
-SLIGHTEST = 0.1
-"""Lowest pressure at which an arm is checked, kPa."""
+FARTHEST = 10.0  # mm: up to this distance clearances are computed
+SLIGHTEST = 0.1  # kPa: lowest pressure at which an arm is checked
 HALVINGS = 5
-FOOT = 3
-"""Levels from below that may rest on the part under the arm."""
-
-
-class _Arm(NamedTuple):
-    """An arm, the solids ``carried`` on its top when it is flat, and the parts ``beside`` it."""
-
-    placed: PlacedSba
-    stack: Stack
-    carried: Solids
-    beside: dict[str, Solids]
-
-
-class _Bent(NamedTuple):
-    """A bent arm with the parts on it: solids of its lowest levels, which may rest on the part
-    ``on``, and the others.
-    """
-
-    pose: Pose
-    on: str | None
-    foot: Solids
-    rest: Solids
-
-    def facing(self, part: str) -> Solids:
-        """Return the solids that must not meet a part."""
-        return self.rest if part == self.on else self.foot + self.rest
+FOOT = 3  # levels from below that may rest on the part under the arm
 
 
 class _Scene:
-    """The parts of an assembly as solids at one pressure.
+    """The parts of an assembly as solids, all actuators inflated to ``pressure`` kPa.
 
-    ``stacks`` are those of actuators with round pockets, and ``rises`` the vectors (3,) in mm by
-    which these lift the parts on their tops.
+    ``stacks`` are those of actuators with round pockets, by part; ``solids`` are in place.
     """
 
     def __init__(self, assembled: Assembled, pressure: float) -> None:
@@ -365,52 +334,57 @@ class _Scene:
             for placed in assembled.parts
             if isinstance(placed, PlacedSba) and isinstance(placed.made.design.form.pockets, Discs)
         }
-        self.rises: dict[str, Array] = {}
-        for name, its_stack in self.stacks.items():
-            heights = its_stack.flat_height, self._free(its_stack).height
-            low, high = assembled[name].upright(np.array([[0.0, 0.0, z] for z in heights]))
-            self.rises[name] = high - low
+        self.poses = {
+            name: arm.pose((pressure,) * arm.chambers) for name, arm in self.stacks.items()
+        }
 
-    def _free(self, its_stack: Stack) -> Pose:
-        return its_stack.pose((self.pressure,) * its_stack.chambers)
+    @cached_property
+    def solids(self) -> dict[str, Solids]:
+        return {p.name: self._solids(p, self.poses) for p in self.assembled.parts if _is_seen(p)}
 
-    def _lift(self, placed: PlacedPart) -> Array:
-        """Return the vector (3,), mm, by which the actuators under a part lift it."""
-        lift = np.zeros(3)
-        while placed.part.on is not None:
-            if placed.part.at == "top":
-                lift = lift + self.rises.get(placed.part.on, 0.0)
-            placed = self.assembled[placed.part.on]
-        return lift
+    def _move(self, placed: PlacedPart, poses: Mapping[str, Pose]) -> Array:
+        """Return the matrix (4, 4) by which actuators in these poses move a part that is on them
+        when they are flat.
+        """
+        host = placed.part.on
+        if host is None:
+            return np.eye(4)
+        under = self.assembled[host]
+        move = self._move(under, poses)
+        if placed.part.at != "top" or host not in poses:
+            return move
+        # From the flat actuator's top to its tip, in its own frame, then in the assembly's.
+        pose, tip, frame = poses[host], np.eye(4), np.eye(4)
+        tip[:3, :3] = pose.frames[1][-1]
+        tip[:3, 3] = pose.tip - tip[:3, 2] * self.stacks[host].flat_height
+        corners = under.upright(np.concatenate([np.zeros((1, 3)), np.eye(3)]))
+        frame[:3, 3], frame[:3, :3] = corners[0], (corners[1:] - corners[0]).T
+        moved: Array = move @ frame @ tip @ np.linalg.inv(frame)
+        return moved
 
-    def _solids(self, placed: PlacedPart, lift: Array | None = None) -> Solids:
-        """Return a part lifted, by default by what is under it, with all others inflated."""
-        lift = self._lift(placed) if lift is None else lift
-        if isinstance(placed, PlacedSba) and placed.name in self.stacks:
-            its_stack = self.stacks[placed.name]
-            return _posed(placed, its_stack, self._free(its_stack), lift)
-        return _as_it_is(placed, lift)
+    def _solids(self, placed: PlacedPart, poses: Mapping[str, Pose]) -> Solids:
+        rows = np.ascontiguousarray(self._move(placed, poses)[:3])
+        return [solid.transform(rows) for solid in _unmoved(placed, self.stacks, poses)]
 
-    def _carried(self, name: str) -> set[str]:
-        """Return a part and everything fixed on it, directly or not."""
-        names = {name}
+    def _moving(self, name: str) -> dict[str, PlacedPart]:
+        """Return what is fixed on a part, directly or not, by name."""
+        names: dict[str, PlacedPart] = {}
         for part in self.assembled.parts:
-            if part.part.on in names:
-                names.add(part.name)
+            if part.part.on == name or part.part.on in names:
+                names[part.name] = part
         return names
 
     def touches(self, placed: PlacedSba) -> Iterator[Touch]:
         """Yield the parts that an actuator meets when all are upright, each pair once."""
-        own = self._solids(placed)
         # Parts on it move along; the part under it touches it as when flat.
-        apart = {*self._carried(placed.name), placed.part.on}
+        apart = {placed.name, placed.part.on, *self._moving(placed.name)}
         names = [part.name for part in self.assembled.parts]
         apart.update(name for name in names[: names.index(placed.name)] if name in self.stacks)
-        for other in self._others(placed):
-            if other.name not in apart:
-                volume = _shared_volume(own, self._solids(other))
+        for other, theirs in self.solids.items():
+            if other not in apart:
+                volume = _shared_volume(self.solids[placed.name], theirs)
                 if volume > TOUCH:
-                    yield Touch(placed.name, other.name, volume)
+                    yield Touch(placed.name, other, volume)
 
     def bends(
         self, placed: PlacedSba, pause: Callable[[], None]
@@ -420,82 +394,73 @@ class _Scene:
         No clearance is given for the part under the arm and for parts farther away than
         ``FARTHEST``.
         """
-        its_stack = self.stacks[placed.name]
-        if its_stack.chambers < 2:
+        arm = self.stacks[placed.name]
+        if arm.chambers < 2:
             return
-        arm = self._arm(placed)
+        moving = {placed.name, *self._moving(placed.name)}
+        beside = {name: theirs for name, theirs in self.solids.items() if name not in moving}
         nearest: dict[str, tuple[float, str]] = {}
         met = set()
-        for chambers in _ways(its_stack.chambers):
+        for chambers in _ways(arm.chambers):
             pause()
             names = " and ".join(placed.made.laminate.chambers[i].name for i in chambers)
-            bent = self._bent(arm, chambers, self.pressure)
-            for part, theirs in arm.beside.items():
-                volume = _shared_volume(bent.facing(part), theirs)
+            pose, foot, rest = self._bent(placed, chambers, self.pressure)
+            for part, theirs in beside.items():
+                facing = rest if part == placed.part.on else foot + rest
+                volume = _shared_volume(facing, theirs)
                 if volume > TOUCH:
                     met.add(part)
-                    first = self._first(arm, part, chambers, bent.pose)
-                    start, measured = max(first.pressures), its_stack.counterparts.get("bend", "")
+                    first = self._first_contact(placed, chambers, part, pose)
+                    start, measured = max(first.pressures), arm.counterparts.get("bend", "")
                     yield BentTouch(placed.name, part, names, volume, start, first.bend, measured)
                 elif part != placed.part.on:
                     least = nearest.get(part, (FARTHEST, ""))
-                    gap = _gap(bent.facing(part), theirs, least[0])
+                    gap = _gap(facing, theirs, least[0])
                     nearest[part] = least if gap >= least[0] else (gap, names)
         for part, (gap, names) in nearest.items():
             if part not in met and gap < FARTHEST:
                 words = f"clearance to {part}, bent by {names}"
-                yield AssemblyFigure(placed.name, words, gap, "mm", STACK)
+                yield AssemblyFigure(placed.name, words, gap, "mm", ModelId.ELASTIC_STACK.words)
 
-    def _arm(self, placed: PlacedSba) -> _Arm:
-        arm = _Arm(placed, self.stacks[placed.name], [], {})
-        moving = self._carried(placed.name)
-        for part in self._others(placed):
-            if part.name in moving:
-                lift = self._lift(part) - self.rises[placed.name]
-                arm.carried.extend(self._solids(part, lift))
-            else:
-                arm.beside[part.name] = self._solids(part)
-        return arm
-
-    def _others(self, placed: PlacedPart) -> list[PlacedPart]:
-        parts = self.assembled.parts
-        return [part for part in parts if part is not placed and part.part.kind != "line"]
-
-    def _bent(self, arm: _Arm, chambers: Sequence[int], pressure: float) -> _Bent:
-        """Return the arm bent by some chambers, and the parts on it."""
-        count = range(arm.stack.chambers)
-        pose = arm.stack.pose(tuple(pressure if i in chambers else 0.0 for i in count))
-        lift = self._lift(arm.placed)
-        places = arm.placed.upright(pose.frames[0]) + lift
+    def _bent(
+        self, placed: PlacedSba, chambers: Sequence[int], pressure: float
+    ) -> tuple[Pose, Solids, Solids]:
+        """Return the pose of an arm bent by some chambers, its lowest levels, which may rest on the
+        part under it, and its other levels with all that is fixed on it.
+        """
+        arm = self.stacks[placed.name]
+        pose = arm.pose(tuple(pressure if i in chambers else 0.0 for i in range(arm.chambers)))
+        poses = {**self.poses, placed.name: pose}
+        places = placed.upright(pose.frames[0]) + self._move(placed, poses)[:3, 3]
         levels = (places[1:] + places[:-1]) / 2
-        bent = _Bent(pose, arm.placed.part.on, [], [])
-        for solid in _posed(arm.placed, arm.stack, pose, lift):
+        foot: Solids = []
+        rest: Solids = []
+        for solid in self._solids(placed, poses):
             middle = np.array(solid.bounding_box()).reshape(2, 3).mean(0)
             level = int(np.linalg.norm(levels - middle, axis=1).argmin())
-            (bent.foot if level < FOOT else bent.rest).append(solid)
-        # From the flat arm's top to the bent one's, in the arm's own frame, then in the assembly's.
-        tip = np.eye(4)
-        tip[:3, :3] = pose.frames[1][-1]
-        tip[:3, 3] = pose.tip - tip[:3, :3] @ np.array([0.0, 0.0, arm.stack.flat_height])
-        corners = arm.placed.upright(np.concatenate([np.zeros((1, 3)), np.eye(3)]))
-        frame = np.eye(4)
-        frame[:3, 3] = corners[0] + lift
-        frame[:3, :3] = (corners[1:] - corners[0]).T
-        rows = np.ascontiguousarray((frame @ tip @ np.linalg.inv(frame))[:3])
-        bent.rest.extend(solid.transform(rows) for solid in arm.carried)
-        return bent
+            (foot if level < FOOT else rest).append(solid)
+        for part in filter(_is_seen, self._moving(placed.name).values()):
+            rest += self._solids(part, poses)
+        return pose, foot, rest
 
-    def _first(self, arm: _Arm, part: str, chambers: Sequence[int], pose: Pose) -> Pose:
-        """Return approximately the first pose in contact with another part, at the latest this."""
+    def _first_contact(
+        self, placed: PlacedSba, chambers: Sequence[int], part: str, pose: Pose
+    ) -> Pose:
+        """Return approximately the first pose in contact with a part, at the latest this one."""
         low, high = min(SLIGHTEST, self.pressure / 2), self.pressure
         for _ in range(HALVINGS):
             middle = math.sqrt(low * high)
-            tried = self._bent(arm, chambers, middle)
-            if _shared_volume(tried.facing(part), arm.beside[part]) > TOUCH:
-                high, pose = middle, tried.pose
+            tried, foot, rest = self._bent(placed, chambers, middle)
+            facing = rest if part == placed.part.on else foot + rest
+            if _shared_volume(facing, self.solids[part]) > TOUCH:
+                high, pose = middle, tried
             else:
                 low = middle
         return pose
+
+
+def _is_seen(placed: PlacedPart) -> bool:
+    return placed.part.kind != "line"
 
 
 def _stack_of(made: PartDesign) -> Stack:
@@ -508,30 +473,24 @@ def _ways(chambers: int) -> list[tuple[int, ...]]:
     return alone + [(i, (i + 1) % chambers) for i in range(chambers) if chambers > 2]
 
 
-def _posed(placed: PlacedSba, its_stack: Stack, pose: Pose, lift: Array) -> Solids:
-    """Return an inflated actuator's balloons and webs in a pose, in place."""
-    pieces = []
-    for part in inflated(placed.made.laminate, its_stack, pose, COARSE):
-        points = placed.upright(part.surface.points) + lift
-        pieces += Surface(points, part.surface.faces).manifold().decompose()
-    return pieces
-
-
-def _as_it_is(placed: PlacedPart, lift: Array) -> Solids:
-    """A part without an elastic stack, its pockets filled; one around a tube is its free inflated
-    cylinder.
+def _unmoved(placed: PlacedPart, stacks: Mapping[str, Stack], poses: Mapping[str, Pose]) -> Solids:
+    """Return a part on flat hosts: balloons and webs of a stack in its pose; of others the part
+    with its pockets filled, or the free inflated cylinder of one around a tube.
     """
-    if placed.made is not None:
-        widest = sizes(placed.made.design, placed.made.laminate).get("inflated_diameter")
-        if widest is not None:
-            import manifold3d
+    made = placed.made
+    if made is not None and placed.name in stacks:
+        parts = inflated(made.laminate, stacks[placed.name], poses[placed.name], COARSE)
+        surfaces = [Surface(placed.upright(x.surface.points), x.surface.faces) for x in parts]
+        return [piece for surface in surfaces for piece in surface.manifold().decompose()]
+    widest = None if made is None else sizes(made.design, made.laminate).get("inflated_diameter")
+    if made is None or widest is None:
+        return [placed_surface(placed, filled=True).manifold()]
+    import manifold3d
 
-            _, low, _, high = placed.made.laminate.layers[0].profile.turned(placed.turn).bounds
-            cylinder = manifold3d.Manifold.cylinder(high - low, widest / 2)
-            rows = np.column_stack([np.array(placed.pose.rows), np.array(placed.pose.shift) + lift])
-            return [cylinder.translate((0.0, 0.0, low)).transform(rows)]
-    surface = placed_surface(placed, filled=True)
-    return [surface.manifold().translate(tuple(lift.tolist()))]
+    _, low, _, high = made.laminate.layers[0].profile.turned(placed.turn).bounds
+    cylinder = manifold3d.Manifold.cylinder(high - low, widest / 2)
+    rows = np.column_stack([np.array(placed.pose.rows), np.array(placed.pose.shift)])
+    return [cylinder.translate((0.0, 0.0, low)).transform(rows)]
 
 
 def _shared_volume(first: Solids, second: Solids) -> float:

@@ -26,7 +26,7 @@ from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.laminate.lay_up import LayUpStep, distinct_layers, lay_up_steps, press_steps
 from sbafab.pressing.cycles import Runs, serial
 from sbafab.pressing.schedule import joined_words, layers_in_words
-from sbafab.reports.traveller.shapes import Bed, beds
+from sbafab.reports.traveller.lay_up import Bed, beds
 
 # PDF 1.4 without compression, dates or embedded fonts: the same pages give the same bytes with
 # every version of every library. Arcs become Bezier curves, within 5e-6 of their radius.

@@ -4,37 +4,71 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import cached_property
-from itertools import islice, pairwise
+from itertools import pairwise
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Interval, coord, section
+from sbafab.geometry.region import Interval, Region, coord, section
 from sbafab.laminate.films import ink
 from sbafab.laminate.laminate import Interface, Laminate, Layer, Pin
 from sbafab.laminate.lay_up import press_steps
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import BOND, length
 
-MOST_BALLOONS = 4
-"""Most balloons shown in full."""
+MOST_BALLOONS = 4  # shown in full
 BEYOND_LUMEN = 3.25
 PAGE_WIDTH = 297.0
 LEFT, RIGHT = 56.0, 56.0
 HEAD, FOOT = 42.0, 36.0
-TALLEST = 120.0
-TALLEST_FILM = 8.0
+TALLEST, TALLEST_FILM = 120.0, 8.0
 BREAK = 13.0
 ROW_STEP = 6.0
-SLIT = 0.18
-"""Share of the gap drawn open above and below a mask, to show what does not bond."""
+SLIT = 0.18  # share of the gap drawn open above and below a mask, to show what does not bond
 EXAGGERATIONS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50, 60, 80, 100)
 STEEL = "#ccd2d8"
-SEAM = 1.0
-"""Height of a bond without a gap on the page, mm."""
-PAST = 2.0
-"""Length by which a pin's axis extends past its ends, mm."""
+SEAM = 1.0  # height of a bond without a gap on the page, mm
+PAST = 2.0  # a pin's axis and a fold's line extend past their ends by this, mm on the page
 Spans = Sequence[Interval]
+
+
+class Plane(NamedTuple):
+    """The plane of the section: a point on it and a unit vector along it."""
+
+    origin: Point
+    direction: Point
+
+    def along(self, p: Point) -> float:
+        (x, y), (u, v) = self.origin, self.direction
+        return (p[0] - x) * u + (p[1] - y) * v
+
+    def cut(self, region: Region) -> Spans:
+        return section(region, self.origin, self.direction)
+
+
+class SectionSlab(NamedTuple):
+    """A layer cut by the plane: the spans with film, and its heights on the page."""
+
+    layer: Layer
+    spans: Spans
+    bottom: float
+    top: float
+
+    @property
+    def middle(self) -> float:
+        return (self.bottom + self.top) / 2
+
+
+class Joint(NamedTuple):
+    """An interface cut by the plane: the spans where the films are bonded, and its heights."""
+
+    interface: Interface
+    spans: Spans
+    bottom: float
+    top: float
+
+    @property
+    def middle(self) -> float:
+        return (self.bottom + self.top) / 2
 
 
 class Rod(NamedTuple):
@@ -53,37 +87,12 @@ class Rod(NamedTuple):
     def middle(self) -> float:
         return (self.span[0] + self.span[1]) / 2
 
-    @property
-    def words(self) -> str:
-        many = "s" if len(self.steps) > 1 else ""
-        return f"pin {self.name}, step{many} {', '.join(map(str, self.steps))}"
-
-
-class SectionSlab(NamedTuple):
-    """A layer cut by the plane: the spans with film."""
-
-    layer: Layer
-    spans: Spans
-
-
-class Joint(NamedTuple):
-    """An interface cut by the plane: the spans where the films are bonded."""
-
-    interface: Interface
-    spans: Spans
-
-    @property
-    def layer(self) -> int:
-        """Index of the layer at whose height it is drawn: a mask, or the film above."""
-        masks = self.interface.masks
-        return masks[0].index if masks else self.interface.above.index
-
 
 class FoldEnd(NamedTuple):
     """A fold cut by the plane, at ``s`` along it; its film is on the far or the near side."""
 
-    lower: Layer
-    upper: Layer
+    lower: int
+    upper: int
     s: float
     is_ahead: bool
 
@@ -101,68 +110,75 @@ class StackSection:
 
     def __init__(self, laminate: Laminate) -> None:
         self.laminate = laminate
-        self.chamber, origin = _axis(laminate)
-        inlet = next((inlet for inlet in laminate.inlets if inlet.chamber == self.chamber), None)
-        direction = inlet.direction if inlet else (1.0, 0.0)
         layers, self.hidden, self.break_above = _shown(laminate)
-        self.lumen = -_along(origin, (0.0, 0.0), direction) if laminate.lumen else None
+        self.chamber, plane = _plane(laminate)
+        self.lumen = plane.along((0.0, 0.0)) if laminate.lumen else None
         patterns = {layer.pattern: layer.profile for layer in layers}
-        if not any(section(region, origin, direction) for region in patterns.values()):
+        if not any(map(plane.cut, patterns.values())):
             # The chamber lies outside every layer: rule sealing reports it, the picture shows the
             # films.
             low_x, low_y, high_x, high_y = laminate.layers[0].profile.bounds
-            origin = ((low_x + high_x) / 2, (low_y + high_y) / 2)
-        cuts = {name: section(region, origin, direction) for name, region in patterns.items()}
+            plane = plane._replace(origin=((low_x + high_x) / 2, (low_y + high_y) / 2))
+        cuts = {name: plane.cut(region) for name, region in patterns.items()}
         ends = [end for spans in cuts.values() for span in spans for end in span]
         self.low, self.high = min(ends), max(ends)
         beyond = (laminate.lumen or 0) / 2 + BEYOND_LUMEN
         self.cropped = self.lumen is not None and self.lumen - beyond > self.low
         if self.lumen is not None and self.cropped:
             self.low = self.lumen - beyond
-        self.slabs = [SectionSlab(layer, self._clipped(cuts[layer.pattern])) for layer in layers]
-        shown = {layer.index for layer in layers}
-        self.joints = [
-            Joint(gap, self._clipped(section(gap.bond, origin, direction)))
-            for gap in laminate.interfaces
-            if (gap.masks or gap.seams)
-            and shown.issuperset([mask.index for mask in gap.masks] or gap.layer_indices)
-        ]
-        mouth = _along(inlet.mouth, origin, direction) if inlet else 0.0
+        self._scale([layer.film.thickness for layer in layers])
+        self.slabs = list(self._slabs(layers, cuts))
+        self.by_index = {slab.layer.index: slab for slab in self.slabs}
+        self.joints = list(self._joints(plane))
+        inlet = next((inlet for inlet in laminate.inlets if inlet.chamber == self.chamber), None)
+        mouth = plane.along(inlet.mouth) if inlet else 0.0
         self.tab = (mouth - inlet.length, mouth) if inlet else None
-        rods = _rods(laminate, origin, direction)
-        self.rods = [rod for rod in rods if rod.span[0] > self.low]
-        self.folds = list(_fold_ends(laminate, self.slabs, origin, direction))
+        self.rods = [rod for rod in _rods(laminate, plane) if rod.span[0] > self.low]
+        self.folds = list(self._fold_ends(plane))
+
+    def _scale(self, films: Sequence[float]) -> None:
         self.across = (PAGE_WIDTH - LEFT - RIGHT) / (self.high - self.low)
-        films = [layer.film.thickness for layer in layers]
         most = min(TALLEST / sum(films), TALLEST_FILM / max(films)) / self.across
         self.factor = max(step for step in EXAGGERATIONS if step <= max(most, 1.0))
         self.up = self.across * self.factor
         self.height = sum(films) * self.up + (BREAK if self.hidden else 0.0)
+
+    def _slabs(self, layers: Sequence[Layer], cuts: dict[str, Spans]) -> Iterator[SectionSlab]:
+        y = HEAD + self.height
+        for layer in layers:
+            top = y - layer.film.thickness * self.up
+            yield SectionSlab(layer, self._clipped(cuts[layer.pattern]), y, top)
+            y = top - BREAK * (layer.index == self.break_above)
+
+    def _joints(self, plane: Plane) -> Iterator[Joint]:
+        for gap in self.laminate.interfaces:
+            levels = [mask.index for mask in gap.masks] or [*gap.layer_indices]
+            if (gap.masks or gap.seams) and self.by_index.keys() >= {*levels}:
+                # Films that a seam bonds lie on each other: it is drawn over the line between them.
+                bottom = self.by_index[levels[0 if gap.masks else -1]].bottom
+                half = 0.0 if gap.masks else SEAM / 2
+                top = bottom - gap.gap * self.up * bool(gap.masks)
+                spans = self._clipped(plane.cut(gap.bond))
+                yield Joint(gap, spans, bottom + half, top - half)
+
+    def _fold_ends(self, plane: Plane) -> Iterator[FoldEnd]:
+        """Yield the folds cut by the plane, if the films shown end at them."""
+        (a, b), (dx, dy) = plane
+        for fold in self.laminate.folds:
+            (x, y), (u, v) = fold.line
+            along = dx * (v - y) - dy * (u - x)
+            if abs(along) < 1e-9 * math.dist((x, y), (u, v)) or fold.lower not in self.by_index:
+                continue
+            s = ((x - a) * (v - y) - (y - b) * (u - x)) / along
+            for start, end in self.by_index[fold.lower].spans:
+                if abs(start - s) < 1e-6 or abs(end - s) < 1e-6:
+                    yield FoldEnd(fold.lower, fold.upper, s, abs(start - s) < 1e-6)
 
     def _clipped(self, spans: Spans) -> Spans:
         return tuple((max(start, self.low), end) for start, end in spans if end > self.low)
 
     def x(self, s: float) -> float:
         return LEFT + (s - self.low) * self.across
-
-    def y(self, z: float, index: int) -> float:
-        """Page height of ``z`` in the layer with this index."""
-        is_above = self.hidden and index > self.break_above
-        return HEAD + self.height - z * self.up + (self._drop if is_above else 0.0)
-
-    @cached_property
-    def _drop(self) -> float:
-        """Page mm by which layers above the break are lower than to scale."""
-        last, above = next(
-            (a.layer, b.layer) for a, b in pairwise(self.slabs) if b.layer.index > self.break_above
-        )
-        return (above.z - last.z - last.film.thickness) * self.up - BREAK
-
-    def bottom(self, layer: Layer, inset: float = 0.0) -> float:
-        return self.y(layer.z + inset, layer.index)
-
-    def top(self, layer: Layer, inset: float = 0.0) -> float:
-        return self.y(layer.z + layer.film.thickness - inset, layer.index)
 
     def boxes(
         self, spans: Spans, top: float, bottom: float, fill: str, stroke: str = "none"
@@ -176,22 +192,19 @@ class StackSection:
         return [joint for joint in self.joints if joint.interface.kind == kind and joint.spans]
 
 
-def _along(p: Point, origin: Point, direction: Point) -> float:
-    return (p[0] - origin[0]) * direction[0] + (p[1] - origin[1]) * direction[1]
-
-
-def _axis(laminate: Laminate) -> tuple[str, Point]:
-    """The name and place of the first chamber's axis, or of the first port."""
+def _plane(laminate: Laminate) -> tuple[str, Plane]:
+    """Return the name of the first chamber, or of the first port, and the plane through it."""
     if not laminate.chambers:
         port = laminate.ports[0]
-        return port.name, port.at
+        return port.name, Plane(port.at, (1.0, 0.0))
     chamber = laminate.chambers[0]
     bored = (bore.centre for bore in laminate.bores if bore.chamber == chamber.name)
-    return chamber.name, next(bored, chamber.centres[0])
+    inlets = (inlet.direction for inlet in laminate.inlets if inlet.chamber == chamber.name)
+    return chamber.name, Plane(next(bored, chamber.centres[0]), next(inlets, (1.0, 0.0)))
 
 
 def _shown(laminate: Laminate) -> tuple[Sequence[Layer], int, int]:
-    """The layers to show, the number of balloons left out, and the layer above which they are."""
+    """Return the layers to show, the number of balloons left out, and the layer below those."""
     count = laminate.balloons
     if count <= MOST_BALLOONS:
         return laminate.layers, 0, 0
@@ -204,53 +217,34 @@ def _shown(laminate: Laminate) -> tuple[Sequence[Layer], int, int]:
     return (*bottom, *top), count - 3, bottom[-1].index
 
 
-def _rods(laminate: Laminate, origin: Point, direction: Point) -> Iterator[Rod]:
+def _rods(laminate: Laminate, plane: Plane) -> Iterator[Rod]:
     """Yield the pins that hold layers and that the plane meets, in the laminate's order."""
-    u, v = direction
+    (u, v), steps = plane.direction, press_steps(laminate)
     for pin in laminate.pins:
-        along, aside = _along(pin.centre, origin, direction), _along(pin.centre, origin, (v, -u))
-        radius = pin.diameter / 2
-        stacks, steps = _stands(laminate, pin)
+        along, radius = plane.along(pin.centre), pin.diameter / 2
+        aside = plane._replace(direction=(v, -u)).along(pin.centre)
+        stacks = _stands(laminate, pin)
         if abs(aside) < radius and stacks:
             half = math.sqrt(radius**2 - aside**2)
-            yield Rod(pin.name, (along - half, along + half), stacks, steps)
+            numbers = [step.number for step in steps if pin in step.pins]
+            yield Rod(pin.name, (along - half, along + half), stacks, numbers)
 
 
-def _stands(laminate: Laminate, pin: Pin) -> tuple[Sequence[tuple[int, int]], Sequence[int]]:
-    """Lowest and highest layer that the pin holds, stack by stack, and the steps."""
+def _stands(laminate: Laminate, pin: Pin) -> Sequence[tuple[int, int]]:
+    """Return the lowest and highest layer that the pin holds, stack by stack."""
     pinned = {
         layer.index
         for layers in laminate.patterns.values()
         if pin in laminate.pins_holding(layers[0])
         for layer in layers
     }
-    steps = [step for step in press_steps(laminate) if pin in step.pins]
-    spans = [
-        (min(joined), max(joined)) for step in steps if (joined := pinned.intersection(step.layers))
-    ]
-    whole = [
-        span
-        for span in dict.fromkeys(spans)
-        if not any(a <= span[0] and span[1] <= b for a, b in spans if (a, b) != span)
-    ]
-    return tuple(whole), [step.number for step in steps]
-
-
-def _fold_ends(
-    laminate: Laminate, slabs: Sequence[SectionSlab], origin: Point, direction: Point
-) -> Iterator[FoldEnd]:
-    """Yield the folds cut by the plane, if the films shown end at them."""
-    spans = {slab.layer.index: slab.spans for slab in slabs}
-    for fold in laminate.folds:
-        (x, y), (u, v) = fold.line
-        along = direction[0] * (v - y) - direction[1] * (u - x)
-        if abs(along) < 1e-9 * math.dist((x, y), (u, v)):
-            continue
-        s = ((x - origin[0]) * (v - y) - (y - origin[1]) * (u - x)) / along
-        both = laminate.layer(fold.lower), laminate.layer(fold.upper)
-        for start, end in spans.get(fold.lower, ()):
-            if abs(start - s) < 1e-6 or abs(end - s) < 1e-6:
-                yield FoldEnd(*both, s, abs(start - s) < 1e-6)
+    held = [pinned.intersection(s.layers) for s in press_steps(laminate) if pin in s.pins]
+    spans = dict.fromkeys((min(joined), max(joined)) for joined in held if joined)
+    return tuple(
+        (low, high)
+        for low, high in spans
+        if not any(a <= low and high <= b for a, b in spans if (a, b) != (low, high))
+    )
 
 
 def opening(spans: Spans, at: float) -> Interval | None:
@@ -267,113 +261,89 @@ def opening(spans: Spans, at: float) -> Interval | None:
 
 def stack_svg(laminate: Laminate) -> str:
     """The section through the first chamber in the plane of its inlet, labelled, on A4."""
-    section = StackSection(laminate)
-    page = section.height + HEAD + FOOT
-    seams = [joint for joint in section.joints if not joint.interface.masks]
-    elements = [
-        *_heading(section),
-        *(part for rod in section.rods for part in _rod(rod, section)),
-        *(part for joint in section.joints if joint not in seams for part in _bond(joint, section)),
-        *(part for slab in section.slabs for part in _slab(slab, section)),
-        *(part for joint in seams for part in _bond(joint, section)),
-        *(part for fold in section.folds for part in _fold(fold, section)),
-        *_breaks(section),
-        *_dimensions_above(section),
-        *_dimensions_below(section),
-        *_labels(section),
-        *_legend(section, page),
-    ]
+    cut = StackSection(laminate)
+    page = cut.height + HEAD + FOOT
+    elements = list(_heading(cut))
+    for rod in cut.rods:
+        elements += _rod(rod, cut)
+    elements += _bonds(cut, with_masks=True)
+    for layer, spans, bottom, top in cut.slabs:
+        inset = SLIT * (bottom - top) if layer.is_mask else 0.0
+        look = draw.film_fill(layer.film), ink(layer.film).line
+        elements += cut.boxes(spans, top + inset, bottom - inset, *look)
+    elements += _bonds(cut, with_masks=False)
+    for fold in cut.folds:
+        elements += _fold(fold, cut)
+    elements += [*_breaks(cut), *_dimensions_above(cut), *_dimensions_below(cut)]
+    elements += [*_labels(cut), *_legend(cut, page)]
     return draw.document(PAGE_WIDTH, page, f"{laminate.name}: section", elements)
 
 
-def _heading(section: StackSection) -> list[str]:
-    laminate = section.laminate
+def _heading(cut: StackSection) -> Iterator[str]:
+    laminate = cut.laminate
     along = "its inlet" if laminate.chambers else "x"
-    scale = f"Height exaggerated {section.factor}{draw.TIMES}" if section.factor > 1 else "To scale"
+    scale = f"Height exaggerated {cut.factor}{draw.TIMES}" if cut.factor > 1 else "To scale"
     content = (
-        f"Section through {section.chamber} along {along}. "
+        f"Section through {cut.chamber} along {along}. "
         f"{scale}, {coord(laminate.thickness)} in all (nominal). All dimensions in mm."
     )
-    return [
-        draw.text((10.0, 13.0), laminate.name, size=4.6, bold=True),
-        draw.text((10.0, 18.6), content),
-        *(
-            draw.text((10.0, 23.4 + 4.2 * row), note, bold=True)
-            for row, note in enumerate(laminate.notes)
-        ),
-    ]
+    yield draw.text((10.0, 13.0), laminate.name, size=4.6, bold=True)
+    yield draw.text((10.0, 18.6), content)
+    for row, note in enumerate(laminate.notes):
+        yield draw.text((10.0, 23.4 + 4.2 * row), note, bold=True)
 
 
-def _slab(slab: SectionSlab, section: StackSection) -> list[str]:
-    layer = slab.layer
-    inset = SLIT * layer.film.thickness if layer.is_mask else 0.0
-    ends = section.top(layer, inset), section.bottom(layer, inset)
-    return section.boxes(slab.spans, *ends, draw.film_fill(layer.film), ink(layer.film).line)
+def _bonds(cut: StackSection, with_masks: bool) -> Iterator[str]:
+    for gap, spans, bottom, top in cut.joints:
+        if bool(gap.masks) == with_masks:
+            yield from cut.boxes(spans, top, bottom, BOND)
 
 
-def _bond(joint: Joint, section: StackSection) -> list[str]:
-    """The bonds in a gap; without masks, over the line on which the films lie on each other."""
-    gap = joint.interface
-    half = 0.0 if gap.masks else SEAM / 2
-    top, bottom = (section.y(z, joint.layer) for z in (gap.z + gap.gap * bool(gap.masks), gap.z))
-    return section.boxes(joint.spans, top - half, bottom + half, BOND)
-
-
-def _fold(fold: FoldEnd, section: StackSection) -> list[str]:
-    """The film that continues from one half to the other, and the line of the fold."""
-    film, turn = fold.lower.film, int(not fold.is_ahead)
-    bottom, top = section.bottom(fold.lower), section.top(fold.upper)
-    thick, outer = film.thickness * section.up, (bottom - top) / 2
-    x, low, high = map(coord, (section.x(fold.s), bottom, top))
-    data = (
-        f"M{x} {low}A{coord(outer)} {coord(outer)} 0 0 {1 - turn} {x} {high}V{coord(top + thick)}"
-    )
+def _fold(fold: FoldEnd, cut: StackSection) -> Iterator[str]:
+    """Yield the film that continues from one half to the other, and the line of the fold."""
+    lower, upper, turn = cut.by_index[fold.lower], cut.by_index[fold.upper], int(not fold.is_ahead)
+    film, thick, outer = lower.layer.film, lower.bottom - lower.top, (lower.bottom - upper.top) / 2
+    x, low, high = map(coord, (cut.x(fold.s), lower.bottom, upper.top))
+    round_ = f"A{coord(outer)} {coord(outer)} 0 0"
+    data = f"M{x} {low}{round_} {1 - turn} {x} {high}V{coord(upper.top + thick)}"
     if outer - thick > 1e-6:
         hollow = coord(outer - thick)
-        data += f"A{hollow} {hollow} 0 0 {turn} {x} {coord(bottom - thick)}"
-    return [
-        draw.path(f"{data}Z", draw.style(ink(film).line, fill=draw.film_fill(film))),
-        draw.path(f"M{x} {coord(top - PAST)}V{coord(bottom + PAST)}", draw.fold_style()),
-    ]
+        data += f"A{hollow} {hollow} 0 0 {turn} {x} {coord(lower.bottom - thick)}"
+    yield draw.path(f"{data}Z", draw.style(ink(film).line, fill=draw.film_fill(film)))
+    ends = f"M{x} {coord(upper.top - PAST)}V{coord(lower.bottom + PAST)}"
+    yield draw.path(ends, draw.fold_style())
 
 
-def _rod(rod: Rod, section: StackSection) -> list[str]:
-    """A dowel pin behind the films, stack by stack, and its axis; nothing across the break."""
-    parts: list[str] = []
-    x = section.x(rod.middle)
+def _rod(rod: Rod, cut: StackSection) -> Iterator[str]:
+    """Yield a dowel pin behind the films and its axis, stack by stack, not across the break."""
+    x = cut.x(rod.middle)
     for lowest, highest in rod.stacks:
-        layers = [s.layer for s in section.slabs if lowest <= s.layer.index <= highest]
-        below = [layer for layer in layers if layer.index <= section.break_above]
-        for run in filter(None, (below, layers[len(below) :])):
-            top, bottom = section.top(run[-1]), section.bottom(run[0])
-            parts += section.boxes([rod.span], top, bottom, STEEL, draw.GREY)
-            parts.append(draw.line([(x, top - PAST), (x, bottom + PAST)], colour=draw.GREY))
-    return parts
+        slabs = [slab for slab in cut.slabs if lowest <= slab.layer.index <= highest]
+        below = [slab for slab in slabs if slab.layer.index <= cut.break_above]
+        for run in filter(None, (below, slabs[len(below) :])):
+            top, bottom = run[-1].top, run[0].bottom
+            yield from cut.boxes([rod.span], top, bottom, STEEL, draw.GREY)
+            yield draw.line([(x, top - PAST), (x, bottom + PAST)], colour=draw.GREY)
 
 
-def _breaks(section: StackSection) -> list[str]:
-    parts: list[str] = []
-    if section.hidden:
-        below = [s for s in section.slabs if s.layer.index <= section.break_above]
-        above = section.slabs[len(below) :]
-        base = section.top(below[-1].layer)
-        x0 = section.x(section.low) - (0.0 if section.cropped else 3.0)
-        right = section.x(max(end for slab in above for _, end in slab.spans)) + 3.0
+def _breaks(cut: StackSection) -> Iterator[str]:
+    if cut.hidden:
+        below = [slab for slab in cut.slabs if slab.layer.index <= cut.break_above]
+        above, base = cut.slabs[len(below) :], below[-1].top
+        x0 = cut.x(cut.low) - (0.0 if cut.cropped else 3.0)
+        right = cut.x(max(end for slab in above for _, end in slab.spans)) + 3.0
         for y in (base - 1.6, base - BREAK + 1.6):
-            parts.append(_wave((x0, y), (right, y)))
-        words = f"\u2026 {section.hidden} more balloon{'s' * (section.hidden > 1)} \u2026"
-        middle = ((x0 + right) / 2, base - BREAK / 2 + 1.0)
-        parts.append(draw.text(middle, words, anchor="middle"))
-    if section.cropped:
-        x, top, bottom = section.x(section.low), HEAD - 2.0, HEAD + section.height + 2.0
+            yield _wave((x0, y), (right, y))
+        words = f"\u2026 {cut.hidden} more balloon{'s' * (cut.hidden > 1)} \u2026"
+        yield draw.text(((x0 + right) / 2, base - BREAK / 2 + 1.0), words, anchor="middle")
+    if cut.cropped:
+        x, top, bottom = cut.x(cut.low), HEAD - 2.0, HEAD + cut.height + 2.0
         # White hides the straight edges beside the line.
-        parts.append(draw.box((x - 1.5, top), (x, bottom), fill="#ffffff"))
-        parts.append(_wave((x, top), (x, bottom)))
-    return parts
+        yield draw.box((x - 1.5, top), (x, bottom), fill="#ffffff")
+        yield _wave((x, top), (x, bottom))
 
 
 def _wave(start: Point, end: Point) -> str:
-    """A wavy break line."""
     away = math.dist(start, end)
     steps = max(8, round(away))
     (x0, y0), (u, v) = start, ((end[0] - start[0]) / away, (end[1] - start[1]) / away)
@@ -384,90 +354,83 @@ def _wave(start: Point, end: Point) -> str:
     return draw.line(points, colour=draw.GREY, width=0.2)
 
 
-def _dimensions_above(section: StackSection) -> list[str]:
-    """Over the top balloon: chamber, the bonds beside it, the lumen, and the whole width."""
-    cap = section.slabs[-1]
-    chambers = [joint for joint in section.joints if joint.interface.kind == "chamber"]
+def _dimensions_above(cut: StackSection) -> Iterator[str]:
+    """Yield, over the top balloon: chamber, the bonds beside it, the lumen, and the whole width."""
+    cap = cut.slabs[-1]
+    chambers = [joint for joint in cut.joints if joint.interface.kind == "chamber"]
     if not chambers:
-        return []
-    spans = chambers[-1].spans
+        return
     measured: list[Interval] = []
-    pocket = opening(spans, 0.0)
+    pocket = opening(chambers[-1].spans, 0.0)
     if pocket is not None:
-        measured = [span for span in spans if span[1] == pocket[0] or span[0] == pocket[1]]
-        measured.append(pocket)
-    through = None if section.lumen is None else opening(cap.spans, section.lumen)
+        sides = [
+            span for span in chambers[-1].spans if pocket[0] == span[1] or pocket[1] == span[0]
+        ]
+        measured = [*sides, pocket]
+    through = None if cut.lumen is None else opening(cap.spans, cut.lumen)
     measured += [through] if through else []
-    shown = [span for span in measured if span[0] > section.low or not section.cropped]
-    top = section.top(cap.layer)
-    parts, rows = _rows(section, [(span, "") for span in shown], top, (0.0, -1.0))
-    if not section.cropped:
-        whole = cap.spans[0][0], cap.spans[-1][1]
-        parts += _dimension(section, whole, "", top, (0.0, -1.0), ROW_STEP * (rows + 1) + 1.0)
-    return parts
+    shown = [(span, "") for span in measured if span[0] > cut.low or not cut.cropped]
+    parts, rows = _rows(cut, shown, cap.top, (0.0, -1.0))
+    yield from parts
+    if not cut.cropped:
+        ends = (cut.x(cap.spans[0][0]), cap.top), (cut.x(cap.spans[-1][1]), cap.top)
+        words = length(cap.spans[-1][1] - cap.spans[0][0])
+        yield from draw.dimension(*ends, words, (0.0, -1.0), ROW_STEP * (rows + 1) + 1.0)
 
 
-def _dimensions_below(section: StackSection) -> list[str]:
-    """Under the stack: the tab, and how far the inlet strip reaches past its mouth."""
-    if section.tab is None:
+def _dimensions_below(cut: StackSection) -> list[str]:
+    """Return, under the stack: the tab, and how far the inlet strip reaches past its mouth."""
+    if cut.tab is None:
         return []
-    mouth = section.tab[1]
-    measured = [(section.tab, "tab")]
-    masks = [slab for slab in section.slabs if slab.layer.role == "chamber-mask" and slab.spans]
+    mouth = cut.tab[1]
+    measured = [(cut.tab, "tab")]
+    masks = [slab for slab in cut.slabs if slab.layer.role == "chamber-mask" and slab.spans]
     reach = max((slab.spans[-1][1] for slab in masks), default=mouth)
     if reach - mouth > 1e-3:
-        tail = any(rod.middle > mouth for rod in section.rods)
+        tail = any(rod.middle > mouth for rod in cut.rods)
         measured.append(((mouth, reach), "tail" if tail else "overhang"))
-    return _rows(section, measured, section.bottom(section.slabs[0].layer), (0.0, 1.0))[0]
+    return _rows(cut, measured, cut.slabs[0].bottom, (0.0, 1.0))[0]
 
 
 def _rows(
-    section: StackSection, measured: Sequence[tuple[Interval, str]], y: float, away: Point
+    cut: StackSection, measured: Sequence[tuple[Interval, str]], y: float, away: Point
 ) -> tuple[list[str], int]:
-    """Named dimensions in as few rows as keep their words apart, and how many rows that took."""
+    """Return named dimensions in as few rows as keep their words apart, and the number of rows."""
     rows: list[list[Interval]] = []
     parts: list[str] = []
     for span, name in measured:
-        middle = section.x((span[0] + span[1]) / 2)
-        half = draw.text_width(_words(name, span)) / 2 + 0.5
-        low, high = middle - half, middle + half
+        words = _words(name, span)
+        start, end = cut.x(span[0]), cut.x(span[1])
+        half = draw.text_width(words) / 2 + 0.5
+        low, high = (start + end) / 2 - half, (start + end) / 2 + half
         free = (n for n, row in enumerate(rows) if not any(a < high and low < b for a, b in row))
         row = next(free, len(rows))
-        if row == len(rows):
-            rows.append([])
-        rows[row].append((low, high))
-        parts += _dimension(section, span, name, y, away, ROW_STEP * (row + 1))
+        rows += [[]] * (row == len(rows))
+        rows[row] = [*rows[row], (low, high)]
+        parts += draw.dimension((start, y), (end, y), words, away, ROW_STEP * (row + 1))
     return parts, len(rows)
-
-
-def _dimension(
-    section: StackSection, span: Interval, name: str, y: float, away: Point, distance: float
-) -> list[str]:
-    start, end = (section.x(s) for s in span)
-    return draw.dimension((start, y), (end, y), _words(name, span), away, distance)
 
 
 def _words(name: str, span: Interval) -> str:
     return f"{name} {length(span[1] - span[0])}".strip()
 
 
-def _legend(section: StackSection, page: float) -> Iterator[str]:
-    films = dict.fromkeys(slab.layer.film for slab in section.slabs)
+def _legend(cut: StackSection, page: float) -> Iterator[str]:
+    films = dict.fromkeys(slab.layer.film for slab in cut.slabs)
     signs = [
         (draw.swatch(draw.film_fill(film)), f"{film.material} film, {coord(film.thickness)}")
         for film in films
     ]
-    gaps = [joint.interface for joint in section.joints]
-    if not gaps or any(gap.masks for gap in gaps):
+    if not cut.joints or any(joint.interface.masks for joint in cut.joints):
         structural = [film.material for film in films if not film.is_mask]
         flows = structural[0] if len(structural) == 1 else "the film that melts"
         signs.append((draw.swatch(BOND), f"bond: the gap filled with {flows}"))
         signs.append((draw.swatch("#ffffff"), "unbonded: drawn as a slit beside the mask"))
-    if any(joint.spans and not joint.interface.masks for joint in section.joints):
+    if any(joint.spans and not joint.interface.masks for joint in cut.joints):
         signs.append((draw.swatch(BOND), "bond of a seam, drawn over the line between the films"))
-    if section.rods:
+    if cut.rods:
         signs.append((draw.swatch(STEEL), "dowel pin"))
-    if section.folds:
+    if cut.folds:
         signs.append((draw.strokes([draw.fold_style()]), draw.FOLD))
     x, y = 10.0, page - 10.0
     for sign, words in signs:
@@ -478,122 +441,109 @@ def _legend(section: StackSection, page: float) -> Iterator[str]:
         x += width + 7.0
 
 
-# Labels at the sides, each with a leader to what it names.
+# Labels at the sides, each with a leader to what it names: its height on the page, the place along
+# the section, words and colour.
 
 
-class StackLabel(NamedTuple):
-    """Label for the place ``s`` along the section, ``z`` high in or beside a layer (its index)."""
-
-    words: str
-    s: float
-    z: float
-    layer: int
-    colour: str = draw.DARK
+SideLabel = tuple[float, float, str, str]
 
 
-def _labels(section: StackSection) -> list[str]:
-    """Layer names at the right, features at the left, each with a leader."""
-    low, high = HEAD - 4.0, HEAD + section.height + 6.0
-    mouth = section.tab[1] if section.tab else section.high
-    slabs = {slab.layer.index: slab for slab in section.slabs}
-    pins: tuple[list[StackLabel], list[StackLabel]] = ([], [])
-    for rod in section.rods:
-        pins[rod.middle > mouth].append(_in_slab(rod.words, rod.middle, slabs[rod.stacks[-1][1]]))
-    parts: list[str] = []
+def _labels(cut: StackSection) -> Iterator[str]:
+    """Yield layer names at the right, features at the left, each with a leader."""
+    low, high = HEAD - 4.0, HEAD + cut.height + 6.0
+    mouth = cut.tab[1] if cut.tab else cut.high
+    pins: tuple[list[SideLabel], list[SideLabel]] = ([], [])
+    for rod in cut.rods:
+        many = "s" if len(rod.steps) > 1 else ""
+        words = f"pin {rod.name}, step{many} {', '.join(map(str, rod.steps))}"
+        slab = cut.by_index[rod.stacks[-1][1]]
+        pins[rod.middle > mouth].append((slab.middle, rod.middle, words, draw.DARK))
     for labels, x, side in (
-        ([*_layer_labels(section), *pins[1]], section.x(section.high) + 5.0, 1),
-        ([*_feature_labels(section), *pins[0]], LEFT - 6.0, -1),
+        ([*_layer_labels(cut), *pins[1]], cut.x(cut.high) + 5.0, 1),
+        ([*_feature_labels(cut), *pins[0]], LEFT - 6.0, -1),
     ):
-        placed = sorted((section.y(label.z, label.layer), label) for label in labels)
-        rows = draw.spread([y for y, _ in placed], 5.2, low, high)
+        placed = sorted(labels, key=lambda label: (label[0], label[2:]))
+        rows = draw.spread([label[0] for label in placed], 5.2, low, high)
         anchor: draw.Anchor = "start" if side > 0 else "end"
-        for (y, label), row in zip(placed, rows, strict=True):
-            parts += draw.leader(
-                (section.x(label.s), y), (x - 2.2 * side, row), (x - 0.6 * side, row)
-            )
+        for (y, s, words, colour), row in zip(placed, rows, strict=True):
+            yield from draw.leader((cut.x(s), y), (x - 2.2 * side, row), (x - 0.6 * side, row))
             at = x + 0.4 * side, row + 1.05
-            parts.append(draw.text(at, label.words, anchor=anchor, colour=label.colour))
-    return parts
+            yield draw.text(at, words, anchor=anchor, colour=colour)
 
 
-def _layer_labels(section: StackSection) -> Iterator[StackLabel]:
-    """Number and role of every layer shown, pointing near its end at the inlet's side."""
-    base_end = max(slab.spans[-1][1] for slab in section.slabs if not slab.layer.is_mask)
-    for slab in section.slabs:
+def _layer_labels(cut: StackSection) -> Iterator[SideLabel]:
+    """Yield number and role of every layer shown, pointing near its end at the inlet's side."""
+    base_end = max(slab.spans[-1][1] for slab in cut.slabs if not slab.layer.is_mask)
+    for slab in cut.slabs:
         if slab.spans:
-            start, end = slab.spans[-1]
-            words = f"{slab.layer.index} {slab.layer.role.replace('-', ' ')}"
-            if slab.layer.role == "chamber-mask" and end > base_end:
+            layer, (start, end) = slab.layer, slab.spans[-1]
+            words = f"{layer.index} {layer.role.replace('-', ' ')}"
+            if layer.role == "chamber-mask" and end > base_end:
                 words += ", inlet strip"
-            label = _in_slab(words, end - min(0.2, 0.25 * (end - start)), slab)
-            yield label._replace(colour=ink(slab.layer.film).line)
+            s = end - min(0.2, 0.25 * (end - start))
+            yield slab.middle, s, words, ink(layer.film).line
 
 
-def _feature_labels(section: StackSection) -> Iterator[StackLabel]:
-    """Yield bond, pocket, neck ring, overhang, bore and lumen, where the section has them."""
-    films = [slab for slab in section.slabs if not slab.layer.is_mask]
-    bore = "bore ⌀" if section.laminate.bores else "opening "
-    for labels in (
-        _bond_beside(section),
-        _pocket(section),
-        _neck_ring(section),
-        _overhang(section),
+def _feature_labels(cut: StackSection) -> Iterator[SideLabel]:
+    """Yield the first of each: bond, pocket, neck ring, overhang, bore and lumen."""
+    films = [slab for slab in cut.slabs if not slab.layer.is_mask]
+    bore = "bore ⌀" if cut.laminate.bores else "opening "
+    for found in (
+        _bond_beside(cut),
+        _pocket(cut),
+        _neck_ring(cut),
+        _overhang(cut),
         _openings(bore, 0.0, films),
-        () if section.lumen is None else _openings("lumen ⌀", section.lumen, section.slabs[-1:]),
+        () if cut.lumen is None else _openings("lumen ⌀", cut.lumen, cut.slabs[-1:]),
     ):
-        yield from islice(labels, 1)
+        for at, words, place in found:
+            yield place.middle, at, words, draw.DARK
+            break
 
 
-def _in_gap(words: str, s: float, joint: Joint) -> StackLabel:
-    interface = joint.interface
-    return StackLabel(words, s, interface.z + interface.gap / 2, joint.layer)
+Feature = tuple[float, str, Joint | SectionSlab]
 
 
-def _in_slab(words: str, s: float, slab: SectionSlab) -> StackLabel:
-    layer = slab.layer
-    return StackLabel(words, s, layer.z + layer.film.thickness / 2, layer.index)
-
-
-def _bond_beside(section: StackSection) -> Iterator[StackLabel]:
+def _bond_beside(cut: StackSection) -> Iterator[Feature]:
     """Yield the bonded rings beside pockets, on the side away from the inlet."""
-    for joint in section.bonds("chamber"):
+    for joint in cut.bonds("chamber"):
         for span in [span for span in joint.spans if span[1] < 0][-1:]:
-            yield _in_gap(_words("bond", span), sum(span) / 2, joint)
+            yield sum(span) / 2, _words("bond", span), joint
 
 
-def _pocket(section: StackSection) -> Iterator[StackLabel]:
+def _pocket(cut: StackSection) -> Iterator[Feature]:
     """Yield the pocket of the second balloon, or of the only one (open toward its inlet)."""
-    for joint in reversed(section.bonds("chamber")[:2]):
+    for joint in reversed(cut.bonds("chamber")[:2]):
         pocket = opening(joint.spans, 0.0)
         if pocket is not None:
-            yield _in_gap(_words("chamber pocket", pocket), 0.6 * pocket[0], joint)
+            yield 0.6 * pocket[0], _words("chamber pocket", pocket), joint
         for end in [end for _, end in joint.spans if end < 0][-1:]:
-            yield _in_gap("chamber pocket", 0.6 * end, joint)
+            yield 0.6 * end, "chamber pocket", joint
 
 
-def _neck_ring(section: StackSection) -> Iterator[StackLabel]:
+def _neck_ring(cut: StackSection) -> Iterator[Feature]:
     """Yield bonds beside the bore that carry one balloon on the next, or a sheet's windows."""
-    for joint in section.bonds("separator"):
+    for joint in cut.bonds("separator"):
         for span in joint.spans:
             if span[0] < 0 < span[1]:
-                yield _in_gap(_words("window, bond", span), sum(span) / 2, joint)
+                yield sum(span) / 2, _words("window, bond", span), joint
         for span in [span for span in joint.spans if span[1] <= 0][-1:]:
-            yield _in_gap(_words("neck ring, bond", span), sum(span) / 2, joint)
+            yield sum(span) / 2, _words("neck ring, bond", span), joint
 
 
-def _overhang(section: StackSection) -> Iterator[StackLabel]:
+def _overhang(cut: StackSection) -> Iterator[Feature]:
     """Yield separator masks past the wall above them, away from the inlet if that shows."""
-    for mask, wall in pairwise(section.slabs):
+    for mask, wall in pairwise(cut.slabs):
         if mask.layer.role == "separator-mask" and mask.spans and wall.spans:
             span = mask.spans[0][0], wall.spans[0][0]
-            if section.cropped:
+            if cut.cropped:
                 span = wall.spans[-1][1], mask.spans[-1][1]
             if span[1] - span[0] > 1e-3:
-                yield _in_slab(_words("overhang", span), sum(span) / 2, mask)
+                yield sum(span) / 2, _words("overhang", span), mask
 
 
-def _openings(name: str, at: float, slabs: Sequence[SectionSlab]) -> Iterator[StackLabel]:
+def _openings(name: str, at: float, slabs: Sequence[SectionSlab]) -> Iterator[Feature]:
     for slab in slabs:
         through = opening(slab.spans, at)
         if through is not None:
-            yield _in_slab(f"{name}{length(through[1] - through[0])}", at, slab)
+            yield at, f"{name}{length(through[1] - through[0])}", slab

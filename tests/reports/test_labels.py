@@ -12,7 +12,7 @@ from lxml import html as lxml_html
 
 from sbafab.cutting.nest import Nest
 from sbafab.cutting.sheets import SheetFile
-from sbafab.reports.traveller.sheet_map import sheet_map
+from sbafab.reports.traveller.pictures import sheet_map
 from tests.reports.pages import built
 
 
@@ -51,7 +51,7 @@ def test_labels_hide_no_window(sheet_files: Any) -> None:
         foot = float(frame.get("y")) + float(frame.get("height"))
         for placement in sheet.nest.on_sheet(sheet.number - 1):
             for hole in sheet.nest.region(placement).holes:
-                points = [(0.5 + scale * x, foot - scale * y) for x, y in hole.polygon()]
+                points = [(scale * x, foot - scale * y) for x, y in hole.polygon()]
                 window = shapely.Polygon(points)
                 hidden = sum(box.intersection(window).area for box in boxes(svg))
                 assert hidden < 0.2 * window.area
@@ -83,7 +83,7 @@ def test_a_long_sheet_is_drawn_in_rows_across_the_page(sheet_files: Any) -> None
     a, b, c, d, e, f = map(float, re.findall(r"-?[\d.]+", first.get("transform")))
     points = [p for ring in part.region.polygons(1e-3)[0] for p in ring]
     moved = shapely.MultiPoint([(a * x + c * y + e, b * x + d * y + f) for x, y in points])
-    corner = 0.5 + 10 * scale, 0.5 + 20 * scale
+    corner = 10 * scale, 20 * scale
     far = corner[0] + (high_y - low_y) * scale, corner[1] + (high_x - low_x) * scale
     assert moved.bounds == pytest.approx((*corner, *far), abs=0.01)
     # Turned, not mirrored: the page's y points down, so the determinant stays negative.

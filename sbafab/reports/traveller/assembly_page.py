@@ -21,8 +21,7 @@ from sbafab.reports.traveller.bench import cutting
 from sbafab.reports.traveller.formatting import frame, millimetres, render, size
 from sbafab.reports.traveller.materials import THREAD, Item, film_items, items_of_part
 from sbafab.reports.traveller.page import code_svg, context, preparations, record_text
-from sbafab.reports.traveller.shapes import definitions, pattern_regions
-from sbafab.reports.traveller.sheet_map import part_regions, sheet_rows
+from sbafab.reports.traveller.pictures import definitions, part_regions, pattern_regions, sheet_rows
 from sbafab.reports.traveller.steps import step_rows
 from sbafab.reports.traveller.times import assembly_times
 from sbafab.reports.traveller.work import Work

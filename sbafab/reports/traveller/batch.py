@@ -11,11 +11,10 @@ from sbafab.pressing.cycles import CYCLE_HOURS, Runs, cycle_name, most_together,
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller.formatting import SHORT_HASH, render
 from sbafab.reports.traveller.materials import Cut, cut_list
-from sbafab.reports.traveller.shapes import (
+from sbafab.reports.traveller.pictures import (
     Picture,
     definitions,
     flat,
-    label,
     pattern_id,
     pattern_regions,
 )
@@ -79,7 +78,7 @@ def _picture(work: Work, runs: Runs) -> str:
         moved = at[0] + scale * x, at[1] - scale * y
         picture.part(pattern_id(widest.pattern), widest.film, flat(scale, moved), "clear")
         spot = moved[0] + scale * middle[0], moved[1] - scale * middle[1] + size / 3
-        picture.add(label(spot, str(place), size))
+        picture.label(spot, str(place), size)
     plate_size = f"{coord(round(wide, 6))} x {coord(round(high, 6))} mm"
     caption = (
         f"base plate and heated area, {plate_size}, from above; the cut corner at the back right"

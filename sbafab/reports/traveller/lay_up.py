@@ -1,4 +1,4 @@
-"""Alignment of layers laid by hand: along an edge, or at a place on their sheet."""
+"""What a step lays: stacks, rounds of layers, and the alignment of what a hand places."""
 
 from __future__ import annotations
 
@@ -8,19 +8,108 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sbafab.geometry.cache import cached
-from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.laminate import Inlet, Laminate, Layer
 from sbafab.laminate.lay_up import LayUpStep, distinct_layers
 from sbafab.reports.drawing import layer_numbers
-from sbafab.reports.traveller.shapes import Bed
 
-STATION = 0.25
-"""Spacing of the points at which two edges are compared, mm."""
+LONGEST_ROUND = 12
+INSIDE = 0.1  # mm inward of its mouth at which a tab is searched
+STATION = 0.25  # spacing of the points at which two edges are compared, mm
+EQUAL = 0.02  # distances that differ by less are the same to a hand, mm
 
 
-EQUAL = 0.02
-"""Distances that differ by less than this are the same to a hand, mm."""
+@dataclass(frozen=True)
+class Round:
+    """Layers that are laid repeatedly in one order; ``turns`` holds every turn."""
+
+    turns: tuple[tuple[Layer, ...], ...]
+
+    @property
+    def count(self) -> int:
+        return len(self.turns)
+
+    @property
+    def first(self) -> Layer:
+        return self.turns[0][0]
+
+    @property
+    def last(self) -> Layer:
+        return self.turns[-1][-1]
+
+    @property
+    def places(self) -> tuple[tuple[Layer, ...], ...]:
+        """The layers of all turns at the same place in the round."""
+        return tuple(zip(*self.turns, strict=True))
+
+    @property
+    def layers(self) -> tuple[Layer, ...]:
+        return tuple(layer for turn in self.turns for layer in turn)
+
+
+def rounds(layers: Sequence[Layer]) -> tuple[Round, ...]:
+    """Return the layers in order, repetitions grouped; a layer without repetition is a round of
+    one.
+    """
+    keys = [(layer.pattern, layer.role) for layer in layers]
+    gathered: list[Round] = []
+    start = 0
+    while start < len(layers):
+        period, count = _repetition(keys[start:])
+        ends = range(start + period, start + period * count + 1, period)
+        gathered.append(Round(tuple(tuple(layers[end - period : end]) for end in ends)))
+        start += period * count
+    return tuple(gathered)
+
+
+def _repetition(keys: Sequence[object]) -> tuple[int, int]:
+    """Return period and count of the longest repetition at the start; (1, 1) without one."""
+    best = 1, 1
+    for period in range(1, min(LONGEST_ROUND, len(keys) // 2) + 1):
+        count = 1
+        while keys[count * period : (count + 1) * period] == keys[:period]:
+            count += 1
+        if count > 1 and count * period > best[0] * best[1]:
+            best = period, count
+    return best
+
+
+@dataclass(frozen=True)
+class Bed:
+    """One of the stacks that a step lays on each other; ``made_in`` is the step that made it.
+
+    Single layers come off the sheet: ``made_in`` is None.
+    """
+
+    layers: tuple[int, ...]
+    made_in: int | None
+
+
+def beds(steps: Sequence[LayUpStep], step: LayUpStep) -> tuple[Bed, ...]:
+    """Return the stacks of a step, lowest first."""
+    before = [earlier for earlier in reversed(steps) if earlier.number < step.number]
+    makers = (
+        next((e.number for e in before if set(e.layers) == set(stack)), None)
+        for stack in step.stacks
+    )
+    return tuple(map(Bed, step.stacks, makers))
+
+
+def inlets_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Inlet, ...]:
+    """Return the inlets whose tab is part of at least one of the layers."""
+    shapes = [layer.profile for layer in distinct_layers(laminate, layers)]
+
+    def tab(inlet: Inlet) -> Point:
+        (x, y), (u, v) = inlet.mouth, inlet.direction
+        return x - INSIDE * u, y - INSIDE * v
+
+    return tuple(
+        inlet for inlet in laminate.inlets if any(shape.contains(tab(inlet)) for shape in shapes)
+    )
+
+
+# Alignment of layers laid by hand: along an edge, or at a place on their sheet.
 
 
 class Lip(NamedTuple):
@@ -89,8 +178,8 @@ class Things:
         if len(self.things) < 2:
             return None
         beside = self.things[place - 1 if place else 1]
-        layer = _widest(self.laminate, self.things[place], highest=False)
-        neighbour = _widest(self.laminate, beside, highest=place > 0)
+        layer = _widest(self.laminate, self.things[place])
+        neighbour = _widest(self.laminate, beside[::-1] if place else beside)
         own = layer.index if len(self.things[place]) > 1 else 0
         edge = Alignment(own, len(layer.profile.pieces) > 1, film_name(neighbour), place == 0)
         edge_lip = lip(layer.profile, neighbour.profile)
@@ -124,6 +213,11 @@ def layer_words(layer: Layer) -> str:
     return f"{film_name(layer)} {layer.pattern}{loose}{face_down(layer)}"
 
 
+def film_name(layer: Layer) -> str:
+    """Return the material and the use of a layer: "TPE wall"."""
+    return f"{layer.film.material} {layer.role.replace('-', ' ')}"
+
+
 def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
     """Return the lowest separator mask among layers around one axis that reaches out to one side.
 
@@ -133,11 +227,11 @@ def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
         return None
     (x, y), (dx, dy) = laminate.chambers[0].centres[0], laminate.inlets[0].direction
     turn = -math.degrees(math.atan2(dy, dx))
-    masks = [layer for layer in map(laminate.layer, layers) if layer.role == "separator-mask"]
-    for mask in masks:
-        low_x, _, high_x, _ = mask.profile.moved(-x, -y).turned(turn).bounds
-        if high_x + low_x > EQUAL:
-            return mask
+    for mask in map(laminate.layer, layers):
+        if mask.role == "separator-mask":
+            low_x, _, high_x, _ = mask.profile.moved(-x, -y).turned(turn).bounds
+            if high_x + low_x > EQUAL:
+                return mask
     return None
 
 
@@ -146,13 +240,11 @@ def lip(region: Region, reference: Region) -> Lip | None:
     """Return the distance between the outlines of two regions; None if it mostly varies."""
     outline = Region(reference.outers)
     distances = []
-    for contour in region.outers:
-        for edge in contour.edges:
-            count = math.ceil(edge.length / STATION)
-            for i in range(count):
-                p = edge.at((i + 0.5) / count)
-                distance = outline.distance_to_edge(p)
-                distances.append(-distance if outline.contains(p) else distance)
+    for edge in (edge for contour in region.outers for edge in contour.edges):
+        count = math.ceil(edge.length / STATION)
+        for p in (edge.at((i + 0.5) / count) for i in range(count)):
+            distance = outline.distance_to_edge(p)
+            distances.append(-distance if outline.contains(p) else distance)
     distances.sort()
     usual = distances[len(distances) // 2]
     near = sum(abs(distance - usual) < EQUAL for distance in distances)
@@ -161,63 +253,42 @@ def lip(region: Region, reference: Region) -> Lip | None:
     return Lip(round(usual, 2) + 0.0, near == len(distances))
 
 
-def places(laminate: Laminate, step: LayUpStep, lying: Sequence[Bed]) -> tuple[PiecePlace, ...]:
+def places(laminate: Laminate, step: LayUpStep, lying: Sequence[Bed]) -> list[PiecePlace]:
     """Return the places of everything laid on a sheet by hand; empty for steps without a sheet."""
     sheet = laminate.layers[0]
     if step.pins or sheet.role != "sheet" or sheet.index not in step.layers:
-        return ()
+        return []
     things = Things(laminate, lying).things
-    return tuple(place for thing in things[1:] for place in _piece_places(laminate, sheet, thing))
+    return [place for thing in things[1:] for place in _piece_places(laminate, sheet, thing)]
 
 
 def pitch(piece_places: Sequence[PiecePlace]) -> float | None:
     """Return the distance from one piece to the next along x; None for a single piece."""
-    first, second = (
-        next((p for p in piece_places if p.piece == number), None) for number in (1, 2)
-    )
-    return second.x - first.x if first and second else None
+    xs = {place.piece: place.x for place in reversed(piece_places)}
+    return xs[2] - xs[1] if 2 in xs else None
 
 
 def _piece_places(laminate: Laminate, sheet: Layer, thing: Sequence[int]) -> Iterator[PiecePlace]:
-    layer = _widest(laminate, thing, highest=False)
+    layer = _widest(laminate, thing)
     sheet_left, sheet_low = sheet.profile.bounds[:2]
     single = f"layer {layer.index}, {film_name(layer)}"
     words = single if len(thing) == 1 else f"stack of layers {layer_numbers(thing)}"
     centres = [centre for chamber in laminate.chambers for centre in chamber.centres]
-    pieces = sorted(layer.profile.pieces, key=lambda piece: piece.bounds)
-    for number, piece in enumerate(pieces, 1):
-        outline = Region(piece.outers)
-        inside = [centre for centre in centres if outline.contains(centre)] or [
-            _middle(piece.bounds)
-        ]
+    for number, piece in enumerate(sorted(layer.profile.pieces, key=lambda p: p.bounds), 1):
+        outline, (left, low, right, high) = Region(piece.outers), piece.bounds
+        middle = (left + right) / 2, (low + high) / 2
+        inside = [centre for centre in centres if outline.contains(centre)] or [middle]
         x, y = (sum(values) / len(inside) for values in zip(*inside, strict=True))
-        yield PiecePlace(
-            words,
-            number,
-            x - sheet_left,
-            y - sheet_low,
-            piece.bounds[0] - sheet_left,
-            piece.bounds[1] - sheet_low,
-        )
+        ends = x - sheet_left, y - sheet_low, left - sheet_left, low - sheet_low
+        yield PiecePlace(words, number, *ends)
 
 
-def _middle(bounds: Bounds) -> Point:
-    return (bounds[0] + bounds[2]) / 2, (bounds[1] + bounds[3]) / 2
-
-
-def _widest(laminate: Laminate, layers: Sequence[int], highest: bool) -> Layer:
-    """Return the layer whose outline is visible around all others; the highest or lowest of
-    several.
-    """
+def _widest(laminate: Laminate, layers: Sequence[int]) -> Layer:
+    """Return the first layer whose outline is visible around all others."""
     reach = {
         layer.pattern: round(sum(contour.area for contour in layer.profile.outers), 6)
         for layer in distinct_layers(laminate, layers)
     }
     most = max(reach.values())
-    wide = [i for i in layers if reach[laminate.layer(i).pattern] == most]
-    return laminate.layer(wide[-1] if highest else wide[0])
-
-
-def film_name(layer: Layer) -> str:
-    """Return the material and the use of a layer: "TPE wall"."""
-    return f"{layer.film.material} {layer.role.replace('-', ' ')}"
+    layer = (laminate.layer(index) for index in layers)
+    return next(one for one in layer if reach[one.pattern] == most)

@@ -16,7 +16,7 @@ from sbafab.pressing.schedule import Step, joined_words
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.prints import PAPER, leaves, tray_sheets
 from sbafab.reports.traveller.formatting import BLANK, count, millimetres, size
-from sbafab.reports.traveller.shapes import thumbnail
+from sbafab.reports.traveller.pictures import thumbnail
 from sbafab.reports.traveller.work import Work
 from sbafab.spreadsheet import csv_text
 

@@ -24,11 +24,11 @@ from sbafab.reports.traveller import acceptance, steps
 from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.bench import cutting, nominal
 from sbafab.reports.traveller.formatting import SHORT_HASH, frame, render
-from sbafab.reports.traveller.joints import joint_pages
+from sbafab.reports.traveller.lay_up import Round, rounds
 from sbafab.reports.traveller.materials import bill, cut_list, prints, release_films
+from sbafab.reports.traveller.pictures import definitions, part_regions, pattern_regions, sheet_rows
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS, record_tables
-from sbafab.reports.traveller.shapes import Round, definitions, pattern_regions, rounds
-from sbafab.reports.traveller.sheet_map import part_regions, sheet_rows
+from sbafab.reports.traveller.steps import joint_pages
 from sbafab.reports.traveller.times import times
 from sbafab.reports.traveller.work import Work
 from sbafab.rules.finding import Finding
