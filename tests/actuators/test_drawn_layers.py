@@ -3,47 +3,28 @@
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-import tomli_w
 
 from sbafab.actuators import FAMILIES, build, load_design
-from sbafab.design.files import template_text
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import validated
-from sbafab.errors import DesignError
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.region import Region, disc
-from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import PredictionRequest
 from sbafab.models.pouch import half_angle
 from sbafab.models.prediction import predict
-from sbafab.rules.deck import run_deck
-from tests.designs import PAPER
+from sbafab.rules.deck import run_deck, run_rule
+from sbafab.rules.measures import Measures
+from sbafab.rules.tube_fit import RULE as TUBE_FIT
+from tests.designs import FEW, drawn, failing, tables
 
-FEW = PAPER.with_("rules.yield_builds=100")
 POCKET, BOND, OVERHANG, BORE = 5.0, 0.75, 0.5, 1.04
 END = POCKET / 2 + BOND + 5.0
-
-
-def failing(laminate: Laminate) -> set[str]:
-    return {finding.rule for finding in run_deck(laminate, FEW) if finding.verdict == "fail"}
-
-
-def tables() -> dict[str, Any]:
-    return tomllib.loads(template_text("pouch"))
-
-
-def drawn(folder: Path, data: dict[str, Any]) -> Laminate:
-    path = folder / "drawn.toml"
-    path.write_text(tomli_w.dumps(data), encoding="utf-8")
-    return build(load_design(path))
 
 
 def as_1dof(balloons: int, width: float) -> dict[str, Any]:
@@ -92,7 +73,7 @@ def test_1dof_5mm_drawn_is_the_familys_own_laminate(tmp_path: Path) -> None:
 
 def test_shapes_have_the_areas_of_closed_formulas(tmp_path: Path) -> None:
     def area(shape: dict[str, Any], **others: dict[str, Any]) -> float:
-        data = tables()
+        data = tables("pouch")
         data["shapes"] |= {**others, "body": shape}
         return drawn(tmp_path, {**data, "body": "body"}).outline.area
 
@@ -117,7 +98,7 @@ def test_shapes_have_the_areas_of_closed_formulas(tmp_path: Path) -> None:
 
 def test_a_path_has_exact_arcs(tmp_path: Path) -> None:
     def shape(**keys: object) -> Region:
-        data = tables()
+        data = tables("pouch")
         data["shapes"]["body"] = keys
         return drawn(tmp_path, {**data, "body": "body"}).outline
 
@@ -132,63 +113,6 @@ def test_a_path_has_exact_arcs(tmp_path: Path) -> None:
     assert sum(edge.length for edge in arcs) == pytest.approx(radius * 4 * math.atan(2))
 
 
-REFUSED: list[tuple[Sequence[str], object, str]] = [
-    (("layers", "1", "role"), "cap", "layers has no gap with a chamber; lay a chamber-mask"),
-    (("layers", "1", "shape"), "msk", "layer 2 names a shape 'msk' that is not there; did you"),
-    (
-        ("layers", "0", "flim"),
-        "tpe",
-        "layers.0.flim is not a key of a design file; did you mean layers.0.film?",
-    ),
-    (("shapes", "mask", "union"), ["mask"], "shapes.mask is made of itself, by way of mask"),
-    (("shapes", "mask"), {"disc": 3, "ring": [3, 2]}, "has disc and ring; a shape is one of"),
-    (("shapes", "mask"), {"slot": [[0, 0], [1, 0]]}, "is a slot without width; add it"),
-    (("shapes", "mask"), {"disc": 3, "by": 1}, "is a disc, which has no by; remove it"),
-    (("shapes", "mask"), {"pattern": "tab", "count": 2}, "has either round or step"),
-    (("shapes", "mask"), {"offset": "pocket", "by": -20}, "shapes.mask encloses no area"),
-    (("shapes", "mask"), {"file": "no.dxf"}, "no.dxf does not exist as a file; check its path"),
-    (
-        ("shapes", "mask"),
-        {"polygon": [[0, 0], [5, 5], [5, 0], [0, 5]]},
-        "shapes.mask.polygon crosses or touches itself at x 2.5000, y 2.5000",
-    ),
-    (("shapes", "mask"), {"polygon": [[0, 0], [0, 0], [5, 0]]}, "has one corner twice in a row"),
-    (
-        ("shapes", "mask"),
-        {"path": [[0, 0], [5, 0], [5, 2, -1], [0, 2]]},
-        "shapes.mask.path crosses or touches itself at x 1.0000, y 0.0000",
-    ),
-    (("shapes", "mask"), {"path": [[0, 0], [9, 0]]}, "shapes.mask.path encloses no area; move a"),
-    (("shapes", "Mask"), {"disc": 3}, "has a shape named 'Mask'; a name is a small letter"),
-    (("chambers",), [], "chambers is missing; add a list of"),
-    (
-        ("layers",),
-        [{"role": "base", "shape": "film"}],
-        "layers has 1 structural films; a laminate has",
-    ),
-    (("shapes", "mask"), {"pattern": "many", "count": 200, "step": [1, 0]}, "more than 5000 edges"),
-    (("stack",), {"balloons": 2}, "stack.balloons = 2, and layers has 1 gaps with"),
-    (("registration",), {"method": "ears"}, "'ears' adds parts to layers"),
-    (("chamber",), {"outline": "a.dxf"}, "chamber.outline is a key that family drawn does not use"),
-]
-
-
-@pytest.mark.parametrize(("keys", "value", "sentence"), REFUSED)
-def test_a_bad_key_is_refused_in_a_sentence(
-    keys: Sequence[str], value: object, sentence: str, tmp_path: Path
-) -> None:
-    data: Any = tables()
-    data["shapes"]["many"] = {"pattern": "tab", "count": 200, "step": [9, 0]}
-    table = data
-    for key in keys[:-1]:
-        table = table[int(key) if key.isdigit() else key]
-    table[keys[-1]] = value
-    with pytest.raises(DesignError) as caught:
-        drawn(tmp_path, data)
-    assert sentence in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
 def test_a_drawing_and_a_film_of_its_own_go_into_the_folder_and_back(tmp_path: Path) -> None:
     import ezdxf
 
@@ -197,7 +121,7 @@ def test_a_drawing_and_a_film_of_its_own_go_into_the_folder_and_back(tmp_path: P
         drawing.modelspace().add_circle((0, 0), radius)
         drawing.saveas(tmp_path / "round.dxf")
 
-    data = tables()
+    data = tables("pouch")
     data["shapes"]["pocket"] = {"file": "round.dxf"}
     data["films"] = {"pet": {"kind": "structural", "product": "PET", "thickness": 0.1}}
     data["layers"][2]["film"] = "pet"
@@ -226,7 +150,7 @@ def test_a_drawing_and_a_film_of_its_own_go_into_the_folder_and_back(tmp_path: P
 
 
 def test_predictions_leave_out_in_a_sentence_what_has_no_model() -> None:
-    data = tables()
+    data = tables("pouch")
     del data["mechanism"]
     design = validated(data, {"drawn": FAMILIES["drawn"].record}, Path())
     prediction = predict(design, PredictionRequest((10.0,)))
@@ -256,3 +180,15 @@ def test_a_film_that_would_stretch_leaves_the_pull_out_and_says_how_far_it_holds
     (reason,) = {o.reason for o in prediction.left_out if "10 kPa, 10 % shorter" in o.name}
     assert f"holds to {most:.3g} kPa" in reason
     assert any(f.name.startswith("pull at 0.7") for f in prediction.figures)
+
+
+def test_a_width_unlike_the_drawn_strip_is_named() -> None:
+    [chamber] = load_design("pouch").model_dump()["chambers"]
+    findings = {}
+    for width in (2.0, 3.0):
+        design = load_design("pouch").with_({"chambers": [{**chamber, "width": width}]})
+        findings[width] = run_rule(TUBE_FIT, Measures(build(design), design))
+    assert [finding.verdict for finding in findings[2.0]] == ["pass"]
+    *_, unlike = findings[3.0]
+    assert unlike.verdict == "warn"
+    assert "stated 3.000 mm wide and drawn 2.000, x 0.000, y 24.000" in unlike.message

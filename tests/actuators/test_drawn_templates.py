@@ -9,17 +9,15 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.design.files import read_toml, template_names, template_text, templates_folder
-from sbafab.errors import DesignError
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.meshing.conforming.meshes import conforming_meshes
 from sbafab.meshing.solid import MASKLESS_GAP, cavity, solid
 from sbafab.models.figures import PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.rules.deck import run_deck
-from tests.designs import PAPER
+from tests.designs import FEW
 from tests.quick import few
 
-FEW = PAPER.with_("rules.yield_builds=100")
 DRAWN = [
     name
     for name in template_names()
@@ -106,9 +104,3 @@ def test_the_grippers_right_cavity_goes_through_its_via() -> None:
     lower, upper = 16 * 14, 3.4 * (24 - 2.3) + 3.4 * 25 + 3.4 * 3.8
     expected = 0.025 * (lower + upper) + 0.1 * math.pi * 0.52**2
     assert cavity(laminate, right, 1e-4).volume == pytest.approx(expected, rel=1e-4)
-
-
-def test_a_face_that_no_film_has_is_named() -> None:
-    design = load_design("array", ['face_bonds.coatings.faces=["tpuu", "tpu"]'])
-    with pytest.raises(DesignError, match=r"'tpuu', a face that no film has"):
-        build(design)

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.errors import DesignError
 from sbafab.folders.build import make_build
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, disc
@@ -188,8 +187,3 @@ def test_a_drawn_mask_does_not_go_on_the_pins_flipped(tmp_path: Path) -> None:
     axis, tail = holes
     assert axis == (0.0, 0.0)
     assert 2 * abs(tail[1]) > 0.5 * 1.5
-
-
-def test_a_bore_that_needs_more_room_is_refused() -> None:
-    with pytest.raises(DesignError, match=r"widen the chamber by .* make the bore less than"):
-        eared("1dof-5mm", ["bore.diameter=2.6"])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from sbafab.folders.check import read_folder
 from sbafab.importing.laminates import import_folder
 from sbafab.importing.records import write_imported
 from sbafab.rules.finding import Finding
-from tests.actuators.test_free_layers import WELDED
+from tests.designs import tables
 
 X, Y = 12.0, -3.5
 """Where the hot tip is from the head of its machine, mm."""
@@ -31,11 +30,11 @@ CORNER = [-20, -18, math.tan(math.pi / 8)]
 MOUNTED = {"seam_tools": {"hot_tip": {"offset": [X, Y]}}}
 
 
-def welded(**tables: Any) -> dict[str, Any]:
+def welded(**more: Any) -> dict[str, Any]:
     """A pouch that a hot tip welds, with a small arc at one corner of its path."""
-    data = deepcopy(WELDED)
+    data = tables("welded")
     data["seams"][0]["path"][3:4] = [CORNER, [-18, -20]]
-    return {**data, "rules": {"yield_builds": 100}, **tables}
+    return {**data, "rules": {"yield_builds": 100}, **more}
 
 
 def made(data: dict[str, Any], folder: Path) -> Path:

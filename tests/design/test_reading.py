@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -52,41 +51,12 @@ def test_not_a_length(text: object) -> None:
 
 
 @pytest.mark.parametrize(
-    ("assignments", "says"),
-    [
-        (["chamber.diametr=5"], "did you mean chamber.diameter?"),
-        (["diameter=6"], "did you mean chamber.diameter, bore.diameter or fits.diameter?"),
-        (["films.tpe.xyzzy=1"], "known here: films.tpe.product"),
-        (["tube.outer_diameter=15"], 'it belongs to "radial"'),
-        (["chamber.diameter=-5"], "chamber.diameter = -5 must be at least 0.001 mm"),
-        (["sheets.seconds=20"], "sheets.seconds was removed, as nesting takes no time limit"),
-        (["chamber.diameter=nan"], "must be a finite length"),
-        (["chamber.diameter=5 furlong"], '"0.75 mm"'),
-        (["stack.balloons=2.5"], "must be a whole number"),
-        (["stack.balloons=0"], "must be at least 1"),
-        (["chamber=5"], "must be a table of keys"),
-        (["family=lobbed"], "did you mean lobed?"),
-        (["name=../up"], "must be 1 to 64 letters"),
-        (['films.tpe.faces={upper="TPE", lower="tpe"}'], "must be 1 to 32 small letters"),
-        (
-            ['rules.waive=["bond"]'],
-            "must be the name of a rule; there are bond-width, mask-overhang,",
-        ),
-        (['rules.waive=["bond-with"]'], "did you mean bond-width?"),
-        (["laser.kerf_tpe=7"], "from 0 to 1 mm"),
-        (["laser.kerf_ptfe=[0.1, 2]"], "from 0 to 1 mm"),
-        (["laser.kerf_ptfe=[0.1, 0]"], "neither over ten times the other"),
-        (["laser.kerf_ptfe=[0.1, 0.1, 0.1]"], "[along x, along y]"),
-        (["chamber.diameter.x=5"], "is a value, not a table"),
-        (["chamber"], "is not KEY=VALUE"),
-        (["chamber.diameter=-5", "bond.width=-1"], "and 1 more problem"),
-    ],
+    ("assignment", "says"),
+    [("chamber.diameter.x=5", "is a value, not a table"), ("chamber", "is not KEY=VALUE")],
 )
-def test_bad_values_are_one_sentence(assignments: list[str], says: str) -> None:
-    with pytest.raises(DesignError) as caught:
-        load_design("3dof-15mm", assignments)
-    assert says in str(caught.value)
-    assert "\n" not in str(caught.value)
+def test_what_sets_no_key_is_refused(assignment: str, says: str) -> None:
+    with pytest.raises(DesignError, match=says):
+        load_design("3dof-15mm", [assignment])
 
 
 @pytest.mark.parametrize(
@@ -98,7 +68,6 @@ def test_bad_values_are_one_sentence(assignments: list[str], says: str) -> None:
         (b"[lumen]\ndiameter = 3 mm", 'a value with a unit stands in quotes: "3 mm"'),
         (b"\xff\xfe", "UTF-8"),
         (b"", "family is missing"),
-        (b'family = "lobed"\nname = ""', "name = ''"),
         (b"a = " + b"[" * 5000, "is not valid TOML"),
         (b"#" * 1_100_000, "at most 1,000,000"),
     ],
@@ -117,35 +86,6 @@ def test_unknown_sources(tmp_path: Path) -> None:
         load_design(tmp_path)
     with pytest.raises(DesignError, match="neither a template nor a design file"):
         load_design("a\0b")
-
-
-@pytest.mark.parametrize("template", ["1dof-5mm", "radial-15mm", "pouch"])
-@pytest.mark.parametrize(
-    ("change", "names"),
-    [
-        ({"panel": {"web": 4.0, "margin": 12.0}}, "panel"),
-        ("registration.experimental=true", "registration.experimental"),
-        ("registration.method=sheet", 'registration.method = "sheet"'),
-    ],
-)
-def test_what_was_removed_says_what_to_do_instead(template: str, change: Any, names: str) -> None:
-    with pytest.raises(DesignError, match=f"^{names} belongs to registered sheets.*; delete it"):
-        load_design(template, [change])
-
-
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ("order.shift_hours=8.0", "order.shift_hours was removed; order.at_once says how many"),
-        ("order.technicians=2", "order.technicians was removed: batches are no longer planned"),
-        ('sheets.stock="stock.toml"', "sheets.stock was removed; write .* width and length"),
-        ('films.tpu.sheet.piece="full"', "films.tpu.sheet.piece was removed: stock files"),
-    ],
-)
-def test_a_key_that_was_removed_says_what_to_do_instead(change: str, says: str) -> None:
-    film = {"product": "TPU", "thickness": 0.05, "kind": "structural"}
-    with pytest.raises(DesignError, match=f"^{says}"):
-        load_design("1dof-5mm", [{"films": {"tpu": film}}, change])
 
 
 @pytest.mark.parametrize("name", DESIGNS)

@@ -10,12 +10,12 @@ import tomli_w
 
 from sbafab.api import check_folder, generate
 from sbafab.folders.check import read_folder, rules_as_cut
-from tests.laminate.test_folding import folded
+from tests.designs import tables
 
 
 def made(folder: Path) -> Path:
     path = folder / "folded.toml"
-    path.write_text(tomli_w.dumps(folded(name="folded")), encoding="utf-8")
+    path.write_text(tomli_w.dumps(tables("folded")), encoding="utf-8")
     return generate(path, out=folder / "out").folder
 
 
@@ -47,7 +47,7 @@ def test_a_folded_folder_is_as_designed_and_a_moved_half_is_found(tmp_path: Path
 
 
 def test_a_turned_layer_is_cut_turned_over_and_read_back_as_it_lies(tmp_path: Path) -> None:
-    data = folded(name="turned")
+    data = tables("folded") | {"name": "turned"}
     del data["folds"]
     data["layers"][2]["turned"] = True
     path = tmp_path / "turned.toml"

@@ -22,8 +22,7 @@ from sbafab.geometry.region import Region, disc, strip
 from sbafab.laminate.netlist import compare, parchmint_nets, read_netlist
 from sbafab.rules.finding import Finding
 from sbafab.rules.nets import netlist_findings
-from tests.actuators.test_drawn_nets import ROUTED
-from tests.designs import PAPER
+from tests.designs import DRAWN, PAPER
 from tests.folders.doctoring import Doctor
 from tests.importing.test_parchmint import circuit as circuit_of_two_channels
 from tests.importing.test_parchmint import written
@@ -35,7 +34,9 @@ def clean_routed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Cut files of two pockets fed through holes: layers 1, 3 and 5 are films."""
     out = tmp_path_factory.mktemp("routed")
     path = out / "routed.toml"
-    path.write_text(ROUTED + "\n[rules]\nyield_builds = 100\n", encoding="utf-8")
+    path.write_text(
+        (DRAWN / "routed.toml").read_text() + "\n[rules]\nyield_builds = 100\n", encoding="utf-8"
+    )
     return generate(RunRequest(load_design(path), out / "folder", ("cut",))).folder
 
 

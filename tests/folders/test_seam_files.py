@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
-from copy import deepcopy
 from pathlib import Path
 
 import ezdxf
@@ -16,7 +15,7 @@ from ezdxf.document import Drawing
 from sbafab.api import check_folder, generate, press
 from sbafab.folders.check import read_folder, rules_as_cut
 from sbafab.rules.finding import Finding
-from tests.actuators.test_free_layers import WELDED
+from tests.designs import tables
 from tests.folders.doctoring import Doctor
 
 
@@ -24,7 +23,7 @@ from tests.folders.doctoring import Doctor
 def welded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     """The files of a welded pouch."""
     folder = tmp_path_factory.mktemp("welded")
-    data = deepcopy(WELDED)
+    data = tables("welded")
     # A small arc at one corner: seams keep true arcs.
     path = data["seams"][0]["path"]
     path[3:4] = [[-20, -18, math.tan(math.pi / 8)], [-18, -20]]

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-import tomli_w
 
-from sbafab.actuators import build, load_design
 from sbafab.design.laminate_file import FILE, laminate_json
 from sbafab.geometry.edges import Line
 from sbafab.importing.laminates import import_laminate
 from sbafab.importing.records import Written, write_imported
 from sbafab.laminate.laminate import Laminate
-from tests.actuators.test_free_layers import WELDED
-from tests.laminate.test_folding import folded
+from tests.designs import drawn, tables
 
 HALF_RING = [[-2, 30], [-2, 20, 1], [-2, -20], [2, -20], [2, 30]]
 
 
 def welded(**changes: Any) -> dict[str, Any]:
     """Two coated films on their coated faces, welded along an open path of lines."""
-    data = deepcopy(WELDED)
+    data = tables("welded")
     data["films"] = {
         "tpe": {"faces": {"upper": "pu", "lower": "nylon"}},
         "foil": {
@@ -49,7 +45,7 @@ def turned() -> dict[str, Any]:
 
 def ringed() -> dict[str, Any]:
     """Welded along the boundary of a shape with a hole, and named places on two nets."""
-    data = deepcopy(WELDED)
+    data = tables("welded")
     data["shapes"]["rim"] = {"ring": [38, 20]}
     data["seams"] = [
         {"name": "rim", "layers": [1, 2], "shape": "rim", "width": 1, "tool": "roller"},
@@ -62,13 +58,11 @@ def ringed() -> dict[str, Any]:
     return data
 
 
-DESIGNS = {"faces": welded, "turned": turned, "shape": ringed, "fold": folded}
+DESIGNS = {"faces": welded, "turned": turned, "shape": ringed, "fold": lambda: tables("folded")}
 
 
 def again(data: dict[str, Any], folder: Path) -> tuple[Laminate, Written]:
-    path = folder / "drawn.toml"
-    path.write_text(tomli_w.dumps(data), encoding="utf-8")
-    laminate = build(load_design(path))
+    laminate = drawn(folder, data)
     (folder / FILE).write_text(laminate_json(laminate), encoding="utf-8")
     written = write_imported(import_laminate(folder / FILE), folder / "again.toml", FILE)
     return laminate, written
@@ -82,7 +76,7 @@ def test_joints_come_back_exactly(name: str, tmp_path: Path) -> None:
 
 
 def test_an_open_path_keeps_its_arcs(tmp_path: Path) -> None:
-    data = deepcopy(WELDED)
+    data = tables("welded")
     data["seams"][0]["path"] = HALF_RING
     laminate, written = again(data, tmp_path)
     (ours,), (theirs,) = laminate.seams[0].path, written.laminate.seams[0].path
