@@ -15,19 +15,17 @@ import numpy as np
 
 from docs.scripts.measured import Record, keep, texts, versions
 from docs.scripts.tables import Table
-from sbafab.validation.curve_intervals import curve_intervals, uncertainty_for
-from sbafab.validation.files import shipped_evidence
+from sbafab.validation.comparison import curve_intervals, uncertainty_for
+from sbafab.validation.evidence import Evidence, MeasuredCurve, shipped_evidence
 from sbafab.validation.fit import (
     as_calibration,
     film_of,
     left_out_fits,
-    sampled_curve,
+    sampled_curves,
     sizes_of_groups,
     usable_curves,
 )
 from sbafab.validation.posterior import Posterior, SampledCurve
-from sbafab.validation.records import Evidence, MeasuredCurve
-from sbafab.validation.surface import surfaces
 
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
@@ -87,14 +85,13 @@ def left_out_curves(
         usable, _ = usable_curves([source])
         if not usable:
             continue
-        made = surfaces(usable, _print_progress)
-        curves = [sampled_curve(*pair) for pair in zip(usable, made, strict=True)]
-        for left_out in left_out_fits(curves, _print_progress, only):
-            generator = np.random.default_rng(left_out.seed)
+        curves = sampled_curves(usable, _print_progress)
+        for test, seed, posterior in left_out_fits(curves, _print_progress, only):
+            generator = np.random.default_rng(seed)
             for measured, curve in zip(usable, curves, strict=True):
-                if curve.test == left_out.test:
-                    drawn = left_out.posterior.predicted(curve, generator)
-                    stated = _stated(source, measured, left_out.posterior)
+                if curve.test == test:
+                    drawn = posterior.predicted(curve, generator)
+                    stated = _stated(source, measured, posterior)
                     yield LeftOutCurve(source.id, measured, curve, drawn, stated)
 
 
@@ -106,9 +103,7 @@ def _stated(
     source: Evidence, measured: MeasuredCurve, posterior: Posterior
 ) -> Sequence[tuple[float, float] | None]:
     rest, _ = usable_curves([source])
-    sizes = sizes_of_groups(
-        [c for c in rest if (c.group or c.id) != (measured.group or measured.id)]
-    )
+    sizes = sizes_of_groups([curve for curve in rest if curve.test != measured.test])
     calibration = as_calibration(NAME, "", film_of(measured), [source], posterior, [], sizes)
     intervals = curve_intervals(measured, uncertainty_for(measured, calibration))
     return intervals or [None] * len(measured.y)

@@ -20,7 +20,7 @@ from sbafab.models.calibrated import load_calibration
 from sbafab.models.elastic import blocked_force, pose_bent_by
 from sbafab.models.figures import Factors
 from sbafab.models.stack import Plate, Pose, Stack, stack
-from sbafab.validation.paper_calibrated import PAPER
+from sbafab.validation.paper_table import PAPER
 
 COLUMNS = (
     "section",

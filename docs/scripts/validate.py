@@ -6,9 +6,7 @@ from __future__ import annotations
 
 from docs.scripts import candidates, measured, sensitivity
 from docs.scripts.tables import FOLDER, Table, markdown_rows
-from sbafab.validation import paper_calibrated
-from sbafab.validation.page import page
-from sbafab.validation.paper_calibrated import TITLE
+from sbafab.validation.paper_table import CALIBRATED_COLUMNS, TITLE, PaperTable
 
 PATH = FOLDER / "validation.csv"
 COLUMNS = ("section", "figure", "paper", "where", "predicted", "residual", "model", "why")
@@ -18,10 +16,10 @@ def validation() -> tuple[Table, Table]:
     """Return every figure of the paper beside its prediction, and the values beside the calibrated
     models, as `sbafab reproduce` writes them.
     """
-    rows = list(markdown_rows(page()))
+    rows = list(markdown_rows(PaperTable().page()))
     return (
         Table(COLUMNS, [row for row in rows if row[0] != TITLE and len(row) == len(COLUMNS)]),
-        Table(paper_calibrated.COLUMNS, [row[1:] for row in rows if row[0] == TITLE]),
+        Table(CALIBRATED_COLUMNS, [row[1:] for row in rows if row[0] == TITLE]),
     )
 
 

@@ -93,9 +93,9 @@ def _print(fitted: Fit) -> None:
     click.echo(f"What the models miss beyond that (one standard deviation): {missed}")
     names = ("", "measured", "predicted", "90 % interval", "")
     print_table("Left out", names, [*map(_held_out, fitted.points)])
-    for set_ups in fitted.open_set_ups:
-        shares = ", ".join(f"{name} {100 * share:.0f} %" for name, share in set_ups.probabilities)
-        click.echo(f"Left open by {set_ups.curve}: {shares}")
+    for name, set_ups in fitted.open_set_ups.items():
+        shares = ", ".join(f"{phrase} {100 * share:.0f} %" for phrase, share in set_ups.items())
+        click.echo(f"Left open by {name}: {shares}")
     for curve, reason in fitted.left_out:
         click.echo(f"Not fitted: {curve}: {reason}")
 
@@ -108,14 +108,14 @@ def _held_out(point: HeldOutPoint) -> Sequence[str]:
 
 
 def _as_json(fitted: Fit, path: Path) -> dict[str, Any]:
-    left_open = fitted.open_set_ups
     return {
         "schema": "sbafab/calibrate@1",
         "file": str(path),
         "calibration": fitted.calibration.as_dict(),
         "held_out": [{**asdict(point), "inside": point.is_inside} for point in fitted.points],
         "left_open": [
-            {"curve": e.curve, "probabilities": dict(e.probabilities)} for e in left_open
+            {"curve": curve, "probabilities": shares}
+            for curve, shares in fitted.open_set_ups.items()
         ],
         "not_fitted": [{"curve": curve, "reason": reason} for curve, reason in fitted.left_out],
     }

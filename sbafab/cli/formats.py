@@ -41,7 +41,7 @@ from sbafab.search.find import FindDocument
 from sbafab.search.sweep import SweepDocument
 from sbafab.simulators.simulator import SimulateDocument
 from sbafab.validation.comparison import ComparisonDocument
-from sbafab.validation.page import ReproductionDocument
+from sbafab.validation.paper_table import ReproductionDocument
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

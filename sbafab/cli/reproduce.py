@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -11,18 +10,10 @@ from sbafab.cli.options import json_option, out_option
 from sbafab.cli.printing import print_json, print_verdict
 from sbafab.lab.evidence import load_source
 from sbafab.models.calibrated import load_calibration
-from sbafab.validation import page
-from sbafab.validation.comparison import (
-    ComparisonDocument,
-    compare,
-    compare_calibrated,
-    table_lines,
-)
-from sbafab.validation.files import shipped_evidence
-from sbafab.validation.paper_calibrated import PAPER, TITLE
-
-if TYPE_CHECKING:
-    from sbafab.validation.rows import Row
+from sbafab.validation.comparison import ComparisonDocument, compare, table_lines
+from sbafab.validation.evidence import shipped_evidence
+from sbafab.validation.paper_table import PAPER, TITLE, PaperTable
+from sbafab.validation.paper_table import as_json as table_json
 
 FOLDER = "reproduction"
 ALL = "all"
@@ -54,38 +45,31 @@ def reproduce(source: str | None, calibration: str | None, out: Path, as_json: b
         return
     if calibration is not None:
         raise click.UsageError("--calibration goes with a SOURCE")
-    sections, calibrated = page.reproduce(out / FOLDER)
+    table, folder = PaperTable(), out / FOLDER
+    table.write(folder)
     if as_json:
-        document = page.as_json(sections, calibrated)
-        print_json({**document, "folder": str(out / FOLDER)})
+        print_json(table_json(table, folder=str(folder)))
         return
-    for section, rows in sections.items():
+    for section, rows in table.sections.items():
         click.echo(f"\n{section}")
         for row in rows:
-            click.echo(f"  {row.figure:<58}{_measured(row):>20}{_predicted(row):>16}  {row.model}")
+            predicted = row.predicted_text or "-"
+            click.echo(f"  {row.figure:<58}{row.measured_text:>20}{predicted:>16}  {row.model}")
     click.echo(f"\n{TITLE}")
-    for line in table_lines(calibrated.curves):
+    for line in table_lines(table.curves):
         click.echo(f"  {line}")
-    rows = [row for section in sections.values() for row in section]
-    predicted = sum(row.predicted is not None for row in rows)
+    count = sum(row.predicted is not None for row in table.rows)
     print_verdict(
-        f"\nPaper reproduced: {predicted} of {len(rows)} values predicted; "
-        f"{calibrated.summary}. Written to "
-        f"{out / FOLDER}: reproduction.md, reproduction.json, charts",
-        out / FOLDER,
+        f"\nPaper reproduced: {count} of {len(table.rows)} values predicted; {table.summary}. "
+        f"Written to {folder}: reproduction.md, reproduction.json, charts",
+        folder,
     )
 
 
 def _print_comparison(source: str, name: str, as_json: bool) -> None:
     calibration = load_calibration(name, key="--calibration")
     evidences = shipped_evidence() if source == ALL else (load_source(source),)
-    curves = [
-        curve
-        for evidence in evidences
-        for curve in (
-            compare_calibrated(evidence, calibration) if calibration else compare(evidence)
-        )
-    ]
+    curves = [curve for evidence in evidences for curve in compare(evidence, calibration)]
     if as_json:
         print_json(ComparisonDocument.of(None, calibration=name, sources=evidences, curves=curves))
         return
@@ -104,11 +88,3 @@ def _print_comparison(source: str, name: str, as_json: bool) -> None:
         f"{source} compared: {predicted} of {len(points)} values in {len(curves)} curves predicted"
         + (f", {inside} of {len(bounded)} in their 90 % intervals" if bounded else "")
     )
-
-
-def _measured(row: Row) -> str:
-    return str(row.measured) if row.measured.unit else ""
-
-
-def _predicted(row: Row) -> str:
-    return "-" if row.predicted is None else f"{row.predicted:.4g} {row.measured.unit}"

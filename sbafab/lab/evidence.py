@@ -5,20 +5,18 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from sbafab.errors import DesignError
 from sbafab.lab.report import Built, items
 from sbafab.lab.store import Lab
-from sbafab.validation.files import load_evidence
-from sbafab.validation.records import (
+from sbafab.validation.evidence import (
     Evidence,
-    MeasuredActuator,
     MeasuredCurve,
     Setup,
     StatedError,
+    load_evidence,
 )
 
 
@@ -60,12 +58,12 @@ def from_lab_records(lab: Lab) -> Evidence:
             f"{lab.path} has no record with any of {', '.join(RECORDED)}; record one, such as "
             "--stroke 16.8"
         )
-    return Evidence(_id(lab.path.stem), f"build records in {lab.path.name}", "", _renamed(curves))
+    citation = f"build records in {lab.path.name}"
+    return Evidence(id=_id(lab.path.stem), citation=citation, curves=_renamed(curves))
 
 
 def _curves(actuators: Sequence[Built]) -> list[MeasuredCurve]:
     build = actuators[0].build
-    measured = MeasuredActuator(toml=build.toml) if build.design else MeasuredActuator()
     curves = []
     for name, kind in RECORDED.items():
         values = tuple(a.numbers[name] for a in actuators if name in a.numbers)
@@ -79,7 +77,7 @@ def _curves(actuators: Sequence[Built]) -> list[MeasuredCurve]:
                 y=values,
                 x_name=kind.x_name,
                 x=(0.0,) * len(values) if kind.x_name else (),
-                actuator=measured,
+                toml=build.toml if build.design else "",
                 setup=kind.setup,
                 error=StatedError(source="not recorded"),
                 group=_id(actuators[0].design),
@@ -101,7 +99,9 @@ def _renamed(curves: Sequence[MeasuredCurve]) -> tuple[MeasuredCurve, ...]:
     for curve in curves:
         counts[curve.id] += 1
         number = counts[curve.id]
-        renamed.append(curve if number == 1 else replace(curve, id=f"{curve.id}-{number}"))
+        renamed.append(
+            curve if number == 1 else curve.model_copy(update={"id": f"{curve.id}-{number}"})
+        )
     return tuple(renamed)
 
 

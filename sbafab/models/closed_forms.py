@@ -15,11 +15,11 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sbafab.errors import DesignError
+from sbafab.models.film_elements import Array
 
-Array = NDArray[np.float64]
 BISECTIONS = 60
 ROUNDING = 1e-9
 """Relative rounding error by which a value may lie past the end of its range."""

@@ -1,20 +1,21 @@
-"""Measured curves beside the models, point by point, as values and as lines of a table."""
+"""Measured curves beside the models, point by point with 90 % intervals, and as a table."""
 
 from __future__ import annotations
 
+import math
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from sbafab.documents import Document, Short, attribute
-from sbafab.models.calibrated import Ends, ModelCalibration
+from sbafab.errors import DesignError
+from sbafab.models.calibrated import SHARE, Ends, ModelCalibration, deviations
 from sbafab.models.figures import Factors
-from sbafab.validation.curve_intervals import curve_intervals, uncertainty_for
-from sbafab.validation.model_values import NoModel, model_values
-from sbafab.validation.records import Evidence, MeasuredCurve
+from sbafab.models.intervals import ActuatorSizes, Uncertainty, for_film
+from sbafab.validation.evidence import Evidence, MeasuredCurve
+from sbafab.validation.fit import GROUP_OF, MIDDLES, relative_errors, term_of
+from sbafab.validation.model_values import ModelledActuator, ModelValues, NoModel, model_values
 
-Intervals = Callable[[MeasuredCurve], Sequence[Ends | None] | None]
-"""Intervals of a prediction at the points of a curve; None for a point or a curve without any."""
 WIDTH = 100
 
 
@@ -63,50 +64,85 @@ class ComparedCurve:
     reason: str
 
 
-def compare(
-    evidence: Evidence, factors: Factors | None = None, intervals: Intervals | None = None
-) -> list[ComparedCurve]:
-    """Return the curves of a source beside the models with a calibration's factors."""
-    return [_compared(evidence.id, curve, factors, intervals) for curve in evidence.curves]
-
-
-def compare_calibrated(evidence: Evidence, calibration: ModelCalibration) -> list[ComparedCurve]:
-    """Return the curves of a source beside the calibrated models and their 90 % intervals, which
-    span the set-ups that the source leaves open.
+def compare(evidence: Evidence, calibration: ModelCalibration | None = None) -> list[ComparedCurve]:
+    """Return the curves of a source beside the models, with a calibration beside the calibrated
+    ones and their 90 % intervals, which span the set-ups that the source leaves open.
     """
-    compared = []
-    for curve in evidence.curves:
-        uncertainty = uncertainty_for(curve, calibration)
-        compared.append(
-            _compared(
-                evidence.id,
-                curve,
-                uncertainty.factors,
-                lambda each, of=uncertainty: curve_intervals(each, of),  # type: ignore[misc]
-            )
-        )
-    return compared
+    return [_compared(evidence.id, curve, calibration) for curve in evidence.curves]
 
 
 def _compared(
-    source: str, curve: MeasuredCurve, factors: Factors | None, intervals: Intervals | None
+    source: str, curve: MeasuredCurve, calibration: ModelCalibration | None
 ) -> ComparedCurve:
-    count = len(curve.y)
-    answer = model_values(curve, factors)
-    has_model = not isinstance(answer, NoModel)
-    ranges = [None] * count if isinstance(answer, NoModel) else answer.ranges()
-    of_prediction = intervals(curve) if intervals and has_model else None
-    points = [
-        ComparedPoint(point.x, point.y, point.error, model, interval)
-        for point, model, interval in zip(
-            curve.points(), ranges, of_prediction or [None] * count, strict=True
-        )
-    ]
+    uncertainty = None if calibration is None else uncertainty_for(curve, calibration)
+    answer = model_values(curve, uncertainty.factors if uncertainty else None)
     if isinstance(answer, NoModel):
-        return ComparedCurve(source, curve, tuple(points), "", (), answer.reason)
-    return ComparedCurve(
-        source, curve, tuple(points), answer.model, tuple(filter(None, answer.series)), ""
+        points = tuple(ComparedPoint(*point, None, None) for point in curve.points())
+        return ComparedCurve(source, curve, points, "", (), answer.reason)
+    intervals = curve_intervals(curve, uncertainty) if uncertainty else None
+    points = tuple(
+        ComparedPoint(*point, model, interval)
+        for point, model, interval in zip(
+            curve.points(), answer.ranges(), intervals or [None] * len(curve.y), strict=True
+        )
     )
+    return ComparedCurve(source, curve, points, answer.model, (*filter(None, answer.series),), "")
+
+
+def uncertainty_for(curve: MeasuredCurve, calibration: ModelCalibration) -> Uncertainty:
+    """Return a calibration as it holds for the actuator that was measured."""
+    if not curve.is_described:
+        return Uncertainty(calibration, {})
+    of = ModelledActuator(curve, Factors(**MIDDLES))
+    try:
+        subject = ActuatorSizes.of(of.design.form, of.laminate, calibration.film)
+    except DesignError:
+        return Uncertainty(calibration, {})
+    return Uncertainty(for_film(calibration, of.design.films.tpe.product), {}, subject)
+
+
+def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends | None] | None:
+    """Return the interval of the measured value at each point of a curve, in its unit.
+
+    The interval spans every assumption on the set-up that the source leaves open. It includes the
+    calibration's uncertainty, the models' discrepancy and the error of the measurement. Returns
+    None if the calibration does not cover the quantity. A point's interval is None if an
+    assumption reaches the point with the median factors, but not with factors one standard
+    deviation away.
+    """
+    group = GROUP_OF.get(curve.quantity)
+    median = None if group is None else model_values(curve, uncertainty.factors)
+    if group is None or not isinstance(median, ModelValues):
+        return None
+    series = {uncertainty.factors: median.series}
+    for change, factors in uncertainty.shifted():
+        moved = model_values(curve, factors) if change else median
+        series[factors] = moved.series if isinstance(moved, ModelValues) else {}
+    unreached = (None,) * len(curve.y)
+    intervals: list[Ends | None] = []
+    for point, error in enumerate(relative_errors(curve).tolist()):
+        ends: list[Ends] = []
+        for phrase in (name for name, values in median.series.items() if values[point] is not None):
+            found = {of: values.get(phrase, unreached)[point] for of, values in series.items()}
+            known = {of: value for of, value in found.items() if value is not None}
+            if len(known) < len(found):
+                ends = []
+                break
+            wide = uncertainty.interval_of(group, known.__getitem__, term=term_of(curve))
+            ends.append(widened(*wide, error))
+        intervals.append((min(a for a, _ in ends), max(b for _, b in ends)) if ends else None)
+    return intervals
+
+
+def widened(value: float, ends: Ends, error: float) -> Ends:
+    """Return an interval with a relative standard error added to it as an independent one."""
+    low, high = ends
+    half = deviations(SHARE) * error
+    if low > 0:
+        span = math.hypot(math.log(high / value), half)
+        return value * math.exp(-span), value * math.exp(span)
+    span = math.hypot(high - value, half * abs(value))
+    return value - span, value + span
 
 
 # The table.
@@ -125,8 +161,8 @@ def table_lines(curves: Sequence[ComparedCurve]) -> Iterator[str]:
         for point in compared.points:
             yield COLUMN.format(
                 "",
-                _axis(compared, point),
-                _measured(point),
+                "" if point.x is None else f"{point.x:g} {curve.x_unit}".rstrip(),
+                measured_text(point),
                 span(point.model) or "-",
                 _deviation(point),
                 {None: "-", True: "yes", False: "no"}[point.is_within],
@@ -134,11 +170,8 @@ def table_lines(curves: Sequence[ComparedCurve]) -> Iterator[str]:
         yield from _remarks(compared)
 
 
-def _axis(compared: ComparedCurve, point: ComparedPoint) -> str:
-    return "" if point.x is None else f"{point.x:g} {compared.curve.x_unit}".rstrip()
-
-
-def _measured(point: ComparedPoint) -> str:
+def measured_text(point: ComparedPoint) -> str:
+    """Return a measured value with its standard error."""
     return f"{point.measured:g}" + (f" +- {point.error:.2g}" if point.error else "")
 
 
@@ -160,18 +193,16 @@ def _deviation(point: ComparedPoint) -> str:
 
 
 def _remarks(compared: ComparedCurve) -> Iterator[str]:
+    notes = []
     if compared.reason:
-        reason = compared.reason
-        yield from _wrapped(f"{reason[:1].upper()}{reason[1:]}.")
+        notes.append(f"{compared.reason[:1].upper()}{compared.reason[1:]}.")
     if compared.assumptions:
-        yield from _wrapped(f"Not stated, so assumed: {'; '.join(compared.assumptions)}.")
+        notes.append(f"Not stated, so assumed: {'; '.join(compared.assumptions)}.")
     if not compared.curve.comparable:
-        yield from _wrapped(f"Not comparable: {compared.curve.reason}")
-
-
-def _wrapped(text: str) -> list[str]:
-    indent = "    "
-    return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent)
+        notes.append(f"Not comparable: {compared.curve.reason}")
+    indent = " " * 4
+    for note in notes:
+        yield from textwrap.wrap(note, WIDTH, initial_indent=indent, subsequent_indent=indent)
 
 
 ShortEnds = tuple[Short, Short] | None

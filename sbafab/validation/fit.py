@@ -7,32 +7,36 @@ from __future__ import annotations
 import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 import tomli_w
 
 from sbafab.errors import DesignError
 from sbafab.models.calibrated import GROUPS, SHARE, ModelCalibration, SizeRange
+from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
 from sbafab.models.intervals import sizes_of
-from sbafab.models.unknowns import UNKNOWNS, factors_at
+from sbafab.models.unknowns import UNKNOWNS
 from sbafab.process import Progress
-from sbafab.validation.model_values import ModelledActuator, NoModel, model_values
+from sbafab.validation.evidence import Evidence, MeasuredCurve
+from sbafab.validation.model_values import ModelledActuator, ModelValues, NoModel, model_values
 from sbafab.validation.posterior import (
     LEAST_ERROR,
+    NODE_COORDINATES,
+    NODES,
     Posterior,
     SampledCurve,
-    correlations,
     sampled,
     set_up_probabilities,
 )
-from sbafab.validation.records import Evidence, MeasuredCurve
-from sbafab.validation.surface import ValueSurface, surfaces
 
 DIGITS = 6
 TOLD_APART = 0.3
 """Correlation from which two unknowns are said not to be told apart well."""
+IMPOSSIBLE = 1e-3
+"""Share of a curve's measured values that stands for a state which an actuator cannot reach."""
 
 
 @dataclass(frozen=True)
@@ -55,34 +59,16 @@ class HeldOutPoint:
         return self.low <= self.measured <= self.high
 
 
-class LeftOutFit(NamedTuple):
-    """A fit without the curves of a ``test``, and the ``seed`` of its random numbers."""
-
-    test: str
-    seed: int
-    posterior: Posterior
-
-
-@dataclass(frozen=True)
-class OpenSetUp:
-    """The set-ups that a curve's source leaves open: each assumed ``phrase`` with its probability.
-
-    The probabilities are the fit's, from equal prior ones.
-    """
-
-    curve: str
-    probabilities: tuple[tuple[str, float], ...]
-
-
 @dataclass(frozen=True)
 class Fit:
-    """A calibration, its held-out points, the set-ups that sources leave open, and the curves that
-    were not fitted, each with its reason.
+    """A calibration, its held-out points, and the curves that were not fitted, each with its
+    reason; ``open_set_ups`` are the set-ups that a curve's source leaves open: each assumed phrase
+    with its probability by the fit, from equal prior ones.
     """
 
     calibration: ModelCalibration
     points: tuple[HeldOutPoint, ...]
-    open_set_ups: tuple[OpenSetUp, ...]
+    open_set_ups: Mapping[str, Mapping[str, float]]
     left_out: tuple[tuple[str, str], ...]
 
 
@@ -114,7 +100,7 @@ def usable_curves(
             if not reason and min(curve.y) <= 0:
                 reason = "its values are not all above 0"
             if not reason:
-                answer = model_values(curve, factors_at(MIDDLES))
+                answer = model_values(curve, Factors(**MIDDLES))
                 reason = answer.reason if isinstance(answer, NoModel) else ""
             if reason:
                 left_out.append((curve.id, reason))
@@ -123,7 +109,7 @@ def usable_curves(
     return curves, left_out
 
 
-MIDDLES = {unknown.field: unknown.middle for unknown in UNKNOWNS}
+MIDDLES: dict[str, Any] = {unknown.field: unknown.middle for unknown in UNKNOWNS}
 """Values in the middle of the priors."""
 
 
@@ -141,52 +127,85 @@ def fit(name: str, sources: Sequence[Evidence], progress: Progress, about: str =
         raise DesignError(
             f"the curves are of {len(films)} films ({', '.join(films)}); calibrate each by itself"
         )
-    curves = [
-        sampled_curve(curve, surface)
-        for curve, surface in zip(usable, surfaces(usable, progress), strict=True)
-    ]
+    curves = sampled_curves(usable, progress)
     progress("posterior", 0, 1)
     posterior = sampled(curves)
-    points = held_out(usable, curves, progress)
+    points = [
+        point
+        for test, seed, rest in left_out_fits(curves, progress)
+        for source, curve in zip(usable, curves, strict=True)
+        if curve.test == test
+        for point in predicted_points(source, curve, rest, seed)
+    ]
+    sizes = sizes_of_groups(usable)
     return Fit(
-        as_calibration(name, about, films[0], sources, posterior, points, sizes_of_groups(usable)),
+        as_calibration(name, about, films[0], sources, posterior, points, sizes),
         tuple(points),
-        tuple(open_set_ups(usable, curves, posterior)),
+        open_set_ups(usable, curves, posterior),
         tuple(left_out),
     )
 
 
 def open_set_ups(
     measured: Sequence[MeasuredCurve], curves: Sequence[SampledCurve], posterior: Posterior
-) -> Iterator[OpenSetUp]:
-    """Yield the set-ups of each curve whose source leaves some open."""
+) -> dict[str, dict[str, float]]:
+    """Return the set-ups of each curve whose source leaves some open, with their probabilities."""
+    shares = {}
     for source, curve in zip(measured, curves, strict=True):
-        answer = model_values(source, factors_at(MIDDLES))
-        if isinstance(answer, NoModel) or len(answer.series) < 2:
-            continue
-        shares = set_up_probabilities(curve, posterior)
-        pairs = zip(answer.series, shares.tolist(), strict=True)
-        yield OpenSetUp(source.id, tuple(pairs))
+        answer = model_values(source, Factors(**MIDDLES))
+        if isinstance(answer, ModelValues) and len(answer.series) > 1:
+            probabilities = set_up_probabilities(curve, posterior).tolist()
+            shares[source.id] = dict(zip(answer.series, probabilities, strict=True))
+    return shares
 
 
 def film_of(curve: MeasuredCurve) -> str:
     """Return the product of the film of the actuator that was measured."""
-    return ModelledActuator(curve.actuator, factors_at(MIDDLES)).design.films.tpe.product
+    return ModelledActuator(curve, Factors(**MIDDLES)).design.films.tpe.product
 
 
-def sampled_curve(curve: MeasuredCurve, surface: ValueSurface) -> SampledCurve:
-    """Return a curve in the form for the posterior."""
+def sampled_curves(curves: Sequence[MeasuredCurve], progress: Progress) -> list[SampledCurve]:
+    """Return curves in the form for the posterior: the models' values at all nodes."""
     fields = [unknown.field for unknown in UNKNOWNS]
-    term = term_of(curve)
-    return SampledCurve(
-        curve.id,
-        curve.group or curve.id,
-        GROUPS.index(GROUP_OF[curve.quantity]),
-        surface,
-        np.log(curve.y),
-        relative_errors(curve),
-        fields.index(term) if term else -1,
-    )
+    tables: list[dict[tuple[int, ...], Array]] = [{} for _ in curves]
+    # Maps of balloons hang on the pocket loss alone.
+    for loss, ratio, press in np.ndindex(NODES[1], NODES[0], NODES[2]):
+        progress("models", loss, NODES[1])
+        place = ratio, loss, press
+        values = [
+            unknown.value(float(nodes[at]))
+            for unknown, nodes, at in zip(UNKNOWNS, NODE_COORDINATES, place, strict=False)
+        ]
+        factors = Factors(**dict(zip(fields, values, strict=False)))  # type: ignore[arg-type]
+        for table, curve in zip(tables, curves, strict=True):
+            table[place] = logarithms(curve, factors)
+    sampled_ones = []
+    for curve, table in zip(curves, tables, strict=True):
+        joined = np.stack([table[place] for place in np.ndindex(NODES)])
+        sampled_ones.append(
+            SampledCurve(
+                curve.test,
+                GROUPS.index(GROUP_OF[curve.quantity]),
+                joined.reshape(*NODES, *joined.shape[1:]),
+                np.log(curve.y),
+                relative_errors(curve),
+                fields.index(term) if (term := term_of(curve)) else -1,
+            )
+        )
+    return sampled_ones
+
+
+def logarithms(curve: MeasuredCurve, factors: Factors) -> Array:
+    """Return logarithms of the models' values of a curve (open set-ups, points).
+
+    A state that an actuator does not reach has IMPOSSIBLE times the measured value. Raises
+    DesignError if no model gives the curve.
+    """
+    answer = model_values(curve, factors, shares_maps=True)
+    if isinstance(answer, NoModel):
+        raise DesignError(f"{curve.id}: {answer.reason}")
+    rows = [[value or 0.0 for value in values] for values in answer.series.values()]
+    return np.asarray(np.log(np.maximum(rows, IMPOSSIBLE * np.array(curve.y))))
 
 
 def term_of(curve: MeasuredCurve) -> str:
@@ -204,26 +223,11 @@ def relative_errors(curve: MeasuredCurve) -> Array:
     return np.asarray(np.maximum(stated / np.array(curve.y), LEAST_ERROR))
 
 
-def held_out(
-    measured: Sequence[MeasuredCurve], curves: Sequence[SampledCurve], progress: Progress
-) -> list[HeldOutPoint]:
-    """Return each curve's points, predicted by a fit without its test.
-
-    Empty if all curves are of one test.
-    """
-    return [
-        point
-        for left_out in left_out_fits(curves, progress)
-        for source, curve in zip(measured, curves, strict=True)
-        if curve.test == left_out.test
-        for point in predicted_points(source, curve, left_out.posterior, left_out.seed)
-    ]
-
-
 def left_out_fits(
     curves: Sequence[SampledCurve], progress: Progress, only: Collection[str] = ()
-) -> Iterator[LeftOutFit]:
-    """Yield fits that each leave out one test: every test in turn, or each of ``only``.
+) -> Iterator[tuple[str, int, Posterior]]:
+    """Yield fits that each leave out one test, every test in turn or each of ``only``: the test,
+    the seed of its random numbers, and the posterior.
 
     Yields nothing if all curves are of one test.
     """
@@ -233,8 +237,7 @@ def left_out_fits(
             continue
         progress("held out", done, len(tests))
         seed = zlib.crc32(test.encode())
-        rest = [curve for curve in curves if curve.test != test]
-        yield LeftOutFit(test, seed, sampled(rest, seed))
+        yield test, seed, sampled([curve for curve in curves if curve.test != test], seed)
 
 
 def predicted_points(
@@ -255,7 +258,7 @@ def sizes_of_groups(curves: Sequence[MeasuredCurve]) -> dict[str, SizeRange]:
     """Return the sizes of the actuators that were measured, by group of quantities."""
     by_group: dict[str, SizeRange] = {}
     for curve in curves:
-        of = ModelledActuator(curve.actuator, factors_at(MIDDLES))
+        of = ModelledActuator(curve, Factors(**MIDDLES))
         sizes, group = sizes_of(of.design.form, of.laminate), GROUP_OF[curve.quantity]
         by_group[group] = by_group[group].joined(sizes) if group in by_group else sizes
     return by_group
@@ -271,10 +274,6 @@ def as_calibration(
     sizes: Mapping[str, SizeRange],
 ) -> ModelCalibration:
     """Return the calibration that a posterior stands for."""
-    sentences = tuple(
-        f"{row['first']} and {row['second']}: correlation {row['correlation']:.2f}"
-        for row in correlations(posterior.covariance, TOLD_APART)
-    )
     return ModelCalibration(
         name=name,
         about=about,
@@ -288,8 +287,17 @@ def as_calibration(
         sizes=sizes,
         points=len(points),
         inside=sum(point.is_inside for point in points),
-        sentences=sentences,
+        sentences=tuple(correlated(posterior.covariance)),
     )
+
+
+def correlated(covariance: Array) -> Iterator[str]:
+    """Yield the pairs of unknowns that are correlated by TOLD_APART or more either way."""
+    deviations = np.sqrt(np.diag(covariance))
+    table = covariance / np.outer(deviations, deviations)
+    for (i, first), (j, second) in combinations(enumerate(UNKNOWNS), 2):
+        if abs(table[i, j]) >= TOLD_APART:
+            yield f"{first.title} and {second.title}: correlation {table[i, j]:.2f}"
 
 
 def calibration_text(calibration: ModelCalibration) -> str:

@@ -6,7 +6,7 @@ import json
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,10 +31,12 @@ from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count
 from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack
 from sbafab.models.unknowns import UNKNOWNS
-from sbafab.validation.records import MeasuredActuator, MeasuredCurve
+from sbafab.validation.evidence import MeasuredCurve
 
 ModelValue = float | None
 """A value of a model; None if the model has no such state."""
+Series = dict[str, tuple[ModelValue, ...]]
+"""Values at a curve's points by the assumption on the set-up, as a phrase; "" if none is made."""
 SAMPLES = 16
 LEAST_FREE_KPA, FIRST_KPA, MOST_FREE_KPA = 0.002, 0.5, 20.0
 """Pressures between which a single balloon is inflated, and the first end of its range."""
@@ -49,11 +51,7 @@ LEAST_RATIO = UNKNOWNS[0].least
 
 @dataclass(frozen=True)
 class ModelValues:
-    """Values of a model at a curve's points, in its unit.
-
-    ``series`` maps each assumption on the set-up, as a phrase, to one value for each point. The
-    phrase is "" if nothing is assumed.
-    """
+    """Values of a model at a curve's points, in its unit."""
 
     model: str
     series: Mapping[str, tuple[ModelValue, ...]]
@@ -63,11 +61,11 @@ class ModelValues:
 
         None for a point at which no assumption has a value.
         """
-        ends: list[tuple[float, float] | None] = []
-        for values in zip(*self.series.values(), strict=True):
-            known = [value for value in values if value is not None]
-            ends.append((min(known), max(known)) if known else None)
-        return ends
+        known = [
+            [value for value in values if value is not None]
+            for values in zip(*self.series.values(), strict=True)
+        ]
+        return [(min(values), max(values)) if values else None for values in known]
 
 
 class NoModel(NamedTuple):
@@ -87,10 +85,10 @@ def model_values(
     answer = ANSWERS.get(curve.quantity)
     if answer is None:
         return NoModel(WITHOUT_MODEL[curve.quantity])
-    if not curve.actuator.is_described:
+    if not curve.is_described:
         return NoModel("no design describes the actuator")
     try:
-        return answer(ModelledActuator(curve.actuator, factors or Factors(), shares_maps), curve)
+        return ModelValues(*answer(ModelledActuator(curve, factors or Factors(), shares_maps)))
     except DesignError as error:
         return NoModel(str(error))
 
@@ -106,13 +104,8 @@ WITHOUT_MODEL = {
 """Why a quantity has no model."""
 
 
-def _text(measured: MeasuredActuator) -> str:
-    """Return the description of an actuator, as a key of caches."""
-    return json.dumps([measured.design, dict(measured.changes), measured.toml], sort_keys=True)
-
-
 @lru_cache(maxsize=64)
-def measured_design(text: str) -> tuple[Design, Laminate]:
+def _measured_design(text: str) -> tuple[Design, Laminate]:
     """Return design and laminate of a measured actuator by its text. Raises DesignError."""
     name, changes, toml = json.loads(text)
     if toml:
@@ -127,16 +120,12 @@ def measured_design(text: str) -> tuple[Design, Laminate]:
 
 @lru_cache(maxsize=64)
 def _drawn_stack(text: str, loss: float) -> tuple[Stack, Factors]:
-    factors = Factors(pocket_loss=loss, modulus_ratio=LEAST_RATIO)
-    return stack(*measured_design(text), factors=factors), factors
-
-
-def drawn_stack(measured: MeasuredActuator, loss: float) -> tuple[Stack, Factors]:
     """Return the stack with a pocket loss in mm at the least modulus ratio, and its factors.
 
     Its maps also serve all other factors.
     """
-    return _drawn_stack(_text(measured), loss)
+    factors = Factors(pocket_loss=loss, modulus_ratio=LEAST_RATIO)
+    return stack(*_measured_design(text), factors=factors), factors
 
 
 @dataclass(frozen=True)
@@ -147,19 +136,24 @@ class ModelledActuator:
     then within 1 % of poses from dedicated maps, and take less than a second.
     """
 
-    measured: MeasuredActuator
+    curve: MeasuredCurve
     factors: Factors
     shares_maps: bool = False
 
     @cached_property
+    def _text(self) -> str:
+        curve = self.curve
+        return json.dumps([curve.design, curve.changes, curve.toml], sort_keys=True)
+
+    @property
     def design(self) -> Design:
         """The design. Raises DesignError."""
-        return measured_design(_text(self.measured))[0]
+        return _measured_design(self._text)[0]
 
-    @cached_property
+    @property
     def laminate(self) -> Laminate:
         """The laminate. Raises DesignError."""
-        return measured_design(_text(self.measured))[1]
+        return _measured_design(self._text)[1]
 
     @cached_property
     def actuator(self) -> Actuator:
@@ -170,16 +164,48 @@ class ModelledActuator:
     def stack(self) -> Stack:
         """The elastic stack. Raises DesignError for pockets that are not round."""
         if self.shares_maps:
-            together, base = drawn_stack(self.measured, self.factors.pocket_loss)
+            together, base = _drawn_stack(self._text, self.factors.pocket_loss)
             moved = elastic.moved_stack(together, self.laminate, base, self.factors)
             if moved is not None:
                 return moved
         return stack(self.design, self.laminate, factors=self.factors)
 
-    @cached_property
-    def name(self) -> str:
+    @property
+    def stack_model(self) -> str:
         """The name of the elastic stack with its factors."""
         return elastic.calibrated(elastic.FORCE, self.factors).name
+
+    @property
+    def balloon_model(self) -> str:
+        """The name of the elastic balloon with its factors."""
+        return elastic.calibrated(elastic.ELASTIC, self.factors).name
+
+    def balloons(self, modulus_ratio: float | None = None) -> list[Balloon]:
+        """Return the balloons of one chamber, of their or another modulus ratio. Raises
+        DesignError.
+        """
+        ratio = self.factors.modulus_ratio if modulus_ratio is None else modulus_ratio
+        return balloons_of(self.design, self.laminate, replace(self.factors, modulus_ratio=ratio))
+
+    def free_pose(self, chambers: int, pressure: float) -> Pose:
+        """Return the pose with some chambers at a pressure in kPa. Raises DesignError."""
+        return self.stack.pose(self.filled(chambers, pressure))
+
+    def filled(self, chambers: int, pressure: float) -> tuple[float, ...]:
+        """Return the pressures in kPa with some chambers filled."""
+        return (pressure,) * chambers + (0.0,) * (self.stack.chambers - chambers)
+
+    @property
+    def chambers_that_bend(self) -> dict[str, int]:
+        """How many chambers may have been pressurised for a bend, by the phrase that assumes it.
+
+        Raises DesignError for one chamber.
+        """
+        given = self.curve.setup.chambers
+        counts = list(range(1, self.stack.chambers)) if given is None else [given]
+        if not counts:
+            raise DesignError("one chamber does not bend")
+        return {chamber_count(count) if len(counts) > 1 else "": count for count in counts}
 
     def figure(self, quantity: Quantity) -> Figure:
         """Return the prediction's figure of a quantity. Raises DesignError if it does not exist."""
@@ -193,20 +219,24 @@ class ModelledActuator:
         raise DesignError(next(reasons, f"no {quantity.named(ANYWHERE)}"))
 
 
-def _by_pressure(
-    curve: MeasuredCurve, value: Callable[[float], ModelValue]
-) -> dict[str, tuple[ModelValue, ...]]:
+NamedSeries = tuple[str, Series]
+"""The model's name, and its values."""
+
+
+def _tried(value: Callable[..., float], *at: float) -> ModelValue:
+    """Return a value; None if the model has no such state."""
+    try:
+        return value(*at)
+    except DesignError:
+        return None
+
+
+def _by_pressure(curve: MeasuredCurve, value: Callable[[float], float]) -> Series:
     """Return a value at each pressure of a curve, by the assumption on the pressure.
 
     OPEN_PRESSURES are assumed if neither axis nor set-up gives a pressure.
     """
-
-    def reached(pressure: float) -> ModelValue:
-        try:
-            return value(pressure)
-        except DesignError:
-            return None
-
+    reached = partial(_tried, value)
     if curve.x_name == "pressure_kpa":
         return {"": tuple(map(reached, curve.x))}
     count = len(curve.y)
@@ -215,38 +245,23 @@ def _by_pressure(
     return {f"{p:g} kPa in the chambers": (reached(p),) * count for p in OPEN_PRESSURES}
 
 
-def _phrase(*parts: str) -> str:
-    return ", ".join(filter(None, parts))
-
-
 # Forces.
 
 
-def _forces(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+def _forces(of: ModelledActuator) -> NamedSeries:
+    curve = of.curve
     if curve.x_name == "bend_deg" or curve.setup.bend_deg is not None:
-        return _bent_forces(of, curve)
-    states = _blocked_states(of, curve)
-    if isinstance(states, NoModel):
-        return states
-    series = {}
-    for phrase, strokes in states.items():
+        return _bent_forces(of)
+    pressures, pushing = _pressures(curve), curve.setup.chambers or of.actuator.form.pushing
+    series: Series = {}
+    for phrase, strokes in _blocked_states(of).items():
         series[phrase] = tuple(
-            None if stroke is None else _blocked_force(of, curve, pressure, stroke)
-            for stroke, pressure in zip(strokes, _pressures(curve), strict=True)
+            None
+            if stroke is None
+            else pushing * float(elastic.blocked_force(of.stack, pressure, stroke))
+            for stroke, pressure in zip(strokes, pressures, strict=True)
         )
-    return ModelValues(of.name, series)
-
-
-def _blocked_force(
-    of: ModelledActuator, curve: MeasuredCurve, pressure: float, stroke: float
-) -> float:
-    """Return N on a level plate at a stroke in mm."""
-    return _pushing(of, curve) * float(elastic.blocked_force(of.stack, pressure, stroke))
-
-
-def _pushing(of: ModelledActuator, curve: MeasuredCurve) -> int:
-    """Return how many chambers push on a level plate."""
-    return curve.setup.chambers or of.actuator.form.pushing
+    return of.stack_model, series
 
 
 def _pressures(curve: MeasuredCurve) -> tuple[float, ...]:
@@ -258,23 +273,22 @@ def _pressures(curve: MeasuredCurve) -> tuple[float, ...]:
     return (curve.setup.pressure_kpa,) * len(curve.y)
 
 
-def _blocked_states(
-    of: ModelledActuator, curve: MeasuredCurve
-) -> dict[str, tuple[ModelValue, ...]] | NoModel:
-    """Return the strokes in mm at which a force was measured, by assumption on the full stroke."""
-    count = len(curve.y)
-    if curve.x_name == "stroke_mm":
-        return {"": curve.x}
-    if curve.x_name == "height_share":
-        return _shares(of, curve.x)
-    if curve.setup.stroke_mm is not None:
-        return {"": (curve.setup.stroke_mm,) * count}
-    if curve.setup.height_share is not None:
-        return _shares(of, (curve.setup.height_share,) * count)
-    return NoModel("the set-up names no height at which the tip is held")
+def _blocked_states(of: ModelledActuator) -> Series:
+    """Return the strokes in mm at which a force was measured, by assumption on the full stroke.
+    Raises DesignError if none is named.
+    """
+    curve = of.curve
+    for name, given in (
+        ("stroke_mm", curve.setup.stroke_mm),
+        ("height_share", curve.setup.height_share),
+    ):
+        if curve.x_name == name or (given is not None and curve.x_name != "height_share"):
+            values = curve.x if curve.x_name == name else (given or 0.0,) * len(curve.y)
+            return _shares(of, values) if name == "height_share" else {"": values}
+    raise DesignError("the set-up names no height at which the tip is held")
 
 
-def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> dict[str, tuple[ModelValue, ...]]:
+def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> Series:
     """Return the strokes in mm at shares of the full stroke, by the assumption on the full stroke.
 
     Assumptions are a free stroke at each of OPEN_PRESSURES, or one that the paper gives. Values
@@ -282,10 +296,11 @@ def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> dict[str, tuple[
     """
     if not any(shares):
         return {"": shares}
-    full: dict[str, ModelValue] = {
-        f"full stroke at {pressure:g} kPa": _free_stroke(of.stack, pressure)
-        for pressure in OPEN_PRESSURES
-    }
+
+    def free(pressure: float) -> float:
+        return of.free_pose(of.stack.chambers, pressure).height - of.stack.flat_height
+
+    full = {f"full stroke at {p:g} kPa": _tried(free, p) for p in OPEN_PRESSURES}
     if of.actuator.has_reference:
         full["full height as in Sec. 4.6"] = elastic.stroke_at(of.actuator, 1.0)
         longer = paper.LONGEST_STROKE.value / paper.FULL_HEIGHT.value
@@ -298,142 +313,98 @@ def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> dict[str, tuple[
     }
 
 
-def _free_stroke(whole: Stack, pressure: float) -> ModelValue:
-    try:
-        return whole.pose((pressure,) * whole.chambers).height - whole.flat_height
-    except DesignError:
-        return None
-
-
-def _bent_forces(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
-    counts = _chamber_counts(of, curve)
-    if not counts:
-        return NoModel("one chamber does not bend")
-    given = curve.setup.bend_deg
-    angles = curve.x if curve.x_name == "bend_deg" else (given or 0.0,) * len(curve.y)
+def _bent_forces(of: ModelledActuator) -> NamedSeries:
+    curve, counts = of.curve, of.chambers_that_bend
+    given = curve.setup.bend_deg or 0.0
+    angles = curve.x if curve.x_name == "bend_deg" else (given,) * len(curve.y)
     pairs = list(zip(angles, _pressures(curve), strict=True))
-    return ModelValues(
-        of.name,
-        {
-            _chambers(count, counts): tuple(_bent_force(of.stack, count, *pair) for pair in pairs)
-            for count in counts
-        },
-    )
+    return of.stack_model, {
+        phrase: tuple(_bent_force(of, count, *pair) for pair in pairs)
+        for phrase, count in counts.items()
+    }
 
 
-def _bent_force(whole: Stack, chambers: int, angle: float, pressure: float) -> ModelValue:
+def _bent_force(of: ModelledActuator, chambers: int, angle: float, pressure: float) -> ModelValue:
     """Return N on a plate square to the tip at an angle; None if it does not bend that far."""
-    pose = elastic.pose_bent_by(whole, chambers, angle)
+    pose = elastic.pose_bent_by(of.stack, chambers, angle)
     if pose is None or pose.pressures[0] > pressure:
         return None
     x, y, z = pose.tip.tolist()
     across, aside, along = pose.frames[1][-1][:, 2].tolist()
     plate = Plate((x, y, z), (across, aside, along))
-    try:
-        return whole.pose(_filled(whole, chambers, pressure), plate=plate, near=pose).force
-    except DesignError:
-        return None
-
-
-def _filled(whole: Stack, chambers: int, pressure: float) -> tuple[float, ...]:
-    return (pressure,) * chambers + (0.0,) * (whole.chambers - chambers)
-
-
-def _chamber_counts(of: ModelledActuator, curve: MeasuredCurve) -> list[int]:
-    """Return how many chambers may have been pressurised for a bend."""
-    given = curve.setup.chambers
-    return list(range(1, of.stack.chambers)) if given is None else [given]
-
-
-def _chambers(count: int, counts: list[int]) -> str:
-    """Return the phrase that assumes ``count`` pressurised chambers; "" if the source states it."""
-    return chamber_count(count) if len(counts) > 1 else ""
+    pressures = of.filled(chambers, pressure)
+    return _tried(lambda: of.stack.pose(pressures, plate=plate, near=pose).force)
 
 
 # Strokes, heights and bends.
 
 
-def _strokes(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+def _strokes(of: ModelledActuator) -> NamedSeries:
+    curve = of.curve
+    is_stroke = curve.quantity == "stroke_mm"
     is_whole = curve.setup.chambers in (None, of.design.form.stacks)
     if is_whole and curve.x_name != "volume_ul" and not of.shares_maps:
-        return _free_strokes(of, curve)
-    flat = of.stack.flat_height if curve.quantity == "stroke_mm" else 0.0
-    return _risen(of, curve, lambda pose: pose.height - flat)
+        # One pressure in all chambers: by the balloons themselves.
+        kinds = Counter(of.balloons())
+        flat = 0.0 if is_stroke else of.actuator.thickness
+        rise = _by_pressure(curve, lambda p: flat + elastic.free_rise(kinds, p).stroke)
+        return of.balloon_model, rise
+    flat = of.stack.flat_height if is_stroke else 0.0
+    chambers = {"": curve.setup.chambers or of.stack.chambers}
+    return _risen(of, chambers, lambda pose: pose.height - flat)
 
 
-def _free_strokes(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues:
-    """Return strokes or heights with one pressure in all chambers, by the balloons themselves."""
-    kinds = Counter(balloons_of(of.design, of.laminate, of.factors))
-    flat = 0.0 if curve.quantity == "stroke_mm" else of.actuator.thickness
-    model = elastic.calibrated(elastic.ELASTIC, of.factors).name
-    series = _by_pressure(curve, lambda p: flat + elastic.free_rise(kinds, p).stroke)
-    return ModelValues(model, series)
-
-
-def _bends(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
-    return _risen(of, curve, lambda pose: pose.bend)
+def _bends(of: ModelledActuator) -> NamedSeries:
+    return _risen(of, of.chambers_that_bend, lambda pose: pose.bend)
 
 
 def _risen(
-    of: ModelledActuator, curve: MeasuredCurve, value: Callable[[Pose], float]
-) -> ModelValues | NoModel:
+    of: ModelledActuator, chambers: Mapping[str, int], value: Callable[[Pose], float]
+) -> NamedSeries:
     """Return values of the free stack's pose at the curve's pressures or volumes."""
-    whole = of.stack
-    counts = [curve.setup.chambers or whole.chambers]
-    if curve.quantity == "bend_deg":
-        counts = _chamber_counts(of, curve)
-    if not counts:
-        return NoModel("one chamber does not bend")
-    series = {}
-    for count in counts:
-        if curve.x_name == "volume_ul":
-            poses = (_pose_with(whole, count, volume) for volume in curve.x)
-            values = tuple(None if pose is None else value(pose) for pose in poses)
-            series[_chambers(count, counts)] = values
+    series: Series = {}
+    for phrase, count in chambers.items():
+        if of.curve.x_name == "volume_ul":
+            poses = [_pose_with(of, count, volume) for volume in of.curve.x]
+            series[phrase] = tuple(None if pose is None else value(pose) for pose in poses)
             continue
-        by_pressure = _by_pressure(curve, _at_pressure(whole, count, value))
+        by_pressure = _by_pressure(of.curve, lambda p, n=count: value(of.free_pose(n, p)))  # type: ignore[misc]
         for assumed, values in by_pressure.items():
-            series[_phrase(_chambers(count, counts), assumed)] = values
-    return ModelValues(of.name, series)
+            series[", ".join(filter(None, (phrase, assumed)))] = values
+    return of.stack_model, series
 
 
-def _at_pressure(
-    whole: Stack, chambers: int, value: Callable[[Pose], float]
-) -> Callable[[float], ModelValue]:
-    return lambda pressure: value(whole.pose(_filled(whole, chambers, pressure)))
-
-
-def _pose_with(whole: Stack, chambers: int, volume: float) -> Pose | None:
+def _pose_with(of: ModelledActuator, chambers: int, volume: float) -> Pose | None:
     """Return the free pose with ``volume`` ul added to the pressurised chambers in total.
 
     None if that takes more than the stack's greatest pressure.
     """
-    empty = float(whole.pose((0.0,) * whole.chambers).volumes[:chambers].sum())
-    low, high = 0.0, min(whole.most_pressure, MOST_PRESSURE)
-    pose = whole.pose(_filled(whole, chambers, high))
-    if float(pose.volumes[:chambers].sum()) - empty < volume:
+
+    def held(pose: Pose) -> float:
+        return float(pose.volumes[:chambers].sum())
+
+    wanted = volume + held(of.free_pose(chambers, 0.0))
+    low, high = 0.0, min(of.stack.most_pressure, MOST_PRESSURE)
+    pose = of.free_pose(chambers, high)
+    if held(pose) < wanted:
         return None
     for _ in range(40):
         middle = (low + high) / 2
-        pose = whole.pose(_filled(whole, chambers, middle))
-        is_low = float(pose.volumes[:chambers].sum()) - empty < volume
-        low, high = (middle, high) if is_low else (low, middle)
+        pose = of.free_pose(chambers, middle)
+        low, high = (middle, high) if held(pose) < wanted else (low, middle)
     return pose
 
 
-def _balloon_strokes(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
-    kinds = set(balloons_of(of.design, of.laminate, of.factors))
-    if len(kinds) > 1:
-        return NoModel("its balloons are of unlike size")
-    (balloon,) = kinds
-    model = elastic.calibrated(elastic.ELASTIC, of.factors).name
-    if curve.x_name == "volume_ul":
+def _balloon_strokes(of: ModelledActuator) -> NamedSeries:
+    if len(set(of.balloons())) > 1:
+        raise DesignError("its balloons are of unlike size")
+    if of.curve.x_name == "volume_ul":
         # A stroke by its volume is the same for every modulus.
-        drawn = replace(of.factors, modulus_ratio=1.0)
-        balloon = balloons_of(of.design, of.laminate, drawn)[0]
-        return ModelValues(model, {"": _strokes_by_volume(balloon, curve.x)})
-    series = _by_pressure(curve, lambda p: float(free_shapes(balloon, p).height[0]))
-    return ModelValues(model, series)
+        drawn = of.balloons(modulus_ratio=1.0)[0]
+        return of.balloon_model, {"": _strokes_by_volume(drawn, of.curve.x)}
+    balloon = of.balloons()[0]
+    series = _by_pressure(of.curve, lambda p: float(free_shapes(balloon, p).height[0]))
+    return of.balloon_model, series
 
 
 def _strokes_by_volume(balloon: Balloon, volumes: tuple[float, ...]) -> tuple[ModelValue, ...]:
@@ -442,7 +413,7 @@ def _strokes_by_volume(balloon: Balloon, volumes: tuple[float, ...]) -> tuple[Mo
     None for a volume that MOST_FREE_KPA does not reach.
     """
     top = FIRST_KPA
-    while top < MOST_FREE_KPA and _free_volume(balloon, top) < max(volumes):
+    while top < MOST_FREE_KPA and _filling(balloon, top)[0][-1] < max(volumes):
         top = min(2 * top, MOST_FREE_KPA)
     held, heights = _filling(balloon, top)
     return tuple(
@@ -457,23 +428,15 @@ def _filling(balloon: Balloon, top: float) -> tuple[Array, Array]:
     return np.append(0.0, shapes.volume), np.append(0.0, shapes.height)
 
 
-@lru_cache(maxsize=256)
-def _free_volume(balloon: Balloon, pressure: float) -> float:
-    return float(free_shapes(balloon, pressure).volume[0])
-
-
 # Work, times, stiffness, sizes.
 
 
-def _energies(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+def _energies(of: ModelledActuator) -> NamedSeries:
     # Energies are proportional to the modulus at equal pressure over modulus.
-    ratio = of.factors.modulus_ratio
-    balloons = balloons_of(of.design, of.laminate, replace(of.factors, modulus_ratio=1.0))
-    values = []
-    for pressure in curve.x:
-        stored = sum(_stored(balloon, pressure / ratio) for balloon in balloons)
-        values.append(ratio * stored * of.design.form.stacks / 1000)
-    return ModelValues(elastic.calibrated(elastic.ELASTIC, of.factors).name, {"": tuple(values)})
+    ratio, balloons = of.factors.modulus_ratio, of.balloons(modulus_ratio=1.0)
+    stored = [sum(_stored(each, p / ratio) for each in balloons) for p in of.curve.x]
+    stacks = of.design.form.stacks
+    return of.balloon_model, {"": tuple(ratio * each * stacks / 1000 for each in stored)}
 
 
 @lru_cache(maxsize=1024)
@@ -485,117 +448,95 @@ def _stored(balloon: Balloon, pressure: float) -> float:
     return float(shape.energy[0])
 
 
-def _losses(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+def _losses(of: ModelledActuator) -> NamedSeries:
     """Return work lost, as the calibration's share of the input work."""
-    work, share = _energies(of, curve), of.factors.loss_share
-    if isinstance(work, NoModel):
-        return work
-    return ModelValues(
-        work.model,
-        {"": tuple(None if each is None else share * each for each in work.series[""])},
-    )
+    model, series = _energies(of)
+    return model, {"": tuple(of.factors.loss_share * (each or 0.0) for each in series[""])}
 
 
-def _loss_shares(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues:
+def _loss_shares(of: ModelledActuator) -> NamedSeries:
     """Return the calibration's share of the input work that is lost; 0 without a calibration."""
-    model = elastic.calibrated(elastic.ELASTIC, of.factors).name
-    return ModelValues(model, {"": (of.factors.loss_share,) * len(curve.y)})
+    return of.balloon_model, {"": (of.factors.loss_share,) * len(of.curve.y)}
 
 
-def _times(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
-    flow = curve.setup.flow_ml_min
-    if flow is None:
-        return NoModel("the set-up names no flow")
-    if curve.x_name == "bend_deg":
-        counts = _chamber_counts(of, curve)
-        if not counts:
-            return NoModel("one chamber does not bend")
-        return ModelValues(
-            f"{of.name}, no tube",
-            {
-                _chambers(count, counts): tuple(
-                    _time_to_bend(of, count, angle, curve) for angle in curve.x
-                )
-                for count in counts
-            },
-        )
-    given = curve.setup.tube_mm
+def _times(of: ModelledActuator) -> NamedSeries:
+    setup, until = of.curve.setup, of.curve.x
+    if setup.flow_ml_min is None:
+        raise DesignError("the set-up names no flow")
+    flow = setup.flow_ml_min
+    if of.curve.x_name == "bend_deg":
+        delay = of.factors.air_delay if setup.fluid == "air" else of.factors.water_delay
+        return f"{of.stack_model}, no tube", {
+            phrase: tuple(_time_to_bend(of, count, angle, flow, delay) for angle in until)
+            for phrase, count in of.chambers_that_bend.items()
+        }
     tubes = {"no tube": NO_TUBE, f"{TUBE_LENGTH:g} mm of tube": TUBE_LENGTH}
-    if given is not None:
-        tubes = {"": max(given, NO_TUBE)}
-    bore = curve.setup.tube_bore_mm or TUBE_DIAMETER
-    is_air = curve.setup.fluid != "water"
-    if not is_air and bore != TUBE_DIAMETER:
-        return NoModel(f"times of water are of a tube of {TUBE_DIAMETER:g} mm bore")
-    delay = of.factors.air_delay if is_air else of.factors.water_delay
-    return ModelValues(
-        f"{of.name} in time",
-        {
-            phrase: tuple(
-                elastic.air_time(of.stack, flow, until, Line(AIR, length, bore)) + delay
-                if is_air
-                else elastic.time_to_fill(of.stack, flow, until, length)[0] + delay
-                for until in curve.x
-            )
-            for phrase, length in tubes.items()
-        },
-    )
+    if setup.tube_mm is not None:
+        tubes = {"": max(setup.tube_mm, NO_TUBE)}
+    bore = setup.tube_bore_mm or TUBE_DIAMETER
+    if setup.fluid == "water":
+        if bore != TUBE_DIAMETER:
+            raise DesignError(f"times of water are of a tube of {TUBE_DIAMETER:g} mm bore")
+        delay = of.factors.water_delay
+
+        def time(kpa: float, length: float) -> float:
+            return elastic.time_to_fill(of.stack, flow, kpa, length)[0] + delay
+    else:
+        delay = of.factors.air_delay
+
+        def time(kpa: float, length: float) -> float:
+            return elastic.air_time(of.stack, flow, kpa, Line(AIR, length, bore)) + delay
+
+    return f"{of.stack_model} in time", {
+        phrase: tuple(time(kpa, length) for kpa in until) for phrase, length in tubes.items()
+    }
 
 
 def _time_to_bend(
-    of: ModelledActuator, chambers: int, angle: float, curve: MeasuredCurve
+    of: ModelledActuator, chambers: int, angle: float, flow: float, delay: float
 ) -> ModelValue:
     """Return the seconds until the tip is bent, all the flow in some chambers, no tube."""
-    whole, flow = of.stack, curve.setup.flow_ml_min
-    assert flow is not None
-    delay = of.factors.air_delay if curve.setup.fluid == "air" else of.factors.water_delay
-    pose = elastic.pose_bent_by(whole, chambers, angle)
+    pose = elastic.pose_bent_by(of.stack, chambers, angle)
     if pose is None:
         return None
-    empty = whole.pose((0.0,) * whole.chambers)
-    taken_in = float((pose.volumes - empty.volumes)[:chambers].sum())
+    taken_in = float((pose.volumes - of.free_pose(chambers, 0.0).volumes)[:chambers].sum())
     return taken_in / (flow * 1000 / 60) + delay
 
 
-def _moduli(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+def _moduli(of: ModelledActuator) -> NamedSeries:
     plate = plate_of(of.laminate)
     if plate is None:
-        return NoModel("the topmost film is not the plain outline: it has tabs or ears")
+        raise DesignError("the topmost film is not the plain outline: it has tabs or ears")
     second, _ = second_moments(plate)
 
     def at(pressure: float) -> float:
         tip, height = elastic.shut_stiffness(of.stack, pressure)
         return modulus(tip, 1.0, height, second)
 
-    return ModelValues(f"{of.name}, chambers shut", _by_pressure(curve, at))
+    return f"{of.stack_model}, chambers shut", _by_pressure(of.curve, at)
 
 
-def _sizes(
-    quantity: Quantity,
-) -> Callable[[ModelledActuator, MeasuredCurve], ModelValues | NoModel]:
-    def answer(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
-        figure = of.figure(quantity)
-        return ModelValues(figure.model.name, {"": (figure.value,) * len(curve.y)})
-
-    return answer
+def _of_prediction(quantity: Quantity, of: ModelledActuator) -> NamedSeries:
+    figure = of.figure(quantity)
+    return figure.model.name, {"": (figure.value,) * len(of.curve.y)}
 
 
-ANSWERS: dict[str, Callable[[ModelledActuator, MeasuredCurve], ModelValues | NoModel]] = {
+ANSWERS: dict[str, Callable[[ModelledActuator], NamedSeries]] = {
     "force_n": _forces,
     "stroke_mm": _strokes,
     "height_mm": _strokes,
     "balloon_stroke_mm": _balloon_strokes,
     "bend_deg": _bends,
-    "flat_height_mm": _sizes(Quantity.FOLDED_HEIGHT),
+    "flat_height_mm": partial(_of_prediction, Quantity.FOLDED_HEIGHT),
     "energy_mj": _energies,
     "loss_mj": _losses,
     "loss_share": _loss_shares,
     "time_s": _times,
     "modulus_kpa": _moduli,
-    "burst_kpa": _sizes(Quantity.BURST),
-    "deflated_diameter_mm": _sizes(Quantity.DEFLATED_DIAMETER),
-    "inflated_diameter_mm": _sizes(Quantity.INFLATED_DIAMETER),
-    "folded_diameter_mm": _sizes(Quantity.FOLDED_DIAMETER),
-    "mass_g": _sizes(Quantity.MASS),
+    "burst_kpa": partial(_of_prediction, Quantity.BURST),
+    "deflated_diameter_mm": partial(_of_prediction, Quantity.DEFLATED_DIAMETER),
+    "inflated_diameter_mm": partial(_of_prediction, Quantity.INFLATED_DIAMETER),
+    "folded_diameter_mm": partial(_of_prediction, Quantity.FOLDED_DIAMETER),
+    "mass_g": partial(_of_prediction, Quantity.MASS),
 }
 """Functions that answer by quantity; the others are in WITHOUT_MODEL."""

@@ -1,5 +1,8 @@
 """Posterior of the unknowns and of the models' discrepancy, sampled by emcee.
 
+Logarithms of the models' values are interpolated linearly in modulus ratio (its logarithm), pocket
+loss and press factor.
+
 The logarithm of a measured value is the logarithm of the model's value, plus a discrepancy, plus
 the error of the measurement. Discrepancies are normal with one standard deviation for each group of
 quantities; half of their variance is shared by the points of a curve. If a source leaves the set-up
@@ -9,7 +12,7 @@ open, all candidate set-ups are equally likely.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -20,7 +23,6 @@ from sbafab.errors import DesignError
 from sbafab.models.calibrated import GROUPS
 from sbafab.models.film_elements import Array
 from sbafab.models.unknowns import UNKNOWNS
-from sbafab.validation.surface import ValueSurface, interpolated
 
 SHARED = 0.5
 """Share of the discrepancy's variance that the points of a curve have in common."""
@@ -34,30 +36,72 @@ WALKERS, STEPS, BURN_IN, THINNING = 40, 2000, 800, 20
 SEED = 20220085
 
 
+NODES = (11, 6, 6)
+"""Nodes of a curve's table by modulus ratio, pocket loss and press factor."""
+NODE_COORDINATES = [
+    np.linspace(unknown.coordinate(unknown.least), unknown.coordinate(unknown.most), count)
+    for unknown, count in zip(UNKNOWNS, NODES, strict=False)
+]
+"""The nodes' coordinates by each design unknown, evenly spaced."""
+
+
+def interpolated(table: Array, coordinates: Array) -> Array:
+    """Return values linear between the nodes of a table (*NODES, ...) at coordinates (n, unknowns):
+    (n, ...).
+    """
+    row = np.zeros((1, len(coordinates)), dtype=np.int_)
+    weight = np.ones((1, len(coordinates)))
+    for axis, nodes in enumerate(NODE_COORDINATES):
+        place = (coordinates[:, axis] - nodes[0]) / (nodes[1] - nodes[0])
+        place = np.clip(place, 0.0, len(nodes) - 1.0)
+        first = np.minimum(place.astype(np.int_), len(nodes) - 2)
+        share = place - first
+        row = np.concatenate([row * len(nodes) + first, row * len(nodes) + first + 1])
+        weight = np.concatenate([weight * (1 - share), weight * share])
+    flat = table.reshape(math.prod(NODES), -1)
+    values = (weight[..., None] * flat[row]).sum(0)
+    return np.asarray(values.reshape(len(coordinates), *table.shape[len(NODES) :]))
+
+
 class SampledCurve(NamedTuple):
-    """A curve for the posterior: its surface, logarithms of the measured values and their
-    standard errors, (points,), the test that it comes from, the number of its quantity's group in
-    GROUPS, and the column in UNKNOWNS of the unknown that its values have as a term (-1: none).
+    """A curve for the posterior: the ``test`` that it comes from, the number of its quantity's
+    ``group`` in GROUPS, a ``table`` of logarithms of the models' values (*NODES, open set-ups,
+    points), logarithms of the ``measured`` values and their standard ``errors``, (points,), and the
+    column in UNKNOWNS of the unknown that its values have as a ``term`` (-1: none).
     """
 
-    id: str
     test: str
     group: int
-    surface: ValueSurface
+    table: Array
     measured: Array
     errors: Array
     term: int
 
     def logarithms(self, samples: Array) -> Array:
-        """Return logarithms of the models' values (n, open set-ups, points)."""
-        return self.with_term(self.surface.at(samples), samples)
-
-    def with_term(self, values: Array, samples: Array) -> Array:
-        """Return logarithms with the term in them, such as the delay of pump or valve."""
+        """Return logarithms of the models' values (n, open set-ups, points), with the term in them,
+        such as the delay of pump or valve.
+        """
+        values = interpolated(self.table, samples)
         if self.term < 0:
             return values
-        terms = np.exp(samples[:, self.term])[:, None, None]
-        return np.asarray(np.log(np.exp(values) + terms))
+        return np.asarray(np.log(np.exp(values) + np.exp(samples[:, self.term])[:, None, None]))
+
+    def densities(self, samples: Array, log_scales: Array) -> Array:
+        """Return the log density of the measured values by set-up (n, set-ups), with standard
+        deviations of the discrepancies (logarithms, n).
+
+        A normal whose covariance is the discrepancy's plus the measurement's: a diagonal and one
+        shared part, whose inverse and determinant have closed forms (Sherman and Morrison).
+        """
+        residuals = self.measured - self.logarithms(samples)
+        squares = np.exp(2 * log_scales)[:, None]
+        each = (1 - SHARED) * squares + self.errors**2
+        weighted = residuals / each[:, None]
+        shared = SHARED * squares
+        growth = 1 + shared * (1 / each).sum(-1, keepdims=True)
+        quadratic = (weighted * residuals).sum(-1) - shared / growth * weighted.sum(-1) ** 2
+        halves = (np.log(each).sum(-1) + np.log(growth[:, 0])) / 2
+        return np.asarray(-0.5 * quadratic - halves[:, None])
 
 
 @dataclass(frozen=True)
@@ -98,8 +142,7 @@ def set_up_probabilities(curve: SampledCurve, posterior: Posterior) -> Array:
     """Return the probability of each set-up that a curve's source leaves open, by the fit to it:
     (set-ups,).
     """
-    residuals = curve.measured - curve.logarithms(posterior.samples)
-    logs = _set_up_densities(residuals, curve.errors, posterior.scales[:, curve.group])
+    logs = curve.densities(posterior.samples, posterior.scales[:, curve.group])
     weights = np.exp(logs - logs.max(-1, keepdims=True))
     return np.asarray((weights / weights.sum(-1, keepdims=True)).mean(0))
 
@@ -126,56 +169,16 @@ def log_prior(coordinates: Array) -> Array:
     return np.asarray(total)
 
 
-class Likelihood:
-    """The likelihood of curves, their surfaces joined in one table."""
-
-    def __init__(self, curves: Sequence[SampledCurve]) -> None:
-        self.curves = curves
-        tables = [curve.surface.table for curve in curves]
-        self.shapes = [table.shape[-2:] for table in tables]
-        self.flat = np.concatenate(
-            [
-                table.reshape(-1, math.prod(shape))
-                for table, shape in zip(tables, self.shapes, strict=True)
-            ],
-            axis=1,
-        )
-
-    def __call__(self, coordinates: Array) -> Array:
-        """Return the log likelihood at coordinates (n, unknowns + groups): (n,)."""
-        values = interpolated(self.flat, coordinates)
-        scales = coordinates[:, len(UNKNOWNS) :]
-        total, start = np.zeros(len(coordinates)), 0
-        for curve, shape in zip(self.curves, self.shapes, strict=True):
-            end = start + math.prod(shape)
-            block = values[:, start:end].reshape(-1, *shape)
-            residuals = curve.measured - curve.with_term(block, coordinates)
-            total = total + _curve_likelihood(residuals, curve.errors, scales[:, curve.group])
-            start = end
-        return total
-
-
-def _curve_likelihood(residuals: Array, errors: Array, log_scales: Array) -> Array:
-    """Return the log density of residuals (n, set-ups, points), set-ups averaged."""
-    logs = _set_up_densities(residuals, errors, log_scales)
-    most = logs.max(-1)
-    return np.asarray(most + np.log(np.exp(logs - most[:, None]).mean(-1)))
-
-
-def _set_up_densities(residuals: Array, errors: Array, log_scales: Array) -> Array:
-    """Return the log density of residuals (n, set-ups, points) by set-up (n, set-ups).
-
-    A normal whose covariance is the discrepancy's plus the measurement's: a diagonal and one shared
-    part, whose inverse and determinant have closed forms (Sherman and Morrison).
+def log_likelihood(curves: Sequence[SampledCurve], coordinates: Array) -> Array:
+    """Return the log likelihood at coordinates (n, unknowns + groups): (n,). Open
+    set-ups are averaged.
     """
-    squares = np.exp(2 * log_scales)[:, None]
-    each = (1 - SHARED) * squares + errors**2
-    weighted = residuals / each[:, None]
-    shared = SHARED * squares
-    growth = 1 + shared * (1 / each).sum(-1, keepdims=True)
-    quadratic = (weighted * residuals).sum(-1) - shared / growth * weighted.sum(-1) ** 2
-    halves = (np.log(each).sum(-1) + np.log(growth[:, 0])) / 2
-    return np.asarray(-0.5 * quadratic - halves[:, None])
+    total = np.zeros(len(coordinates))
+    for curve in curves:
+        logs = curve.densities(coordinates, coordinates[:, len(UNKNOWNS) + curve.group])
+        most = logs.max(-1)
+        total += most + np.log(np.exp(logs - most[:, None]).mean(-1))
+    return total
 
 
 def sampled(curves: Sequence[SampledCurve], seed: int = SEED, steps: int = STEPS) -> Posterior:
@@ -192,10 +195,9 @@ def sampled(curves: Sequence[SampledCurve], seed: int = SEED, steps: int = STEPS
         inside = np.isfinite(prior)
         total = np.full(len(prior), -np.inf)
         if inside.any():
-            total[inside] = prior[inside] + likelihood(coordinates[inside])
+            total[inside] = prior[inside] + log_likelihood(curves, coordinates[inside])
         return total
 
-    likelihood = Likelihood(curves)
     generator = np.random.RandomState(seed)
     start = _start(generator)
     sampler = emcee.EnsembleSampler(WALKERS, start.shape[1], log_posterior, vectorize=True)
@@ -214,15 +216,3 @@ def _start(generator: np.random.RandomState) -> Array:
         columns.append(np.clip(drawn, low + 1e-3 * (high - low), high - 1e-3 * (high - low)))
     scales = math.log(SCALE_MIDDLE) + 0.5 * SCALE_SPREAD * generator.randn(WALKERS, len(GROUPS))
     return np.concatenate([np.stack(columns, -1), scales], -1)
-
-
-def correlations(covariance: Array, least: float) -> list[Mapping[str, object]]:
-    """Return pairs of unknowns whose correlation is at least ``least`` either way."""
-    deviations = np.sqrt(np.diag(covariance))
-    table = covariance / np.outer(deviations, deviations)
-    return [
-        {"first": UNKNOWNS[i].title, "second": UNKNOWNS[j].title, "correlation": float(table[i, j])}
-        for i in range(len(UNKNOWNS))
-        for j in range(i + 1, len(UNKNOWNS))
-        if abs(table[i, j]) >= least
-    ]

@@ -103,20 +103,18 @@ def test_what_is_predicted_of_an_assembly_is_of_its_schema() -> None:
 
 
 def test_the_reproduction_is_of_its_schema() -> None:
-    from sbafab.models.calibrated import load_calibration
     from sbafab.models.paper import Measured
     from sbafab.validation.comparison import ComparedCurve, ComparedPoint
-    from sbafab.validation.files import load_evidence
-    from sbafab.validation.page import as_json as told
-    from sbafab.validation.paper_calibrated import CalibratedPaper
-    from sbafab.validation.rows import Row
+    from sbafab.validation.evidence import load_evidence
+    from sbafab.validation.paper_table import PaperTable, Row, as_json
 
-    rows = [Row("x", Measured(1.0, 0.1, "mm", "Sec. 2"), value, "m", "w") for value in (1.1, None)]
+    measured = Measured(1.0, 0.1, "mm", "Sec. 2")
+    table = PaperTable()
+    table.__dict__["rows"] = [Row("one", "x", measured, value, "m", "w") for value in (1.1, None)]
     points = (ComparedPoint(1.0, 0.5, 0.1, (0.4, 0.6), (0.3, 0.7)),)
     curve = ComparedCurve("paper", load_evidence("paper").curves[0], points, "m", ("a",), "")
-    calibration = load_calibration("paper")
-    assert calibration is not None
-    hold("reproduction", told({"one": rows}, CalibratedPaper(calibration, (curve,))))
+    table.__dict__["curves"] = (curve,)
+    hold("reproduction", as_json(table))
 
 
 def test_what_runs_print_is_of_its_schema(

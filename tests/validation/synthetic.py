@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from sbafab.models.calibrated import GROUPS
 from sbafab.models.unknowns import UNKNOWNS
 from sbafab.validation.posterior import (
+    NODE_COORDINATES,
     SCALE_MIDDLE,
     SCALE_SPREAD,
     SampledCurve,
     discrepancies,
     sampled,
 )
-from sbafab.validation.surface import NODE_COORDINATES, ValueSurface
 
 Array = NDArray[np.float64]
 ERROR = 0.02
@@ -33,10 +33,10 @@ class SyntheticLab(NamedTuple):
     curves: list[SampledCurve]
 
 
-def surface(rates: Array) -> ValueSurface:
-    """A surface whose logarithms grow by ``rates`` (3, set-ups, points) by coordinate."""
+def surface(rates: Array) -> Array:
+    """A table whose logarithms grow by ``rates`` (3, set-ups, points) by coordinate."""
     grid = np.stack(np.meshgrid(*NODE_COORDINATES, indexing="ij"), -1)
-    return ValueSurface(np.tensordot(grid, rates, axes=([-1], [0])))
+    return np.asarray(np.tensordot(grid, rates, axes=([-1], [0])))
 
 
 def lab(number: int) -> SyntheticLab:
@@ -50,7 +50,7 @@ def lab(number: int) -> SyntheticLab:
         group = int(generator.integers(len(GROUPS)))
         rates = generator.normal(0.0, [[[0.8]], [[2.0]], [[0.8]]], (3, 1, points))
         plain = SampledCurve(
-            str(count), str(count), group, surface(rates), np.zeros(points),
+            str(count), group, surface(rates), np.zeros(points),
             np.full(points, ERROR), -1,
         )  # fmt: skip
         values = plain.logarithms(truth[None])[0, 0]

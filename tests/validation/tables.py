@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from sbafab.spreadsheet import csv_text
-from sbafab.validation.files import COLUMNS, NUMBERS
-from sbafab.validation.records import MeasuredCurve
+from sbafab.validation.evidence import COLUMNS, OF_CURVE, OF_ERROR, OF_SETUP, MeasuredCurve
 
 
 def evidence_csv(curves: Sequence[MeasuredCurve]) -> str:
@@ -16,29 +15,14 @@ def evidence_csv(curves: Sequence[MeasuredCurve]) -> str:
     """
     rows: list[Sequence[Any]] = [COLUMNS]
     for curve in curves:
-        cells = _cells_to_write(curve)
+        cells = {key: getattr(curve, key) for key in OF_CURVE}
+        cells |= {key: getattr(curve.setup, key) for key in OF_SETUP}
+        cells |= {column: getattr(curve.error, key) for column, key in OF_ERROR.items()}
+        cells |= {"comparable": "yes" if curve.comparable else "no"}
+        cells |= {"unknown": " | ".join(curve.unknown)}
         errors = curve.error.absolute or (None,) * len(curve.y)
-        for x, y, error in zip(curve.x or (None,) * len(curve.y), curve.y, errors, strict=True):
-            rows.append([{**cells, "x": x, "y": y, "error": error}[key] for key in COLUMNS])
-            cells = dict.fromkeys(COLUMNS) | {"curve": curve.id}
+        for x, y, error in zip(curve.x or errors, curve.y, errors, strict=True):
+            values = {"curve": curve.id, "x": x if curve.x else None, "y": y, "error": error}
+            rows.append([{**cells, **values}[key] for key in COLUMNS])
+            cells = dict.fromkeys(COLUMNS)
     return csv_text(rows)
-
-
-def _cells_to_write(curve: MeasuredCurve) -> dict[str, Any]:
-    setup, error = curve.setup, curve.error
-    texts = ("supply", "fluid", "chambers", "tip", "note")
-    return {
-        "curve": curve.id,
-        "quantity": curve.quantity,
-        "design": curve.actuator.design,
-        "x_name": curve.x_name,
-        "place": curve.place,
-        "group": curve.group,
-        "kind": error.kind,
-        "runs": error.runs,
-        "error_source": error.source,
-        **{key: getattr(setup, key) for key in (*texts, *NUMBERS)},
-        "comparable": "yes" if curve.comparable else "no",
-        "reason": curve.reason,
-        "unknown": " | ".join(curve.unknown),
-    }

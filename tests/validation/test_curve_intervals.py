@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -11,9 +10,9 @@ from sbafab.models.calibrated import ModelCalibration, load_calibration
 from sbafab.models.figures import Factors
 from sbafab.models.intervals import Uncertainty
 from sbafab.models.unknowns import UNKNOWNS
-from sbafab.validation.curve_intervals import curve_intervals, uncertainty_for, widened
+from sbafab.validation.comparison import curve_intervals, uncertainty_for, widened
+from sbafab.validation.evidence import MeasuredCurve, Setup, StatedError
 from sbafab.validation.model_values import ModelValues
-from sbafab.validation.records import MeasuredActuator, MeasuredCurve, Setup, StatedError
 
 FILMS, MASKS = 12 * 0.038, 11 * 0.025
 """mm: twelve films of the 1-DoF and eleven masks between them."""
@@ -30,11 +29,11 @@ def paper() -> ModelCalibration:
 
 def curve(quantity: str, setup: Setup | None = None, y: float = 1.0) -> MeasuredCurve:
     return MeasuredCurve(
-        "bench",
-        quantity,
-        "bench",
-        (y,),
-        actuator=MeasuredActuator("1dof-5mm"),
+        id="bench",
+        quantity=quantity,
+        place="bench",
+        y=(y,),
+        design="1dof-5mm",
         setup=setup or Setup(),
         error=StatedError(absolute=(0.2 * y,), source="scale"),
     )
@@ -69,7 +68,7 @@ def test_what_a_source_leaves_open_widens_the_interval(
         series = {"10 kPa": (factors.modulus_ratio,), "100 kPa": (40.0,), "300 kPa": (None,)}
         return ModelValues("m", series)
 
-    monkeypatch.setattr("sbafab.validation.curve_intervals.model_values", model)
+    monkeypatch.setattr("sbafab.validation.comparison.model_values", model)
     of = curve("height_mm", y=7.0)
     intervals = curve_intervals(of, uncertainty_for(of, paper))
     assert intervals is not None
@@ -127,14 +126,14 @@ def test_an_error_is_added_as_an_independent_one() -> None:
 def test_a_quantity_that_no_unknown_changes_has_none(paper: ModelCalibration) -> None:
     mass = curve("mass_g")
     assert curve_intervals(mass, uncertainty_for(mass, paper)) is None
-    undescribed = replace(curve("force_n"), actuator=MeasuredActuator())
+    undescribed = curve("force_n").model_copy(update={"design": ""})
     assert curve_intervals(undescribed, uncertainty_for(undescribed, paper)) is None
 
 
 def test_another_film_is_as_uncertain_as_the_prior(paper: ModelCalibration) -> None:
     film = {"product": "TPU 50", "thickness": 0.05, "modulus": 20.0, "poisson": 0.4}
     changes = {f"films.tpe.{key}": value for key, value in film.items()}
-    of = replace(curve("height_mm"), actuator=MeasuredActuator("1dof-5mm", changes))
+    of = curve("height_mm").model_copy(update={"changes": changes})
     calibration = uncertainty_for(of, paper).calibration
     assert calibration.values["modulus_ratio"] == 1.0
     assert calibration.covariance[0][0] == pytest.approx(UNKNOWNS[0].spread ** 2)

@@ -10,7 +10,7 @@ from docs.scripts import held_out
 from docs.scripts.measured import FOLDER, record
 from docs.scripts.tables import Table
 from sbafab.models.calibrated import load_calibration
-from sbafab.validation.files import shipped_evidence
+from sbafab.validation.evidence import shipped_evidence
 from sbafab.validation.fit import GROUP_OF
 
 TABLES = record(held_out.NAME).tables
@@ -35,7 +35,7 @@ def test_every_value_of_every_source_is_left_out_once_or_has_a_reason() -> None:
             len(curve.y) for curve in may
         ]
         values, held = sum(len(c.y) for c in source.curves), sum(len(c.y) for c in may)
-        tests = {curve.group or curve.id for curve in may}
+        tests = {curve.test for curve in may}
         assert row[1:5] == [str(n) for n in (values, held, len(may), len(tests))]
         for curve in source.curves:
             assert (f"{curve.id}: " in row[-1]) == (curve not in may)

@@ -17,7 +17,14 @@ from sbafab.lab.store import Lab
 from sbafab.models.figures import Factors
 from sbafab.models.stack import Stack
 from sbafab.validation.comparison import compare, table_lines
-from sbafab.validation.files import load_evidence
+from sbafab.validation.evidence import (
+    QUANTITIES,
+    Evidence,
+    MeasuredCurve,
+    Setup,
+    StatedError,
+    load_evidence,
+)
 from sbafab.validation.model_values import (
     ANSWERS,
     WITHOUT_MODEL,
@@ -25,18 +32,10 @@ from sbafab.validation.model_values import (
     NoModel,
     model_values,
 )
-from sbafab.validation.records import (
-    QUANTITIES,
-    Evidence,
-    MeasuredActuator,
-    MeasuredCurve,
-    Setup,
-)
 from tests.site.formats import hold
 from tests.validation.tables import evidence_csv
 
-ONE = MeasuredActuator("1dof-5mm")
-THREE = MeasuredActuator("3dof-15mm")
+THREE = "3dof-15mm"
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +46,17 @@ def three() -> Stack:
 def curve(
     quantity: str, x_name: str = "", x: tuple[float, ...] = (), **more: object
 ) -> MeasuredCurve:
-    base = MeasuredCurve("a", quantity, "bench", (1.0,) * max(len(x), 1), x_name, x, ONE)
-    return replace(base, **more)  # type: ignore[arg-type]
+    return MeasuredCurve(
+        id="a",
+        quantity=quantity,
+        place="bench",
+        design=str(more.pop("design", "1dof-5mm")),
+        x_name=x_name,
+        x=x,
+        y=more.pop("y", (1.0,) * max(len(x), 1)),
+        error=StatedError(source="bench"),
+        **more,
+    )
 
 
 def values(
@@ -114,20 +122,16 @@ def test_shares_of_the_height_have_five_readings_and_strokes_have_none(three: St
         "full stroke as in Sec. 4.2",
     ]
     # Sec. 4.2: a stack of 15 balloons inflates almost 2 cm.
-    almost = replace(shares, x_name="stroke_mm", x=(0.0, 5.0, 15.0))
+    almost = shares.model_copy(update={"x_name": "stroke_mm", "x": (0.0, 5.0, 15.0)})
     assert values(almost)[""] == pytest.approx(series["full stroke as in Sec. 4.2"])
     full = three.pose((10.0,) * 3).height - three.flat_height
-    by_stroke = replace(shares, x_name="stroke_mm", x=(0.0, full / 4, 3 * full / 4))
+    by_stroke = shares.model_copy(
+        update={"x_name": "stroke_mm", "x": (0.0, full / 4, 3 * full / 4)}
+    )
     assert values(by_stroke)[""] == pytest.approx(series["full stroke at 10 kPa"])
     # A column blocked at the height that it reaches freely pushes with nothing.
-    alone = replace(
-        shares,
-        x_name="stroke_mm",
-        x=(1.01 * full,),
-        y=(0.0,),
-        error=type(shares.error)(),
-        setup=Setup(pressure_kpa=10.0, tip="held"),
-    )
+    held = Setup(pressure_kpa=10.0, tip="held")
+    alone = curve("force_n", "stroke_mm", (1.01 * full,), design=THREE, setup=held)
     assert values(alone)[""] == (0.0,)
 
 
@@ -140,14 +144,14 @@ def test_chambers_that_a_source_leaves_open_are_a_series_each(three: Stack) -> N
     states = [(p, q, 0.0) for p in (10.0, 30.0, 100.0) for q in (0.0, p)]
     bends = [three.pose(state).bend for state in states]
     assert answer.ranges() == [pytest.approx((min(bends), max(bends)))]
-    named = replace(bend, setup=Setup(chambers=2, pressure_kpa=5.0))
+    named = bend.model_copy(update={"setup": Setup(chambers=2, pressure_kpa=5.0)})
     assert values(named)[""] == pytest.approx([three.pose((5.0, 5.0, 0.0)).bend])
 
 
 def test_a_volume_leads_back_to_its_pose(three: Stack) -> None:
     empty, pose = three.pose((0.0,) * 3), three.pose((2.0, 2.0, 2.0))
     taken_in = float((pose.volumes - empty.volumes).sum())
-    stroke = curve("stroke_mm", "volume_ul", (taken_in, 1e6), actuator=THREE)
+    stroke = curve("stroke_mm", "volume_ul", (taken_in, 1e6), design=THREE)
     first, beyond = values(stroke)[""]
     assert first == pytest.approx(pose.height - three.flat_height, rel=1e-6)
     assert beyond is None
@@ -157,10 +161,12 @@ def test_times_are_volume_over_flow_without_a_tube(three: Stack) -> None:
     empty, pose = three.pose((0.0,) * 3), three.pose((4.0, 4.0, 4.0))
     taken_in = float((pose.volumes - empty.volumes).sum())
     setup = Setup(fluid="water", flow_ml_min=35.0, tube_mm=0.0)
-    time = curve("time_s", "pressure_kpa", (4.0,), actuator=THREE, setup=setup)
+    time = curve("time_s", "pressure_kpa", (4.0,), design=THREE, setup=setup)
     (water,) = values(time)[""]
     assert water == pytest.approx(taken_in / (35_000 / 60), rel=1e-3)
-    (air,) = values(replace(time, setup=replace(setup, fluid="air")))[""]
+    (air,) = values(time.model_copy(update={"setup": setup.model_copy(update={"fluid": "air"})}))[
+        ""
+    ]
     # Of air at 4 kPa the same volume holds 1 + 4 / 101.325 as much at the atmosphere; and the flat
     # balloons hold a little.
     assert air == pytest.approx(water * (1 + 4 / 101.325), rel=5e-3)
@@ -183,9 +189,9 @@ def test_work_is_the_integral_of_pressure_over_volume() -> None:
         (curve("force_n", "stroke_mm", (1.0,)), "names no pressure"),
         (curve("time_s", "pressure_kpa", (10.0,)), "names no flow"),
         (curve("bend_deg"), "one chamber does not bend"),
-        (curve("force_n", actuator=MeasuredActuator()), "no design describes the actuator"),
-        (curve("stroke_mm", actuator=MeasuredActuator("nosuch")), "neither a template"),
-        (curve("stroke_mm", actuator=MeasuredActuator("radial-15mm")), "round"),
+        (curve("force_n", design=""), "no design describes the actuator"),
+        (curve("stroke_mm", design="nosuch"), "neither a template"),
+        (curve("stroke_mm", design="radial-15mm"), "round"),
     ],
 )
 def test_what_has_no_value_says_why(of: MeasuredCurve, words: str) -> None:
@@ -199,15 +205,14 @@ def test_what_has_no_value_says_why(of: MeasuredCurve, words: str) -> None:
 
 def test_intervals_are_held_against_the_measured_values() -> None:
     flat = curve("flat_height_mm", y=(0.4, 0.5))
-    (compared,) = compare(
-        Evidence("lab", "a lab", "", (flat,)), intervals=lambda _: [(0.45, 0.6), (0.45, 0.6)]
-    )
-    assert [point.is_within for point in compared.points] == [False, True]
-    assert compared.points[0].deviation == pytest.approx((0.331, 0.331))
-    lines = list(table_lines([compared]))
-    assert [line.split()[-1] for line in lines[2:]] == ["no", "yes"]
-    (without,) = compare(Evidence("lab", "a lab", "", (flat,)))
+    lab = Evidence(id="lab", citation="a lab", curves=(flat,))
+    (without,) = compare(lab)
     assert without.points[0].is_within is None
+    assert without.points[0].deviation == pytest.approx((0.331, 0.331))
+    points = tuple(replace(point, interval=(0.45, 0.6)) for point in without.points)
+    assert [point.is_within for point in points] == [False, True]
+    lines = list(table_lines([replace(without, points=points)]))
+    assert [line.split()[-1] for line in lines[2:]] == ["no", "yes"]
 
 
 def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:

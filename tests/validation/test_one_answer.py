@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,8 +27,8 @@ from sbafab.models.formulas import size_phrases, sizes
 from sbafab.models.intervals import factors_of
 from sbafab.search.quantities import Subject, read_quantity
 from sbafab.studio.jobs import elastic, motion
+from sbafab.validation.evidence import MeasuredCurve, Setup, StatedError
 from sbafab.validation.model_values import ModelValues, model_values
-from sbafab.validation.records import MeasuredActuator, MeasuredCurve, Setup
 from tests.studio.worked import job
 from tests.validation.commands import run_predict
 
@@ -47,7 +46,17 @@ class Case(NamedTuple):
 
 
 def _curve(quantity: str, setup: Setup, x_name: str = "", x: tuple[float, ...] = ()) -> Any:
-    return MeasuredCurve("one", quantity, "bench", (1.0,), x_name, x, MeasuredActuator(NAME), setup)
+    return MeasuredCurve(
+        id="one",
+        quantity=quantity,
+        place="bench",
+        design=NAME,
+        x_name=x_name,
+        x=x,
+        y=(1.0,),
+        setup=setup,
+        error=StatedError(source="bench"),
+    )
 
 
 CASES = {
@@ -129,7 +138,7 @@ def test_measured_curves_have_it_beside_them(case: Case, prediction: Prediction)
 
 
 def test_a_height_is_the_stroke_above_the_flat_one(prediction: Prediction) -> None:
-    of = replace(CASES["stroke"].curve, quantity="height_mm")
+    of = CASES["stroke"].curve.model_copy(update={"quantity": "height_mm"})
     answer = model_values(of, factors_of(sbafab.load(NAME)))
     assert isinstance(answer, ModelValues)
     height = _figure(prediction, "free height at 10 kPa")

@@ -10,23 +10,24 @@ import pytest
 from docs.scripts.measured import FOLDER, record
 from sbafab.models.calibrated import GROUPS
 from sbafab.models.unknowns import UNKNOWNS
+from sbafab.validation.fit import correlated
 from sbafab.validation.posterior import (
+    NODE_COORDINATES,
     SHARED,
-    Likelihood,
     Posterior,
     SampledCurve,
-    correlations,
     discrepancies,
+    interpolated,
+    log_likelihood,
     log_prior,
     sampled,
     set_up_probabilities,
 )
-from sbafab.validation.surface import NODE_COORDINATES, ValueSurface
 from tests.validation.synthetic import held_out_inside, lab, share_and_error, surface
 
 
 def curve(rates: np.ndarray, measured: list[float], errors: list[float]) -> SampledCurve:  # type: ignore[type-arg]
-    return SampledCurve("c", "c", 0, surface(rates), np.array(measured), np.array(errors), -1)
+    return SampledCurve("c", 0, surface(rates), np.array(measured), np.array(errors), -1)
 
 
 def coordinates(scale: float) -> np.ndarray:  # type: ignore[type-arg]
@@ -37,7 +38,7 @@ def coordinates(scale: float) -> np.ndarray:  # type: ignore[type-arg]
 def test_a_surface_is_exact_between_its_nodes_where_it_is_linear() -> None:
     rates = np.arange(6.0).reshape(3, 1, 2)
     place = np.array([[nodes[0] * 0.3 + nodes[1] * 0.7 for nodes in NODE_COORDINATES]])
-    assert surface(rates).at(place)[0, 0] == pytest.approx(place[0] @ rates[:, 0])
+    assert interpolated(surface(rates), place)[0, 0] == pytest.approx(place[0] @ rates[:, 0])
 
 
 def test_the_likelihood_is_that_of_a_normal_with_shared_discrepancy() -> None:
@@ -50,7 +51,7 @@ def test_the_likelihood_is_that_of_a_normal_with_shared_discrepancy() -> None:
     x, y = residuals
     square = (d * x * x - 2 * b * x * y + a * y * y) / det
     expected = -0.5 * square - 0.5 * math.log(det)
-    value = Likelihood([curve(rates, list(residuals), list(errors))])(coordinates(scale))
+    value = log_likelihood([curve(rates, list(residuals), list(errors))], coordinates(scale))
     assert value[0] == pytest.approx(expected)
 
 
@@ -58,8 +59,8 @@ def test_open_set_ups_are_averaged() -> None:
     """One set-up right, the other far off: the density is half of that of the right one alone."""
     one, both = np.zeros((3, 1, 1)), np.zeros((3, 2, 1))
     both[0, 1] = 50.0
-    alone = Likelihood([curve(one, [0.1], [0.1])])(coordinates(0.1))
-    averaged = Likelihood([curve(both, [0.1], [0.1])])(coordinates(0.1))
+    alone = log_likelihood([curve(one, [0.1], [0.1])], coordinates(0.1))
+    averaged = log_likelihood([curve(both, [0.1], [0.1])], coordinates(0.1))
     assert averaged[0] == pytest.approx(alone[0] - math.log(2))
 
 
@@ -84,9 +85,7 @@ def test_a_fit_finds_unknowns_that_curves_tell_apart() -> None:
         rates = np.zeros((3, 1, 1))
         rates[axis] = 1.0 if axis != 1 else 10.0
         value = float(truth[axis] * rates[axis, 0, 0])
-        curves.append(
-            curve(rates, [value], [0.02])._replace(id=str(axis), test=str(axis), group=axis)
-        )
+        curves.append(curve(rates, [value], [0.02])._replace(test=str(axis), group=axis))
     posterior = sampled(curves, 3, 1000)
     spreads = np.sqrt(np.diag(posterior.covariance))[:3]
     assert (np.abs(posterior.mean[:3] - truth) < 2 * spreads).all()
@@ -96,9 +95,7 @@ def test_a_fit_finds_unknowns_that_curves_tell_apart() -> None:
 def test_correlated_unknowns_are_named() -> None:
     covariance = np.eye(len(UNKNOWNS))
     covariance[0, 1] = covariance[1, 0] = -0.8
-    (row,) = correlations(covariance, 0.3)
-    assert (row["first"], row["second"]) == ("modulus ratio", "pocket loss")
-    assert row["correlation"] == pytest.approx(-0.8)
+    assert list(correlated(covariance)) == ["modulus ratio and pocket loss: correlation -0.80"]
 
 
 def test_the_same_curves_give_the_same_samples() -> None:
@@ -138,8 +135,7 @@ def test_probabilities_of_set_ups_are_their_densities() -> None:
     both = np.zeros((3, 2, 1))
     open_curve = curve(both, [0.0], [error])
     off = np.array([0.0, 2 * math.hypot(scale, error)])
-    table = open_curve.surface.table + off[:, None]
-    open_curve = open_curve._replace(surface=ValueSurface(table))
+    open_curve = open_curve._replace(table=open_curve.table + off[:, None])
     place = coordinates(scale)
     posterior = Posterior(place[:, : len(UNKNOWNS)], place[:, len(UNKNOWNS) :])
     right, wrong = set_up_probabilities(open_curve, posterior)

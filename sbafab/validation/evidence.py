@@ -1,0 +1,484 @@
+"""Measured curves as data, with set-up, error and what a source leaves out; the sources that ship,
+TOML files, and CSV tables of a lab's curves.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar
+
+from pydantic import Field, model_validator
+
+from sbafab.design.files import checked, hint, listed, read_toml, shown
+from sbafab.design.sections import NAME_PATTERN
+from sbafab.design.toml_table import Section
+from sbafab.errors import DesignError
+from sbafab.spreadsheet import plain_text
+
+FOLDER = Path(__file__).parent
+MOST_BYTES = 1_000_000
+"""Size of a CSV table."""
+MOST_POINTS = 10_000
+
+
+class CurveQuantity(NamedTuple):
+    """A measured quantity: its unit, its title, and the axes that it is measured against.
+
+    The axis "" means that the quantity is measured without an axis.
+    """
+
+    unit: str
+    title: str
+    axes: tuple[str, ...] = ("",)
+
+
+NO_AXIS = ""
+AXES = {
+    "pressure_kpa": "kPa",
+    "volume_ul": "ul",
+    "height_share": "",
+    "stroke_mm": "mm",
+    "bend_deg": "deg",
+    NO_AXIS: "",
+}
+"""Axes and their units. ``height_share`` counts from the flat to the full height, as the source
+counts it; ``volume_ul`` is one balloon's for ``balloon_stroke_mm``, else all chambers' in total."""
+BY_AIR = ("pressure_kpa", "volume_ul", NO_AXIS)
+QUANTITIES = {
+    "force_n": CurveQuantity(
+        "N", "blocked force", ("height_share", "stroke_mm", "bend_deg", "pressure_kpa", NO_AXIS)
+    ),
+    "stroke_mm": CurveQuantity("mm", "free stroke", BY_AIR),
+    "balloon_stroke_mm": CurveQuantity("mm", "stroke of one balloon", BY_AIR),
+    "height_mm": CurveQuantity("mm", "height", BY_AIR),
+    "flat_height_mm": CurveQuantity("mm", "deflated height"),
+    "bend_deg": CurveQuantity("deg", "bend", BY_AIR),
+    "energy_mj": CurveQuantity("mJ", "pneumatic input work", ("pressure_kpa",)),
+    "loss_mj": CurveQuantity("mJ", "work lost in a cycle", ("pressure_kpa",)),
+    "loss_share": CurveQuantity(
+        "", "share of the input work lost in a cycle", ("pressure_kpa", NO_AXIS)
+    ),
+    "time_s": CurveQuantity("s", "time", ("pressure_kpa", "bend_deg")),
+    "modulus_kpa": CurveQuantity("kPa", "modulus in bending", ("pressure_kpa", NO_AXIS)),
+    "burst_kpa": CurveQuantity("kPa", "burst pressure"),
+    "geometric_kpa": CurveQuantity("kPa", "pressure that ends the geometric regime"),
+    "deflated_diameter_mm": CurveQuantity("mm", "deflated diameter"),
+    "inflated_diameter_mm": CurveQuantity("mm", "inflated diameter"),
+    "folded_diameter_mm": CurveQuantity("mm", "folded diameter"),
+    "mass_g": CurveQuantity("g", "mass"),
+    "success_share": CurveQuantity("", "share of builds that hold"),
+    "build_time_h": CurveQuantity("h", "time to build"),
+    "cutting_error_mm": CurveQuantity("mm", "largest error of the laser's cut"),
+    "pin_error_mm": CurveQuantity("mm", "error of the dowel pins"),
+    "density_kg_m3": CurveQuantity("kg/m3", "density of the film"),
+}
+"""Quantities by name."""
+KINDS = {
+    "standard deviation": 1.0,
+    "standard error": 1.0,
+    "largest": 1 / math.sqrt(3),
+    "rounding": 1 / math.sqrt(3),
+}
+"""Kinds of a stated error, and the standard error over it: an error that is the largest, or half of
+the last digit, is taken as even over its range (JCGM 100:2008, 4.3.7)."""
+
+ShortText = Annotated[str, Field(max_length=400)]
+Numbers = Annotated[tuple[float, ...], Field(strict=False, max_length=MOST_POINTS)]
+Sentences = Annotated[tuple[str, ...], Field(strict=False)]
+
+
+class StatedError(Section):
+    """The error of a curve's values as its source states it.
+
+    ``absolute``: one per value, in the curve's unit; empty if not stated. ``relative``: of the
+    value. ``runs``: how often each value was measured; ``source``: the place that states it.
+    """
+
+    absolute: Numbers = ()
+    relative: float = Field(default=0.0, ge=0, le=10)
+    kind: Literal["standard deviation", "standard error", "largest", "rounding"] = (
+        "standard deviation"
+    )
+    runs: int | None = Field(default=None, ge=1)
+    source: str = Field(min_length=1, max_length=400)
+
+
+class Setup(Section):
+    """The set-up of a measurement; None and "" mean that the source does not state the value.
+
+    ``supply`` feeds ``fluid`` at ``flow_ml_min`` through a tube of ``tube_mm`` length and
+    ``tube_bore_mm`` bore. ``chambers`` are pressurised, the others empty. The ``tip`` is free; held
+    by a plate or sensor at ``height_share`` or ``stroke_mm``; bent by ``bend_deg`` and held by a
+    sensor; or pushed to a side. The curve's axis, which may be ``pressure_kpa``, is empty here.
+    """
+
+    supply: ShortText = ""
+    fluid: Literal["air", "water", ""] = ""
+    flow_ml_min: float | None = Field(default=None, gt=0, le=1e6)
+    tube_mm: float | None = Field(default=None, ge=0, le=1e5)
+    tube_bore_mm: float | None = Field(default=None, gt=0, le=100)
+    pressure_kpa: float | None = Field(default=None, ge=0, le=1e4)
+    height_share: float | None = Field(default=None, ge=0, le=1)
+    stroke_mm: float | None = Field(default=None, ge=0, le=1e4)
+    bend_deg: float | None = Field(default=None, ge=0, le=360)
+    chambers: int | None = Field(default=None, ge=0, le=100)
+    tip: Literal["free", "held", "bent", "pushed", ""] = ""
+    note: ShortText = ""
+
+
+class MeasuredCurve(Section):
+    """Values of one quantity by one set-up.
+
+    ``place``: figure and section of the source. The actuator is a ``design``, a template's name or
+    a file, changed by ``changes`` (dotted key to value); or ``toml``, the text of a whole design;
+    all are empty if no design describes it. ``x`` is empty if ``x_name`` is; else it has one number
+    per value. ``comparable`` False: no prediction may be compared with it or fitted to it, for
+    ``reason``. Curves of a ``group`` come from one test, so a fit that leaves one out leaves all of
+    them out; "" is a test of its own. ``unknown``: sentences on facts that the source does not
+    state.
+    """
+
+    id: str = Field(pattern=NAME_PATTERN)
+    quantity: str
+    place: str = Field(min_length=1, max_length=400)
+    group: ShortText = ""
+    design: ShortText = ""
+    changes: dict[str, Any] = Field(default_factory=dict)
+    toml: str = ""
+    x_name: str = NO_AXIS
+    x: Numbers = ()
+    y: Numbers = Field(min_length=1)
+    setup: Setup = Setup.model_construct()
+    error: StatedError
+    comparable: bool = True
+    reason: ShortText = ""
+    unknown: Sentences = ()
+
+    @model_validator(mode="after")
+    def _agrees_with_itself(self) -> Self:
+        if self.quantity not in QUANTITIES:
+            near = hint(self.quantity, QUANTITIES)
+            raise ValueError(f"has the quantity {shown(self.quantity)}, which is not known; {near}")
+        axes, values = QUANTITIES[self.quantity].axes, len(self.y)
+        if self.x_name not in axes:
+            raise ValueError(
+                f"has x_name = {shown(self.x_name)}, which is no axis of {self.quantity}; write "
+                f"one of {listed(axes)}"
+            )
+        if len(self.x) != (values if self.x_name else 0):
+            fix = "give one for each" if self.x_name else "remove them, or name their axis: x_name"
+            raise ValueError(f"has {len(self.x)} x for {values} y; {fix}")
+        errors = self.error.absolute
+        if errors and len(errors) != values:
+            raise ValueError(
+                f"has {len(errors)} absolute errors for {values} y; give one for each, or relative"
+            )
+        if min(errors, default=0.0) < 0:
+            raise ValueError(f"has an absolute error of {min(errors):g}; it must be at least 0")
+        if not self.comparable and not self.reason:
+            raise ValueError("is not comparable without a reason; give reason")
+        return self
+
+    @property
+    def test(self) -> str:
+        """The test that the curve comes from."""
+        return self.group or self.id
+
+    @property
+    def is_described(self) -> bool:
+        """True if a design describes the actuator."""
+        return bool(self.design or self.toml)
+
+    @property
+    def y_unit(self) -> str:
+        """The unit of the values."""
+        return QUANTITIES[self.quantity].unit
+
+    @property
+    def y_name(self) -> str:
+        """The quantity's title."""
+        return QUANTITIES[self.quantity].title
+
+    @property
+    def x_unit(self) -> str:
+        """The unit of the axis."""
+        return AXES[self.x_name]
+
+    @property
+    def errors(self) -> tuple[float | None, ...]:
+        """Standard errors of the values, in their unit; None if the source does not state them."""
+        stated = self.error
+        if not stated.absolute and not stated.relative:
+            return (None,) * len(self.y)
+        sizes = stated.absolute or (0.0,) * len(self.y)
+        pairs = zip(sizes, self.y, strict=True)
+        return tuple(KINDS[stated.kind] * math.hypot(e, stated.relative * y) for e, y in pairs)
+
+    def points(self) -> Iterator[tuple[float | None, float, float | None]]:
+        """Yield the values: the place on the axis (None without one), value, and standard error."""
+        return zip(self.x or (None,) * len(self.y), self.y, self.errors, strict=True)
+
+
+class Evidence(Section):
+    """The measured curves of one source: a paper, or a lab's file or records.
+
+    ``missing``: sentences on figures of the source that could not be had.
+    """
+
+    id: str
+    citation: str = Field(min_length=1, max_length=400)
+    doi: ShortText = ""
+    curves: tuple[MeasuredCurve, ...]
+    missing: Sentences = ()
+
+    def curve(self, name: str) -> MeasuredCurve:
+        """Return the curve of an id. Raises StopIteration without one."""
+        return next(curve for curve in self.curves if curve.id == name)
+
+
+class _EvidenceFile(Section):
+    schema_name: Literal["sbafab/evidence@1"] = Field(alias="schema")
+    citation: str = Field(min_length=1, max_length=400)
+    doi: ShortText = ""
+    missing: Sentences = ()
+    curves: list[dict[str, Any]] = Field(min_length=1)
+
+
+@cache
+def evidence_ids() -> tuple[str, ...]:
+    """Return the ids of the sources that ship, the paper first."""
+    names = sorted(path.stem for path in FOLDER.glob("*.toml"))
+    return tuple(sorted(names, key=lambda name: name != "paper"))
+
+
+def load_evidence(source: str | Path) -> Evidence:
+    """Return the evidence of a shipped source, or of a file (``.toml``, ``.csv``).
+
+    Raises DesignError with one sentence if the source does not exist or has a fault.
+    """
+    if str(source) in evidence_ids():
+        return _shipped(str(source))
+    path = Path(source)
+    if path.suffix.lower() not in (".toml", ".csv"):
+        raise DesignError(
+            f"{shown(source)} is neither evidence that ships ({', '.join(evidence_ids())}) nor a "
+            f"file that ends in .toml or .csv; {hint(str(source), evidence_ids())}"
+        )
+    return read_csv(path) if path.suffix.lower() == ".csv" else read_evidence(path)
+
+
+@cache
+def _shipped(name: str) -> Evidence:
+    return read_evidence(FOLDER / f"{name}.toml")
+
+
+def shipped_evidence() -> tuple[Evidence, ...]:
+    """Return all evidence that ships, the paper first."""
+    return tuple(map(_shipped, evidence_ids()))
+
+
+AnySection = TypeVar("AnySection", bound=Section)
+
+
+def _read(kind: type[AnySection], table: Mapping[str, Any], where: object) -> AnySection:
+    try:
+        return checked(kind, table, {}, file="file of evidence")
+    except DesignError as error:
+        # A message on the whole table begins with its verb.
+        message = str(error)
+        raise DesignError(f"{where}{'' if message[0] == ' ' else ': '}{message}") from None
+
+
+def read_evidence(path: Path) -> Evidence:
+    """Return the evidence of a TOML file; its id is the file's name.
+
+    A ``design`` that is a file is taken to lie beside it. Raises DesignError with one sentence.
+    """
+    record = _read(_EvidenceFile, read_toml(path), path)
+    curves: dict[str, MeasuredCurve] = {}
+    for place, table in enumerate(record.curves, start=1):
+        name = table.get("id", place)
+        where = f"{path}, curve {shown(name) if isinstance(name, str) else place}"
+        curve = _curve(table, path, where)
+        if curve.id in curves:
+            raise DesignError(f"{path} has two curves {shown(curve.id)}; give each its id")
+        curves[curve.id] = curve
+    return Evidence(
+        id=path.stem,
+        citation=record.citation,
+        doi=record.doi,
+        curves=tuple(curves.values()),
+        missing=record.missing,
+    )
+
+
+def _curve(table: Mapping[str, Any], path: Path, where: str) -> MeasuredCurve:
+    """Return the curve of a table; a design file lies beside the evidence."""
+    design = table.get("design", "")
+    if str(design).endswith(".toml"):
+        table = {**table, "design": str(path.parent / design)}
+    return _read(MeasuredCurve, table, where)
+
+
+# CSV: one row for each value; a curve's cells are in its first row, and may be repeated below.
+
+
+OF_A_VALUE = ("x", "y", "error")
+OF_CURVE = ("quantity", "design", "x_name", "place", "group", "comparable", "reason", "unknown")
+OF_ERROR = {"kind": "kind", "runs": "runs", "error_source": "source"}
+OF_SETUP = tuple(Setup.model_fields)
+COLUMNS = ("curve", *OF_A_VALUE, *OF_CURVE, *OF_ERROR, *OF_SETUP)
+"""Columns of a lab's table; only quantity and y are needed. ``unknown`` parts its sentences by "|".
+"""
+COUNTS = ("runs", "chambers")
+NUMBERS = tuple(name for name, key in Setup.model_fields.items() if key.annotation == float | None)
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
+TableRow = tuple[str, dict[str, str]]
+"""The place of a row for messages, and its cells that are not empty by column."""
+
+
+def read_csv(path: Path) -> Evidence:
+    """Return the curves of a table with some of COLUMNS; the file's name is their id and citation.
+
+    Columns are separated by commas, semicolons or tabs, the latter two also with decimal commas.
+    Rows of one ``curve`` need not be adjacent; without that column the quantity separates curves. A
+    cell that applies to the whole curve may be in any of its rows. Raises DesignError with the
+    line.
+    """
+    rows_by_curve: dict[str, list[TableRow]] = {}
+    for where, row in _rows(path):
+        name = row.get("curve") or row.get("quantity", "")
+        if not name:
+            raise DesignError(f"{where} names no curve and no quantity; fill in one of the two")
+        rows_by_curve.setdefault(name, []).append((where, row))
+    if not rows_by_curve:
+        raise DesignError(f"{path} has no row below its columns; fill in one for each value")
+    curves = tuple(_curve_of_rows(name, rows, path) for name, rows in rows_by_curve.items())
+    return Evidence(id=path.stem, citation=f"measurements in {path.name}", curves=curves)
+
+
+def _rows(path: Path) -> Iterator[TableRow]:
+    lines = [
+        line
+        for line in enumerate(_text(path).splitlines(), start=1)
+        if line[1].strip(' ,;\t"') and not line[1].lstrip(' "').startswith("#")
+    ]
+    if not lines:
+        raise DesignError(f"{path} is empty; its first line names columns: {', '.join(COLUMNS)}")
+    separator = max(",;\t", key=lines[0][1].count)
+    names = [name.lower() for name in _cells(lines[0][1], separator, str(path))]
+    _check_names(names, path)
+    for number, line in lines[1:]:
+        where = f"{path}, line {number}"
+        cells = _cells(line, separator, where)
+        if len(cells) != len(names):
+            raise DesignError(
+                f"{where} has {len(cells)} cells where the header has {len(names)}; write decimal "
+                "points, or part columns by semicolons"
+            )
+        row = {name: cell for name, cell in zip(names, cells, strict=True) if name and cell}
+        if "y" not in row:
+            raise DesignError(f"{where} has no y; fill it in or remove the line")
+        yield where, row
+
+
+def _text(path: Path) -> str:
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise DesignError(f"{path} is larger than {MOST_BYTES:,} bytes; give fewer values")
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise DesignError(f"{path} is not a text file in UTF-8; save it as CSV") from None
+
+
+def _cells(line: str, separator: str, where: str) -> list[str]:
+    try:
+        return [_unmarked(cell.strip()) for cell in next(csv.reader([line], delimiter=separator))]
+    except csv.Error as error:
+        raise DesignError(f"{where} cannot be read ({error}); save the table as CSV") from None
+
+
+def _unmarked(cell: str) -> str:
+    """Return a cell without the mark that keeps a spreadsheet from taking it for a formula."""
+    return cell[1:] if cell[:1] == "'" and plain_text(cell[1:]) == cell else cell
+
+
+def _check_names(names: Sequence[str], path: Path) -> None:
+    for name in filter(None, names):
+        if name not in COLUMNS:
+            raise DesignError(f"{path} has a column {shown(name)}; {hint(name, COLUMNS)}")
+        if names.count(name) > 1:
+            raise DesignError(f"{path} has two columns {name}; keep one")
+    for name in ("quantity", "y"):
+        if name not in names:
+            raise DesignError(f"{path} has no column {name}; every value needs it")
+
+
+def _curve_of_rows(name: str, rows: Sequence[TableRow], path: Path) -> MeasuredCurve:
+    where = f"{path}, curve {shown(name)}"
+    cells = _cells_of_curve(rows)
+    x, y, error = (
+        [_number(row[key], key, place) for place, row in rows if key in row] for key in OF_A_VALUE
+    )
+    stated = {key: cells[column] for column, key in OF_ERROR.items() if column in cells}
+    return _curve(
+        {
+            "id": name,
+            "place": path.name,
+            "group": name,
+            **{key: cells[key] for key in OF_CURVE if key in cells},
+            "x": x,
+            "y": y,
+            "error": _read(StatedError, {"source": path.name, **stated, "absolute": error}, where),
+            "setup": _read(Setup, {key: cells[key] for key in OF_SETUP if key in cells}, where),
+        },
+        path,
+        where,
+    )
+
+
+def _cells_of_curve(rows: Sequence[TableRow]) -> dict[str, Any]:
+    """Return the curve's values from its rows, by column. Raises DesignError if two rows do not
+    agree.
+    """
+    cells: dict[str, str] = {}
+    values: dict[str, Any] = {}
+    for where, row in rows:
+        for key, cell in row.items():
+            if key in OF_A_VALUE:
+                continue
+            if cells.setdefault(key, cell) != cell:
+                raise DesignError(
+                    f"{where}: {key} is {shown(cell)}, and {shown(cells[key])} in an earlier line "
+                    "of this curve; write one of the two, or name two curves"
+                )
+            values[key] = _cell_value(cell, key, where)
+    return values
+
+
+def _cell_value(cell: str, key: str, where: str) -> Any:
+    if key in NUMBERS:
+        return _number(cell, key, where)
+    if key in COUNTS:
+        if not re.fullmatch(r"\d{1,6}", cell, re.ASCII):
+            raise DesignError(f"{where}: {key} is {shown(cell)}; it must be a whole number")
+        return int(cell)
+    if key == "comparable":
+        if cell not in ("yes", "no"):
+            raise DesignError(f"{where}: comparable is {shown(cell)}; write yes or no")
+        return cell == "yes"
+    return list(filter(None, map(str.strip, cell.split("|")))) if key == "unknown" else cell
+
+
+def _number(text: str, key: str, where: str) -> float:
+    number = float(text.replace(",", ".")) if _NUMBER.fullmatch(text) else math.nan
+    if not math.isfinite(number):
+        raise DesignError(f"{where}: {key} is {shown(text)}, not a number such as 16.8")
+    return number
