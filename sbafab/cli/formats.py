@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
 import click
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from sbafab import actuators
 from sbafab.assemblies.records import Assembly
@@ -25,7 +25,6 @@ from sbafab.errors import ERROR_SCHEMA
 from sbafab.folders.artefacts import PredictDocument
 from sbafab.folders.checks import Checks
 from sbafab.folders.manifest import AssemblyManifest, JobManifest, Manifest
-from sbafab.folders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.lab.inspection import InspectionDocument
 from sbafab.lab.records import HistoryDocument, RecordsDocument
 from sbafab.lab.report import ReportDocument
@@ -112,12 +111,6 @@ def _design() -> dict[str, Any]:
     return {key: value for key, value in schema.items() if key != "$schema"}
 
 
-def _manifest(record: type[BaseModel], identity: str) -> dict[str, Any]:
-    body = record.model_json_schema(by_alias=True)
-    body["properties"]["schema"] = {"const": identity}
-    return body
-
-
 def _templates() -> dict[str, Any]:
     text = {"type": "string"}
     keys = {"name": text, "summary": text}
@@ -134,19 +127,9 @@ FORMATS: Mapping[str, Format] = {
         lambda: LaminateDocument.model_json_schema(mode="serialization"),
     ),
     "nets": _of("a netlist, for `check --nets`", NetsDocument),
-    "manifest": Format(
-        SCHEMA, "`manifest.json` of a design's folder", lambda: _manifest(Manifest, SCHEMA)
-    ),
-    "job": Format(
-        JOB_SCHEMA,
-        "`manifest.json` of several designs cut together by `nest`",
-        lambda: _manifest(JobManifest, JOB_SCHEMA),
-    ),
-    "assembly": Format(
-        ASSEMBLY_SCHEMA,
-        "`manifest.json` of an assembly's folder",
-        lambda: _manifest(AssemblyManifest, ASSEMBLY_SCHEMA),
-    ),
+    "manifest": _of("`manifest.json` of a design's folder", Manifest),
+    "job": _of("`manifest.json` of several designs cut together by `nest`", JobManifest),
+    "assembly": _of("`manifest.json` of an assembly's folder", AssemblyManifest),
     "press": _of("`press.json`, the heat-press schedule", PressDocument),
     "predict": _of(
         "`predict.json`, and what `predict --json` prints of a design", PrintedPrediction

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
@@ -20,12 +19,10 @@ from pydantic import TypeAdapter
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.checks import run_checks
 from sbafab.assemblies.files import DESIGN_FILE, load_assembly
 from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import FOLDER as LAYERS
 from sbafab.cutting.properties import curves_of
-from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.folders.artefacts import (
@@ -37,16 +34,11 @@ from sbafab.folders.artefacts import (
     DesignFolder,
     RunPart,
     write_artefacts,
-    write_nested_sheets,
-    write_plates,
 )
 from sbafab.folders.as_cut import (
-    ExpectedLaminate,
     LayerFile,
-    chords_for_arc,
     expected_laminate,
     laminate_as_cut,
-    layer_departures,
     path_in_folder,
     read_layers,
     read_seams,
@@ -62,23 +54,23 @@ from sbafab.folders.differences import (
     file_difference,
     findings_of,
     has_lost_properties,
-    index_difference,
     unreadable,
+    value_difference,
 )
-from sbafab.folders.folder import write_design, write_folder
+from sbafab.folders.folder import write_folder
 from sbafab.folders.manifest import (
+    AssemblyManifest,
     JobManifest,
     Manifest,
     as_json,
     file_hashes,
     file_names,
-    is_assembly,
     is_job,
-    read_claims,
-    read_job,
+    read_design_index,
+    read_index,
 )
-from sbafab.folders.order import SCHEMA, Order, of_assembly
-from sbafab.folders.swap import is_among_cut_files
+from sbafab.folders.order import JOB_SCHEMA, SCHEMA, Order, of_assembly
+from sbafab.folders.swap import MANIFEST, is_among_cut_files
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.figures import PredictionRequest
@@ -93,7 +85,6 @@ from sbafab.rules.rule import Rule
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 from sbafab.version import GENERATOR
 
-INDEX = "manifest.json"
 AS_DESIGNED = "all files match design.toml"
 CUT_ENDINGS = (
     *(".dxf", ".dwg", ".ai", ".cdr", ".eps", ".lbrn", ENDING),
@@ -104,8 +95,6 @@ DESIGN_ERRORS = (DesignError, OutputError, GeometryError, ArithmeticError, Looku
 """Errors of a doctored design."""
 BY_OTHER_COMMANDS = (*MESH, *PREDICTION, *SIMULATORS)
 """Folders and files of other commands, which are not made again."""
-NOT_COMPARED = ("files", "mesh_statistics", "meshes")
-"""Keys of a manifest that hold hashes, or meshes of several commands."""
 UNMEASURED = (ArithmeticError, ValueError, LookupError, StopIteration)
 """Errors that rules raise on shapes no design makes; programming errors are not included."""
 
@@ -120,25 +109,60 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
     cannot be read, or one of a job.
     """
     netlist = None if nets is None else read_netlist(nets)
-    if is_job(folder):
+    index = read_index(folder)
+    if isinstance(index, JobManifest):
         if nets is not None:
             raise DesignError(
                 f"{folder} holds several designs, and a netlist is one design's; check the folder "
                 "of that one"
             )
-        return _check_job(folder, read_job(folder))
-    claims = read_claims(folder)
+        return _check_job(folder, index)
     try:
         built = read_folder(folder)
     except DesignError as error:
-        return _by_hashes(folder, claims, [str(error)])
-    findings = _findings(built, [*built.problems, *remade_problems(folder, built)])
+        return _by_hashes(folder, index, [str(error)])
+    order = Order(SCHEMA, built.design.name, (built.build,))
+    problems = [*built.problems, *_remade_problems(folder, index, order)]
+    findings = _findings(built, problems)
     if netlist is None or nets is None:
         return findings
     if built.laminate is None:
         message = f"{nets.name} was not compared: not all layers could be read"
         return (*findings, Finding(NETLIST, "fail", None, None, "", Place(), message))
     return (*findings, *netlist_findings(built.laminate, built.design, netlist, nets.name))
+
+
+def _check_job(folder: Path, job: JobManifest) -> tuple[Finding, ...]:
+    """Return the findings on the designs of a job, its sheets, and between an assembly's parts."""
+    built: list[AsBuiltFolder] = []
+    unusable: list[str] = []
+    for entry in job.designs:
+        try:
+            built.append(read_folder(path_in_folder(folder, entry.folder)))
+        except DesignError as error:
+            unusable.append(f"{entry.name}: {error}")
+    order = Order(JOB_SCHEMA, job.name, tuple(each.build for each in built))
+    if isinstance(job, AssemblyManifest) and not unusable:
+        try:
+            order = of_assembly(assemble(load_assembly(folder / DESIGN_FILE)), order.builds)
+        except (DesignError, OSError) as error:
+            unusable.append(f"the parts were not put together, for {error or type(error).__name__}")
+    if unusable:
+        return _by_hashes(folder, job, unusable)
+    problems = [*file_problems(folder, job), *_remade_problems(folder, job, order)]
+    findings = [
+        replace(finding, design=each.design.name)
+        for each in built
+        for finding in _findings(each, each.problems)
+        if finding.rule != DESIGNED or finding.verdict == "fail"
+    ]
+    return (
+        *findings,
+        *(order.between or ()),
+        *findings_of(INTEGRITY, problems, f"{len(job.sheets)} sheets read back"),
+        *findings_of(CLAIMS, problems, "hashes and manifest match the files and the designs"),
+        *findings_of(DESIGNED, problems, AS_DESIGNED),
+    )
 
 
 # The layers of a design's folder.
@@ -148,13 +172,12 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
 class AsBuiltFolder:
     """The folder of a design read back.
 
-    ``build`` is the design with the findings on it, ``expected`` its laminate and paths.
-    ``laminate`` has the layers as cut; None if one could not be read.
+    ``build`` is the design with the findings on it, ``expected`` its laminate. ``laminate`` has the
+    layers as cut; None if one could not be read.
     """
 
-    claims: Manifest
     build: Build
-    expected: ExpectedLaminate
+    expected: Laminate
     files: tuple[LayerFile, ...]
     laminate: Laminate | None
     problems: tuple[Problem, ...]
@@ -170,47 +193,34 @@ def read_folder(folder: Path) -> AsBuiltFolder:
     Raises OutputError for a folder without a sound manifest or without cut files, and DesignError
     if ``design.toml`` is missing or does not make a laminate.
     """
-    claims = read_claims(folder)
+    claims = read_design_index(folder)
     if all(layer.file is None for layer in claims.layers):
         raise OutputError(f"{folder} holds no cut files; write them with sbafab cut or generate")
-    design = _design(folder)
+    path = folder / "design.toml"
+    if not path.exists():
+        raise DesignError("design.toml is missing")
+    try:
+        design = load_design(path)
+    except (DesignError, OSError) as error:
+        raise DesignError(f"design.toml cannot be used: {error or type(error).__name__}") from None
     try:
         build = make_build(design, curves=curves_of(claims.curves))
         expected = expected_laminate(build)
     except DESIGN_ERRORS as error:
         raise DesignError(f"design.toml makes no laminate: {error}") from None
     problems = file_problems(folder, claims)
-    files, errors = read_layers(folder, expected, build.settings, _has_chords(design))
-    seams, seam_errors = read_seams(folder, expected.laminate.seams, build.settings)
-    problems += [*errors, *seam_errors, *layer_departures(files, expected)]
+    files, errors = read_layers(folder, build, expected)
+    seams, seam_errors = read_seams(folder, expected.seams, build.settings)
+    problems += [*errors, *seam_errors]
     laminate: Laminate | None = None
     if all(file.part is not None for file in files):
         try:
-            laminate = laminate_as_cut(files, expected.laminate)
+            laminate = laminate_as_cut(files, expected)
             laminate = laminate if seams == laminate.seams else replace(laminate, seams=seams)
         except UNMEASURED as error:
             message = f"the layers do not lie over each other as films of one stack ({error})"
             problems.append(Problem(INTEGRITY, message))
-    return AsBuiltFolder(claims, build, expected, tuple(files), laminate, tuple(problems))
-
-
-def _design(folder: Path) -> Design:
-    """Return the folder's design. Raises DesignError for one that cannot be used."""
-    path = folder / "design.toml"
-    if not path.exists():
-        raise DesignError("design.toml is missing")
-    try:
-        return load_design(path)
-    except (DesignError, OSError) as error:
-        raise DesignError(f"design.toml cannot be used: {error or type(error).__name__}") from None
-
-
-def _has_chords(design: Design) -> bool:
-    """Return True if an outline of the user's has chords in place of arcs."""
-    try:
-        return any(chords_for_arc(outline) is not None for outline in design.outlines())
-    except (DesignError, OSError):
-        return False
+    return AsBuiltFolder(build, expected, tuple(files), laminate, tuple(problems))
 
 
 def _findings(built: AsBuiltFolder, problems: Sequence[Problem]) -> tuple[Finding, ...]:
@@ -236,7 +246,7 @@ def rules_as_cut(built: AsBuiltFolder) -> tuple[Finding, ...]:
             for rule in RULES
             if rule.name != NETS or built.design.has_nets
         )
-    if built.laminate is built.expected.laminate and not built.build.curves.in_chords:
+    if built.laminate is built.expected and not built.build.curves.in_chords:
         return built.build.findings
     measures = Measures(built.laminate, built.design)
     return tuple(finding for rule in RULES for finding in _findings_as_cut(rule, measures))
@@ -249,46 +259,6 @@ def _findings_as_cut(rule: Rule, measures: Measures) -> list[Finding]:
     except UNMEASURED as error:
         message = f"cannot be measured on these files ({error}); regenerate them"
         return [Finding(rule.name, "fail", None, None, "", Place(), message)]
-
-
-# The folder of several designs, of a job or an assembly.
-
-
-def _check_job(folder: Path, job: JobManifest) -> tuple[Finding, ...]:
-    """Return the findings on the designs of a job, its sheets, and between an assembly's parts."""
-    built: list[AsBuiltFolder] = []
-    unusable: list[str] = []
-    for entry in job.designs:
-        try:
-            built.append(read_folder(path_in_folder(folder, entry.folder)))
-        except DesignError as error:
-            unusable.append(f"{entry.name}: {error}")
-    between: tuple[Finding, ...] = ()
-    whole = Order(job.schema_name, job.name, tuple(each.build for each in built))
-    if is_assembly(job) and not unusable:
-        try:
-            assembled = assemble(load_assembly(folder / DESIGN_FILE))
-            between = run_checks(assembled)
-            whole = of_assembly(assembled, whole.builds)
-        except (DesignError, OSError) as error:
-            unusable.append(f"the parts were not put together, for {error or type(error).__name__}")
-    if unusable:
-        return _by_hashes(folder, job, unusable)
-    problems = [*file_problems(folder, job), *_remade_job_problems(folder, job, whole)]
-    findings = [
-        replace(finding, design=each.design.name)
-        for each in built
-        for finding in _findings(each, each.problems)
-        if finding.rule != DESIGNED or finding.verdict == "fail"
-    ]
-    count = len(job.sheets)
-    return (
-        *findings,
-        *between,
-        *findings_of(INTEGRITY, problems, f"{count} sheets read back"),
-        *findings_of(CLAIMS, problems, "hashes and manifest match the files and the designs"),
-        *findings_of(DESIGNED, problems, AS_DESIGNED),
-    )
 
 
 # Files against the hashes of the manifest.
@@ -304,7 +274,7 @@ def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]
         hashes = file_hashes(folder)
     except OSError as error:
         raise OutputError(f"{folder} cannot be read: {error.strerror or error}") from None
-    hashes.pop(INDEX, None)
+    hashes.pop(MANIFEST, None)
     layers = claims.layers if isinstance(claims, Manifest) else ()
     layer_of = {layer.file: (number,) for number, layer in enumerate(layers, start=1)}
     problems = []
@@ -361,72 +331,51 @@ def _by_hashes(
 # The folder made again, and compared.
 
 
-def remade_problems(folder: Path, built: AsBuiltFolder) -> list[Problem]:
-    """Return the files of a design, but a job's sheets, that differ from those made again."""
-    claims, of_job = built.claims, is_job(folder.absolute().parent)
-    if of_job and not claims.sheets:
-        message = "the film sheets are those of the job, and were not compared; check the folder "
-        sheets = [Problem(CLAIMS, f"{message}above this one", verdict="warn")]
-    else:
-        sheets = []
-    with _temporary_folder(folder) as (fresh, problems):
-        index = _remake(folder, fresh, built, of_job)
-        remade = {*file_names(fresh), *(layer["file"] for layer in index["layers"])}
-        # The pages of a job's design show the sheets of the job, and are compared there.
-        excluded = (*BY_OTHER_COMMANDS, *PAGES) if of_job else BY_OTHER_COMMANDS
-        problems.extend(_foreign_problems(claims, remade, excluded))
-        problems.extend(_compared(folder, fresh, claims.files, claims.generator))
-        if claims.generator == GENERATOR:
-            left_out = (*NOT_COMPARED, "sheets", "films") if of_job else NOT_COMPARED
-            problems.extend(_index_problems(folder, index, left_out))
-            problems.extend(_prediction_problems(folder, fresh, built))
-    return [*sheets, *problems, *_version_problems(claims.generator)]
-
-
-def _remade_job_problems(folder: Path, job: JobManifest, whole: Order) -> list[Problem]:
-    """Return the files of a job and of its designs' folders that differ from those made again."""
-    with _temporary_folder(folder) as (fresh, problems):
-        parts = PICTURES if is_assembly(job) and whole.failed else EVERYTHING
-        nests = whole.nests(folder, ignore_progress) if "cut" in parts else ()
-        index = write_folder(whole, parts, nests, fresh, ignore_progress).index
-        problems.extend(_foreign_problems(job, file_names(fresh)))
-        problems.extend(_compared(folder, fresh, job.files, job.generator))
-        if job.generator == GENERATOR:
-            problems.extend(_index_problems(folder, index, ("files",)))
-    return [*problems, *_version_problems(job.generator)]
-
-
-@contextmanager
-def _temporary_folder(folder: Path) -> Iterator[tuple[Path, list[Problem]]]:
-    """Yield an empty folder and a list of problems; an error of the design is added to it."""
+def _remade_problems(folder: Path, index: Manifest | JobManifest, order: Order) -> list[Problem]:
+    """Return the files of a folder that differ from those made again; layers are read before."""
+    is_of_job = isinstance(index, Manifest) and is_job(folder.absolute().parent)
     problems: list[Problem] = []
+    if is_of_job:
+        message = "the film sheets are those of the job, and were not compared; check the folder "
+        problems.append(Problem(CLAIMS, f"{message}above this one", verdict="warn"))
     with TemporaryDirectory() as name:
+        fresh = Path(name)
         try:
-            yield Path(name), problems
+            made = _remake(folder, index, order, is_of_job, fresh)
+            problems += _foreign_problems(index, file_names(fresh), is_of_job)
+            problems += _compared(folder, fresh, index.files, index.generator)
+            if index.generator == GENERATOR:
+                problems += _index_problems(folder, made, is_of_job)
+                problems += _prediction_problems(folder, index, order.builds[0], fresh)
         except DESIGN_ERRORS as error:
             message = f"{folder.name} could not be made again to be compared: {error}"
             problems.append(Problem(DESIGNED, message))
+    if index.generator != GENERATOR:
+        message = (
+            f"the folder was made by {index.generator}, and this is {GENERATOR}: only what is cut "
+            "and pressed was compared; regenerate the folder"
+        )
+        problems.append(Problem(DESIGNED, message))
+    return problems
 
 
-def _remake(folder: Path, fresh: Path, built: AsBuiltFolder, of_job: bool) -> dict[str, Any]:
-    """Write the files of a run beside the layers to ``fresh``; return its manifest without hashes.
+def _remake(
+    folder: Path, index: Manifest | JobManifest, order: Order, is_of_job: bool, fresh: Path
+) -> dict[str, Any]:
+    """Write the files of a run to ``fresh``; return its manifest without hashes.
 
-    A design ``of_job`` has no film sheets and no pages in its own folder.
+    A design of a job has no film sheets and no pages in its own folder.
     """
-    claims, build = built.claims, built.build
-    parts = _parts(claims.files)
-    # Pictures come with a run that makes everything: then there is a page as well.
-    if not of_job and (TRAVELLER in claims.files or {"press", "preview"} <= parts):
-        parts |= {"press", "preview"}
-    sheets: list[SheetFile] = []
-    if not of_job:
-        order = Order(SCHEMA, build.design.name, (build,))
-        nests = order.nests(folder, ignore_progress)
-        sheets = write_nested_sheets(nests, build.design, fresh, build.settings, ignore_progress)
-    write_plates(build, fresh)
-    remade = DesignFolder(build, frozenset(parts), sheets, fresh, ignore_progress, not of_job)
-    # The layers' files were read, and are compared as regions.
-    return write_design(remade, [row for row in ARTEFACTS if row.path != LAYERS])
+    if isinstance(index, JobManifest):
+        parts = {*(PICTURES if order.assembled is not None and order.failed else EVERYTHING)}
+    else:
+        parts = _parts(index.files)
+        # Pictures come with a run that makes everything: then there is a page as well.
+        if not is_of_job and (TRAVELLER in index.files or {"press", "preview"} <= parts):
+            parts |= {"press", "preview"}
+    nests = order.nests(folder, ignore_progress) if "cut" in parts and not is_of_job else ()
+    extras = {"has_pages": not is_of_job} if order.schema == SCHEMA else {}
+    return write_folder(order, parts, nests, fresh, ignore_progress, **extras).index
 
 
 def _parts(files: Collection[str]) -> set[RunPart]:
@@ -442,18 +391,21 @@ def _parts(files: Collection[str]) -> set[RunPart]:
 
 
 def _foreign_problems(
-    claims: Manifest | JobManifest, remade: Collection[str], excluded: Collection[str] = ()
+    index: Manifest | JobManifest, remade: Collection[str], is_of_job: bool
 ) -> list[Problem]:
     """Return the files that a manifest lists and its design does not make.
 
-    ``excluded``: folders and files of other commands, except files that could be cut.
+    Files of other commands may be there, except those that could be cut.
     """
+    excluded: tuple[str, ...] = () if isinstance(index, JobManifest) else BY_OTHER_COMMANDS
+    # The pages of a job's design show the sheets of the job, and are compared there.
+    excluded = (*excluded, *PAGES) if is_of_job else excluded
     return [
         Problem(DESIGNED, f"{path} is listed and is no file of this design; regenerate the folder")
-        for path in claims.files
+        for path in index.files
         if path not in remade
         and (_could_be_cut(path) or path.partition("/")[0] not in excluded)
-        and _is_compared(path, claims.generator)
+        and _is_compared(path, index.generator)
     ]
 
 
@@ -461,22 +413,21 @@ def _compared(folder: Path, fresh: Path, listed: Collection[str], generator: str
     """Return the files that differ from those made again; those in ``layers`` were read before."""
     problems: list[Problem] = []
     bare: list[str] = []
-    for path in sorted(path for path in fresh.rglob("*") if path.is_file()):
-        name = path.relative_to(fresh).as_posix()
+    for name in file_names(fresh):
+        path, found = fresh / name, folder / name
         is_layer = path.parent.name == LAYERS and path.suffix == ".dxf"
-        if name == INDEX or is_layer or not _is_compared(name, generator):
+        if name == MANIFEST or is_layer or not _is_compared(name, generator):
             continue
-        rule, found = DESIGNED, folder / name
+        rule = DESIGNED
         if name not in listed or not os.path.lexists(found):
             difference = f"{name} is missing"
         elif not found.is_file():
             rule, difference = INTEGRITY, f"{name}: not a plain file"
         elif _are_equal(found, path):
             continue
-        elif name.endswith(f"/{INDEX}"):
-            rule = CLAIMS
-            difference = index_difference(_read_index(found), _read_index(path), ("files",))
-            difference = f"{name}: {difference}" if difference else ""
+        elif name.endswith(f"/{MANIFEST}"):
+            rule, difference = CLAIMS, _index_difference(found, _read_json(path), {"files"})
+            difference = difference and f"{name}: {difference}"
         elif unsound := unreadable(found):
             rule, difference = INTEGRITY, f"{name}: {unsound}"
         else:
@@ -503,30 +454,34 @@ def _is_compared(path: str, generator: str) -> bool:
     return generator == GENERATOR or path.lower().endswith((*PRESS, *CUT_ENDINGS))
 
 
-def _version_problems(generator: str) -> list[Problem]:
-    if generator == GENERATOR:
-        return []
-    message = (
-        f"the folder was made by {generator}, and this is {GENERATOR}: only what is cut and "
-        "pressed was compared; regenerate the folder"
+def _read_json(path: Path) -> Any:
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def _index_difference(path: Path, expected: dict[str, Any], left_out: Collection[str]) -> str:
+    """Return the first difference of a manifest, except the keys ``left_out``; "" if none."""
+    actual = _read_json(path)
+    if not isinstance(actual, dict):
+        return "it is not an index"
+    here, there = (
+        {key: value for key, value in index.items() if key not in left_out}
+        for index in (actual, expected)
     )
-    return [Problem(DESIGNED, message)]
+    return value_difference(here, there)
 
 
-def _read_index(path: Path) -> dict[str, Any]:
-    index: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return index
-
-
-def _index_problems(
-    folder: Path, index: Mapping[str, Any], left_out: Collection[str]
-) -> list[Problem]:
+def _index_problems(folder: Path, index: dict[str, Any], is_of_job: bool) -> list[Problem]:
     """Return the first difference of the manifest from the one made again."""
-    actual, expected = _read_index(folder / INDEX), json.loads(as_json(index))
-    difference = index_difference(actual, expected, left_out)
+    expected = json.loads(as_json(index))
+    # Hashes, or meshes of several commands.
+    left_out = {"files"} | ({"mesh_statistics", "meshes"} if index["schema"] == SCHEMA else set())
+    left_out |= {"sheets", "films"} if is_of_job else set()
+    difference = _index_difference(folder / MANIFEST, expected, left_out)
     if not difference and "meshes" in left_out:
-        difference = _mesh_difference(folder, actual, expected)
-    return [Problem(CLAIMS, f"{INDEX}: {difference}; regenerate the folder")] if difference else []
+        difference = _mesh_difference(folder, _read_json(folder / MANIFEST), expected)
+    return (
+        [Problem(CLAIMS, f"{MANIFEST}: {difference}; regenerate the folder")] if difference else []
+    )
 
 
 def _mesh_difference(folder: Path, actual: dict[str, Any], expected: dict[str, Any]) -> str:
@@ -539,30 +494,30 @@ def _mesh_difference(folder: Path, actual: dict[str, Any], expected: dict[str, A
         listed_mesh: dict[str, Any] = next((m for m in listed if m.get("file") == mesh["file"]), {})
         count = mesh["elements"]
         if listed_mesh.get("elements") != count:
-            count = sum(len(body.surface.faces) for body in bodies(folder / mesh["file"]))
-        difference = index_difference(listed_mesh, {**mesh, "elements": count}, ())
+            count = sum(len(surface.faces) for surface, _ in bodies(folder / mesh["file"]))
+        difference = value_difference(listed_mesh, {**mesh, "elements": count})
         if difference:
             return f"{mesh['file']}: {difference}"
     return ""
 
 
-def _prediction_problems(folder: Path, fresh: Path, built: AsBuiltFolder) -> list[Problem]:
+def _prediction_problems(
+    folder: Path, index: Manifest | JobManifest, build: Build, fresh: Path
+) -> list[Problem]:
     """Return differences of the prediction from one for the same request."""
-    claims = built.claims
-    if "predict.json" not in claims.files:
+    if "predict.json" not in index.files:
         return []
     try:
-        said = json.loads((folder / "predict.json").read_bytes())["asked"]
+        said = _read_json(folder / "predict.json")["asked"]
         factors = None if said["calibration"] else said
         asked = TypeAdapter(PredictionRequest).validate_python({**said, "calibration": factors})
         written = fresh / "prediction"
         written.mkdir()
-        prediction = predict(built.design, asked)
         wanted: frozenset[RunPart] = frozenset(("predict",))
-        again = DesignFolder(built.build, wanted, (), written, ignore_progress)
-        again.prediction = prediction
+        again = DesignFolder(build, wanted, (), written, ignore_progress)
+        again.prediction = predict(build.design, asked)
         write_artefacts(again, [row for row in ARTEFACTS if row.part == "predict"])
     except (ValueError, LookupError, TypeError, OSError):
         message = "predict.json does not say what was asked for; regenerate the folder"
         return [Problem(DESIGNED, message)]
-    return _compared(folder, written, claims.files, claims.generator)
+    return _compared(folder, written, index.files, index.generator)

@@ -12,12 +12,12 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
@@ -30,6 +30,7 @@ from sbafab.cutting.properties import CUT_SEQUENCE
 from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.errors import OutputError
 from sbafab.folders.swap import CUT_FOLDERS
+from sbafab.geometry.edges import Edge, Point
 from sbafab.meshing.surface import Surface, open_edges
 from sbafab.rules.finding import Finding, Place, Verdict
 
@@ -58,36 +59,29 @@ MARK = re.compile(rb"\n *1?0\r?\n")
 
 @dataclass(frozen=True)
 class Problem:
-    """A fault outside the rule deck."""
+    """A fault outside the rule deck, in these layers."""
 
     rule: str
     message: str
     layers: tuple[int, ...] = ()
-    interface: int | None = None
-    x: float | None = None
-    y: float | None = None
     verdict: Verdict = "fail"
 
 
 def findings_of(rule: str, problems: Sequence[Problem], passed: str) -> list[Finding]:
     """Return the findings of a rule: at most MAX_SHOWN problems in full, or one that passes."""
-    rule_problems = [problem for problem in problems if problem.rule == rule]
-    if not any(problem.verdict == "fail" for problem in rule_problems):
-        rule_problems.append(Problem(rule, passed, verdict="pass"))
-    shown, rest = rule_problems[:MAX_SHOWN], rule_problems[MAX_SHOWN:]
+    own = [problem for problem in problems if problem.rule == rule]
+    if not any(problem.verdict == "fail" for problem in own):
+        own.append(Problem(rule, passed, verdict="pass"))
+    shown, rest = own[:MAX_SHOWN], own[MAX_SHOWN:]
     if rest:
         layers = tuple(dict.fromkeys(index for problem in rest for index in problem.layers))
+        has_failed = any(problem.verdict == "fail" for problem in rest)
         message = f"and {len(rest)} more like these"
-        failed = any(problem.verdict == "fail" for problem in rest)
-        shown.append(
-            Problem(rule=rule, message=message, layers=layers, verdict="fail" if failed else "warn")
-        )
-    return [_finding(problem) for problem in shown]
-
-
-def _finding(problem: Problem) -> Finding:
-    place = Place(problem.interface, problem.layers, problem.x, problem.y)
-    return Finding(problem.rule, problem.verdict, None, None, "", place, problem.message)
+        shown.append(Problem(rule, message, layers, "fail" if has_failed else "warn"))
+    return [
+        Finding(rule, each.verdict, None, None, "", Place(None, each.layers), each.message)
+        for each in shown
+    ]
 
 
 # Files that are sound.
@@ -136,16 +130,11 @@ def file_difference(actual: Path, expected: Path, name: str) -> str:
 
     ``name``: the file's name in the sentence.
     """
-    data, expected_data = actual.read_bytes(), expected.read_bytes()
-    if data == expected_data:
-        return ""
     compare = _readers().get(expected.suffix)
     if expected.name.endswith(PROGRAMS["rdworks"].ending):
         compare = rdworks_difference
-    if compare is None:
-        return f"{name} is not what design.toml makes: its bytes differ"
     try:
-        difference = compare(actual, expected)
+        difference = compare(actual, expected) if compare else "its bytes differ"
     except (OutputError, *UNREADABLE) as error:
         difference = f"it cannot be read ({error})"
     return f"{name} is not what design.toml makes: {difference}" if difference else ""
@@ -175,27 +164,16 @@ def _is_cut(path: Path) -> bool:
     return is_ours and path.parent.name in CUT_FOLDERS
 
 
-def index_difference(actual: Any, expected: Any, left_out: Collection[str]) -> str:
-    """Return the first difference of two manifests, except the keys ``left_out``; "" if none."""
-    if not isinstance(actual, dict):
-        return "it is not an index"
-    actual_index, expected_index = (
-        {key: value for key, value in index.items() if key not in left_out}
-        for index in (actual, expected)
-    )
-    return _value_difference(actual_index, expected_index, "")
-
-
 def _readers() -> dict[str, Callable[[Path, Path], str]]:
+    def values(parse: Callable[[str], Any]) -> Callable[[Path, Path], str]:
+        return lambda *paths: value_difference(*(parse(_text(path)) for path in paths))
+
     return {
-        ".json": _json_difference,
+        ".json": values(json.loads),
+        ".csv": values(_table),
+        ".toml": values(tomllib.loads),
         ".dxf": _drawing_difference,
-        ".png": lambda path, expected: _picture_difference(
-            path.read_bytes(), expected.read_bytes()
-        ),
-        ".csv": _table_difference,
-        ".pdf": lambda path, expected: "it shows something else",
-        ".toml": _table_of_keys_difference,
+        ".png": lambda *paths: _picture_difference(*(path.read_bytes() for path in paths)),
         **dict.fromkeys((".svg", ".html", ENDING), _text_difference),
         **dict.fromkeys((".stl", ".3mf", ".glb"), mesh_difference),
     }
@@ -206,45 +184,19 @@ def _text(path: Path) -> str:
         return file.read()
 
 
-def _json_difference(actual: Path, expected: Path) -> str:
-    actual_json, expected_json = (json.loads(_text(path)) for path in (actual, expected))
-    return _value_difference(actual_json, expected_json, "")
+def _table(text: str) -> dict[str, Any]:
+    """Return the rows of a CSV table by column, counted from 1 below the names of the columns."""
+    names, *rows = [*csv.reader(text.splitlines(True))] or [[]]
+    return {"columns": names, "row": [dict(zip_longest(names, row)) for row in rows]}
 
 
-def _table_difference(actual: Path, expected: Path) -> str:
-    """Return the first difference of two tables by row and column; row 1 is below the names."""
-    rows, expected_rows = (
-        [*csv.reader(_text(path).splitlines(True))] for path in (actual, expected)
-    )
-    if rows[:1] != expected_rows[:1]:
-        names, expected_names = (
-            ", ".join(row) for table in (rows, expected_rows) for row in table[:1] or [[]]
-        )
-        return f"its columns are {_shown(names)}, not {_shown(expected_names)}"
-    if len(rows) != len(expected_rows):
-        return f"it has {_rows(len(rows) - 1)}, not {len(expected_rows) - 1}"
-    for number, (row, expected_row) in enumerate(
-        zip(rows[1:], expected_rows[1:], strict=True), start=1
-    ):
-        if len(row) != len(expected_row):
-            return f"row {number} has {len(row)} cells, not {len(expected_row)}"
-        for name, cell, expected_cell in zip(expected_rows[0], row, expected_row, strict=True):
-            difference = _value_difference(cell, expected_cell, f"row {number}, column {name}")
-            if difference:
-                return difference
-    return ""
-
-
-def _rows(count: int) -> str:
-    return f"{count} row{'' if count == 1 else 's'}"
-
-
-def _value_difference(actual: Any, expected: Any, where: str) -> str:
+def value_difference(actual: Any, expected: Any, where: str = "") -> str:
+    """Return the first difference of two values of JSON, with its dotted place; "" if none."""
     if isinstance(expected, dict) and isinstance(actual, dict):
         for key in expected | actual:
             if key not in actual or key not in expected:
                 return f"{where}{key} is {'missing' if key not in actual else 'one too many'}"
-            difference = _value_difference(actual[key], expected[key], f"{where}{key}.")
+            difference = value_difference(actual[key], expected[key], f"{where}{key}.")
             if difference:
                 return difference
         return ""
@@ -253,7 +205,7 @@ def _value_difference(actual: Any, expected: Any, where: str) -> str:
             return f"{where.rstrip('.')} has {len(actual)} entries, not {len(expected)}"
         pairs = zip(actual, expected, strict=True)
         differences = (
-            _value_difference(*pair, f"{where}{n}.") for n, pair in enumerate(pairs, start=1)
+            value_difference(*pair, f"{where}{n}.") for n, pair in enumerate(pairs, start=1)
         )
         return next(filter(None, differences), "")
     if _is_number(expected) and _is_number(actual):
@@ -278,26 +230,17 @@ def _shown(value: object) -> str:
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
-def _table_of_keys_difference(actual: Path, expected: Path) -> str:
-    actual_toml, expected_toml = (tomllib.loads(_text(path)) for path in (actual, expected))
-    return _value_difference(actual_toml, expected_toml, "")
-
-
-def _text_difference(actual: Path, expected: Path) -> str:
+def _text_difference(*paths: Path) -> str:
     """Return the first difference of two texts of XML or HTML, in which comments do not count."""
-    text, expected_text = (COMMENT.sub("", _text(path)) for path in (actual, expected))
-    pictures, expected_pictures = PICTURE.findall(text), PICTURE.findall(expected_text)
-    if len(pictures) != len(expected_pictures):
-        return f"it has {len(pictures)} pictures, not {len(expected_pictures)}"
-    for number, (picture, expected_picture) in enumerate(
-        zip(pictures, expected_pictures, strict=True), start=1
-    ):
-        difference = _picture_difference(
-            base64.b64decode(picture), base64.b64decode(expected_picture)
-        )
+    actual, expected = (COMMENT.sub("", _text(path)) for path in paths)
+    pictures = [[*map(base64.b64decode, PICTURE.findall(text))] for text in (actual, expected)]
+    if len(pictures[0]) != len(pictures[1]):
+        return f"it has {len(pictures[0])} pictures, not {len(pictures[1])}"
+    for number, pair in enumerate(zip(*pictures, strict=True), start=1):
+        difference = _picture_difference(*pair)
         if difference:
             return f"picture {number}: {difference}"
-    return _words_difference(PICTURE.sub("", text), PICTURE.sub("", expected_text))
+    return _words_difference(PICTURE.sub("", actual), PICTURE.sub("", expected))
 
 
 def _words_difference(actual: str, expected: str) -> str:
@@ -351,46 +294,37 @@ def _picture_difference(actual: bytes, expected: bytes) -> str:
 
 def _drawing_difference(actual: Path, expected: Path) -> str:
     """Return a difference of contours, strokes or properties of two drawings; "" if none."""
-    drawing, expected_drawing = read_profile(actual), read_profile(expected)
+    drawing, designed = read_profile(actual), read_profile(expected)
     try:
-        check_contours(drawing.region, expected_drawing.region, TOLERANCE)
+        check_contours(drawing.region, designed.region, TOLERANCE)
     except OutputError as error:
         return str(error).rstrip(".")
     # A version of DXF that knows no properties drops all of them: see ``has_lost_properties``.
-    for name, value in expected_drawing.properties.items() if drawing.properties else ():
+    for name, value in designed.properties.items() if drawing.properties else ():
         if drawing.properties.get(name) != value:
             return f"custom property {name} is {drawing.properties.get(name)!r}, not {value!r}"
-    return _stroke_difference(drawing, expected_drawing)
-
-
-def _stroke_difference(drawing: ReadBack, expected: ReadBack) -> str:
-    """Return a stroke (engraving, cut, frame or datum) that only one drawing has; "" if none."""
-    missing = [*expected.strokes]
+    missing = [(layer, _points(edges)) for layer, edges in designed.strokes]
     for layer, edges in drawing.strokes:
-        points = [edges[0].start, *(edge.end for edge in edges)]
-        match = next(
-            (
-                stroke
-                for stroke in missing
-                if stroke[0] == layer and _same_points(points, stroke[1])
-            ),
-            None,
-        )
-        if match is None:
+        points = _points(edges)
+        found = next((s for s in missing if s[0] == layer and _are_same(points, s[1])), None)
+        if found is None:
             x, y = points[0]
             return f"the stroke on {layer} at x {x:.3f}, y {y:.3f} should not be there"
-        missing.remove(match)
-    if missing:
-        (x, y) = missing[0][1][0].start
-        return f"the stroke on {missing[0][0]} at x {x:.3f}, y {y:.3f} is missing"
+        missing.remove(found)
+    for layer, ((x, y), *_) in missing:
+        return f"the stroke on {layer} at x {x:.3f}, y {y:.3f} is missing"
     return ""
 
 
-def _same_points(points: list[tuple[float, float]], edges: Any) -> bool:
-    expected = [edges[0].start, *(edge.end for edge in edges)]
-    return len(expected) == len(points) and any(
+def _points(edges: Sequence[Edge]) -> list[Point]:
+    return [edges[0].start, *(edge.end for edge in edges)]
+
+
+def _are_same(points: Sequence[Point], others: Sequence[Point]) -> bool:
+    """Return True if two strokes agree within the tolerance, in either direction."""
+    return len(points) == len(others) and any(
         all(math.dist(p, q) <= TOLERANCE for p, q in zip(points, run, strict=True))
-        for run in (expected, expected[::-1])
+        for run in (others, others[::-1])
     )
 
 
@@ -409,11 +343,8 @@ VERTEX = re.compile(r'<vertex x="([^"]*)" y="([^"]*)" z="([^"]*)" */>')
 TRIANGLE = re.compile(r'<triangle v1="([^"]*)" v2="([^"]*)" v3="([^"]*)" */>')
 
 
-class MeshBody(NamedTuple):
-    """A surface, and the other data of its body in the file as text."""
-
-    surface: Surface
-    metadata: str
+MeshBody = tuple[Surface, str]
+"""A surface, and the other data of its body in the file as text."""
 
 
 def mesh_difference(actual: Path, expected: Path) -> str:
@@ -421,13 +352,10 @@ def mesh_difference(actual: Path, expected: Path) -> str:
 
     Points, enclosed volume, area and watertightness are compared; triangles may differ.
     """
-    mesh_bodies, expected_bodies = bodies(actual), bodies(expected)
-    if len(mesh_bodies) != len(expected_bodies):
-        return f"it holds {len(mesh_bodies)} bodies, not {len(expected_bodies)}"
-    pairs = zip(mesh_bodies, expected_bodies, strict=True)
-    return next(
-        filter(None, (_body_difference(body, expected_body) for body, expected_body in pairs)), ""
-    )
+    found, designed = bodies(actual), bodies(expected)
+    if len(found) != len(designed):
+        return f"it holds {len(found)} bodies, not {len(designed)}"
+    return next(filter(None, map(_body_difference, found, designed)), "")
 
 
 def bodies(path: Path) -> list[MeshBody]:
@@ -443,25 +371,27 @@ def bodies(path: Path) -> list[MeshBody]:
         raise OutputError(f"no sound mesh: {error}") from error
 
 
-def _body_difference(body: MeshBody, expected: MeshBody) -> str:
-    if body.metadata != expected.metadata:
+def _body_difference(found: MeshBody, designed: MeshBody) -> str:
+    (surface, metadata), (expected, expected_metadata) = found, designed
+    if metadata != expected_metadata:
         return "names, materials or scales of its bodies are others"
-    surface, expected_surface = body.surface, expected.surface
     defect = _unsound(surface)
     if defect:
         return defect
-    for present, compared, fault in (
-        (surface, expected_surface, "too many"),
-        (expected_surface, surface, "missing"),
+    for points, others, fault in (
+        (surface.points, expected.points, "too many"),
+        (expected.points, surface.points, "missing"),
     ):
-        point = _unmatched_point(present.points, compared.points)
+        point = _unmatched_point(points, others)
         if point is not None:
             x, y, z = point
             return f"the point at x {x:.3f}, y {y:.3f}, z {z:.3f} is {fault}"
-    if abs(surface.volume - expected_surface.volume) > MESH_SHARE * abs(expected_surface.volume):
-        return f"it encloses {surface.volume:.4f} mm3, not {expected_surface.volume:.4f}"
-    if abs(_area(surface) - _area(expected_surface)) > MESH_SHARE * _area(expected_surface):
-        return f"its surface is {_area(surface):.3f} mm2, not {_area(expected_surface):.3f}"
+    for what, here, there in (
+        ("mm3 inside", surface.volume, expected.volume),
+        ("mm2 of surface", _area(surface), _area(expected)),
+    ):
+        if abs(here - there) > MESH_SHARE * abs(there):
+            return f"it has {here:.4f} {what}, not {there:.4f}"
     return ""
 
 
@@ -513,7 +443,7 @@ def _stl(path: Path) -> list[MeshBody]:
     normal = np.cross(edges[:, 1] - edges[:, 0], edges[:, 2] - edges[:, 0])
     if (np.einsum("ij,ij->i", normal, mesh["face_normals"]) < 0).any():
         raise OutputError("a triangle's normal points inward")
-    return [MeshBody(surface, "")]
+    return [(surface, "")]
 
 
 def _3mf(path: Path) -> list[MeshBody]:
@@ -525,19 +455,19 @@ def _3mf(path: Path) -> list[MeshBody]:
     points = np.array(VERTEX.findall(model), dtype=np.float64).reshape(-1, 3)
     faces = np.array(TRIANGLE.findall(model), dtype=np.int64).reshape(-1, 3)
     frame = TRIANGLE.sub("", VERTEX.sub("", model)).split()
-    return [MeshBody(Surface(points, faces), json.dumps([parts, frame]))]
+    return [(Surface(points, faces), json.dumps([parts, frame]))]
 
 
 def _glb(path: Path) -> list[MeshBody]:
     import trimesh
 
     scene = trimesh.load_scene(path, process=False)
-    mesh_bodies = []
+    mesh_bodies: list[MeshBody] = []
     for node in sorted(scene.graph.nodes_geometry):
         transform, name = scene.graph[node]
         mesh = scene.geometry[name]
         surface = Surface(np.array(mesh.vertices), np.array(mesh.faces))
         material = mesh.visual.material
         paint = [material.name, *map(str, (material.baseColorFactor, material.roughnessFactor))]
-        mesh_bodies.append(MeshBody(surface, json.dumps([node, transform.tolist(), paint])))
+        mesh_bodies.append((surface, json.dumps([node, transform.tolist(), paint])))
     return mesh_bodies

@@ -28,7 +28,7 @@ from sbafab.folders.artefacts import (
     write_text,
 )
 from sbafab.folders.checks import checks
-from sbafab.folders.manifest import AssemblyManifest, as_json, file_hashes, job_manifest, manifest
+from sbafab.folders.manifest import as_json, file_hashes, job_manifest, manifest
 from sbafab.folders.order import SCHEMA, Order
 from sbafab.meshing.formats import Node, write_scene, write_stl
 from sbafab.process import Progress
@@ -82,9 +82,10 @@ def write_folder(
         verified |= {f"{subfolder.name}/{name}": file for name, file in folder.verified.items()}
         left_out += [(f"{subfolder.name}/{name}", reason) for name, reason in folder.left_out]
     designs = [build.design for build in order.builds]
-    index = job_manifest(order.schema, order.name, order.settings, designs, sheets)
+    more = None
     if order.assembled is not None:
-        index = _write_assembly(order, order.assembled, sheets, index, path, progress)
+        more = _write_assembly(order, order.assembled, sheets, path, progress)
+    index = job_manifest(order.name, order.settings, designs, sheets, more)
     return WrittenFolder(index, verified, tuple(left_out))
 
 
@@ -137,11 +138,12 @@ def _write_assembly(
     order: Order,
     assembled: Assembled,
     sheets: Sequence[SheetFile],
-    index: dict[str, Any],
     path: Path,
     progress: Progress,
 ) -> dict[str, Any]:
-    """Write what an assembly's folder holds beside its designs; return its manifest."""
+    """Write what an assembly's folder holds beside its designs; return the keys that its manifest
+    has beside a job's.
+    """
     # A design has no picture of an assembly.
     from sbafab.reports.assembly_png import assembly_pngs
 
@@ -167,8 +169,13 @@ def _write_assembly(
     found = checks(order.findings, "design", order.name, designs)
     write_text(path / "checks.json", as_json(found))
     write_text(path / DESIGN_FILE, assembly_toml(assembled))
-    index |= {**_claims(assembled), "meshes": meshes, "files": {}}
-    return AssemblyManifest.model_validate_json(as_json(index)).as_dict()
+    return {
+        "family": assembled.assembly.family,
+        "design_sha256": sha256,
+        "copies": assembled.assembly.order.copies,
+        "parts": [part_entry(placed) for placed in assembled.parts],
+        "meshes": meshes,
+    }
 
 
 def _note(order: Order) -> str:
@@ -212,16 +219,6 @@ def _material(placed: PlacedPart) -> str:
     if placed.made is not None:
         return placed.made.laminate.bonded_materials
     return str(getattr(placed.part, "material", placed.part.kind))
-
-
-def _claims(assembled: Assembled) -> dict[str, Any]:
-    """Return the keys of an assembly's manifest that a job's lacks."""
-    return {
-        "family": assembled.assembly.family,
-        "design_sha256": assembly_sha256(assembled),
-        "copies": assembled.assembly.order.copies,
-        "parts": [part_entry(placed) for placed in assembled.parts],
-    }
 
 
 def _bench_pages(

@@ -1,4 +1,4 @@
-"""``manifest.json``: the records that it is written from and read with, and the hashes of files.
+"""``manifest.json``: its records, each read from what it describes, and the hashes of files.
 
 A key with a default may be missing in a folder that is read.
 """
@@ -8,11 +8,10 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, ConfigDict, Field, ValidationError
 
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.properties import CutSettings, layer_path, said_of
@@ -20,14 +19,15 @@ from sbafab.cutting.seam_files import seam_path
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.identity import citation, design_sha256
 from sbafab.design.records import Design
+from sbafab.documents import Document, attribute
 from sbafab.errors import OutputError
 from sbafab.folders.build import Build, warnings
-from sbafab.folders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, BatchSchema
-from sbafab.folders.swap import read_manifest
-from sbafab.geometry.offset import Kerf
+from sbafab.folders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
+from sbafab.folders.swap import MANIFEST, read_manifest
+from sbafab.geometry.edges import Point
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.joints import SeamKind, SeamTool
-from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, Role
+from sbafab.laminate.laminate import InterfaceKind, Laminate, Layer, Role
 from sbafab.laminate.lay_up import lay_up_steps
 from sbafab.meshing.mesh_files import MeshFile
 from sbafab.models.formulas import sizes
@@ -36,46 +36,50 @@ from sbafab.version import GENERATOR
 
 MOST_SIZE = 10_000.0
 """mm, of a film sheet."""
+
+
+def _rounded(digits: int) -> AfterValidator:
+    # Adding 0.0 turns a rounded -0.0 into 0.0.
+    return AfterValidator(lambda value: round(value, digits) + 0.0)
+
+
+Six = Annotated[float, _rounded(6)]
+Three = Annotated[float, _rounded(3)]
 Count = Annotated[int, Field(ge=1, le=10_000_000)]
-Size = Annotated[float, Field(gt=0, le=MOST_SIZE)]
+Copies = Annotated[int, Field(ge=1, le=1000)]
+Size = Annotated[float, Field(gt=0, le=MOST_SIZE), _rounded(6)]
 Thickness = Annotated[float, Field(gt=0, le=10)]
 
 
 # The records.
 
 
-class _Claim(BaseModel):
-    model_config = ConfigDict(
-        extra="ignore", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
-    )
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the keys of the file in the order of the fields, without unset ones."""
-        return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
+class _Claim(Document):
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False, populate_by_name=True)
 
 
 class LayerClaim(_Claim):
     index: int
     name: str
-    material: Material
+    material: Material = attribute("film.material")
     role: Role
     balloon: int | None
-    thickness: Thickness
+    thickness: Thickness = attribute("film.thickness")
     z: float
     file: str | None
     pattern: str
-    area: float
+    area: Six = attribute("profile.area")
     pieces: int
     bores: tuple[str, ...]
 
 
 class InterfaceClaim(_Claim):
-    below: int
-    above: int
+    below: int = attribute("below.index")
+    above: int = attribute("above.index")
     masks: tuple[int, ...]
     kind: InterfaceKind
-    contact_area: float
-    bond_area: float
+    contact_area: Six = attribute("contact.area")
+    bond_area: Six = attribute("bond.area")
 
 
 class SeamClaim(_Claim):
@@ -90,30 +94,30 @@ class SeamClaim(_Claim):
     tool: SeamTool
     kind: SeamKind
     width: float
-    length: float
+    length: Six
     order: int
     step: int
 
 
 class BoreClaim(_Claim):
     chamber: str
-    x: float
-    y: float
+    x: Six = attribute("centre.0")
+    y: Six = attribute("centre.1")
     diameter: float
 
 
 class InletClaim(_Claim):
     chamber: str
-    x: float
-    y: float
+    x: Six = attribute("mouth.0")
+    y: Six = attribute("mouth.1")
     width: float
-    tube_outer_diameter: float
+    tube_outer_diameter: float = attribute("tube_diameter")
 
 
 class PinClaim(_Claim):
     name: str
-    x: float
-    y: float
+    x: Six = attribute("centre.0")
+    y: Six = attribute("centre.1")
     diameter: float
 
 
@@ -136,16 +140,16 @@ class _FilmNeed(_OfFilm):
     product: str
     thickness: Thickness
     layers: int
-    area: float
+    area: Six
 
 
 class FilmUseClaim(_OfFilm):
     """Sheets of a film and their area in mm2; zeros without sheets."""
 
     sheets: int = 0
-    sheet_area: float = 0.0
-    waste: float = 0.0
-    density: float = 0.0
+    sheet_area: Three = 0.0
+    waste: Three = 0.0
+    density: Annotated[float, _rounded(4)] = 0.0
 
 
 class FilmClaim(FilmUseClaim, _FilmNeed):
@@ -167,26 +171,26 @@ class SheetPartClaim(_Claim):
 class SheetClaim(_Claim):
     """A film sheet; lengths in mm, areas in mm2."""
 
-    file: str
+    file: str = attribute("path")
     picture: str
     project: str
     machine_file: str | None = None
     material: Material
     number: Count
-    width: Size
+    width: Annotated[float, Field(gt=0, le=MOST_SIZE)]
     length: Size
-    border: Annotated[float, Field(ge=0, le=MOST_SIZE)]
-    spacing: Annotated[float, Field(gt=0, le=MOST_SIZE)]
+    border: Annotated[float, Field(ge=0, le=MOST_SIZE)] = attribute("nest.stock.border")
+    spacing: Annotated[float, Field(gt=0, le=MOST_SIZE)] = attribute("nest.stock.spacing")
     pins: Annotated[tuple[SheetPinClaim, ...], Field(max_length=100)]
     parts: tuple[SheetPartClaim, ...]
-    parts_area: float
-    density: float
+    parts_area: Six
+    density: Annotated[float, _rounded(4)]
     label: str
     contours: Count
-    cut_length: float
-    travel: float
-    unsorted_travel: float
-    estimated_minutes: float
+    cut_length: Three
+    travel: Three
+    unsorted_travel: Three
+    estimated_minutes: Annotated[float, _rounded(2)] = attribute("minutes")
 
 
 class MeshClaim(_Claim):
@@ -194,13 +198,13 @@ class MeshClaim(_Claim):
     kind: str
     chamber: str | None
     fill_ul: float
-    volume_mm3: float
+    volume_mm3: Six
     elements: int
 
 
 class PlaceClaim(_Claim):
-    x: float
-    y: float
+    x: Six
+    y: Six
 
 
 class BatchClaim(_Claim):
@@ -218,10 +222,9 @@ class KitClaim(_Claim):
     departures: tuple[str, ...]
 
 
-class Manifest(_Claim):
+class Manifest(_Claim, schema=SCHEMA):
     """``manifest.json`` of one design's folder."""
 
-    schema_name: Literal["sbafab/manifest@1"] = Field(alias="schema")
     name: str
     family: str
     units: Literal["mm"]
@@ -233,9 +236,9 @@ class Manifest(_Claim):
     curves: str | None = None
     waived: tuple[str, ...]
     lowered_limits: tuple[str, ...]
-    sizes: dict[str, float]
+    sizes: dict[str, Six]
     notes: tuple[str, ...]
-    copies: Annotated[int, Field(ge=1, le=1000)]
+    copies: Copies
     batch: BatchClaim | None = None
     films: tuple[FilmClaim, ...]
     warnings: tuple[str, ...]
@@ -255,15 +258,14 @@ class Manifest(_Claim):
 class DesignClaim(_Claim):
     name: str
     folder: str
-    copies: Annotated[int, Field(ge=1, le=1000)]
+    copies: Copies
     design_sha256: str
     kit: KitClaim
 
 
-class JobManifest(_Claim):
+class JobManifest(_Claim, schema=JOB_SCHEMA):
     """``manifest.json`` of several designs cut together."""
 
-    schema_name: BatchSchema = Field(alias="schema")
     name: str
     units: Literal["mm"]
     designs_sha256: str
@@ -276,7 +278,7 @@ class JobManifest(_Claim):
     files: dict[str, str]
 
 
-class AssemblyManifest(JobManifest):
+class AssemblyManifest(JobManifest, schema=ASSEMBLY_SCHEMA):
     """``manifest.json`` of an assembly: a job's, with the parts and their places."""
 
     family: str
@@ -286,7 +288,7 @@ class AssemblyManifest(JobManifest):
     meshes: tuple[dict[str, Any], ...]
 
 
-# Manifests of plans.
+# Manifests of builds.
 
 
 def as_json(value: object) -> str:
@@ -305,241 +307,162 @@ def manifest(
 
     ``is_cut``: it has cut files; ``statistics`` describe conforming meshes.
     """
-    design, laminate = build.design, build.laminate
-    curves = said_of(build.curves) if is_cut else None
-    optional: dict[str, Any] = {}
-    if curves is not None:
-        optional["curves"] = curves
-    if build.cycles.copies > 1:
-        optional["batch"] = _batch(build.cycles)
-    if laminate.seams:
-        optional["seams"] = _seams(laminate, is_cut)
-    if statistics is not None:
-        optional["mesh_statistics"] = statistics
-    return Manifest(
-        schema=SCHEMA,
+    design, laminate, cycles = build.design, build.laminate, build.cycles
+    optional = {
+        "curves": said_of(build.curves) if is_cut else None,
+        "batch": None if cycles.copies == 1 else _batch(cycles),
+        "seams": _seams(laminate, is_cut) or None,
+        "mesh_statistics": statistics,
+    }
+    return Manifest.of(
+        None,
         name=laminate.name,
         family=laminate.family,
         units="mm",
         design_sha256=build.sha256,
         generator=GENERATOR,
-        kit=KitClaim.model_validate_json(as_json(citation(design))),
-        registration=RegistrationClaim(
-            method=laminate.registration,
-            pins=tuple(
-                PinClaim(name=pin.name, **_place(pin.centre), diameter=pin.diameter)
-                for pin in laminate.pins
-            ),
-        ),
-        kerf={name: kerf_claim(width) for name, width in design.kerf_widths.items()},
+        kit=citation(design),
+        registration={"method": laminate.registration, "pins": laminate.pins},
+        kerf={
+            name: {"state": "uncalibrated" if width is None else "compensated", "width": width}
+            for name, width in design.kerf_widths.items()
+        },
         waived=build.waived,
         lowered_limits=build.lowered,
-        sizes={name: round(value, 6) for name, value in sizes(design, laminate).items()},
+        sizes=sizes(design, laminate),
         notes=laminate.notes,
         copies=design.order.quantity,
         films=_films(laminate, sheets),
         warnings=tuple(dict.fromkeys(warnings(design).values())),
-        layers=tuple(_layer(build, layer, is_cut) for layer in laminate.layers),
-        interfaces=tuple(_interface(interface) for interface in laminate.interfaces),
-        bores=tuple(
-            BoreClaim(chamber=bore.chamber, **_place(bore.centre), diameter=bore.diameter)
-            for bore in laminate.bores
-        ),
-        inlets=tuple(
-            InletClaim(
-                chamber=inlet.chamber,
-                **_place(inlet.mouth),
-                width=inlet.width,
-                tube_outer_diameter=inlet.tube_diameter,
-            )
-            for inlet in laminate.inlets
-        ),
+        layers=[_layer(build, layer, is_cut) for layer in laminate.layers],
+        interfaces=[
+            InterfaceClaim.read(interface, masks=[mask.index for mask in interface.masks])
+            for interface in laminate.interfaces
+        ],
+        bores=laminate.bores,
+        inlets=laminate.inlets,
         lumen=laminate.lumen,
         fixture=FIXTURE if is_cut and laminate.pins else None,
-        sheets=tuple(_sheet(sheet) for sheet in sheets),
-        meshes=tuple(
-            MeshClaim(**{**asdict(mesh), "volume_mm3": round(mesh.volume_mm3, 6)})
-            for mesh in meshes
-        ),
-        **optional,
+        sheets=[*map(_sheet, sheets)],
+        meshes=meshes,
+        **{name: value for name, value in optional.items() if value is not None},
         files={},
-    ).as_dict()
+    )
 
 
 def job_manifest(
-    schema: BatchSchema,
     name: str,
     settings: CutSettings,
     designs: Sequence[Design],
     sheets: Sequence[SheetFile],
+    assembly: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the manifest of the folder of several designs, without the hashes of its files.
 
-    ``settings`` belong to the shared ``sheets``.
+    ``settings`` belong to the shared ``sheets``; ``assembly`` has the keys that an assembly adds.
     """
-    return JobManifest(
-        schema=schema,
+    record = JobManifest if assembly is None else AssemblyManifest
+    return record.of(
+        None,
         name=name,
         units="mm",
         designs_sha256=settings.design_sha256,
         generator=GENERATOR,
         waived=settings.waived,
         lowered_limits=settings.lowered,
-        designs=tuple(
-            DesignClaim(
-                name=design.name,
-                folder=design.name,
-                copies=design.order.quantity,
-                design_sha256=design_sha256(design),
-                kit=KitClaim.model_validate_json(as_json(citation(design))),
-            )
+        designs=[
+            {
+                "name": design.name,
+                "folder": design.name,
+                "copies": design.order.quantity,
+                "design_sha256": design_sha256(design),
+                "kit": citation(design),
+            }
             for design in designs
-        ),
-        films=tuple(
-            FilmUseClaim(material=material, **use) for material, use in _film_use(sheets).items()
-        ),
-        sheets=tuple(_sheet(sheet) for sheet in sheets),
+        ],
+        films=[{"material": material, **use} for material, use in _film_use(sheets).items()],
+        sheets=[*map(_sheet, sheets)],
         files={},
-    ).as_dict()
-
-
-def kerf_claim(width: Kerf | None) -> KerfClaim:
-    return KerfClaim(state="uncalibrated" if width is None else "compensated", width=width)
-
-
-def _batch(runs: Runs) -> BatchClaim:
-    """Return press cycles and places of several copies."""
-    places = tuple(PlaceClaim(**_place(place)) for place in runs.places)
-    return BatchClaim(at_once=runs.together, cycles=runs.cycles, places=places)
-
-
-def _place(point: tuple[float, float]) -> dict[str, float]:
-    # Adding 0.0 turns a rounded -0.0 into 0.0.
-    return {"x": round(point[0], 6) + 0.0, "y": round(point[1], 6) + 0.0}
-
-
-def _sheet(sheet: SheetFile) -> SheetClaim:
-    """Return a film sheet as the manifest lists it; lengths mm, areas mm2."""
-    stock = sheet.nest.stock
-    other = {} if sheet.machine_file is None else {"machine_file": sheet.machine_file}
-    return SheetClaim(
-        **other,
-        file=sheet.path,
-        picture=sheet.picture,
-        project=sheet.project,
-        material=sheet.material,
-        number=sheet.number,
-        width=sheet.width,
-        length=round(sheet.length, 6),
-        border=stock.border,
-        spacing=stock.spacing,
-        pins=tuple(SheetPinClaim(x=x, y=y, diameter=d) for x, y, d in stock.pins),
-        parts=tuple(
-            SheetPartClaim(design=design, pattern=pattern, count=count)
-            for design, pattern, count in sheet.counts
-        ),
-        parts_area=round(sheet.parts_area, 6),
-        density=round(sheet.density, 4),
-        label=sheet.label,
-        contours=sheet.contours,
-        cut_length=round(sheet.cut_length, 3),
-        travel=round(sheet.travel, 3),
-        unsorted_travel=round(sheet.unsorted_travel, 3),
-        estimated_minutes=round(sheet.minutes, 2),
+        **(assembly or {}),
     )
 
 
-def _film_use(sheets: Sequence[SheetFile]) -> dict[Material, dict[str, Any]]:
+def _batch(runs: Runs) -> dict[str, Any]:
+    """Return press cycles and places of several copies."""
+    places = [{"x": x, "y": y} for x, y in runs.places]
+    return {"at_once": runs.together, "cycles": runs.cycles, "places": places}
+
+
+def _sheet(sheet: SheetFile) -> dict[str, Any]:
+    """Return a film sheet as the manifest lists it."""
+    keys = SheetClaim.of(
+        sheet,
+        pins=[{"x": x, "y": y, "diameter": d} for x, y, d in sheet.nest.stock.pins],
+        parts=[
+            {"design": design, "pattern": pattern, "count": count}
+            for design, pattern, count in sheet.counts
+        ],
+    )
+    return {key: value for key, value in keys.items() if value is not None}
+
+
+def _film_use(sheets: Sequence[SheetFile]) -> dict[Material, dict[str, float]]:
     """Return number and area of sheets, share of the parts and waste in mm2, by material."""
-    used: dict[Material, dict[str, float]] = {}
-    for sheet in sheets:
-        entry = used.setdefault(sheet.material, {"sheets": 0, "sheet_area": 0.0, "parts_area": 0.0})
-        entry["sheets"] += 1
-        entry["sheet_area"] += sheet.width * sheet.length
-        entry["parts_area"] += sheet.parts_area
-    return {material: _shares(entry) for material, entry in used.items()}
+    use: dict[Material, dict[str, float]] = {}
+    for material in dict.fromkeys(sheet.material for sheet in sheets):
+        own = [sheet for sheet in sheets if sheet.material == material]
+        area = sum(sheet.width * sheet.length for sheet in own)
+        parts = sum(sheet.parts_area for sheet in own)
+        waste, density = area - parts, parts / area
+        use[material] = {
+            "sheets": len(own),
+            "sheet_area": area,
+            "waste": waste,
+            "density": density,
+        }
+    return use
 
 
-def _shares(entry: Mapping[str, float]) -> dict[str, float]:
-    area, parts = entry["sheet_area"], entry["parts_area"]
-    return {
-        "sheets": entry["sheets"],
-        "sheet_area": round(area, 3),
-        "waste": round(area - parts, 3),
-        "density": round(parts / area, 4),
-    }
-
-
-def _films(laminate: Laminate, sheets: Sequence[SheetFile]) -> tuple[FilmClaim, ...]:
+def _films(laminate: Laminate, sheets: Sequence[SheetFile]) -> list[dict[str, Any]]:
     use = _film_use(sheets)
     layers: dict[Film, list[Layer]] = {}
     for layer in laminate.layers:
         layers.setdefault(layer.film, []).append(layer)
-    return tuple(
-        FilmClaim(
-            material=film.material,
-            product=film.product,
-            thickness=film.thickness,
-            layers=len(stack),
-            area=round(sum(layer.profile.area for layer in stack), 6),
+    return [
+        {
+            "material": film.material,
+            "product": film.product,
+            "thickness": film.thickness,
+            "layers": len(stack),
+            "area": sum(layer.profile.area for layer in stack),
             **use.get(film.material, {}),
-        )
+        }
         for film, stack in layers.items()
-    )
+    ]
 
 
 def _layer(build: Build, layer: Layer, is_cut: bool) -> LayerClaim:
     kerf, laminate = build.settings.kerf_width(layer.film.material), build.laminate
-    bores, cut = laminate.bores, laminate.layer(laminate.cut_with(layer))
-    return LayerClaim(
-        index=layer.index,
-        name=layer.name,
-        material=layer.film.material,
-        role=layer.role,
-        balloon=layer.balloon,
-        thickness=layer.film.thickness,
-        z=layer.z,
+    cut = laminate.layer(laminate.cut_with(layer))
+    return LayerClaim.read(
+        layer,
         file=layer_path(cut.name, kerf) if is_cut else None,
-        pattern=layer.pattern,
-        area=round(layer.profile.area, 6),
         pieces=len(layer.profile.pieces),
-        bores=tuple(bore.chamber for bore in bores if _is_open(layer, bore.centre)),
+        bores=[bore.chamber for bore in laminate.bores if _is_open(layer, bore.centre)],
     )
 
 
-def _is_open(layer: Layer, place: tuple[float, float]) -> bool:
+def _is_open(layer: Layer, place: Point) -> bool:
     return any(hole.winding(place) != 0 for hole in layer.profile.holes)
 
 
-def _interface(interface: Interface) -> InterfaceClaim:
-    return InterfaceClaim(
-        below=interface.below.index,
-        above=interface.above.index,
-        masks=tuple(mask.index for mask in interface.masks),
-        kind=interface.kind,
-        contact_area=round(interface.contact.area, 6),
-        bond_area=round(interface.bond.area, 6),
-    )
-
-
-def _seams(laminate: Laminate, is_cut: bool) -> tuple[SeamClaim, ...]:
+def _seams(laminate: Laminate, is_cut: bool) -> list[SeamClaim]:
     steps = [(step.joining.seam, step.number) for step in lay_up_steps(laminate) if step.joining]
-    return tuple(
-        SeamClaim(
-            name=seam.name,
-            file=seam_path(seam) if is_cut else None,
-            below=seam.below,
-            above=seam.above,
-            tool=seam.tool,
-            kind=seam.kind,
-            width=seam.width,
-            length=round(seam.length, 6),
-            order=seam.order,
-            step=number,
-        )
+    return [
+        SeamClaim.read(seam, file=seam_path(seam) if is_cut else None, step=number)
         for seam, number in steps
         if seam is not None
-    )
+    ]
 
 
 def file_hashes(folder: Path) -> dict[str, str]:
@@ -572,16 +495,12 @@ def carried_over(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
 
 
 MAX_MANIFEST_BYTES = 50_000_000
-
-
-def read_claims(folder: Path) -> Manifest:
-    """Return the manifest of an output folder. Raises OutputError if it is missing or unsound."""
-    return _read(folder, Manifest, SCHEMA)
+RECORDS = {record.SCHEMA: record for record in (Manifest, JobManifest, AssemblyManifest)}
 
 
 def is_job(folder: Path) -> bool:
     """Return True if a folder holds several designs, of a job or an assembly."""
-    path = folder / "manifest.json"
+    path = folder / MANIFEST
     try:
         is_small = path.is_file() and path.stat().st_size <= MAX_MANIFEST_BYTES
     except OSError:
@@ -589,26 +508,17 @@ def is_job(folder: Path) -> bool:
     return is_small and (read_manifest(folder) or {}).get("schema") in (JOB_SCHEMA, ASSEMBLY_SCHEMA)
 
 
-def read_job(folder: Path) -> JobManifest:
-    """Return the manifest of a job's folder. Raises OutputError as ``read_claims`` does."""
-    return _read(folder, JobManifest, JOB_SCHEMA)
+def read_design_index(folder: Path) -> Manifest:
+    """Return the manifest of a design's folder. Raises OutputError as ``read_index`` does."""
+    index = read_index(folder)
+    if isinstance(index, Manifest):
+        return index
+    raise OutputError(f"{folder} is not the folder of one design; regenerate the folder above it")
 
 
-def is_assembly(job: JobManifest) -> bool:
-    """Return True if a job's designs are the parts of an assembly."""
-    return job.schema_name == ASSEMBLY_SCHEMA
-
-
-def read_assembly(folder: Path) -> AssemblyManifest:
-    """Return the manifest of an assembly's folder. Raises OutputError as ``read_claims`` does."""
-    return _read(folder, AssemblyManifest, ASSEMBLY_SCHEMA)
-
-
-Read = TypeVar("Read", Manifest, JobManifest, AssemblyManifest)
-
-
-def _read(folder: Path, kind: type[Read], schema: str) -> Read:
-    path = folder / "manifest.json"
+def read_index(folder: Path) -> Manifest | JobManifest:
+    """Return the manifest of an output folder. Raises OutputError if it is missing or unsound."""
+    path = folder / MANIFEST
     try:
         # Reading a pipe or a device would never end.
         if path.exists() and not path.is_file():
@@ -626,13 +536,16 @@ def _read(folder: Path, kind: type[Read], schema: str) -> Read:
         if isinstance(error, OutputError):
             raise
         raise OutputError(f"{path} cannot be read: {error.strerror or error}") from None
+    schema = (read_manifest(folder) or {}).get("schema")
     try:
-        return kind.model_validate_json(data)
+        if schema is not None:
+            return RECORDS[str(schema)].model_validate_json(data)
+        fault = "it is not JSON of this schema"
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        reason = first["msg"][:1].lower() + first["msg"][1:]
-        fault = f"{where}: {reason}" if where else reason
-        raise OutputError(
-            f"{path} is not a sound {schema}: {fault}; regenerate the folder with sbafab generate"
-        ) from None
+        where = "".join(f"{part}." for part in first["loc"])
+        fault = f"{where[:-1]}: {first['msg'][:1].lower()}{first['msg'][1:]}"
+    raise OutputError(
+        f"{path} is not a sound {schema or SCHEMA}: {fault}; regenerate the folder with sbafab "
+        "generate"
+    )

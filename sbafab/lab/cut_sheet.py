@@ -12,7 +12,7 @@ from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.nest import TURNS
 from sbafab.errors import DesignError, OutputError
 from sbafab.folders.as_cut import path_in_folder
-from sbafab.folders.manifest import JobManifest, Manifest, is_job, read_claims, read_job
+from sbafab.folders.manifest import JobManifest, Manifest, read_design_index, read_index
 from sbafab.geometry.edges import Bounds
 from sbafab.geometry.region import Region
 
@@ -59,7 +59,7 @@ def read_cut_sheet(source: Path, name: str | None) -> DrawnSheet:
     """
     if source.suffix.lower() == ".dxf":
         return _sheet(source.stem, source, (), SPACING, ())
-    claims: Manifest | JobManifest = read_job(source) if is_job(source) else read_claims(source)
+    claims = read_index(source)
     sheets = {Path(sheet.file).stem: sheet for sheet in claims.sheets}
     layers = dict(_layers(source, claims))
     name = _chosen(name, [*sheets, *layers])
@@ -89,7 +89,7 @@ def _layers(folder: Path, claims: Manifest | JobManifest) -> Iterator[tuple[str,
     if isinstance(claims, JobManifest):
         for design in claims.designs:
             inner = path_in_folder(folder, design.folder)
-            for name, (pattern, path) in _layers(inner, read_claims(inner)):
+            for name, (pattern, path) in _layers(inner, read_design_index(inner)):
                 yield f"{design.name}/{name}", (f"{design.name} {pattern}", path)
         return
     for layer in claims.layers:

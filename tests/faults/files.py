@@ -22,14 +22,14 @@ CLAIMS = "manifest-claims"
 POLYLINE = "AcDbPolyline\n"
 
 
-def broken(name: str, change: Callable[[Path], object]) -> Fault:
+def broken(name: str, change: Callable[[Path], object], rule: str = "file-integrity") -> Fault:
     """A fault in the file of the lowest wall, with its hash put right."""
 
     def put(specimen: Specimen) -> None:
         change(specimen.doctor.path(tabbed_wall(specimen.clean).index))
         specimen.doctor.rehash()
 
-    return Fault(name, "file-integrity", put)
+    return Fault(name, rule, put)
 
 
 def edited(name: str, change: Callable[[str], str]) -> Fault:
@@ -227,7 +227,7 @@ KIND = Kind(
         edited("contour on a layer that is not cut", on_layer("REFERENCE")),
         edited("contour on layer 0", on_layer("0")),
         edited("contour off the plane", raised),
-        broken("contours as chords", as_chords),
+        broken("contours as chords", as_chords, "as-designed"),
         *(
             edited(f"stray line on {layer} through the part", with_stroke(layer))
             for layer in ("CUT_SHEET", "ENGRAVE", "REFERENCE")

@@ -12,6 +12,7 @@ from unittest.mock import patch
 
 from sbafab.folders import build as builds
 from sbafab.folders import check as as_built
+from sbafab.folders.order import Order
 
 
 def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
@@ -29,15 +30,15 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     )
     made: dict[str, Any] = {}
 
-    def remake_once(folder: Path, fresh: Path, built: as_built.AsBuiltFolder, of_job: bool) -> Any:
+    def remake_once(folder: Path, index: Any, order: Order, is_of_job: bool, fresh: Path) -> Any:
         asked = [folder / name for name in ("design.toml", "sheets/nest.json")]
         files = [path.read_bytes() if path.exists() else b"" for path in asked]
-        claims = built.claims
-        said = repr((sorted(claims.files), claims.curves, built.build.findings)).encode()
+        curves = [build.curves for build in order.builds]
+        said = repr((sorted(index.files), curves, order.findings)).encode()
         key = sha256(b"".join(files) + said).hexdigest()
         if key not in made:
             (root / key).mkdir(parents=True)
-            made[key] = remake(folder, root / key, built, of_job)
+            made[key] = remake(folder, index, order, is_of_job, root / key)
         shutil.copytree(root / key, fresh, dirs_exist_ok=True)
         return made[key]
 

@@ -13,7 +13,7 @@ from unittest.mock import patch
 from sbafab.folders import as_cut
 from sbafab.folders import build as builds
 from sbafab.folders import check as as_built
-from sbafab.folders.as_cut import CutPart, Expected, read_part
+from sbafab.folders.as_cut import CutPart, read_part
 from sbafab.folders.check import check_folder
 from sbafab.geometry.region import Region
 from sbafab.laminate import laminate
@@ -50,16 +50,10 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
     folder is written.
     """
 
-    def known(
-        path: Path,
-        has_chords: bool = False,
-        properties: Mapping[str, str] | None = None,
-        expected: Expected | None = None,
-    ) -> CutPart:
-        shape = expected.profile.key if expected is not None else ""
-        digest = sha256(path.read_bytes()).hexdigest() + shape
+    def known(path: Path, properties: Mapping[str, str], profile: Region, beam: Region) -> CutPart:
+        digest = sha256(path.read_bytes()).hexdigest() + profile.key
         if digest not in parts:
-            parts[digest] = read_part(path, has_chords, properties, expected)
+            parts[digest] = read_part(path, properties, profile, beam)
         return parts[digest]
 
     def regions(below: Region, above: Region, masks: Sequence[Region]) -> tuple[Region, ...]:

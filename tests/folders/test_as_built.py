@@ -94,10 +94,6 @@ def contour_on_reference(doctor: Doctor) -> None:
     doctor.edit(3, "  8\nCUT_INNER\n100\nAcDbCircle", "  8\nREFERENCE\n100\nAcDbCircle")
 
 
-def chords(doctor: Doctor) -> None:
-    doctor.redraw(3, lambda region: in_chords(region, "wall", 0.005))
-
-
 @pytest.mark.parametrize(
     "fault",
     [
@@ -111,7 +107,6 @@ def chords(doctor: Doctor) -> None:
         crossing_contours,
         wrong_dxf_layer,
         contour_on_reference,
-        chords,
     ],
 )
 def test_unsound_files_are_told_with_their_layer(
@@ -125,6 +120,12 @@ def test_unsound_files_are_told_with_their_layer(
     told = {finding.rule: finding for finding in found}
     assert told["sealing"].verdict == "warn"
     assert "not run" in told["sealing"].message
+
+
+def test_chords_that_no_property_states_depart_from_the_design(doctor: Doctor) -> None:
+    doctor.redraw(3, lambda region: in_chords(region, "separator-mask", 0.005))
+    doctor.rehash()
+    assert failed(doctor.folder)["as-designed"].where.layers == (3,)
 
 
 def test_files_swapped_are_told(doctor: Doctor) -> None:

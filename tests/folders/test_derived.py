@@ -16,16 +16,12 @@ TABLE = "step,title,minutes\n1,flash,3\n2,bond,12\n"
     [
         (TABLE, ""),
         (TABLE.replace("12", "12.00000001"), ""),
-        (TABLE + "3,bond,20\n", "it has 3 rows, not 2"),
-        ("step,title,minutes\n1,flash,3\n", "it has 1 row, not 2"),
-        (TABLE.replace("12", "13"), 'row 2, column minutes is "13", not "12"'),
-        (TABLE.replace("flash", "bond"), 'row 1, column title is "bond", not "flash"'),
-        (TABLE.replace("bond,12", "bond,12,4"), "row 2 has 4 cells, not 3"),
-        (
-            TABLE.replace("title", "name"),
-            'its columns are "step, name, minutes", not "step, title, minutes"',
-        ),
-        ("", 'its columns are "", not "step, title, minutes"'),
+        (TABLE + "3,bond,20\n", "row has 3 entries, not 2"),
+        (TABLE.replace("12", "13"), 'row.2.minutes is "13", not "12"'),
+        (TABLE.replace("bond,12", "bond,12,4"), "row.2.None is one too many"),
+        (TABLE.replace("bond,12", "bond"), 'row.2.minutes is null, not "12"'),
+        (TABLE.replace("title", "name"), 'columns.2 is "name", not "title"'),
+        ("", "columns has 0 entries, not 3"),
     ],
 )
 def test_a_table_s_difference_names_row_and_column(text: str, says: str, tmp_path: Path) -> None:
