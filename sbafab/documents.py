@@ -94,14 +94,17 @@ class Document(Described):
         return {"schema": cls.SCHEMA, **keys} if cls.SCHEMA else keys
 
 
-def json_schema(record: type, identity: str) -> dict[str, Any]:
-    """Return the JSON schema of a record or document that is written below its id."""
-    if issubclass(record, BaseModel):
-        body = record.model_json_schema(mode="serialization")
-    else:
-        body = TypeAdapter(record).json_schema(mode="serialization")
-    body["properties"] = {"schema": {"const": identity}, **body["properties"]}
-    return {**body, "required": ["schema", *body.get("required", ())]}
+def json_schema(record: Any, identity: str) -> dict[str, Any]:
+    """Return the JSON schema of a record or document that is written below its id.
+
+    A list of records has no id.
+    """
+    body = TypeAdapter(record).json_schema(mode="serialization")
+    if "properties" not in body:
+        return body
+    required = [key for key in body.get("required", ()) if key != "schema"]
+    keys = {**body["properties"], "schema": {"const": identity}}
+    return {**body, "properties": keys, "required": ["schema", *required]}
 
 
 class _Joined:

@@ -20,10 +20,7 @@ from sbafab.rules.nets import connectivity
 
 @command
 def check(
-    source: Source | Assembly,
-    *changes: Change,
-    progress: Progress | None = None,
-    **tables: Any,
+    source: Source | Assembly, *changes: Change, progress: Progress | None = None, **tables: Any
 ) -> Findings:
     """Check a design with the rule deck; an assembly also between its parts.
 

@@ -9,9 +9,11 @@ from typing import Any
 
 from sbafab.api.designs import Source, command, either_of, load
 from sbafab.assemblies.records import Assembly
-from sbafab.cutting.properties import Curves, DxfProfile
+from sbafab.cutting.properties import TRUE_ARCS, Curves, DxfProfile
 from sbafab.design.files import Change
 from sbafab.design.records import Design
+from sbafab.errors import DesignError
+from sbafab.folders.artefacts import EVERYTHING
 from sbafab.folders.run import Conforming, Run, RunRequest, Simulated
 from sbafab.folders.run import generate as run
 from sbafab.folders.run import simulate as run_simulator
@@ -19,7 +21,7 @@ from sbafab.importing.records import default_file, write_imported
 from sbafab.importing.sources import import_source
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
 from sbafab.process import Progress
-from sbafab.simulators.simulator import Name, SimulationRequest
+from sbafab.simulators.simulator import NAMES, Name, SimulationRequest
 
 
 def import_design(source: str | Path, out: str | Path | None = None) -> Design:
@@ -43,26 +45,37 @@ def import_design(source: str | Path, out: str | Path | None = None) -> Design:
 def generate(
     source: Source | Assembly,
     *changes: Change,
-    out: str | Path = "out",
+    out: str | Path = RunRequest.out,
+    decks: bool = False,
+    dxf_profile: DxfProfile = TRUE_ARCS.profile,
+    chord_error: float = TRUE_ARCS.chord_error,
     progress: Progress | None = None,
     **tables: Any,
 ) -> Run:
     """Writes everything into ``out/<name>/``; the run tells whether a rule failed.
 
+    ``decks`` adds what the simulators read; ``dxf_profile`` and ``chord_error`` mm are as in
+    ``cut``.
     ``progress`` is called with each step; an exception from it ends the run and leaves the old
     folder intact. Raises DesignError, OutputError if the folder cannot be written or belongs to
     another design, and DefectError if the written files differ from the checked design.
     """
-    return run(RunRequest(either_of(source, changes, tables), Path(out)), progress)
+    either = either_of(source, changes, tables)
+    if decks and isinstance(either, Assembly):
+        raise DesignError(
+            f"decks are of one design, and {either.name} is an assembly; leave them out"
+        )
+    parts = (*EVERYTHING, *NAMES) if decks else EVERYTHING
+    return run(RunRequest(either, Path(out), parts, Curves(dxf_profile, chord_error)), progress)
 
 
 @command
 def cut(
     source: Source,
     *changes: Change,
-    out: str | Path = "out",
-    dxf_profile: DxfProfile = "bulges",
-    chord_error: float = 0.005,
+    out: str | Path = RunRequest.out,
+    dxf_profile: DxfProfile = TRUE_ARCS.profile,
+    chord_error: float = TRUE_ARCS.chord_error,
     progress: Progress | None = None,
     **tables: Any,
 ) -> Run:
@@ -78,20 +91,26 @@ def cut(
 
 
 @command
-def press(source: Source, *changes: Change, out: str | Path = "out", **tables: Any) -> Run:
+def press(
+    source: Source,
+    *changes: Change,
+    out: str | Path = RunRequest.out,
+    progress: Progress | None = None,
+    **tables: Any,
+) -> Run:
     """Writes the heat-press schedule, ``press.json`` and ``press.csv``; in C, kPa, N, mm and min.
 
     The steps are the paper's (Sec. 2). Raises DesignError if temperature, pad or pins do not
     suit the laminate, and OutputError.
     """
-    return run(RunRequest(load(source, *changes, **tables), Path(out), ("press",)))
+    return run(RunRequest(load(source, *changes, **tables), Path(out), ("press",)), progress)
 
 
 @command
 def mesh(
     source: Source,
     *changes: Change,
-    out: str | Path = "out",
+    out: str | Path = RunRequest.out,
     formats: str | Sequence[str] = ("vtu",),
     h: float = MeshSettings.h,
     element: Element = MeshSettings.element,
@@ -99,6 +118,7 @@ def mesh(
     fill_ul: float | Mapping[str, float] | None = MeshSettings.fill_ul,
     gaps: bool = MeshSettings.gaps,
     wrapped: bool = MeshSettings.wrapped,
+    progress: Progress | None = None,
     **tables: Any,
 ) -> Run:
     """Writes solid, cavities and conforming meshes; the run's ``conforming`` lists the latter.
@@ -111,15 +131,24 @@ def mesh(
     each = (formats,) if isinstance(formats, str) else tuple(formats)
     design = load(source, *changes, **tables)
     request = RunRequest(design, Path(out), ("mesh",), conforming=Conforming(settings, each))
-    return run(request)
+    return run(request, progress)
 
 
-def nest(sources: Sequence[Source], name: str = "job", out: str | Path = "out") -> Run:
+def nest(
+    sources: Sequence[Source],
+    name: str = RunRequest.name,
+    out: str | Path = RunRequest.out,
+    dxf_profile: DxfProfile = TRUE_ARCS.profile,
+    chord_error: float = TRUE_ARCS.chord_error,
+    progress: Progress | None = None,
+) -> Run:
     """Writes several designs into ``out/<name>/``, cut from the same film sheets.
 
-    Their films, sheets and kerf must be alike. Raises DesignError, OutputError and DefectError.
+    Their films, sheets and kerf must be alike; ``dxf_profile`` and ``chord_error`` mm are as in
+    ``cut``. Raises DesignError, OutputError and DefectError.
     """
-    return run(RunRequest([load(source) for source in sources], Path(out), name=name))
+    designs, curves = [load(source) for source in sources], Curves(dxf_profile, chord_error)
+    return run(RunRequest(designs, Path(out), curves=curves, name=name), progress)
 
 
 @command
@@ -127,7 +156,7 @@ def simulate(
     source: Source,
     *changes: Change,
     simulator: Name,
-    out: str | Path = "out",
+    out: str | Path = RunRequest.out,
     export: bool = False,
     pressure: float | None = None,
     chambers: Mapping[str, float] | None = None,
@@ -138,6 +167,7 @@ def simulate(
     scene: str | None = None,
     seconds: float | None = None,
     volumes: Mapping[str, float] | None = None,
+    progress: Progress | None = None,
     **tables: Any,
 ) -> Simulated:
     """Runs an installed simulator and writes to ``out/<name>/<simulator>/``.
@@ -153,4 +183,4 @@ def simulate(
         pressure, chambers or {}, minutes, h, symmetry, procedure, scene, seconds, volumes or {}
     )
     design = load(source, *changes, **tables)
-    return run_simulator(design, simulator, request, Path(out), export=export)
+    return run_simulator(design, simulator, request, Path(out), progress, export)

@@ -13,7 +13,6 @@ from click.shell_completion import CompletionItem
 
 from sbafab import __version__
 from sbafab.cli.exit import BAD_INPUT, exit_plainly, prepared_streams, print_error
-from sbafab.cli.progress import add_verbosity
 from sbafab.process import prepare
 
 GROUPS = {
@@ -61,7 +60,19 @@ A module has the name of its command, unless HOMES names another. The summaries 
 SUMMARIES = {name: summary for group in GROUPS.values() for name, summary in group.items()}
 BUILTIN = {"map": "map_", "import": "import_"}
 """Functions that cannot have the name of their command."""
-HOMES = {**dict.fromkeys(GROUPS["Make"], "make"), "schema": "formats", "import": "import_"}
+HOMES = {
+    name: module
+    for module, names in {
+        "start": "new studio",
+        "make": "import generate cut press mesh nest",
+        "inflate": "map picture",
+        "search": "find sweep compare",
+        "measure": "kerf inspect",
+        "evidence": "reproduce calibrate",
+        "formats": "schema",
+    }.items()
+    for name in names.split()
+}
 """Modules with another name than their command."""
 
 
@@ -71,6 +82,9 @@ class CommandTable(UserDict[str, Any]):
     def __getitem__(self, name: str) -> click.Command:
         command: click.Command | None = self.data[name]
         if command is None:
+            # Its module loads what commands print, and so the rules.
+            from sbafab.cli.show import add_verbosity
+
             module = import_module(f"sbafab.cli.{HOMES.get(name, name)}")
             command = self.data[name] = getattr(module, BUILTIN.get(name, name))
             add_verbosity(command)

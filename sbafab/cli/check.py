@@ -7,209 +7,142 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import click
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.files import load
-from sbafab.cli.exit import RULE_FAILED, print_error
-from sbafab.cli.options import (
-    designs,
-    json_option,
-    set_option,
-    target_yield_option,
-    waive_option,
-)
-from sbafab.cli.printing import (
-    FILES,
-    FindingGroup,
-    groups_of,
-    notes_of,
-    print_failed,
-    print_failure,
-    print_findings,
-    print_json,
-    print_line,
-    print_listed,
-    print_passed,
-    print_wrapped,
-)
-from sbafab.cli.progress import shown_progress
+from sbafab.cli import options as opt
+from sbafab.cli import show
+from sbafab.cli.exit import print_error
 from sbafab.design.files import template_names
 from sbafab.design.identity import cited
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, SbafabError
 from sbafab.folders.build import Build, refuse_undoable
 from sbafab.folders.checks import checks
-from sbafab.folders.order import Order, make_order
+from sbafab.folders.order import make_order
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.formulas import size_phrases, sizes
-from sbafab.process import Progress
-from sbafab.rules.deck import has_failed
-from sbafab.rules.finding import Finding
 from sbafab.rules.nets import netlist_findings
-from sbafab.search.advice import Advice, advise
+from sbafab.search.advice import advise
 
 YIELD_RULE = "registration-yield"
 DEFAULT_KIT = "paper"
 """The kit of a design that names none."""
 
 
-class CheckOutcome(NamedTuple):
-    """Result of a check: ``findings`` in the designs of ``job``, or in a folder without one.
-
-    ``has_target`` is True if the design itself sets ``rules.target_yield``.
-    """
-
-    name: str
-    findings: Sequence[Finding]
-    groups: Sequence[FindingGroup]
-    job: Order | None = None
-    advice: Advice | None = None
-    has_target: bool = False
-
-    @property
-    def designs(self) -> Sequence[Build]:
-        return () if self.job is None else self.job.builds
-
-
 @click.command()
-@click.argument("source", metavar="DESIGN|FOLDER", shell_complete=designs)
-@set_option
-@waive_option("Accept the failure of this rule; cut files would state it. Repeatable.")
-@target_yield_option(
+@opt.design_argument(metavar="DESIGN|FOLDER")
+@opt.set_option
+@opt.waive_option("Accept the failure of this rule; cut files would state it. Repeatable.")
+@opt.target_yield_option(
     "Fail if fewer random builds are good than this share, e.g. 0.99, and advise the smallest bond "
     "and overhang that reach it."
 )
-@click.option(
-    "--nets",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Also compare what the layers join with a netlist: JSON of sbafab/nets@1 or ParchMint.",
+@opt.option(
+    "--nets FILE",
+    "Also compare what the layers join with a netlist: JSON of sbafab/nets@1 or ParchMint.",
+    opt.file_path(exists=True, dir_okay=False),
 )
-@click.option("-v", "--verbose", is_flag=True, help="All findings, with places and reasons.")
-@click.option("--watch", is_flag=True, help="Check again whenever a file of the design changes.")
-@json_option
-def check(  # noqa: PLR0913, PLR0917 - one an option
-    source: str,
-    assignments: tuple[str, ...],
-    waivers: tuple[str, ...],
-    target_yield: float | None,
-    nets: Path | None,
-    verbose: bool,
-    watch: bool,
-    as_json: bool,
-) -> None:
+@opt.option("-v --verbose", "All findings, with places and reasons.", bool)
+@opt.option("--watch", "Check again whenever a file of the design changes.", bool)
+@opt.json_option
+def check(source: str, watch: bool, as_json: bool, **options: Any) -> None:
     """Run the rules on a design or on an output folder.
 
     Nothing is written. FOLDER was written by sbafab generate; the files on disk are checked.
     """
-
-    def run() -> bool:
-        """Check and print the outcome; return True if a rule failed."""
-        if is_folder:
-            outcome = _check_folder(Path(source), nets)
-        else:
-            with shown_progress(as_json) as progress:
-                outcome = _check_source(source, assignments, waivers, target_yield, nets, progress)
-        if as_json:
-            _print_json(outcome)
-        else:
-            _print(outcome, verbose)
-        return has_failed(outcome.findings)
-
     is_folder = source not in template_names() and Path(source).is_dir()
-    if is_folder and (assignments or waivers or target_yield is not None):
+    if is_folder and (options["assignments"] or options["waivers"] or options["target_yield"]):
         raise DesignError(
             "--set, --waive and --target-yield go with a design; leave them out to check a folder"
         )
     if watch and as_json:
         raise click.UsageError("--watch and --json exclude each other; leave one out")
+
+    def run() -> bool:
+        """Check and print the outcome; return True if a rule failed."""
+        if is_folder:
+            return _check_folder(Path(source), options["nets"], options["verbose"], as_json)
+        return _check_design(source, as_json, **options)
+
     if watch:
         watch_source(run, Path(source))
     elif run():
-        click.get_current_context().exit(RULE_FAILED)
+        show.end_failed()
 
 
-def _print_json(outcome: CheckOutcome) -> None:
-    more: dict[str, object] = {"notes": notes_of(outcome.designs)}
-    if outcome.job is not None:
-        more["sizes"] = {
-            each.design.name: sizes(each.design, each.laminate) for each in outcome.designs
-        }
-    if outcome.advice is not None:
-        more["advice"] = outcome.advice
-    kind = "as-built" if outcome.job is None else "design"
-    designs = [each.design for each in outcome.designs]
-    print_json(checks(outcome.findings, kind, outcome.name, designs, **more))
-
-
-def _print(outcome: CheckOutcome, verbose: bool) -> None:
-    """Print sizes, kit, notes and findings, and last the verdict."""
-    if outcome.job is None:
-        print_line(f"as built: {outcome.name}")
-    for each in outcome.designs:
-        label = "size" if len(outcome.designs) == 1 else f"{each.design.name}, size"
-        print_listed(label, size_phrases(each.design, each.laminate))
-    designs = [each.design for each in outcome.designs]
-    kits = [cited(design) for design in designs if verbose or design.kit != DEFAULT_KIT]
-    for line in dict.fromkeys(kits):
-        print_wrapped(line)
-    for note in notes_of(outcome.designs):
-        print_wrapped(f"note: {note}")
-    print_findings(outcome.groups, verbose)
-    if outcome.advice:
-        print_wrapped(outcome.advice.sentence)
-    failed = {finding.rule for finding in outcome.findings if finding.verdict == "fail"}
-    if outcome.advice and failed == {YIELD_RULE} and not outcome.has_target:
-        print_failure(
-            f"{outcome.name} failed: yield below the requested {outcome.advice.target:g}. Without "
-            "--target-yield all rules pass, and it may be cut"
-        )
-    elif failed:
-        change = FILES if outcome.job is None else "design"
-        print_failed(outcome.name, outcome.findings, "It must not be cut", change)
-    else:
-        print_passed(outcome.name, outcome.groups, "" if verbose else "-v")
-
-
-def _check_source(
+def _check_design(
     name: str,
+    as_json: bool,
+    *,
     assignments: tuple[str, ...],
     waivers: tuple[str, ...],
-    target: float | None,
+    target_yield: float | None,
     nets: Path | None,
-    progress: Progress,
-) -> CheckOutcome:
-    """Check a design or an assembly. Raises DesignError, also if press or sheets cannot make it."""
+    verbose: bool,
+) -> bool:
+    """Check a design or an assembly and print the outcome; return True if a rule failed.
+
+    Raises DesignError, also if press or sheets cannot make it.
+    """
     source = load(name, assignments, waivers)
-    for option, value in (("--target-yield", target), ("--nets", nets)):
+    for flag, value in (("--target-yield", target_yield), ("--nets", nets)):
         if value is not None and not isinstance(source, Design):
             raise DesignError(
-                f"{option} goes with a design, and this is an assembly; check its parts' designs "
+                f"{flag} goes with a design, and this is an assembly; check its parts' designs "
                 "one by one"
             )
-    advice, has_target = None, False
-    if target is not None and isinstance(source, Design):
-        wanted = (*assignments, f"rules.target_yield={target}")
-        advice = advise(load_design(name, wanted), target, progress)
-        has_target = source.rules.target_yield is not None
-        source = load_design(name, wanted, waivers)
-    job = make_order(source, progress=progress)
-    if not job.failed:
-        refuse_undoable(job.builds)
-    findings, groups = job.findings, groups_of(job.builds, job.between)
+    advice, has_target = None, isinstance(source, Design) and source.rules.target_yield is not None
+    with show.progress(as_json) as progress:
+        if target_yield is not None:
+            wanted = (*assignments, f"rules.target_yield={target_yield}")
+            advice = advise(load_design(name, wanted), target_yield, progress)
+            source = load_design(name, wanted, waivers)
+        order = make_order(source, progress=progress)
+    if not order.failed:
+        refuse_undoable(order.builds)
+    findings, groups = order.findings, show.groups_of(order)
     if nets is not None:
-        (checked,) = job.builds
-        more = netlist_findings(checked.laminate, checked.design, read_netlist(nets), nets.name)
+        (build,) = order.builds
+        more = netlist_findings(build.laminate, build.design, read_netlist(nets), nets.name)
         findings = (*findings, *more)
-        groups = (FindingGroup(job.name, findings),)
-    return CheckOutcome(job.name, findings, groups, job, advice, has_target)
+        groups = {order.name: findings}
+    if as_json:
+        printed: dict[str, object] = {} if advice is None else {"advice": advice}
+        printed["sizes"] = {b.design.name: sizes(b.design, b.laminate) for b in order.builds}
+        printed["notes"] = show.notes_of(order.builds)
+        designs = [build.design for build in order.builds]
+        show.document(checks(findings, "design", order.name, designs, **printed))
+        return bool(show.failed_rules(findings))
+    _print_heads(order.builds, verbose)
+    show.findings(groups, verbose)
+    if advice is not None:
+        show.wrapped(advice.sentence)
+    if advice is not None and show.failed_rules(findings) == [YIELD_RULE] and not has_target:
+        show.failure(
+            f"{order.name} failed: yield below the requested {advice.target:g}. Without "
+            "--target-yield all rules pass, and it may be cut"
+        )
+        return True
+    return _print_outcome(order.name, groups, verbose, "design")
 
 
-def _check_folder(folder: Path, nets: Path | None) -> CheckOutcome:
-    """Check the files of an output folder."""
+def _print_heads(builds: Sequence[Build], verbose: bool) -> None:
+    """Print sizes, kits and notes."""
+    for build in builds:
+        label = "size" if len(builds) == 1 else f"{build.design.name}, size"
+        show.phrases(label, size_phrases(build.design, build.laminate))
+    designs = [build.design for build in builds]
+    kits = [cited(design) for design in designs if verbose or design.kit != DEFAULT_KIT]
+    for line in (*dict.fromkeys(kits), *(f"note: {note}" for note in show.notes_of(builds))):
+        show.wrapped(line)
+
+
+def _check_folder(folder: Path, nets: Path | None, verbose: bool, as_json: bool) -> bool:
+    """Check the files of an output folder and print the outcome; return True if a rule failed."""
     import logging
 
     # Modules that read a folder back take as long to load as those that check a design.
@@ -218,7 +151,22 @@ def _check_folder(folder: Path, nets: Path | None) -> CheckOutcome:
     # A broken file becomes a finding; the log of ezdxf would repeat it on the screen.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
     findings = check_folder(folder, nets)
-    return CheckOutcome(str(folder), findings, [FindingGroup(str(folder), findings)])
+    if as_json:
+        show.document(checks(findings, "as-built", str(folder), notes=()))
+        return bool(show.failed_rules(findings))
+    show.line(f"as built: {folder}")
+    show.findings({str(folder): findings}, verbose)
+    return _print_outcome(str(folder), {str(folder): findings}, verbose, show.FILES)
+
+
+def _print_outcome(name: str, groups: show.Groups, verbose: bool, change: str) -> bool:
+    """Print the verdict; return True if a rule failed."""
+    findings = [finding for group in groups.values() for finding in group]
+    if not show.failed_rules(findings):
+        show.passed(name, groups, "" if verbose else "-v")
+        return False
+    show.failed(name, findings, "It must not be cut", change)
+    return True
 
 
 # Checking again after every change of a file, until Ctrl-C.

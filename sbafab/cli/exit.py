@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import Literal, NamedTuple, NoReturn
+from typing import Literal, NoReturn
 
 import click
 
@@ -42,24 +42,17 @@ RAISE_AGAIN_SECONDS = 0.01
 """Seconds after which a lost interrupt is raised again."""
 
 
-class Exit(NamedTuple):
-    """The end of a command: kind of error, one sentence, exit code."""
-
-    kind: ErrorKind
-    sentence: str
-    code: int
-
-
-def end(outcome: Exit, as_json: bool) -> NoReturn:
-    """Print the error, with ``as_json`` also as JSON on standard output, and exit with its code."""
-    print_error(outcome.sentence)
+def end(kind: ErrorKind, sentence: str, code: int, as_json: bool) -> NoReturn:
+    """Print an error in one sentence, with ``as_json`` also as JSON on standard output, and exit
+    with ``code``.
+    """
+    print_error(sentence)
     if as_json:
-        kind, sentence, code = outcome
         document = {"kind": kind, "message": " ".join(sentence.split()), "exit_code": code}
         # Standard output may be what failed.
         with suppress(OSError):
             click.echo(json.dumps({"schema": ERROR_SCHEMA, "error": document}, indent=1))
-    sys.exit(outcome.code)
+    sys.exit(code)
 
 
 def print_error(sentence: str) -> None:
@@ -96,33 +89,28 @@ def exit_plainly(as_json: bool = False) -> Iterator[None]:
         if error.ctx is not None:
             see = " See" if sentence.endswith("?") else "; see"
             sentence += f"{see} {error.ctx.command_path} --help"
-        end(Exit("usage", sentence, BAD_INPUT), as_json)
+        end("usage", sentence, BAD_INPUT, as_json)
     except SbafabError as error:
-        kind: ErrorKind = next(
-            (name for kind, name in KINDS.items() if isinstance(error, kind)), "input"
-        )
-        code = BAD_INPUT if kind == "input" else RULE_FAILED
-        end(Exit(kind, str(error), code), as_json)
+        kinds: list[ErrorKind] = [name for of, name in KINDS.items() if isinstance(error, of)]
+        kind = kinds[0] if kinds else "input"
+        end(kind, str(error), BAD_INPUT if kind == "input" else RULE_FAILED, as_json)
     except KeyboardInterrupt as stop:
-        code = BY_SIGNAL + (stop.args[0] if stop.args else signal.SIGINT)
         sentence = stop.sentence if isinstance(stop, Stopped) else STOPPED
-        end(Exit("stopped", sentence, code), as_json)
+        number = stop.args[0] if stop.args else signal.SIGINT
+        end("stopped", sentence, BY_SIGNAL + number, as_json)
     except BrokenPipeError:
         # The reader of standard output has closed it (``| head``); the files are written.
         _discard_output()
         sys.exit(BY_SIGNAL + getattr(signal, "SIGPIPE", 13))
     except MemoryError:
         sentence = "there is not enough memory; make the design smaller"
-        end(Exit("memory", sentence, BAD_INPUT), as_json)
+        end("memory", sentence, BAD_INPUT, as_json)
     except OSError as error:
         if error.filename is None:
             _discard_output()
-        where = error.filename or "standard output"
         reason = error.strerror or str(error)
-        message = (
-            f"{where}: {reason[:1].lower()}{reason[1:]}; free space there or name another folder"
-        )
-        end(Exit("files", message, BAD_INPUT), as_json)
+        where = f"{error.filename or 'standard output'}: {reason[:1].lower()}{reason[1:]}"
+        end("files", f"{where}; free space there or name another folder", BAD_INPUT, as_json)
 
 
 def _discard_output() -> None:

@@ -13,8 +13,8 @@ from click.shell_completion import CompletionItem
 
 from sbafab import actuators
 from sbafab.assemblies.records import Assembly
-from sbafab.cli.options import completions, json_option
-from sbafab.cli.printing import print_facts, print_json
+from sbafab.cli import options as opt
+from sbafab.cli import show
 from sbafab.documents import Document
 from sbafab.rules.deck import EXPLAINED
 from sbafab.rules.sentences import Explanation
@@ -70,7 +70,7 @@ class DesignKey:
 
 
 def _completed(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
-    return completions(typed, ((name, None) for name in explainable_names()))
+    return opt.completions(typed, ((name, None) for name in explainable_names()))
 
 
 class ExplainDocument(Document, schema="sbafab/explain@1"):
@@ -94,7 +94,7 @@ class ExplainedDocument(Document, schema="sbafab/explained@1"):
 
 @click.command()
 @click.argument("name", required=False, shell_complete=_completed)
-@json_option
+@opt.json_option
 def explain(name: str | None, as_json: bool) -> None:
     """Explain a rule, a key of design files, a quantity, or a flag of figures.
 
@@ -102,29 +102,29 @@ def explain(name: str | None, as_json: bool) -> None:
     """
     if name is None:
         if as_json:
-            print_json(ExplainedDocument.of(None, rules=EXPLAINED))
+            show.document(ExplainedDocument.of(None, rules=EXPLAINED))
         else:
             _print_listed({rule: each.holds for rule, each in EXPLAINED.items()})
         return
     document = _explained(name)
     if as_json:
-        print_json(ExplainDocument.of(None, **document))
+        show.document(ExplainDocument.of(None, **document))
     elif "rule" in document:
         keys = ", ".join(document["keys"]) or "none"
         heads = {"rule": "rule", "holds": "passes when", "why": "because", "mend": "if it fails"}
-        print_facts([*((head, document[key]) for key, head in heads.items()), ("keys", keys)])
+        show.facts([*((head, document[key]) for key, head in heads.items()), ("keys", keys)])
     elif "term" in document:
-        print_facts(document.items())
+        show.facts(document.items())
     elif "quantities" in document:
         for row in document["quantities"]:
-            print_facts(
+            show.facts(
                 [("quantity", row.written), ("unit", row.unit or "none"), ("meaning", row.meaning)]
             )
     elif any(row.key != name for row in document["keys"]):
         _print_listed({row.key: row.meaning for row in document["keys"]})
     else:
         for row in document["keys"]:
-            print_facts({**asdict(row), "families": ", ".join(row.families)}.items())
+            show.facts({**asdict(row), "families": ", ".join(row.families)}.items())
 
 
 def _explained(name: str) -> dict[str, Any]:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
 import click
@@ -13,11 +13,13 @@ from pydantic import Field
 
 from sbafab import actuators
 from sbafab.assemblies.records import Assembly
+from sbafab.cli import show
+from sbafab.cli.evidence import CalibrateDocument
 from sbafab.cli.exit import ErrorKind
 from sbafab.cli.explain import ExplainDocument, ExplainedDocument
-from sbafab.cli.kerf import KerfDocument
 from sbafab.cli.make import NestedDocument, RunDocument
-from sbafab.cli.printing import print_json
+from sbafab.cli.measure import KerfDocument
+from sbafab.cli.start import TemplateEntry
 from sbafab.design.laminate_file import SCHEMA as LAMINATE
 from sbafab.design.laminate_file import LaminateDocument
 from sbafab.documents import Document, json_schema
@@ -95,36 +97,22 @@ class ErrorDocument(Document, schema=ERROR_SCHEMA):
 
 
 class Format(NamedTuple):
-    """A format: the id in its files, what it describes, and what its schema comes from."""
+    """A format: the id in its files, what it describes, and its record."""
 
     identity: str
     about: str
-    body: type | Callable[[], dict[str, Any]]
+    record: Any
 
 
 def _of(about: str, document: type[Document]) -> Format:
     return Format(document.SCHEMA, about, document)
 
 
-def _design() -> dict[str, Any]:
-    schema = actuators.schema(Assembly)
-    return {key: value for key, value in schema.items() if key != "$schema"}
-
-
-def _templates() -> dict[str, Any]:
-    text = {"type": "string"}
-    keys = {"name": text, "summary": text}
-    item = {"type": "object", "required": [*keys], "properties": keys}
-    return {"type": "array", "items": item}
-
-
 FORMATS: Mapping[str, Format] = {
-    "design": Format("sbafab/design@1", "design and assembly files (TOML)", _design),
+    "design": Format("sbafab/design@1", "design and assembly files (TOML)", Assembly),
     "checks": _of("`checks.json`, and what `check --json` prints", Checks),
     "laminate": Format(
-        LAMINATE,
-        "`laminate.json`: layers with exact edges, films, inlets",
-        lambda: LaminateDocument.model_json_schema(mode="serialization"),
+        LAMINATE, "`laminate.json`: layers with exact edges, films, inlets", LaminateDocument
     ),
     "nets": _of("a netlist, for `check --nets`", NetsDocument),
     "manifest": _of("`manifest.json` of a design's folder", Manifest),
@@ -143,8 +131,7 @@ FORMATS: Mapping[str, Format] = {
     "report": _of("what `record --report --json` prints", ReportDocument),
     "sweep": _of("what `sweep --json` prints", SweepDocument),
     "simulate": _of(
-        "`result.json` of a simulator's folder, and what `simulate --json` prints",
-        SimulateDocument,
+        "`result.json` of a simulator's folder, and what `simulate --json` prints", SimulateDocument
     ),
     "assembly-predict": Format(
         ASSEMBLY_PREDICTION, "what `predict --json` prints of an assembly", AssemblyPrediction
@@ -158,8 +145,9 @@ FORMATS: Mapping[str, Format] = {
     "kerf": _of("what `kerf --json` prints", KerfDocument),
     "explain": _of("what `explain NAME --json` prints", ExplainDocument),
     "explained": _of("what `explain --json` prints of all rules", ExplainedDocument),
+    "calibrate": _of("what `calibrate --json` prints", CalibrateDocument),
     "templates": Format(
-        "sbafab/templates@1", "what `new --json` prints: a list, without id", _templates
+        "sbafab/templates@1", "what `new --json` prints: a list, without id", list[TemplateEntry]
     ),
     "error": _of("what any command prints with `--json` when it ends in an error", ErrorDocument),
 }
@@ -167,10 +155,11 @@ FORMATS: Mapping[str, Format] = {
 
 def schema_of(name: str) -> dict[str, Any]:
     """Return the JSON schema of a format in ``FORMATS``."""
-    form = FORMATS[name]
-    head = {"$schema": DIALECT, "$id": f"urn:{form.identity.replace('/', ':')}"}
-    body = form.body
-    return {**head, **(json_schema(body, form.identity) if isinstance(body, type) else body())}
+    identity, _, record = FORMATS[name]
+    # A design file is an assembly or of any family.
+    body = actuators.schema(record) if record is Assembly else json_schema(record, identity)
+    head = {"$schema": DIALECT, "$id": f"urn:{identity.replace('/', ':')}"}
+    return head | {key: value for key, value in body.items() if key != "$schema"}
 
 
 @click.command()
@@ -180,4 +169,4 @@ def schema(name: str) -> None:
 
     Editors use it to complete and check design files; the other schemas describe JSON output.
     """
-    print_json(schema_of(name))
+    show.document(schema_of(name))

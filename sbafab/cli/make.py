@@ -1,72 +1,47 @@
-"""``sbafab generate``, ``cut``, ``press``, ``mesh`` and ``nest``: commands that write a folder.
+"""``sbafab generate``, ``cut``, ``press``, ``mesh``, ``nest`` and ``import``: commands that write.
 
 Each runs a design, prints the table of its files, and exits by the verdict.
 """
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
 import click
 
 from sbafab.actuators import load_design
+from sbafab.api import runs
 from sbafab.assemblies.files import load
-from sbafab.cli.exit import RULE_FAILED, Exit, end, print_error
-from sbafab.cli.options import (
-    LENGTH,
-    VOLUME,
-    OfChamber,
-    Request,
-    by_chamber,
-    dxf_options,
-    run_options,
-    sheet_options,
-    target_yield_option,
-)
-from sbafab.cli.printing import (
-    groups_of,
-    notes_of,
-    print_facts,
-    print_failed,
-    print_json,
-    print_line,
-    print_open,
-    print_passed,
-    print_table,
-    print_wrapped,
-    print_written,
-    several,
-)
-from sbafab.cli.progress import shown_progress
-from sbafab.cutting.properties import Curves
+from sbafab.cli import options as opt
+from sbafab.cli import show
+from sbafab.cli.exit import RULE_FAILED, end, print_error
 from sbafab.design.files import changed_keys
 from sbafab.design.records import Design
 from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
-from sbafab.folders.artefacts import EVERYTHING, RunPart
 from sbafab.folders.checks import FindingEntry
-from sbafab.folders.run import Conforming, Run, RunRequest
-from sbafab.folders.run import generate as run_design
+from sbafab.folders.order import JOB_SCHEMA
+from sbafab.folders.run import Run
+from sbafab.importing.records import default_file, write_imported
+from sbafab.importing.sources import import_source
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
 from sbafab.meshing.formats import CONFORMING_ENDINGS
 from sbafab.pressing.cycles import batch_times, design_runs
-from sbafab.simulators.simulator import NAMES
 
 
 @click.command()
-@run_options()
-@dxf_options
-@sheet_options
-@target_yield_option(
+@opt.run_options()
+@opt.cut_options
+@opt.target_yield_option(
     "Change the design as little as this share of good random builds needs, e.g. 0.95: order of "
     "stacking, bond and overhang, plate, ears. Keys of --set stay."
 )
-@click.option("--decks", is_flag=True, help="Also write the input files of the simulators.")
-def generate(request: Request, curves: Curves, target_yield: float | None, decks: bool) -> None:
+@opt.option("--decks", "Also write the input files of the simulators.", bool)
+def generate(request: opt.Request, target_yield: float | None, **settings: Any) -> None:
     """Write everything: cut files, schedule, traveller, meshes.
 
     --decks also writes calculix/, sofa/ and mujoco/, like `sbafab simulate --export`. An assembly
@@ -74,15 +49,11 @@ def generate(request: Request, curves: Curves, target_yield: float | None, decks
     --target-yield prints what it changed and what that costs, and the folder's design.toml is the
     changed design; if the share is not reached, nothing is written and the exit code is 1.
     """
-    source = load(request.design, request.assignments, request.waivers)
-    if decks and not isinstance(source, Design):
-        raise click.UsageError("--decks goes with one design; leave it out for an assembly")
-    parts = (*EVERYTHING, *NAMES) if decks else EVERYTHING
-    wanted = RunRequest(source, request.out, parts, curves)
+    source = load(*request.source)
     if target_yield is None:
-        run_request(wanted, request)
+        _run(request, runs.generate, source, **settings)
     elif isinstance(source, Design):
-        _generate_for_yield(source, target_yield, wanted, request)
+        _generate_for_yield(source, target_yield, request, settings)
     else:
         raise DesignError(
             "--target-yield goes with a design, and this is an assembly; generate its parts' "
@@ -91,162 +62,157 @@ def generate(request: Request, curves: Curves, target_yield: float | None, decks
 
 
 @click.command()
-@run_options()
-@dxf_options
-@sheet_options
-def cut(request: Request, curves: Curves) -> None:
+@opt.run_options()
+@opt.cut_options
+def cut(request: opt.Request, **curves: Any) -> None:
     """Write the cut files: a DXF for each layer, and film sheets."""
-    _run_parts(request, ("cut",), curves=curves)
+    _run(request, runs.cut, load_design(*request.source), **curves)
 
 
 @click.command()
-@run_options()
-def press(request: Request) -> None:
+@opt.run_options()
+def press(request: opt.Request) -> None:
     """Write the heat-press schedule."""
-    _run_parts(request, ("press",))
-
-
-def _positive(ctx: click.Context, param: click.Parameter, value: float) -> float:
-    if value <= 0:
-        raise click.BadParameter("must be a length above 0 mm", ctx, param)
-    return value
-
-
-def _fill(
-    ctx: click.Context, param: click.Parameter, values: tuple[tuple[str, float], ...]
-) -> float | dict[str, float] | None:
-    """Return one volume for all balloons, one by chamber, or None."""
-    volumes = by_chamber(ctx, param, values)
-    if "" in volumes and len(volumes) > 1:
-        raise click.BadParameter("give one volume for all, or one for each chamber", ctx, param)
-    return volumes.get("", volumes) if volumes else None
+    _run(request, runs.press, load_design(*request.source))
 
 
 @click.command()
-@run_options()
-@click.option(
-    "--h",
-    "h",
-    type=LENGTH.read,
-    callback=_positive,
-    default="0.35",
-    metavar="MM",
-    help="Edge length of the triangles.",
-)
-@click.option(
+@opt.run_options()
+@opt.option("--h", "Edge length of the triangles.", opt.POSITIVE_LENGTH, default=MeshSettings.h)
+@opt.option(
     "--element",
-    type=click.Choice(get_args(Element)),
-    default="wedge",
-    help="Second-order wedges or tetrahedra.",
+    "Second-order wedges or tetrahedra.",
+    get_args(Element),
+    default=MeshSettings.element,
 )
-@click.option(
+@opt.option(
     "--symmetry",
-    type=click.Choice(get_args(Symmetry)),
-    default="full",
-    help="Part of the actuator that is meshed.",
+    "Part of the actuator that is meshed.",
+    get_args(Symmetry),
+    default=MeshSettings.symmetry,
 )
-@click.option(
-    "--fill",
-    "fill_ul",
-    multiple=True,
-    type=OfChamber(VOLUME, all_chambers=True).read,
-    callback=_fill,
-    metavar="UL|CHAMBER=UL",
-    help="Air volume of each balloon, e.g. 5ul. Repeatable for chambers.  [default: flat]",
+@opt.option(
+    "--fill fill_ul...",
+    "Air volume of each balloon, or of each of a chamber, e.g. 5ul.  [default: flat]",
+    opt.OfChamber(opt.VOLUME, all_chambers=True),
 )
-@click.option("--gaps", is_flag=True, help="Keep films a mask thickness apart.")
-@click.option("--flat", is_flag=True, help="Do not wrap designs for a tube.")
-@click.option(
-    "--format",
-    "formats",
-    type=click.Choice(CONFORMING_ENDINGS),
-    multiple=True,
-    help="Formats of the volume, shell and cavity meshes. Repeatable.  [default: all]",
+@opt.option("--gaps", "Keep films a mask thickness apart.", bool)
+@opt.option("--flat", "Do not wrap designs for a tube.", bool)
+@opt.option(
+    "--format formats...",
+    "Formats of the volume, shell and cavity meshes.  [default: all]",
+    tuple(CONFORMING_ENDINGS),
 )
-def mesh(request: Request, formats: tuple[str, ...], flat: bool, **settings: Any) -> None:
+def mesh(
+    request: opt.Request,
+    formats: tuple[str, ...],
+    flat: bool,
+    fill_ul: dict[str, float],
+    **more: Any,
+) -> None:
     """Write meshes: solid, cavities, volume and shell.
 
     Volume and shell meshes need the extra "mesh": pip install "sbafab[mesh]".
     """
-    conforming = Conforming(
-        MeshSettings(wrapped=not flat, **settings), formats or CONFORMING_ENDINGS
-    )
-    _run_parts(request, ("mesh",), conforming=conforming)
+    if "" in fill_ul and len(fill_ul) > 1:
+        raise click.UsageError("--fill takes one volume for all, or one for each chamber")
+    fill = fill_ul.get("", fill_ul) if fill_ul else None
+    more |= {"formats": formats or CONFORMING_ENDINGS, "wrapped": not flat, "fill_ul": fill}
+    _run(request, runs.mesh, load_design(*request.source), **more)
 
 
 @click.command()
-@run_options(is_several=True)
-@click.option("--name", default="job", help="Name of the folder OUT/<name>/.")
-@dxf_options
-@sheet_options
-def nest(request: Request, name: str, curves: Curves) -> None:
+@opt.run_options(is_several=True)
+@opt.option("--name", "Name of the folder OUT/<name>/.", default="job")
+@opt.cut_options
+def nest(request: opt.Request, **settings: Any) -> None:
     """Cut several designs from the same film sheets.
 
     OUT/<name>/ receives a folder for each DESIGN, and sheets/ with the parts of all. Overrides
     apply to every design. Copies: --copies of every design, else each design's order.copies.
     """
     designs = [load_design(name, request.assignments, request.waivers) for name in request.designs]
-    wanted = RunRequest(designs, request.out, curves=curves, name=name)
-    run_request(wanted, request, _print_job, _job_json)
+    _run(request, runs.nest, designs, **settings)
+
+
+@click.command("import")
+@click.argument("source", type=opt.file_path())
+@opt.folder_option("Folder in which NAME.toml and a folder of its drawings are written.")
+@opt.file_option("NAME.toml")
+@opt.json_option
+def import_(source: Path, out: Path, to: Path | None, as_json: bool) -> None:
+    """Write a design of drawn layers from other files.
+
+    SOURCE is a folder of drawings with a table layers.csv, an output folder, a laminate.json, a
+    ParchMint circuit (JSON), or a laminate of foldable_robotics or popupCAD. What is not carried
+    over is named.
+    """
+    name, imported = import_source(source)
+    file = opt.design_file(to, out, default_file(imported).name)
+    written = write_imported(imported, file, source.name)
+    layers, patterns = len(written.laminate.layers), len(written.laminate.patterns)
+    if as_json:
+        document = {"file": str(written.file), "format": name, "layers": layers}
+        show.document({**document, "patterns": patterns, "remarks": list(imported.remarks)})
+        return
+    for remark in imported.remarks:
+        show.note(remark)
+    show.verdict(
+        f"{written.file} written: {layers} layers in {patterns} patterns, from {name}. Next: "
+        f"sbafab generate {shlex.quote(str(written.file))}",
+        written.file,
+    )
 
 
 # Running a request.
 
 
-def _run_parts(request: Request, parts: Sequence[RunPart], **settings: Any) -> None:
-    """Load a design, write ``parts`` of it and exit with 1 if a rule failed."""
-    design = load_design(request.design, request.assignments, request.waivers)
-    run_request(RunRequest(design, request.out, parts, **settings), request)
-
-
-def run_request(
-    wanted: RunRequest,
-    request: Request,
-    show: Callable[[Run], None] | None = None,
-    as_json: Callable[[Run], object] | None = None,
+def _run(
+    request: opt.Request,
+    write: Callable[..., Run],
+    source: object,
+    before: Callable[[], None] = lambda: None,
+    more: Mapping[str, object] | None = None,
+    **settings: Any,
 ) -> None:
-    """Write a folder, print it (by ``show`` or ``as_json``) and exit with 1 if a rule failed."""
-    with shown_progress(request.as_json) as progress:
-        run = run_design(wanted, progress)
+    """Write a folder, print it and exit with 1 if a rule failed.
+
+    ``before`` prints what comes before the files, ``more`` has further keys of the document.
+    """
+    with show.progress(request.as_json) as progress:
+        run = write(source, out=request.out, progress=progress, **settings)
     for name, reason in run.left_out:
         print_error(f"left out: {name}. {reason}")
     if request.as_json:
-        print_json((as_json or _run_json)(run))
+        show.document({**_document(run), **(more or {})})
     else:
-        (show or _print_run)(run)
+        before()
+        _print_run(run)
     if run.failed:
-        click.get_current_context().exit(RULE_FAILED)
+        show.end_failed()
 
 
 def _generate_for_yield(
-    design: Design, target: float, wanted: RunRequest, request: Request
+    design: Design, target: float, request: opt.Request, settings: dict[str, Any]
 ) -> None:
     """Write the folder of a design changed for a yield; exits with 1 if none reaches it."""
     # Both designs are predicted, which a plain run does not do: models load slowly.
-    from sbafab.cli.compare import print_figures
-    from sbafab.search.compare import DESIGNS, reach_yield
-    from sbafab.search.vary import format_value
+    from sbafab.cli.search import print_changes
+    from sbafab.search.compare import reach_yield
 
-    with shown_progress(request.as_json) as progress:
+    with show.progress(request.as_json) as progress:
         fixed = frozenset(changed_keys(request.assignments))
         reached = reach_yield(design, target, fixed, progress)
     if reached.design is None:
-        end(Exit("yield", reached.sentence, RULE_FAILED), request.as_json)
+        end("yield", reached.sentence, RULE_FAILED, request.as_json)
 
-    def show(run: Run) -> None:
-        if reached.comparison is not None:
-            names = ("", *DESIGNS)
-            rows = [(row.key, *map(format_value, row.values)) for row in reached.changes]
-            print_table("Changed for the yield", names, rows)
-            print_figures(reached.comparison, names)
-        print_wrapped(reached.sentence)
-        print_line("")
-        _print_run(run)
+    def before() -> None:
+        print_changes(reached)
+        show.wrapped(reached.sentence)
+        show.line("")
 
-    def as_json(run: Run) -> dict[str, object]:
-        return {**_run_json(run), "yield": reached.as_dict()}
-
-    run_request(replace(wanted, source=reached.design), request, show, as_json)
+    more = {"yield": reached.as_dict()} if request.as_json else {}
+    _run(request, runs.generate, reached.design, before, more, **settings)
 
 
 # The documents of runs.
@@ -261,11 +227,6 @@ class RunDocument(Document, schema="sbafab/run@1"):
     notes: list[str]
     files: list[str]
     """contents of the folder"""
-
-
-def _run_json(run: Run) -> dict[str, Any]:
-    files = [] if run.kept else sorted(run.manifest["files"])
-    return RunDocument.of(run, notes=notes_of(run.builds), files=files)
 
 
 class NestedDesign(Document):
@@ -287,9 +248,12 @@ class NestedDocument(Document, schema="sbafab/nested@1"):
     """contents of the folder"""
 
 
-def _job_json(job: Run) -> dict[str, Any]:
-    designs = [NestedDesign.read(each, notes=notes_of([each])) for each in job.builds]
-    return NestedDocument.of(job, designs=designs, files=sorted(job.manifest.get("files", ())))
+def _document(run: Run) -> dict[str, Any]:
+    files = [] if run.kept else sorted(run.manifest["files"])
+    if run.order.schema == JOB_SCHEMA:
+        designs = [NestedDesign.read(each, notes=show.notes_of([each])) for each in run.builds]
+        return NestedDocument.of(run, designs=designs, files=files)
+    return RunDocument.of(run, notes=show.notes_of(run.builds), files=files)
 
 
 # Printing: a table of facts, and the verdict.
@@ -306,72 +270,58 @@ Facts = Iterator[tuple[str, str]]
 
 
 def _print_run(run: Run) -> None:
-    """Print the files of a design or an assembly, remedies and, last, the verdict."""
-    is_design = run.between is None
-    if not run.kept:
-        print_facts(_run_facts(run) if is_design else _assembly_facts(run))
-        print_line("")
-    groups = groups_of(run.builds, run.between)
-    for group in groups:
-        print_open(group.findings)
-    if not run.failed:
-        print_passed(run.folder.name, groups, f"sbafab check {run.folder}", run.folder)
-        return
-    if run.kept:
-        print_line(f"{run.folder} {UNCHANGED}")
-    change = "design" if is_design else "assembly"
-    print_failed(run.folder.name, run.findings, "No cut files were written", change)
-    print_written(None if run.kept else run.folder)
-
-
-def _print_job(job: Run) -> None:
-    """Print the files of several designs, the findings of those that failed, and the verdict."""
-    print_facts(_batch_facts(job))
-    print_line("")
-    for checked in job.builds:
-        if checked.failed:
-            print_line(checked.design.name, "bold red")
-            print_open(checked.findings)
-    if job.failed:
-        findings = [finding for checked in job.builds for finding in checked.findings]
-        consequence = f"Nothing was written; {job.folder} is unchanged"
-        print_failed(job.folder.name, findings, consequence, "designs")
+    """Print the files of an order, remedies and, last, the verdict."""
+    is_job, is_design = run.order.schema == JOB_SCHEMA, len(show.groups_of(run)) == 1
+    if is_job or not run.kept:
+        show.facts(_design_facts(run) if is_design and not is_job else _order_facts(run))
+        show.line("")
+    groups = show.groups_of(run)
+    if is_design:
+        show.remedies(run.findings)
     else:
-        print_passed(job.folder.name, groups_of(job.builds), written=job.folder)
+        show.findings(groups)
+    name, change = run.folder.name, "design" if is_design else "designs" if is_job else "assembly"
+    if not run.failed:
+        show.passed(name, groups, "" if is_job else f"sbafab check {run.folder}", run.folder)
+        return
+    consequence = "No cut files were written"
+    if is_job:
+        consequence = f"Nothing was written; {run.folder} is unchanged"
+    elif run.kept:
+        show.line(f"{run.folder} {UNCHANGED}")
+    show.failed(name, run.findings, consequence, change)
+    show.written(None if run.kept else run.folder)
 
 
-def _assembly_facts(run: Run) -> Facts:
+def _order_facts(run: Run) -> Facts:
+    """Yield rows on several designs: parts, copies, verdict, notes, film, meshes and folder."""
     index = run.manifest
-    yield "assembly", f"{index['name']}, {index['design_sha256'][:12]}"
-    yield "parts", ", ".join(f"{p['name']} ({p['design'] or p['kind']})" for p in index["parts"])
-    yield from _batch_facts(run)
-
-
-def _batch_facts(run: Run) -> Facts:
-    """Yield rows on several designs: copies, verdict, notes, film, meshes and folder."""
-    for checked in run.builds:
-        warnings = sorted({f.rule for f in checked.findings if f.verdict == "warn"})
-        warned = f"; warnings: {', '.join(warnings)}" if warnings else ""
-        waived = f"; waived: {', '.join(checked.waived)}" if checked.waived else ""
-        verdict = "failed" if checked.failed else "passed"
-        copies = several(checked.design.order.quantity, "copy", "copies")
-        yield checked.design.name, f"{copies}, {verdict}{waived}{warned}"
-    for note in notes_of(run.builds):
+    if run.between is not None:
+        yield "assembly", f"{index['name']}, {index['design_sha256'][:12]}"
+        parts = (f"{part['name']} ({part['design'] or part['kind']})" for part in index["parts"])
+        yield "parts", ", ".join(parts)
+    for build in run.builds:
+        words = [show.several(build.design.order.quantity, "copy", "copies") + ", "]
+        words += ["failed" if build.failed else "passed"]
+        words += [f"; waived: {', '.join(build.waived)}"] if build.waived else []
+        warned = sorted({f.rule for f in build.findings if f.verdict == "warn"})
+        words += [f"; warnings: {', '.join(warned)}"] if warned else []
+        yield build.design.name, "".join(words)
+    for note in show.notes_of(run.builds):
         yield "note", note
-    index = run.manifest
     for film in index.get("films", ()):
         yield f"{film['material']} film", _film_text(film, index["sheets"], 1)
     for mesh in index.get("meshes", ()):
         yield "solid", f"{mesh['file']}, with a node for each part"
-    yield from _stale_facts(run.dropped)
+    yield from _stale_facts(run)
     if index:
         yield "folder", str(run.folder)
 
 
-def _run_facts(run: Run) -> Facts:
+def _design_facts(run: Run) -> Facts:
     """Yield rows on a design's run."""
     index, laminate = run.manifest, run.laminate
-    balloons = several(laminate.balloons, "balloon")
+    balloons = show.several(laminate.balloons, "balloon")
     sha256 = index["design_sha256"][:12]
     yield "design", f"{laminate.name} ({laminate.family}, {balloons}), {sha256}"
     yield "kit", f"{index['kit']['name']}, version {index['kit']['version']}"
@@ -380,7 +330,7 @@ def _run_facts(run: Run) -> Facts:
     kinds = Counter(f"{layer.film.material} {layer.role}" for layer in laminate.layers)
     listed = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
     yield "layers", f"{len(laminate.layers)} in {len(laminate.patterns)} patterns: {listed}"
-    yield from _stale_facts(run.dropped)
+    yield from _stale_facts(run)
     # Layers of a folded film share a file.
     files = {layer["file"] for layer in index["layers"] if layer["file"]}
     if files:
@@ -394,12 +344,10 @@ def _run_facts(run: Run) -> Facts:
             yield f"{film['material']} film", _film_text(film, index["sheets"], index["copies"])
     yield from _press_facts(run)
     yield from _mesh_facts(run)
-    for warning in index["warnings"] if files else ():
-        yield "warning", warning
-    for note in laminate.notes:
-        yield "note", note
-    for warning in run.schedule.warnings if run.schedule is not None else ():
-        yield "warning", warning
+    scheduled = run.schedule.warnings if run.schedule is not None else ()
+    yield from (("warning", warning) for warning in (index["warnings"] if files else ()))
+    yield from (("note", note) for note in laminate.notes)
+    yield from (("warning", warning) for warning in scheduled)
     yield "folder", str(run.folder)
 
 
@@ -427,7 +375,7 @@ def _press_facts(run: Run) -> Facts:
         sizes = ", ".join(map(str, dict.fromkeys(runs.cycles)))
         yield (
             "batch",
-            f"{runs.copies} copies in {several(runs.count, 'press cycle')} of {sizes}: "
+            f"{runs.copies} copies in {show.several(runs.count, 'press cycle')} of {sizes}: "
             f"{_minutes(times.press)} in the press, {_minutes(times.total)} in all",
         )
 
@@ -460,10 +408,10 @@ def _mesh_facts(run: Run) -> Facts:
         yield "", "solid.* and cavity_<chamber>.stl are flat; skin.* is filled"
 
 
-def _stale_facts(dropped: Sequence[str]) -> Facts:
-    if dropped:
-        names = ", ".join(dict.fromkeys(path.partition("/")[0] for path in dropped))
-        count = several(len(dropped), "stale file")
+def _stale_facts(run: Run) -> Facts:
+    if run.dropped:
+        names = ", ".join(dict.fromkeys(path.partition("/")[0] for path in run.dropped))
+        count = show.several(len(run.dropped), "stale file")
         own = "--set name=NAME gives a design another folder"
         yield "replaced", f"removed {count} ({names}); {own}"
 
@@ -477,7 +425,7 @@ def _film_text(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], cop
     bare = any(sheet["label"] == "no room" for sheet in film_sheets)
     unlabelled = "; their borders have no room for labels: label them by hand"
     return (
-        f"{several(len(film_sheets), 'sheet')} of {', '.join(sizes)} mm{many}, "
+        f"{show.several(len(film_sheets), 'sheet')} of {', '.join(sizes)} mm{many}, "
         f"{film['density']:.0%} used, {film['waste'] / 100:.0f} cm2 waste, about {minutes:.1f} min "
         f"of cutting; {', '.join(sheet['file'] for sheet in film_sheets)}"
         f"{unlabelled if bare else ''}"

@@ -12,53 +12,76 @@ from typing import Any, Literal, get_args, get_origin
 import click
 from click.shell_completion import CompletionItem
 
-from sbafab.cutting.properties import Curves, DxfProfile
+from sbafab.cutting.properties import TRUE_ARCS, DxfProfile
 from sbafab.design.files import key_paths, template_summaries
 from sbafab.design.units import KILOPASCALS, MILLILITRES_PER_MINUTE, in_first_unit, share_of
 
+Command = Callable[..., Any]
+Decorator = Callable[[Command], Command]
 
-@dataclass(frozen=True)
-class MeasuredQuantity:
+
+# Types of values.
+
+
+class _Type(click.ParamType):  # type: ignore[type-arg]  # generic in newer clicks only
+    """A type that says what stands for its value in the help."""
+
+    def __init__(self, metavar: str) -> None:
+        self.name = metavar
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
+        return self.name
+
+
+class MeasuredQuantity(_Type):
     """A number with or without a unit; ``units`` gives the size of each in the first unit."""
 
-    name: str
-    units: dict[str, float]
-    example: str
+    def __init__(
+        self, metavar: str, noun: str, units: dict[str, float], example: str, positive: bool = False
+    ) -> None:
+        super().__init__(metavar)
+        self.noun, self.units, self.example, self.positive = noun, units, example, positive
 
-    def read(self, written: str) -> float:
-        """Return a quantity in the first unit; raises BadParameter for other text."""
-        number = in_first_unit(written, self.units)
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the quantity in the first unit; raises BadParameter for other text."""
+        number = in_first_unit(str(value), self.units)
         if number is None:
-            allowed = f"a {self.name} such as {self.example}; the units are {', '.join(self.units)}"
-            raise click.BadParameter(f"{written!r} must be {allowed}")
+            units = ", ".join(self.units)
+            allowed = f"a {self.noun} such as {self.example}; the units are {units}"
+            self.fail(f"{value!r} must be {allowed}", param, ctx)
         if not math.isfinite(number):
-            raise click.BadParameter(f"{written!r} must be a finite {self.name}")
+            self.fail(f"{value!r} must be a finite {self.noun}", param, ctx)
+        if self.positive and number <= 0:
+            self.fail(f"must be a {self.noun} above 0 {next(iter(self.units))}", param, ctx)
         return number
 
 
-LENGTH = MeasuredQuantity(
-    "length", {"mm": 1.0, "um": 0.001, "cm": 10.0, "in": 25.4}, '0.35 or "350 um"'
-)
-PRESSURE = MeasuredQuantity("pressure", KILOPASCALS, '6, "6 kPa" or "60 mbar"')
-MODULUS = MeasuredQuantity("modulus", {"MPa": 1.0, "kPa": 0.001, "GPa": 1000.0}, '10 or "10 MPa"')
-VOLUME = MeasuredQuantity("volume", {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}, '5, 5ul or "0.005 ml"')
-FLOW = MeasuredQuantity("flow", MILLILITRES_PER_MINUTE, '35, "35 ml/min" or "0.6 ml/s"')
+MILLIMETRES = {"mm": 1.0, "um": 0.001, "cm": 10.0, "in": 25.4}
+MICROLITRES = {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}
+MEGAPASCALS = {"MPa": 1.0, "kPa": 0.001, "GPa": 1000.0}
+LENGTH = MeasuredQuantity("MM", "length", MILLIMETRES, '0.35 or "350 um"')
+POSITIVE_LENGTH = MeasuredQuantity("MM", "length", MILLIMETRES, '0.35 or "350 um"', positive=True)
+PRESSURE = MeasuredQuantity("P", "pressure", KILOPASCALS, '6, "6 kPa" or "60 mbar"')
+MODULUS = MeasuredQuantity("E", "modulus", MEGAPASCALS, '10 or "10 MPa"')
+VOLUME = MeasuredQuantity("V", "volume", MICROLITRES, '5, 5ul or "0.005 ml"')
+FLOW = MeasuredQuantity("Q", "flow", MILLILITRES_PER_MINUTE, '35, "35 ml/min" or "0.6 ml/s"')
 
 
-@dataclass(frozen=True)
-class OfChamber:
+class OfChamber(_Type):
     """``NAME=QUANTITY``, or with ``all_chambers`` a quantity alone, whose name is ""."""
 
-    quantity: MeasuredQuantity
-    all_chambers: bool = False
+    def __init__(self, quantity: MeasuredQuantity, all_chambers: bool = False) -> None:
+        unit = next(iter(quantity.units)).upper()
+        super().__init__(f"{unit}|CHAMBER={unit}" if all_chambers else f"NAME={unit}")
+        self.quantity, self.all_chambers = quantity, all_chambers
 
-    def read(self, written: str) -> tuple[str, float]:
-        chamber, equals, text = written.rpartition("=")
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        chamber, equals, text = str(value).rpartition("=")
         if not (chamber.strip() if equals else self.all_chambers):
             short = self.quantity.example.split(",")[0]
-            pattern = f"NAME={self.quantity.name.upper()}"
-            raise click.BadParameter(f"{written!r} must be {pattern}, such as chamber1={short}")
-        return chamber.strip(), self.quantity.read(text)
+            pattern = f"NAME={self.quantity.noun.upper()}"
+            self.fail(f"{value!r} must be {pattern}, such as chamber1={short}", param, ctx)
+        return chamber.strip(), self.quantity.convert(text, param, ctx)
 
 
 def by_chamber(
@@ -69,6 +92,16 @@ def by_chamber(
     if len(chambers) < len(values):
         raise click.BadParameter("each chamber may be given once", ctx, param)
     return chambers
+
+
+class PartialShare(_Type):
+    """A share such as 0.95 or 95%, neither none nor all."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        share = share_of(str(value))
+        if share is None or not 0 < share < 1:
+            self.fail(f"{value!r} must be a share above 0 and below 1, as 0.95 or 95%", param, ctx)
+        return share
 
 
 class _Finite(click.ParamType):  # type: ignore[type-arg]  # generic in newer clicks only
@@ -85,6 +118,11 @@ class FiniteFloat(_Finite, click.types.FloatParamType):
 
 class FiniteRange(_Finite, click.FloatRange):
     """A finite number in a range; ``FloatRange`` accepts nan."""
+
+
+def file_path(**settings: bool) -> click.Path:
+    """Return the type of a path."""
+    return click.Path(path_type=Path, **settings)
 
 
 # Shell completion: templates and files, keys with their values, rules.
@@ -106,10 +144,18 @@ def rules(ctx: click.Context, param: click.Parameter, typed: str) -> list[Comple
 
 def assignments(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete ``KEY=``, and after it the values of a key that has a choice."""
+    # `sbafab new` has options too, and needs no family.
+    from sbafab.actuators import records
+
+    kinds = {key: kind for record in records().values() for key, kind in key_paths(record).items()}
+    tables = {path.rpartition(".")[0] for path in kinds}
     key, equals, _ = typed.partition("=")
-    ends = _choices(_keys().get(key)) if equals else ()
-    names = (f"{key}={value}" for value in ends) if equals else (f"{name}=" for name in _keys())
-    return completions(typed, ((name, None) for name in names))
+    if not equals:
+        return completions(typed, ((f"{name}=", None) for name in sorted(kinds.keys() - tables)))
+    kind = kinds.get(key)
+    words = get_args(kind) if get_origin(kind) is Literal else ()
+    choices = ("true", "false") if kind is bool else words
+    return completions(typed, ((f"{key}={value}", None) for value in choices))
 
 
 def completions(typed: str, candidates: Iterable[tuple[str, str | None]]) -> list[CompletionItem]:
@@ -119,113 +165,83 @@ def completions(typed: str, candidates: Iterable[tuple[str, str | None]]) -> lis
     ]
 
 
-def _keys() -> dict[str, object]:
-    """Return the keys of all families that hold a value, with their annotations."""
-    # `sbafab new` has options too, and needs no family.
-    from sbafab.actuators import records
-
-    keys = {key: kind for record in records().values() for key, kind in key_paths(record).items()}
-    tables = {path.rpartition(".")[0] for path in keys}
-    return {path: keys[path] for path in sorted(keys) if path not in tables}
-
-
-def _choices(annotation: Any) -> tuple[str, ...]:
-    """Return the values of a ``Literal`` or a boolean."""
-    if annotation is bool:
-        return "true", "false"
-    return tuple(map(str, get_args(annotation))) if get_origin(annotation) is Literal else ()
-
-
 # Arguments and options.
 
 
-Command = Callable[..., Any]
+def option(flags: str, words: str, kind: Any = None, **settings: Any) -> Decorator:
+    """Return an option.
 
-_GIVEN = click.core.ParameterSource.COMMANDLINE
+    ``flags`` are its names, then that of its parameter if that has another one, then in capitals
+    what stands for its value, with dots if it is repeatable, such as "--vary varied KEY=VALUES...".
+    ``words`` are its help, ``kind`` is bool for a flag, a type, or a tuple of choices.
+    """
+    names = flags.removesuffix("...").split()
+    if names[-1] != names[-1].lower():
+        settings["metavar"] = names.pop()
+    if flags.endswith("..."):
+        settings["multiple"] = True
+        text, mark, default = words.partition("  [")
+        words = f"{text} Repeatable.{mark}{default}"
+    if kind is bool:
+        settings["is_flag"] = True
+    elif isinstance(kind, OfChamber):
+        settings["callback"] = by_chamber
+    elif isinstance(kind, tuple):
+        kind = click.Choice(kind)
+    return click.option(*names, type=kind, help=words, **settings)
 
 
-set_option = click.option(
-    "--set",
-    "assignments",
-    metavar="KEY=VALUE",
-    multiple=True,
+def design_argument(name: str = "source", **settings: Any) -> Decorator:
+    """Return the argument of a design, which a shell completes."""
+    return click.argument(name, shell_complete=designs, **{"metavar": "DESIGN", **settings})
+
+
+set_option = option(
+    "--set assignments KEY=VALUE...",
+    "Override a key of the design, e.g. --set chamber.diameter=6.",
     shell_complete=assignments,
-    help="Override a key of the design, e.g. --set chamber.diameter=6. Repeatable.",
 )
-json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+json_option = option("--json as_json", "Print the result as JSON.", bool)
 
 
-def pressures_option(words: str, default: str) -> Callable[[Command], Command]:
+def pressures_option(words: str, default: str) -> Decorator:
     """Return ``--pressure``, repeatable, whose help begins with ``words``."""
-    return click.option(
-        "--pressure",
-        "pressures",
-        type=PRESSURE.read,
-        multiple=True,
-        metavar="P",
-        help=f"{words}, kPa or with a unit. Repeatable.  [default: {default}]",
-    )
+    words += f", kPa or with a unit. Repeatable.  [default: {default}]"
+    return option("--pressure pressures", words, PRESSURE, multiple=True)
 
 
 def calibration_options(command: Command) -> Command:
     """Add the calibration options of the elastic models (``models.figures.Factors``)."""
-    lost = click.option(
+    lost = option(
         "--pocket-loss",
-        type=LENGTH.read,
-        metavar="L",
-        help="Measured loss of pocket radius against the drawing, mm or with a unit; for elastic "
+        "Measured loss of pocket radius against the drawing, mm or with a unit; for elastic "
         "models.  [default: the calibration's]",
+        LENGTH,
     )
-    modulus = click.option(
-        "--modulus",
-        "modulus_mpa",
-        type=MODULUS.read,
-        metavar="E",
-        help="Measured Young's modulus of the pressed film, MPa or with a unit.  [default: the "
-        "film's times the calibration's ratio]",
+    modulus = option(
+        "--modulus modulus_mpa",
+        "Measured Young's modulus of the pressed film, MPa or with a unit.  [default: the film's "
+        "times the calibration's ratio]",
+        MODULUS,
     )
     return lost(modulus(command))
 
 
-def flow_option(words: str) -> Callable[[Command], Command]:
+def flow_option(words: str) -> Decorator:
     """Return the option of a flow in ml/min, whose help begins with ``words``."""
-    return click.option(
-        "--flow",
-        "flow_ml_min",
-        type=FLOW.read,
-        default="35 ml/min",
-        metavar="Q",
-        help=f"{words}, ml/min or with a unit.",
+    return option(
+        "--flow flow_ml_min", f"{words}, ml/min or with a unit.", FLOW, default="35 ml/min"
     )
 
 
-def waive_option(words: str) -> Callable[[Command], Command]:
-    """Add ``--waive`` with the help text of a command."""
-    return click.option(
-        "--waive",
-        "waivers",
-        metavar="RULE",
-        multiple=True,
-        shell_complete=rules,
-        help=words,
-    )
+def waive_option(words: str) -> Decorator:
+    """Return ``--waive`` with the help text of a command."""
+    return option("--waive waivers RULE", words, multiple=True, shell_complete=rules)
 
 
-def _target(_: click.Context, __: click.Parameter, text: str | None) -> float | None:
-    """Return a share from 0.95 or 95%; raises BadParameter for none, all and other text."""
-    if text is None:
-        return None
-    target = share_of(text)
-    if target is None or not 0 < target < 1:
-        raise click.BadParameter(f"{text!r} must be a share above 0 and below 1, as 0.95 or 95%")
-    return target
-
-
-def target_yield_option(words: str) -> Callable[[Command], Command]:
+def target_yield_option(words: str) -> Decorator:
     """Return ``--target-yield`` with the help text of a command."""
-    return click.option(
-        "--target-yield", "target_yield", callback=_target, metavar="SHARE", help=words
-    )
+    return option("--target-yield", words, PartialShare("SHARE"))
 
 
 WAIVE_HELP = {
@@ -254,31 +270,25 @@ def _refuse_file(ctx: click.Context, _: click.Parameter, out: Path) -> Path:
     return out
 
 
-def folder_option(words: str, default: str = ".") -> Callable[[Command], Command]:
+def folder_option(words: str, default: str = ".") -> Decorator:
     """Return ``-o``, the folder that a command writes into."""
-    return click.option(
-        "-o",
-        "--out",
-        type=click.Path(path_type=Path, readable=False),
+    return option(
+        "-o --out OUT",
+        words,
+        file_path(readable=False),
         default=Path(default),
         show_default="this folder" if default == "." else None,
         callback=_refuse_file,
-        metavar="OUT",
-        help=words,
     )
 
 
 out_option = folder_option("Folder in which OUT/<name>/ is written.", "out")
 
 
-def file_option(name: str) -> Callable[[Command], Command]:
+def file_option(name: str) -> Decorator:
     """Return ``--to``, the design file to write instead of the one called ``name``."""
-    return click.option(
-        "--to",
-        type=click.Path(path_type=Path, dir_okay=False),
-        metavar="FILE",
-        help=f"Write FILE, which ends in .toml, instead of {name}; its stem names the design.",
-    )
+    words = f"Write FILE, which ends in .toml, instead of {name}; its stem names the design."
+    return option("--to FILE", words, file_path(dir_okay=False))
 
 
 def design_file(to: Path | None, out: Path, name: str) -> Path:
@@ -289,6 +299,15 @@ def design_file(to: Path | None, out: Path, name: str) -> Path:
     if to.suffix.lower() != ".toml":
         raise click.BadParameter(f"{to} must end in .toml", param_hint="--to")
     return to
+
+
+def refuse_options(why: str, *names: str) -> None:
+    """Raise UsageError, ending with ``why``, if one of these parameters is on the command line."""
+    ctx = click.get_current_context()
+    for param in ctx.command.params:
+        source = ctx.get_parameter_source(param.name or "")
+        if param.name in names and source is click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"{max(param.opts, key=len)} {why}")
 
 
 @dataclass(frozen=True)
@@ -302,12 +321,12 @@ class Request:
     as_json: bool
 
     @property
-    def design(self) -> str:
-        """The design, the first one of several."""
-        return self.designs[0]
+    def source(self) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+        """The design, the first one of several, its changed keys and the rules waived."""
+        return self.designs[0], self.assignments, self.waivers
 
 
-def run_options(is_several: bool = False) -> Callable[[Command], Command]:
+def run_options(is_several: bool = False) -> Decorator:
     """Add DESIGN, or any number of them, and the options of a writing command, passed to it as a
     Request.
     """
@@ -320,70 +339,51 @@ def run_options(is_several: bool = False) -> Callable[[Command], Command]:
             )
             return command(request=request, **parameters)
 
-        argument = click.argument(
+        argument = design_argument(
             "designs",
             metavar="DESIGN..." if is_several else "DESIGN",
             nargs=-1 if is_several else 1,
             callback=lambda _, __, value: (value,) if isinstance(value, str) else value,
             required=True,
-            shell_complete=designs,
         )
         waive = waive_option(WAIVE_HELP.get(command.__name__, WAIVE_CUT))
         decorated: Command = gathered
-        for option in (json_option, waive, set_option, out_option, argument):
-            decorated = option(decorated)
+        for each in (json_option, waive, set_option, out_option, argument):
+            decorated = each(decorated)
         return decorated
 
     return add
 
 
-def sheet_options(command: Command) -> Command:
-    """Add ``--copies``, which sets a key of the design."""
+def cut_options(command: Command) -> Command:
+    """Add ``--dxf-profile`` and ``--chord-error``, for readers that cannot read bulges, and
+    ``--copies``, which sets a key of the design.
+    """
 
     @functools.wraps(command)
-    def assigned(request: Request, copies: int | None, **parameters: Any) -> Any:
+    def with_curves(
+        request: Request, chord_error: float | None, copies: int | None, **parameters: Any
+    ) -> Any:
+        if chord_error is not None and parameters["dxf_profile"] != "chords":
+            raise click.UsageError("--chord-error goes with --dxf-profile chords; add it")
+        parameters["chord_error"] = chord_error or TRUE_ARCS.chord_error
         keys = () if copies is None else (f"order.copies={copies}",)
         request = replace(request, assignments=(*request.assignments, *keys))
         return command(request=request, **parameters)
 
-    count = click.option(
-        "--copies",
-        type=int,
-        metavar="K",
-        help="Cut K copies of each actuator.  [default: the design's order.copies, 1]",
-    )
-    return count(assigned)
-
-
-def refuse_options(why: str, *names: str) -> None:
-    """Raise UsageError, ending with ``why``, if one of these parameters is on the command line."""
-    ctx = click.get_current_context()
-    for param in ctx.command.params:
-        if param.name in names and ctx.get_parameter_source(param.name) is _GIVEN:
-            raise click.UsageError(f"{max(param.opts, key=len)} {why}")
-
-
-def dxf_options(command: Command) -> Command:
-    """Add ``--dxf-profile`` and ``--chord-error``, for readers that cannot read bulges."""
-    chord = click.option(
-        "--chord-error",
-        type=FiniteRange(0.0001, 0.1),
-        metavar="MM",
-        help="Largest distance of a chord from its arc, with --dxf-profile chords.  "
-        "[default: 0.005]",
-    )
-    profile = click.option(
+    profile = option(
         "--dxf-profile",
-        type=click.Choice(get_args(DxfProfile)),
-        default="bulges",
-        help="Write arcs as polyline bulges, ARC entities or chords.",
+        "Write arcs as polyline bulges, ARC entities or chords.",
+        get_args(DxfProfile),
+        default=TRUE_ARCS.profile,
     )
-
-    @functools.wraps(command)
-    def with_curves(dxf_profile: DxfProfile, chord_error: float | None, **parameters: Any) -> Any:
-        if chord_error is not None and dxf_profile != "chords":
-            raise click.UsageError("--chord-error goes with --dxf-profile chords; add it")
-        curves = Curves(dxf_profile, chord_error or Curves().chord_error)
-        return command(curves=curves, **parameters)
-
-    return profile(chord(with_curves))
+    chord = option(
+        "--chord-error MM",
+        "Largest distance of a chord from its arc, with --dxf-profile chords.  "
+        f"[default: {TRUE_ARCS.chord_error:g}]",
+        FiniteRange(0.0001, 0.1),
+    )
+    count = option(
+        "--copies K", "Cut K copies of each actuator.  [default: the design's order.copies, 1]", int
+    )
+    return profile(chord(count(with_curves)))

@@ -12,30 +12,9 @@ import click
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import load
 from sbafab.assemblies.records import Assembly
-from sbafab.cli.exit import RULE_FAILED, print_error
-from sbafab.cli.options import (
-    VOLUME,
-    FiniteFloat,
-    FiniteRange,
-    Request,
-    calibration_options,
-    flow_option,
-    pressures_option,
-    refuse_options,
-    run_options,
-)
-from sbafab.cli.printing import (
-    console,
-    print_failure,
-    print_json,
-    print_line,
-    print_listed,
-    print_table,
-    print_verdict,
-    print_wrapped,
-    wrapped,
-)
-from sbafab.cli.progress import shown_progress
+from sbafab.cli import options as opt
+from sbafab.cli import show
+from sbafab.cli.exit import print_error
 from sbafab.design.records import Design, Drawn
 from sbafab.errors import OutputError
 from sbafab.folders.artefacts import prediction_json
@@ -63,50 +42,39 @@ FORMULA_OPTIONS = ("flow_ml_min", "volumes", "contact_factor")
 
 
 @click.command()
-@run_options()
-@pressures_option(
+@opt.run_options()
+@opt.pressures_option(
     "Gauge pressure of force and work, negative for a vacuum",
     "10, 100; of a design that works under a vacuum -10, -100",
 )
-@flow_option("Flow for the actuation time")
-@click.option(
-    "--volume",
-    "volumes",
-    type=VOLUME.read,
-    multiple=True,
-    metavar="V",
-    help="Volume of each balloon for the stroke, ul or with a unit. Repeatable.",
+@opt.flow_option("Flow for the actuation time")
+@opt.option(
+    "--volume volumes...", "Volume of each balloon for the stroke, ul or with a unit.", opt.VOLUME
 )
-@click.option(
-    "--press-factor",
-    type=FiniteFloat(),
-    metavar="F",
-    help="Measured thickness after the press over that before, of films that melt in it.  "
-    "[default: the calibration's]",
+@opt.option(
+    "--press-factor F",
+    "Measured thickness after the press over that before, of films that melt in it.  [default: the "
+    "calibration's]",
+    opt.FiniteFloat(),
 )
-@click.option(
-    "--contact-factor",
-    type=FiniteFloat(),
-    metavar="F",
-    help="Measured ratio of force to Eqs. 1-4.  [default: 1, off]",
+@opt.option(
+    "--contact-factor F",
+    "Measured ratio of force to Eqs. 1-4.  [default: 1, off]",
+    opt.FiniteFloat(),
 )
-@calibration_options
-@click.option(
-    "--load",
-    "load_g",
-    type=FiniteRange(min=0, max=1000),
+@opt.calibration_options
+@opt.option(
+    "--load load_g G",
+    "Assemblies: mass at the tips, g; the default is the paper's marble.",
+    opt.FiniteRange(min=0, max=1000),
     default=1.2,
-    metavar="G",
-    help="Assemblies: mass at the tips, g; the default is the paper's marble.",
 )
-@click.option(
-    "--sensitivity",
-    is_flag=True,
-    help="Add by how much 1 % of a key moves stroke and bend; takes some seconds.",
+@opt.option(
+    "--sensitivity", "Add by how much 1 % of a key moves stroke and bend; takes some seconds.", bool
 )
-@click.option("-v", "--verbose", is_flag=True, help="All figures, with their models and validity.")
+@opt.option("-v --verbose", "All figures, with their models and validity.", bool)
 def predict(
-    request: Request,
+    request: opt.Request,
     pressures: tuple[float, ...],
     flow_ml_min: float,
     volumes: tuple[float, ...],
@@ -124,7 +92,7 @@ def predict(
     Of an assembly it prints reach, load, grip in its lumen, and collisions of inflated parts, at
     one pressure (default 10 kPa).
     """
-    design = load(request.design, request.assignments, request.waivers)
+    design = load(*request.source)
     if not isinstance(design, Design):
         _refuse_for_assembly(design, pressures)
         _predict_assembly(design, request, pressures[0] if pressures else 10.0, load_g)
@@ -133,35 +101,34 @@ def predict(
     wanted = PredictionRequest(
         pressures or usual_pressures(design.form), flow_ml_min, volumes, overrides=factors
     )
-    with shown_progress(request.as_json) as progress:
+    rows: Sequence[SensitivityRow] = ()
+    with show.progress(request.as_json) as progress:
         progress("predicting", 0, 1)
         prediction = predicted(design, wanted)
+        write = RunRequest(design, request.out, ("predict",), prediction=prediction)
         try:
-            run = generate(
-                RunRequest(design, request.out, ("predict",), prediction=prediction), progress
-            )
+            run = generate(write, progress)
         except OutputError:
             # The prediction exists, though it cannot be written.
             if not request.as_json:
                 print_prediction(prediction, verbose)
             raise
-        rows = []
         if sensitivity:
             progress("sensitivity", 0, 1)
             rows = sensitivity_table(design, wanted.pressures_kpa[0])
-    failed = sorted({finding.rule for finding in run.findings if finding.verdict == "fail"})
+    failed = show.failed_rules(run.findings)
     if request.as_json:
         more = {"sensitivity": [asdict(row) for row in rows]} if sensitivity else {}
         document = {**prediction_json(design, prediction), **more}
-        print_json({**document, "failed": failed, "folder": str(run.folder)})
+        show.document({**document, "failed": failed, "folder": str(run.folder)})
     else:
-        print_listed("size", size_phrases(design, run.laminate, prediction.asked.factors))
+        show.phrases("size", size_phrases(design, run.laminate, prediction.asked.factors))
         print_prediction(prediction, verbose)
-        if sensitivity:
+        if rows:
             _print_sensitivity(rows, wanted.pressures_kpa[0])
         if not run.failed:
             details = "" if verbose else " Details: -v"
-            print_verdict(
+            show.verdict(
                 f"{design.name} predicted: {len(prediction.figures)} figures with models and "
                 f"validity. Written to {run.folder}: predict.json, predict/.{details}",
                 run.folder,
@@ -173,28 +140,30 @@ def predict(
             f"{design.name} failed: {', '.join(failed)}. It may leak or burst, and no prediction "
             "was written. Change the design or waive the rule by name"
         )
-        click.get_current_context().exit(RULE_FAILED)
+        show.end_failed()
 
 
 def _print_sensitivity(rows: Sequence[SensitivityRow], pressure: float) -> None:
     """Print by how much 1 % more of each key moves stroke and bend."""
-    print_line(f"\nat {pressure:g} kPa 1 % more of     moves the free stroke    the bend")
+    show.line(f"\nat {pressure:g} kPa 1 % more of     moves the free stroke    the bend")
     for row in rows:
         bend = "" if row.bend is None else f"{row.bend:+.2f} %"
-        print_line(f"{row.key:<26} {row.stroke:>+20.2f} % {bend:>11}".rstrip())
+        show.line(f"{row.key:<26} {row.stroke:>+20.2f} % {bend:>11}".rstrip())
 
 
 def _refuse_for_design(design: Design) -> None:
     """Raise UsageError for an option that no model of the design uses."""
     form = model_form(design)
     reason = f"and {design.name} has others; leave it out"
-    refuse_options(f"is for an assembly, and {design.name} is one actuator; leave it out", "load_g")
+    opt.refuse_options(
+        f"is for an assembly, and {design.name} is one actuator; leave it out", "load_g"
+    )
     if not has_balloons(form):
-        refuse_options(
+        opt.refuse_options(
             f"is for elastic balloons, round pockets on flat plates, {reason}", *ELASTIC_OPTIONS
         )
     if isinstance(form.pockets, Drawn):
-        refuse_options(f"is for pockets that are round or oblong, {reason}", *FORMULA_OPTIONS)
+        opt.refuse_options(f"is for pockets that are round or oblong, {reason}", *FORMULA_OPTIONS)
 
 
 def _refuse_for_assembly(assembly: Assembly, pressures: tuple[float, ...]) -> None:
@@ -202,23 +171,24 @@ def _refuse_for_assembly(assembly: Assembly, pressures: tuple[float, ...]) -> No
     reason = (
         f"is for one actuator, and {assembly.name} is an assembly; predict the part's own design"
     )
-    refuse_options(reason, *FORMULA_OPTIONS, *ELASTIC_OPTIONS, "press_factor")
+    opt.refuse_options(reason, *FORMULA_OPTIONS, *ELASTIC_OPTIONS, "press_factor")
     reason = f"is for written files, and the prediction of {assembly.name} is only printed"
-    refuse_options(f"{reason}; leave it out", "out", "waivers")
+    opt.refuse_options(f"{reason}; leave it out", "out", "waivers")
     if len(pressures) > 1:
         raise click.UsageError("an assembly is predicted at one pressure; give --pressure once")
 
 
 def _predict_assembly(
-    assembly: Assembly, request: Request, pressure_kpa: float, load_g: float
+    assembly: Assembly, request: opt.Request, pressure_kpa: float, load_g: float
 ) -> None:
+    """Predict an assembly and print it; exits with 1 if inflated parts collide."""
     prediction = predict_assembly(assemble(assembly), pressure_kpa, load_g)
     if request.as_json:
-        print_json({"schema": SCHEMA, **asdict(prediction)})
+        show.document({"schema": SCHEMA, **asdict(prediction)})
     else:
         print_assembly_prediction(prediction)
     if prediction.touches:
-        click.get_current_context().exit(RULE_FAILED)
+        show.end_failed()
 
 
 # Printing: main figures of a design, or with -v all and their models; figures of an assembly.
@@ -226,56 +196,50 @@ def _predict_assembly(
 
 NAME_WIDTH, VALUE_WIDTH = 56, 10
 """Columns of a name, at most, and of a value."""
-MAIN_TITLE = "Figures to design with"
-ALTERNATIVES_TITLE = "Alternative models: design with the figures above"
 
 
 def print_prediction(prediction: Prediction, verbose: bool = False) -> None:
     """Print the main figures; ``verbose`` also all figures and the validity of their models."""
-    width = console().width
-    label = max((len(line.quantity) for line in prediction.verdict), default=0) + 2
     lines = prediction.verdict
+    label = max((len(line.quantity) for line in lines), default=0) + 2
     previous = ""
-    for number, line in enumerate(lines):
+    for number, line in enumerate(lines, start=1):
         head = "" if line.quantity == previous else f"{line.quantity}:"
         previous = line.quantity
-        text = f"{line.figure}: {line.note}" if line.quantity == LEFT_OUT else line.figure
-        for row in wrapped(text, width, head.ljust(label), " " * label):
-            print_line(row)
+        is_left_out = line.quantity == LEFT_OUT
+        text = f"{line.figure}: {line.note}" if is_left_out else line.figure
+        show.wrapped(text, indent=" " * label, first=head.ljust(label))
         # A note of several lines stands once, under the last of them.
-        is_last = all(line.note != other.note for other in lines[number + 1 :])
-        if line.quantity != LEFT_OUT and is_last:
-            for row in wrapped(line.note, width, " " * (label + 2), " " * (label + 2)):
-                print_line(row)
+        if not is_left_out and all(line.note != other.note for other in lines[number:]):
+            show.wrapped(line.note, indent=" " * (label + 2))
     if verbose:
         _print_figures(prediction)
 
 
 def _print_figures(prediction: Prediction) -> None:
     """Print all figures, alternative models last, and the validity of the models."""
-    width = console().width
-    main = [figure for figure in prediction.figures if not figure.other]
-    alternatives = [figure for figure in prediction.figures if figure.other]
-    models = list(dict.fromkeys(figure.model for figure in (*main, *alternatives)))
-    for title, figures in ((MAIN_TITLE, main), (ALTERNATIVES_TITLE, alternatives)):
+    groups = {
+        "Figures to design with": [f for f in prediction.figures if not f.other],
+        "Alternative models: design with the figures above": [
+            f for f in prediction.figures if f.other
+        ],
+    }
+    models = list(dict.fromkeys(f.model for figures in groups.values() for f in figures))
+    for title, figures in groups.items():
         if figures:
-            print_line(f"\n{title}", "bold")
-        for line in figure_lines(figures, models, width):
+            show.line(f"\n{title}", "bold")
+        for line in _figure_lines(figures, models, show.console().width):
             # The heading of a group starts at the margin.
-            print_line(line, "" if line.startswith(" ") else "bold")
-    print_line("\nModels and validity", "bold")
+            show.line(line, "" if line.startswith(" ") else "bold")
+    show.line("\nModels and validity", "bold")
     for number, model in enumerate(models, start=1):
         text = f"{model.title}: {model.trust}"
-        for line in wrapped(text, width, f"[{number}]".ljust(5), " " * 5):
-            print_line(line)
-    print_line("")
+        show.wrapped(text, indent=" " * 5, first=f"[{number}]".ljust(5))
+    show.line("")
 
 
-def figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int) -> Iterator[str]:
-    """Yield a heading for each model of a group, and below it a line for each figure.
-
-    A name that begins like the one above it, up to a comma, has blanks in place of that part.
-    """
+def _figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int) -> Iterator[str]:
+    """Yield a heading for each model of a group, and below it a line for each figure."""
     unit = max((len(figure.unit) for figure in figures), default=0)
     spans = max((len(figure.range) + 4 for figure in figures if figure.interval), default=0)
     room = min(NAME_WIDTH, width - VALUE_WIDTH - unit - spans - 4)
@@ -284,22 +248,14 @@ def figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int)
             members = [f for f in figures if f.group == group and f.model == model]
             if members:
                 yield f"{group}: {model.name} [{number}]"
-            previous = ""
             for figure in members:
-                head, comma, rest = figure.name.partition(", ")
-                name = figure.name
-                if comma and head != previous and len(name) > room >= len(head):
-                    yield f"  {head},"
-                    previous = head
-                if comma and head == previous:
-                    name = " " * max(min(len(head) + 2, room - len(rest)), 2) + rest
-                previous = head
-                *over, last = textwrap.wrap(name, room, subsequent_indent="  ") or [name]
+                *over, last = textwrap.wrap(figure.name, room, subsequent_indent="  ") or [""]
                 yield from (f"  {line}" for line in over)
                 interval = f"({figure.range})" if figure.interval else ""
                 value = f"{figure.value:>{VALUE_WIDTH}.4g}  {figure.unit:<{unit}}  {interval}"
                 yield f"  {last:{room}}{value}".rstrip()
-                yield from wrapped(figure.aside, width, "    ", "    ") if figure.aside else ()
+                if figure.aside:
+                    yield from (f"    {line}" for line in textwrap.wrap(figure.aside, width - 4))
 
 
 def print_assembly_prediction(prediction: AssemblyPrediction) -> None:
@@ -312,20 +268,20 @@ def print_assembly_prediction(prediction: AssemblyPrediction) -> None:
         value = f"{figure.value:.4g}"
         rows.append((part, figure.name, value, figure.unit, figure.model, figure.paper))
     names = ("part", "figure", "value", "unit", "model", "paper")
-    print_table(f"{prediction.name} {pressure}", names, rows)
+    show.table(f"{prediction.name} {pressure}", names, rows)
     measured: dict[str, dict[str, None]] = {}
     for figure in prediction.figures:
         if figure.measured:
             measured.setdefault(figure.measured, {})[figure.name] = None
     for sentence, figures in measured.items():
-        print_wrapped(f"{'; '.join(figures)}: {sentence}")
+        show.wrapped(f"{'; '.join(figures)}: {sentence}")
     for reason in prediction.left_out:
-        print_line(f"left out: {reason}")
+        show.line(f"left out: {reason}")
     for part in prediction.near_burst:
-        print_line(f"{part}: {FLAGS[NEAR_BURST]}")
+        show.line(f"{part}: {FLAGS[NEAR_BURST]}")
     for sentence in prediction.met():
-        print_line(sentence)
+        show.line(sentence)
     if prediction.touches:
-        print_failure(f"{prediction.name} failed: inflated parts collide {pressure}")
+        show.failure(f"{prediction.name} failed: inflated parts collide {pressure}")
     else:
-        print_verdict(f"{prediction.name} predicted {pressure}: {len(prediction.figures)} figures")
+        show.verdict(f"{prediction.name} predicted {pressure}: {len(prediction.figures)} figures")

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-from sbafab.cli.options import LENGTH, PRESSURE, Command, json_option, set_option
-from sbafab.cli.printing import cell_text, print_json, print_table, print_verdict, several
+from sbafab.cli import options as opt
+from sbafab.cli import show
 from sbafab.errors import DesignError
 from sbafab.lab import recording
 from sbafab.lab.records import (
-    ERRORS,
     HistoryEntry,
     HistoryRow,
     LabRow,
@@ -28,31 +28,29 @@ from sbafab.lab.records import (
 from sbafab.lab.report import Report, ReportDocument, report, success_svg
 from sbafab.lab.store import Contents, Lab
 
-MEASUREMENTS: tuple[tuple[str, str, Any, str, str], ...] = (
-    ("--leak", "leak", click.Choice(["pass", "fail"]), "", "Result of the leak test."),
-    ("--burst", "burst_kpa", PRESSURE.read, "P", "Burst pressure, kPa."),
-    ("--proof", "proof_kpa", PRESSURE.read, "P", "Pressure held in the proof test, kPa."),
-    ("--stroke", "stroke_mm", LENGTH.read, "MM", "Stroke when full, as the paper measured it."),
-    ("--force", "force_n", float, "N", "Blocked force at 100 kPa, flat."),
-    ("--height", "height_mm", LENGTH.read, "MM", "Pressed height, deflated."),
-    ("--mass", "mass_g", float, "G", "Mass without tubes."),
-    ("--offset", "offset_mm", LENGTH.read, "MM", "Placement error of a layer laid by hand."),
-    ("--turn", "turn_deg", float, "DEG", "Angle error of a layer laid by hand."),
-    ("--cut-error", "cut_mm", LENGTH.read, "MM", "Position error of a cut edge."),
-    ("--operator", "operator", str, "NAME", "Name of the builder."),
-    ("--kit", "kit", str, "NAME", "Kit that it was built with."),
-    ("--note", "note", str, "TEXT", "Free text."),
+MEASUREMENTS = (
+    opt.option("--leak", "Result of the leak test.", ("pass", "fail")),
+    opt.option("--burst burst_kpa P", "Burst pressure, kPa.", opt.PRESSURE),
+    opt.option("--proof proof_kpa P", "Pressure held in the proof test, kPa.", opt.PRESSURE),
+    opt.option("--stroke stroke_mm MM", "Stroke when full, as the paper measured it.", opt.LENGTH),
+    opt.option("--force force_n N", "Blocked force at 100 kPa, flat.", float),
+    opt.option("--height height_mm MM", "Pressed height, deflated.", opt.LENGTH),
+    opt.option("--mass mass_g G", "Mass without tubes.", float),
+    opt.option("--offset offset_mm MM...", "Placement error of a layer laid by hand.", opt.LENGTH),
+    opt.option("--turn turn_deg DEG...", "Angle error of a layer laid by hand.", float),
+    opt.option("--cut-error cut_mm MM...", "Position error of a cut edge.", opt.LENGTH),
+    opt.option("--operator NAME", "Name of the builder."),
+    opt.option("--kit NAME", "Kit that it was built with."),
+    opt.option("--note TEXT", "Free text."),
 )
-"""Option, column of a result, type, word for its value, help."""
-RESULTS = tuple(column for _, column, *_ in MEASUREMENTS)
+"""Options of a result, each with the name of its column."""
+RESULTS = tuple(name for name in columns(Record) if name != "serial")
 
 
-def _measurement_options(command: Command) -> Command:
-    """Add the options of measurements, in the order of the help; errors are repeatable."""
-    for flag, column, kind, word, words in reversed(MEASUREMENTS):
-        settings = {"type": kind, "metavar": word or None, "multiple": column in ERRORS}
-        text = f"{words} Repeatable." if column in ERRORS else words
-        command = click.option(flag, column, **settings, help=text)(command)
+def _measurement_options(command: opt.Command) -> opt.Command:
+    """Add the options of measurements, in the order of the help."""
+    for option in reversed(MEASUREMENTS):
+        command = option(command)
     return command
 
 
@@ -69,68 +67,54 @@ def _row_key(
 
 
 @click.command()
-@click.argument("design", metavar="[DESIGN]", required=False)
-@click.option(
-    "--serial", default="", metavar="NAME", help="Serial of the actuator, on its traveller."
-)
+@opt.design_argument("design", metavar="[DESIGN]", required=False)
+@opt.option("--serial NAME", "Serial of the actuator, on its traveller.", default="")
 @_measurement_options
-@click.option(
-    "--table",
-    type=click.Path(path_type=Path),
-    metavar="CSV",
-    help="Table with a row for each actuator, instead of --serial and measurements.",
+@opt.option(
+    "--table CSV",
+    "Table with a row for each actuator, instead of --serial and measurements.",
+    opt.file_path(),
 )
-@click.option(
-    "--entry",
-    multiple=True,
-    metavar="TEXT",
-    help="A line of the device's history: 'step=1 temperature_c=134 initials=AL'. Fields: "
-    f"{', '.join(columns(HistoryEntry))}. Repeatable.",
+@opt.option(
+    "--entry TEXT...",
+    "A line of the device's history: 'step=1 temperature_c=134 initials=AL'. Fields: "
+    f"{', '.join(columns(HistoryEntry))}.",
 )
-@click.option(
-    "--history",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Lines of history from the filled record page: CSV, TOML or JSON.",
+@opt.option(
+    "--history FILE",
+    "Lines of history from the filled record page: CSV, TOML or JSON.",
+    opt.file_path(),
 )
-@click.option("--again", is_flag=True, help="A new attempt, after a repair.")
-@click.option(
-    "--correct",
+@opt.option("--again", "A new attempt, after a repair.", bool)
+@opt.option(
+    "--correct N",
+    "Add a record that corrects record N, or entry N, such as e3.",
     callback=_row_key,
-    metavar="N",
-    help="Add a record that corrects record N, or entry N, such as e3.",
 )
-@click.option("--withdraw", is_flag=True, help="With --correct: withdraw record or entry N.")
-@click.option(
-    "--find", metavar="TEXT", help="Show the records of a serial, a design or a scanned code."
+@opt.option("--withdraw", "With --correct: withdraw record or entry N.", bool)
+@opt.option("--find TEXT", "Show the records of a serial, a design or a scanned code.")
+@opt.option("--report", "Report on all records.", bool)
+@opt.option(
+    "--export FILE",
+    "Write the rows of all devices, or of --find or --serial: CSV or JSON.",
+    opt.file_path(dir_okay=False),
 )
-@click.option("--report", is_flag=True, help="Report on all records.")
-@click.option(
-    "--export",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="Write the rows of all devices, or of --find or --serial: CSV or JSON.",
+@opt.option(
+    "--chart SVG",
+    "Draw the share of actuators that passed the leak test, with its interval.",
+    opt.file_path(dir_okay=False),
 )
-@click.option(
-    "--chart",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="SVG",
-    help="Draw the share of actuators that passed the leak test, with its interval.",
-)
-@click.option(
-    "--lab",
-    type=click.Path(path_type=Path, dir_okay=False),
+@opt.option(
+    "--lab FILE",
+    "File of the lab's records.",
+    opt.file_path(dir_okay=False),
     default=Path("lab.sqlite"),
     envvar="SBAFAB_LAB",
     show_envvar=True,
-    metavar="FILE",
-    help="File of the lab's records.",
 )
-@set_option
-@json_option
-def record(
-    design: str | None, lab: Path, assignments: tuple[str, ...], as_json: bool, **values: Any
-) -> None:
+@opt.set_option
+@opt.json_option
+def record(lab: Path, assignments: tuple[str, ...], as_json: bool, **values: Any) -> None:
     """Record the results of builds, and report on them.
 
     DESIGN is the name of a template, a TOML file or the output folder of the build, of an assembly
@@ -144,29 +128,28 @@ def record(
     sbafab record --report
     """  # noqa: D301 (click reads the backspace as a mark)
     store = Lab(lab)
-    values = {"design": design, **values}
     values = {k: v for k, v in values.items() if v not in (None, "", ()) and v is not False}
     task = _task(values)
-    if task in ("report", "chart"):
+    if task == "report":
         records, _, builds = store.contents()
-        if task == "report":
-            print_report(report(records, builds), as_json)
-        else:
-            recording.save_text(values["chart"], success_svg(records, builds))
-            print_verdict(str(values["chart"]))
+        _print_report(report(records, builds), as_json)
+    elif task == "chart":
+        records, _, builds = store.contents()
+        recording.save_text(values["chart"], success_svg(records, builds))
+        show.verdict(str(values["chart"]))
     elif task == "export":
         count = recording.write_history(_matches(store, values), values["export"])
-        print_verdict(f"{values['export']}: {several(count, 'device')}")
+        show.verdict(f"{values['export']}: {show.several(count, 'device')}")
     elif task == "find":
         found = _matches(store, values)
-        print_rows([*found.entries, *found.records], store, as_json, "found in")
+        _print_rows([*found.entries, *found.records], store, as_json, "found in")
     elif task == "correct":
-        print_rows([_correct(store, values)], store, as_json, "added to")
+        _print_rows([_correct(store, values)], store, as_json, "added to")
     else:
         rows = _new_rows(values)
         built = recording.built_from(values["design"], assignments)
         rows = recording.record(store, built, rows, "again" in values)
-        print_rows(rows, store, as_json, "added to")
+        _print_rows(rows, store, as_json, "added to")
 
 
 GOES_WITH: Mapping[str, tuple[str, ...]] = {
@@ -197,8 +180,8 @@ def _task(values: Mapping[str, Any]) -> str:
 
 
 def _flag(name: str) -> str:
-    flags = {column: flag for flag, column, *_ in MEASUREMENTS}
-    return "DESIGN" if name == "design" else flags.get(name, f"--{name}")
+    flags = {param.name: param.opts[0] for param in record.params}
+    return "DESIGN" if name == "design" else flags[name]
 
 
 def _new_rows(values: Mapping[str, Any]) -> Sequence[LabRow]:
@@ -223,8 +206,6 @@ def _result(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def _pairs(text: str) -> dict[str, str]:
     """Return the fields of a line such as ``step=1 reason='leaks at the rim'``."""
-    import shlex
-
     try:
         words = shlex.split(text)
     except ValueError:
@@ -267,7 +248,7 @@ def _matches(store: Lab, values: Mapping[str, Any]) -> Contents:
 # Printing: rows as lines, the tables of the report.
 
 
-def print_rows(rows: Sequence[LabRow], store: Lab, as_json: bool, action: str) -> None:
+def _print_rows(rows: Sequence[LabRow], store: Lab, as_json: bool, action: str) -> None:
     """Print a line for each row, and their count with ``action``."""
     records, entries, builds = store.contents()
     newer = {(row.NOUN, row.corrects): row.id for row in (*records, *entries)}
@@ -282,11 +263,13 @@ def print_rows(rows: Sequence[LabRow], store: Lab, as_json: bool, action: str) -
             _print_expired(row)
     if as_json:
         lists = {"records": documents["record"], "entries": documents["entry"]}
-        print_json(RecordsDocument.of(None, **lists))
+        show.document(RecordsDocument.of(None, **lists))
         return
     counts = {"record": "records", "entry": "entries"}
-    each = [several(len(documents[noun]), noun, counts[noun]) for noun in counts if documents[noun]]
-    print_verdict(f"{' and '.join(each)} {action} {store.path}")
+    each = [
+        show.several(len(documents[noun]), noun, counts[noun]) for noun in counts if documents[noun]
+    ]
+    show.verdict(f"{' and '.join(each)} {action} {store.path}")
 
 
 def _line(row: LabRow, design: str, corrected_by: int | None) -> str:
@@ -309,29 +292,27 @@ def _print_expired(row: LabRow) -> None:
         )
 
 
-TITLES = {
-    "success": "Success: leak test passed at the first attempt, with 95 % Wilson interval; "
-    "promised by registration-yield",
-    "measured": "Measured mean with 95 % interval, against predicted",
-}
-"""Lists of the report."""
-NOT_PRINTED = ("unit", "model")
-"""Keys of them that are in JSON alone."""
 FITTED = ("stroke_mm", "force_n", "height_mm")
 """Quantities that ``sbafab calibrate`` fits the models to."""
 
 
-def print_report(report: Report, as_json: bool) -> None:
+def _print_report(report: Report, as_json: bool) -> None:
     """Print success, measured against predicted values, advice, and last the counts."""
     document = ReportDocument.of(report)
     if as_json:
-        print_json(document)
+        show.document(document)
         return
-    for name, title in TITLES.items():
-        rows = [{k: v for k, v in row.items() if k not in NOT_PRINTED} for row in document[name]]
+    titles = {
+        "success": "Success: leak test passed at the first attempt, with 95 % Wilson interval; "
+        "promised by registration-yield",
+        "measured": "Measured mean with 95 % interval, against predicted",
+    }
+    for name, title in titles.items():
+        # Unit and model are in JSON alone.
+        rows = [{k: row[k] for k in row if k not in ("unit", "model")} for row in document[name]]
         if rows:
             names = [key.removeprefix("passed_") for key in rows[0]]
-            print_table(title, names, [[*map(cell_text, row.values())] for row in rows])
+            show.table(title, names, [[*row.values()] for row in rows])
             click.echo()
     off: dict[str, list[str]] = {}
     for compared in report.comparisons:
@@ -339,5 +320,5 @@ def print_report(report: Report, as_json: bool) -> None:
             off.setdefault(compared.design, []).append(compared.quantity)
     for design, quantities in off.items():
         click.echo(f"{design}: sbafab calibrate fits the models to its {', '.join(quantities)}")
-    actuators, records = several(report.items, "actuator"), several(report.records, "record")
-    print_verdict(f"Report on {actuators}, {records}")
+    actuators = show.several(report.items, "actuator")
+    show.verdict(f"Report on {actuators}, {show.several(report.records, 'record')}")

@@ -425,10 +425,7 @@ def listening(port: int | None, address: str = ADDRESS) -> socket.socket:
 
 
 def serve(
-    source: str | None,
-    port: int | None,
-    announce: Callable[[str], None],
-    address: str = ADDRESS,
+    source: str | None, port: int | None, announce: Callable[[str], None], address: str = ADDRESS
 ) -> None:
     """Serves the studio until Ctrl-C; ``announce`` gets the link.
 

@@ -181,12 +181,7 @@ def _movers(assembled: Assembled) -> Iterator[dict[str, Any]]:
         gripper = api.grip(assembled, placed.name)
         if gripper is not None:
             grip, surface = gripper
-            yield {
-                **actuator,
-                "is": "grip",
-                **grip._asdict(),
-                "surface": packed(surface),
-            }
+            yield {**actuator, "is": "grip", **grip._asdict(), "surface": packed(surface)}
             continue
         try:
             stack = stack_of(placed.made.design)

@@ -33,7 +33,7 @@ generate brace --set parts.tube.on=cup | no tube can be fixed on a cup
 generate brace --waive seats | --waive 'seats': no rule has that name; did you mean seat
 generate brace --set parts=1 | add [parts.NAME]
 generate brace --set parts.arm.set.laser.kerf_tpe=0.1 | laser differs
-generate brace --decks | --decks goes with one design
+generate brace --decks | decks are of one design, and brace is an assembly
 generate brace --target-yield 0.9 | generate its parts' designs one by one
 generate standing --copies 0 | order.copies = 0
 generate 3dof-15mm --set name=../x | name = '../x'

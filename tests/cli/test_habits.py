@@ -18,7 +18,7 @@ from sbafab.assemblies.records import Assembly
 from sbafab.cli import app
 from sbafab.cli.check import file_states, watch_source
 from sbafab.cli.explain import design_keys
-from sbafab.cli.printing import limit_text
+from sbafab.cli.show import limit_text
 from sbafab.design.files import key_paths
 from sbafab.design.sections import rule_names
 from sbafab.models.figures import FLAGS

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from sbafab.cli import SUMMARIES
+from sbafab.cli import HOMES, SUMMARIES
 
 HEAVY = {
     "PIL",
@@ -50,8 +50,8 @@ def test_help_loads_neither_geometry_nor_pydantic(arguments: list[str]) -> None:
 
 def test_a_command_loads_no_other_command() -> None:
     loaded = modules_after("new")
-    others = {f"sbafab.cli.{name}" for name in SUMMARIES if name != "new"}
-    assert "sbafab.cli.new" in loaded
+    others = {f"sbafab.cli.{HOMES.get(name, name)}" for name in SUMMARIES} - {"sbafab.cli.start"}
+    assert "sbafab.cli.start" in loaded
     assert not loaded & others
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sbafab.cli.progress import Pace, Stages, plain_lines
+from sbafab.cli.show import Stages, plain_lines
 
 
 class Clock:
@@ -14,30 +14,28 @@ class Clock:
         return self.now
 
 
-def test_time_left_is_that_of_the_pace_so_far() -> None:
-    assert Pace("designs", 25, 100, 60.0, 50.0).remaining == 150.0
-    said = "designs: 25 of 100, 30 per minute, 1 min 00 s elapsed, about 2 min 30 s left"
-    assert Pace("designs", 25, 100, 60.0, 50.0).text == said
-    assert Pace("designs", 100, 200, 50.0, 50.0).text.startswith(
-        "designs: 100 of 200, 2 per second"
-    )
-    assert Pace("designs", 100, 400, 5000.0, 5000.0).text.endswith("about 4 h 10 min left")
-    assert Pace("designs", 99, 100, 6.0, 6.0).text.endswith("6 s elapsed, less than 1 s left")
-    # Nothing done yet, too early to tell, or nobody knows of how many.
-    for done, total, in_stage in ((0, 100, 50.0), (3, 100, 0.5), (0, 0, 50.0)):
-        assert Pace("designs", done, total, 60.0, in_stage).remaining is None
-    assert Pace("trial 3", 0, 0, 61.0, 50.0).text == "trial 3, 1 min 01 s elapsed"
-
-
-def test_a_stage_begins_where_less_is_done_or_the_total_is_another() -> None:
+def text(stage: str, done: int, total: int, before: float, in_stage: float) -> str:
+    """Return the line of a stage that began after some seconds and has run for others."""
     clock = Clock()
     stages = Stages(clock)
-    assert stages.report("bond-width", 0, 16)
-    clock.now += 4
-    assert not stages.report("mask-overhang", 1, 16)
-    assert (stages.pace().elapsed, stages.pace().stage_elapsed) == (4, 4)
-    assert stages.report("sheets", 0, 3)
-    assert (stages.pace().elapsed, stages.pace().stage_elapsed) == (4, 0)
+    clock.now += before
+    stages.report(stage, 0, total + 1)
+    stages.report(stage, 0, total)
+    clock.now += in_stage
+    assert not stages.report(stage, done, total)
+    return stages.text
+
+
+def test_time_left_is_that_of_the_pace_so_far() -> None:
+    said = "designs: 25 of 100, 30 per minute, 1 min 00 s elapsed, about 2 min 30 s left"
+    assert text("designs", 25, 100, 10.0, 50.0) == said
+    assert text("designs", 100, 200, 0.0, 50.0).startswith("designs: 100 of 200, 2 per second")
+    assert text("designs", 100, 400, 0.0, 5000.0).endswith("about 4 h 10 min left")
+    assert text("designs", 99, 100, 0.0, 6.0).endswith("6 s elapsed, less than 1 s left")
+    # Nothing done yet, too early to tell, or nobody knows of how many.
+    for done, total, in_stage in ((0, 100, 50.0), (3, 100, 0.5), (0, 0, 50.0)):
+        assert not text("designs", done, total, 10.0, in_stage).endswith("left")
+    assert text("trial 3", 0, 0, 11.0, 50.0) == "trial 3, 1 min 01 s elapsed"
 
 
 def test_plain_lines_come_now_and_then_and_verbose_ones_at_every_stage() -> None:

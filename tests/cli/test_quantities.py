@@ -26,21 +26,21 @@ CONTEXT = click.Context(click.Command("any"))
     ],
 )
 def test_units(quantity: MeasuredQuantity, written: str, value: float) -> None:
-    assert quantity.read(written) == pytest.approx(value)
+    assert quantity.convert(written, None, None) == pytest.approx(value)
 
 
 @pytest.mark.parametrize("written", ["", "kPa", "6 kpa", "6 7", "nan", "inf", "1_0", "6 kPa x"])
 def test_anything_else_is_refused_with_the_units(written: str) -> None:
     with pytest.raises(click.BadParameter, match="the units are kPa, Pa, MPa, mbar, bar, psi"):
-        PRESSURE.read(written)
+        PRESSURE.convert(written, None, None)
 
 
 def test_chambers() -> None:
-    assert OfChamber(VOLUME).read("chamber1 = 5 ul") == ("chamber1", 5)
-    assert OfChamber(VOLUME, all_chambers=True).read("5ul") == ("", 5)
+    assert OfChamber(VOLUME).convert("chamber1 = 5 ul", None, None) == ("chamber1", 5)
+    assert OfChamber(VOLUME, all_chambers=True).convert("5ul", None, None) == ("", 5)
     for written in ("5ul", "=5ul"):
         with pytest.raises(click.BadParameter, match="chamber1=5"):
-            OfChamber(VOLUME).read(written)
+            OfChamber(VOLUME).convert(written, None, None)
     assert by_chamber(CONTEXT, OPTION, (("a", 1.0), ("b", 2.0))) == {"a": 1.0, "b": 2.0}
     with pytest.raises(click.BadParameter, match="given once"):
         by_chamber(CONTEXT, OPTION, (("a", 1.0), ("a", 2.0)))

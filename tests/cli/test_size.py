@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import sbafab
-from sbafab.cli.printing import print_facts
+from sbafab.cli.show import facts
 from sbafab.models.intervals import factors_of
 from tests.cli.conftest import Run
 
@@ -70,6 +70,6 @@ def test_a_path_longer_than_the_line_is_printed_whole(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "40")
     folder = "/home/lab/" + "actuators/" * 9 + "3dof-15mm"
-    print_facts([("folder", folder)])
+    facts([("folder", folder)])
     told = capsys.readouterr().out.splitlines()
     assert "".join(line[len("folder") :].strip() for line in told) == folder

@@ -248,7 +248,7 @@ def test_the_command_says_what_it_drew_and_refuses_in_a_sentence(tmp_path: Path)
         (["--pressure", "arm=5"], "chamber arm is not there; the chambers are chamber1"),
         (["--pressure", "5", "--volume", "5"], "give --pressure or --volume, not both"),
         (["--pressure", "400", "--to", str(tmp_path / "b.png")], "burst pressure"),
-        (["--to", str(tmp_path / "no" / "a.png")], "cannot be written"),
+        (["--to", str(tmp_path / "no" / "a.png")], "no such file or directory"),
         (["--motion", "circle", "--to", "a.png"], "--motion is for an animation"),
     ):
         code, said = run(*asked, *extra)

@@ -1,4 +1,4 @@
-"""``sbafab new``: a commented design file, a kit, or the kerf's calibration piece."""
+"""``sbafab new`` and ``studio``: a file to start from, and a page to edit it."""
 
 from __future__ import annotations
 
@@ -8,30 +8,35 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
-from sbafab.cli.options import completions, json_option
-from sbafab.cli.printing import print_json
+from sbafab.cli import options as opt
+from sbafab.cli import show
 from sbafab.design.files import template_summaries, write_new
 from sbafab.design.kits import write_kit
+from sbafab.documents import Document
 from sbafab.version import GENERATOR
 
 COUPON = "coupon"
 KIT = "kit"
-OTHERS = {
-    COUPON: "the kerf's calibration piece",
-    KIT: "films, tubes, press, laser, limits",
-}
+OTHERS = {COUPON: "the kerf's calibration piece", KIT: "films, tubes, press, laser, limits"}
 """Files to start from other than designs, with a summary."""
+
+
+class TemplateEntry(Document):
+    """A design that ships."""
+
+    name: str
+    summary: str
 
 
 def templates(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete the names of templates, "coupon" and "kit"."""
-    return completions(typed, (template_summaries() | OTHERS).items())
+    return opt.completions(typed, (template_summaries() | OTHERS).items())
 
 
 @click.command()
 @click.argument("template", required=False, shell_complete=templates)
-@click.argument("file", type=click.Path(path_type=Path), required=False)
-@json_option
+@click.argument("file", type=opt.file_path(), required=False)
+@opt.json_option
 def new(template: str | None, file: Path | None, as_json: bool) -> None:
     """Write a commented design file to start from, or list the templates.
 
@@ -43,8 +48,12 @@ def new(template: str | None, file: Path | None, as_json: bool) -> None:
     """
     if as_json and template is not None:
         raise click.UsageError("--json lists the templates; leave TEMPLATE out")
-    if template is None:
-        _list(as_json)
+    designs = template_summaries()
+    if as_json:
+        rows = [TemplateEntry(name=name, summary=words) for name, words in designs.items()]
+        show.document([row.model_dump() for row in rows])
+    elif template is None:
+        show.names(designs | OTHERS)
     elif template == COUPON:
         _coupon(file or Path(COUPON))
     elif template == KIT:
@@ -54,18 +63,6 @@ def new(template: str | None, file: Path | None, as_json: bool) -> None:
         written = write_new(template, file)
         path = shlex.quote(str(written))
         click.echo(f"{written} written. Edit it, then: sbafab generate {path}")
-
-
-def _list(as_json: bool) -> None:
-    """Print the designs that ship, and a line on the other files."""
-    designs = template_summaries()
-    if as_json:
-        print_json([{"name": name, "summary": summary} for name, summary in designs.items()])
-        return
-    every = designs | OTHERS
-    width = max(map(len, every))
-    for name, summary in every.items():
-        click.echo(f"{name:<{width}}  {summary}")
 
 
 def _coupon(folder: Path) -> None:
@@ -79,3 +76,43 @@ def _coupon(folder: Path) -> None:
         f"{folder} written. Measure the pieces, fill in {table}, then: sbafab kerf {path} "
         "--material tpe"
     )
+
+
+@click.command()
+@click.argument("source", metavar="[DESIGN|FOLDER|LINK]", required=False)
+@opt.option(
+    "--port",
+    "Port to listen on.  [default: 8417, or another if it is taken]",
+    click.IntRange(1, 65535),
+)
+@opt.option(
+    "--browser/--no-browser", "Open the page in the browser, or only print its link.", default=True
+)
+@opt.option(
+    "--phone ADDRESS",
+    "Serve the record page, and nothing else, at this machine's ADDRESS in the network.",
+)
+def studio(source: str | None, port: int | None, browser: bool, phone: str | None) -> None:
+    """Edit a design in the browser.
+
+    Layers, rules, prediction and actuator are updated at once.
+
+    The page is served on this machine only, and needs the token in its link. Ctrl-C stops it.
+    --phone prints the link as a code to scan; it goes through the network without encryption.
+    """
+    # The server comes with the extra "studio".
+    from sbafab.studio.app import ADDRESS, serve
+
+    def announce(link: str) -> None:
+        click.echo(f"studio: {link}")
+        if phone is not None:
+            import segno
+
+            segno.make(link, error="l", micro=False).terminal(compact=True)
+        click.echo("Ctrl-C stops it.")
+        if browser and phone is None:
+            import webbrowser
+
+            webbrowser.open(link)
+
+    serve(source, port, announce, phone or ADDRESS)

@@ -1,19 +1,24 @@
-"""``sbafab kerf``: the kerf from measurements of the coupon."""
+"""``sbafab kerf`` and ``inspect``: the kerf from a coupon, a picture of a cut sheet."""
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import click
 
-from sbafab.cli.options import FiniteRange, json_option
-from sbafab.cli.printing import print_json, print_verdict, several
+from sbafab.cli import options as opt
+from sbafab.cli import show
 from sbafab.design.films import FILM_NAME, is_kerf
 from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
+from sbafab.folders.swap import replace_text
 from sbafab.lab.coupon import (
+    RESOLUTIONS,
     Calibration,
     Estimate,
     Measurement,
@@ -21,6 +26,20 @@ from sbafab.lab.coupon import (
     calibrated,
     read_measurements,
 )
+from sbafab.lab.cut_sheet import read_cut_sheet
+from sbafab.lab.edges import Reference
+from sbafab.lab.inspection import (
+    Inspection,
+    InspectionDocument,
+    drawing,
+    history,
+    inspect_picture,
+    sizes_csv,
+)
+from sbafab.lab.picture import ScanPicture, read_picture
+
+MOST_LINES = 20
+"""Pieces amiss that are printed; the files have all."""
 
 
 class KerfEstimate(Document):
@@ -59,32 +78,31 @@ def _film(context: click.Context, option: click.Parameter, name: str) -> str:
 
 
 @click.command()
-@click.argument("measurements", type=click.Path(path_type=Path))
-@click.option(
-    "--material",
+@click.argument("measurements", type=opt.file_path())
+@opt.option(
+    "--material FILM",
+    "Film of the coupon: tpe, ptfe or another film of a kit.",
     callback=_film,
     default="tpe",
-    metavar="FILM",
-    help="Film of the coupon: tpe, ptfe or another film of a kit.",
 )
-@click.option(
+@opt.option(
     "--instrument",
-    type=click.Choice(["calliper", "scanner", "microscope"]),
-    help="Instrument of the measurements, unless the table has a column of that name.",
+    "Instrument of the measurements, unless the table has a column of that name.",
+    tuple(RESOLUTIONS),
 )
-@click.option(
-    "--resolution",
-    type=FiniteRange(0, 1),
-    metavar="MM",
-    help="Resolution of the instrument.  [default: calliper 0.01, scanner 0.0106 (2400 "
-    "dpi), microscope 0.001]",
+@opt.option(
+    "--resolution MM",
+    "Resolution of the instrument.  [default: "
+    + ", ".join(f"{name} {least:.3g}" for name, least in RESOLUTIONS.items())
+    + "]",
+    opt.FiniteRange(0, 1),
 )
-@click.option(
+@opt.option(
     "--split-xy/--no-split-xy",
+    "Compute two kerfs, along x and along y, or one.  [default: two if they differ]",
     default=None,
-    help="Compute two kerfs, along x and along y, or one.  [default: two if they differ]",
 )
-@json_option
+@opt.json_option
 def kerf(
     measurements: Path,
     material: str,
@@ -111,10 +129,10 @@ def kerf(
     block = _toml_block(material, widths, warnings)
     if as_json:
         sentences = {"warnings": warnings, "remarks": remarks, "toml": block}
-        print_json(KerfDocument.of(calibration, **sentences))
+        show.document(KerfDocument.of(calibration, **sentences))
         return
-    names = {"all": calibration.overall, "along x": calibration.x, "along y": calibration.y}
-    for name, estimate in names.items():
+    estimates = {"all": calibration.overall, "along x": calibration.x, "along y": calibration.y}
+    for name, estimate in estimates.items():
         if estimate is not None:
             kerf_text = _with_interval(estimate.kerf)
             click.echo(f"{name:8} kerf {kerf_text}, from {estimate.count} sizes")
@@ -123,9 +141,9 @@ def kerf(
     read_first = "Read the warnings before you paste" if warnings else "Paste into the design file"
     click.echo(f"\n{read_first}:\n\n{block}")
     values = ", ".join(f"{estimate.kerf.value:.3f}" for estimate in widths)
-    count = f", {several(len(warnings), 'warning')}" if warnings else ""
+    count = f", {show.several(len(warnings), 'warning')}" if warnings else ""
     # A comment, so that all from the table on may be pasted.
-    print_verdict(f"# {material} kerf: {values} mm from {calibration.overall.count} sizes{count}")
+    show.verdict(f"# {material} kerf: {values} mm from {calibration.overall.count} sizes{count}")
 
 
 def _toml_block(film: str, widths: Sequence[Estimate], warnings: Sequence[str]) -> str:
@@ -211,3 +229,119 @@ def _warnings(calibration: Calibration, widths: Sequence[Estimate]) -> Iterator[
             "the instrument with a gauge of known length and cut a second coupon before you adjust "
             "the laser"
         )
+
+
+# Pictures of cut sheets.
+
+
+@click.command()
+@click.argument("folder", metavar="FOLDER", type=opt.file_path())
+@click.argument("picture", metavar="PICTURE", type=opt.file_path())
+@opt.option("--sheet NAME", "Sheet or layer in the picture, e.g. TPE_1.")
+@opt.option(
+    "--dpi N",
+    "Resolution of the scan.  [default: as the file states it]",
+    opt.FiniteRange(50, 20000),
+)
+@opt.option("--bar MM", "Length of a bar that lies beside the parts.", opt.POSITIVE_LENGTH)
+@opt.option("--pins", "Take the scale from the pins of the sheet.", bool)
+@opt.option("--photo", "A camera's picture, with perspective.", bool)
+@opt.option(
+    "--paper",
+    "What the film lies on: darker or lighter than film.",
+    ("dark", "light"),
+    default="dark",
+)
+@opt.folder_option("Folder of the files.", "inspection")
+@opt.json_option
+def inspect(
+    folder: Path,
+    picture: Path,
+    sheet: str | None,
+    photo: bool,
+    paper: str,
+    out: Path,
+    as_json: bool,
+    **reference: Any,
+) -> None:
+    """Compare a scan or photograph of a cut sheet with its cut file.
+
+    FOLDER is an output folder, or a cut file such as coupon.dxf. PICTURE shows the pieces in their
+    places without the waste, or the sheet that they fell out of. Measures the kerf and names
+    missing and wrong pieces. OUT receives the picture with deviations (.svg), the result (.json),
+    sizes for `sbafab kerf` (_sizes.csv) and an entry for `sbafab record --history` (_history.json).
+    """
+    if find_spec("skimage") is None or find_spec("scipy") is None:
+        raise DesignError('sbafab inspect needs scikit-image: pip install "sbafab[scan]"')
+    cut, seen = read_cut_sheet(folder, sheet), read_picture(picture)
+    scale = _reference(seen, photo, **reference)
+    inspection = inspect_picture(seen, cut, scale, photo, paper == "dark")
+    paths = _write_inspection(inspection, out)
+    if as_json:
+        show.document({**InspectionDocument.of(inspection), "files": [str(path) for path in paths]})
+    else:
+        _print_inspection(inspection, paths)
+    if inspection.failed:
+        show.end_failed()
+
+
+def _reference(
+    picture: ScanPicture, photo: bool, dpi: float | None, bar: float | None, pins: bool
+) -> Reference:
+    if bar is not None and pins:
+        raise DesignError("give --bar or --pins, not both")
+    stated = None if photo else picture.dpi
+    resolution = stated if dpi is None else (dpi, dpi)
+    if not photo and resolution is None and bar is None and not pins:
+        raise DesignError(
+            f"{picture.path} states no resolution; give --dpi as scanned, --bar or --pins, or "
+            "--photo to take the scale from the cut edges themselves"
+        )
+    return Reference(resolution, bar, pins)
+
+
+def _write_inspection(inspection: Inspection, out: Path) -> list[Path]:
+    """Write picture, result, entry and table of sizes; return their paths."""
+    out.mkdir(parents=True, exist_ok=True)
+    stem = f"{inspection.sheet.name.replace('/', '_')}-{inspection.picture.path.stem}"
+    texts = {
+        ".json": json.dumps(InspectionDocument.of(inspection), indent=1, ensure_ascii=False) + "\n",
+        "_history.json": json.dumps(history(inspection), indent=1, ensure_ascii=False) + "\n",
+        ".svg": drawing(inspection),
+        "_sizes.csv": sizes_csv(inspection),
+    }
+    for ending, text in texts.items():
+        replace_text(out / f"{stem}{ending}", text)
+    return [out / f"{stem}{ending}" for ending in texts]
+
+
+def _print_inspection(inspection: Inspection, paths: list[Path]) -> None:
+    """Print kerf, scale, edges and the pieces amiss, and last the verdict."""
+    kerf, scale, sheet = inspection.kerf, inspection.scale, inspection.sheet
+    low, high = kerf.interval
+    is_pieces = inspection.location.content == "pieces"
+    seen = "pieces without waste" if is_pieces else "the sheet without its pieces"
+    below = ", seen from below" if inspection.location.from_below else ""
+    show.facts(
+        [
+            ("picture", f"{seen}{below}; {inspection.pixel:.4f} mm a pixel"),
+            ("kerf", f"{kerf.value:.4f} mm, 95 % interval {low:.4f} to {high:.4f}"),
+            ("in file", f"kerf {sheet.kerf}"),
+            ("scale", f"x {scale.x:.5f}, y {scale.y:.5f}, by {scale.reference}"),
+            ("edges", f"rms {inspection.rms:.4f} mm, 95 % within {inspection.within_95:.4f} mm"),
+        ]
+    )
+    click.echo(
+        "The interval leaves out how film and paper reflect: half way in grey may lie beside the "
+        "edge, which reads as kerf"
+    )
+    for piece in inspection.amiss[:MOST_LINES]:
+        click.echo(f"{piece.name} at x {piece.x:.1f}, y {piece.y:.1f}: {piece.message}")
+    rest = len(inspection.amiss) - MOST_LINES
+    if rest > 0:
+        click.echo(f"and {rest} more")
+    click.echo(f"files: {', '.join(map(str, paths))}")
+    sound = len(inspection.pieces) - len(inspection.amiss)
+    verdict = f"{sheet.name}: {sound} of {len(inspection.pieces)} pieces as drawn"
+    (show.failure if inspection.failed else show.verdict)(verdict)
+    show.written(paths[0].parent)

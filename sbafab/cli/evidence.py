@@ -1,0 +1,215 @@
+"""``sbafab reproduce`` and ``calibrate``: measured beside predicted; models fitted."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from sbafab.cli import options as opt
+from sbafab.cli import show
+from sbafab.design.files import shown
+from sbafab.design.sections import NAME_PATTERN
+from sbafab.documents import Document, attribute
+from sbafab.errors import DesignError
+from sbafab.folders.swap import replace_text
+from sbafab.lab.evidence import load_source
+from sbafab.models.calibrated import NONE, load_calibration, shipped_names
+from sbafab.models.unknowns import UNKNOWNS
+from sbafab.validation.comparison import ComparisonDocument, compare, table_lines
+from sbafab.validation.evidence import shipped_evidence
+from sbafab.validation.fit import Fit, HeldOutPoint, calibration_text, fit
+from sbafab.validation.paper_table import PAPER, TITLE, PaperTable
+from sbafab.validation.paper_table import as_json as table_json
+
+FOLDER = "reproduction"
+ALL = "all"
+
+
+@click.command()
+@click.argument("source", required=False)
+@opt.option(
+    "--calibration NAME",
+    "Calibration of the models beside SOURCE: one that ships, a file of calibrate, or none.  "
+    "[default: paper]",
+)
+@opt.out_option
+@opt.json_option
+def reproduce(source: str | None, calibration: str | None, out: Path, as_json: bool) -> None:
+    """Compare predictions with measurements.
+
+    Without SOURCE: OUT/reproduction/ receives reproduction.md, reproduction.json and a chart for
+    each predicted figure of the paper, with its error bars. All values stand beside the models of
+    films as drawn and bought, and those that were calibrated on also beside the calibrated models.
+
+    SOURCE is evidence that ships (paper, pneudots, ...), "all" of it, a file of your own (.toml or
+    .csv), or the lab's build records (.sqlite): its curves are printed beside the models, and
+    nothing is written. Ranges of model and 90 % interval span what the source leaves open.
+    """
+    if source is not None:
+        _print_comparison(source, calibration or PAPER, as_json)
+        return
+    if calibration is not None:
+        raise click.UsageError("--calibration goes with a SOURCE")
+    table, folder = PaperTable(), out / FOLDER
+    table.write(folder)
+    if as_json:
+        show.document(table_json(table, folder=str(folder)))
+        return
+    for section, rows in table.sections.items():
+        click.echo(f"\n{section}")
+        for row in rows:
+            predicted = row.predicted_text or "-"
+            click.echo(f"  {row.figure:<58}{row.measured_text:>20}{predicted:>16}  {row.model}")
+    click.echo(f"\n{TITLE}")
+    for line in table_lines(table.curves):
+        click.echo(f"  {line}")
+    count = sum(row.predicted is not None for row in table.rows)
+    show.verdict(
+        f"\nPaper reproduced: {count} of {len(table.rows)} values predicted; {table.summary}. "
+        f"Written to {folder}: reproduction.md, reproduction.json, charts",
+        folder,
+    )
+
+
+def _print_comparison(source: str, name: str, as_json: bool) -> None:
+    calibration = load_calibration(name, key="--calibration")
+    evidences = shipped_evidence() if source == ALL else (load_source(source),)
+    curves = [curve for evidence in evidences for curve in compare(evidence, calibration)]
+    if as_json:
+        show.document(
+            ComparisonDocument.of(None, calibration=name, sources=evidences, curves=curves)
+        )
+        return
+    for evidence in evidences:
+        click.echo(evidence.citation + (f", doi:{evidence.doi}" if evidence.doi else ""))
+        for line in table_lines([curve for curve in curves if curve.source == evidence.id]):
+            click.echo(line)
+        for sentence in evidence.missing:
+            click.echo(f"Not had: {sentence}")
+        click.echo()
+    points = [point for curve in curves for point in curve.points]
+    predicted = sum(point.model is not None for point in points)
+    bounded = [point for point in points if point.is_within is not None]
+    inside = sum(point.is_within is True for point in bounded)
+    show.verdict(
+        f"{source} compared: {predicted} of {len(points)} values in {len(curves)} curves predicted"
+        + (f", {inside} of {len(bounded)} in their 90 % intervals" if bounded else "")
+    )
+
+
+# Fits.
+
+
+class HeldOutEntry(Document):
+    """A measured value, and its prediction with 90 % interval by a fit without its test."""
+
+    curve: str
+    place: float | None
+    """on the curve's axis"""
+    measured: float
+    median: float
+    low: float
+    high: float
+    unit: str
+    inside: bool = attribute("is_inside")
+
+
+class OpenEntry(Document):
+    """The set-ups that a curve's source leaves open, with the probability of each."""
+
+    curve: str
+    probabilities: Mapping[str, float]
+
+
+class CalibrateDocument(Document, schema="sbafab/calibrate@1"):
+    """Output of ``calibrate --json``."""
+
+    file: Path
+    calibration: dict[str, Any]
+    """contents of the file"""
+    held_out: list[HeldOutEntry] = attribute("points")
+    left_open: list[OpenEntry]
+    not_fitted: list[dict[str, str]]
+
+
+@click.command()
+@click.argument("evidence", nargs=-1)
+@opt.option("--name NAME", "Name of the calibration, and of its file, NAME.toml.", default="lab")
+@opt.folder_option("Folder in which NAME.toml is written.")
+@opt.json_option
+def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) -> None:
+    """Fit the models to measurements.
+
+    EVIDENCE is what reproduce takes: evidence that ships (paper), a file of your own (.toml or
+    .csv), or build records (.sqlite); several are fitted together. By default it is the paper's.
+    The fit gives modulus ratio, pocket loss, press factor and delays with their uncertainty, and
+    what the models miss beyond that. Each test is then predicted from a fit without it. A design
+    or kit uses the file that is written with models.calibration = "NAME.toml".
+    """
+    _check_name(name)
+    sources = [load_source(source) for source in evidence or ("paper",)]
+    with show.progress(as_json) as progress:
+        fitted = fit(name, sources, progress)
+    path = out / f"{name}.toml"
+    out.mkdir(parents=True, exist_ok=True)
+    replace_text(path, calibration_text(fitted.calibration))
+    calibration = fitted.calibration
+    if as_json:
+        unfitted = [{"curve": curve, "reason": reason} for curve, reason in fitted.left_out]
+        left_open = [OpenEntry(curve=k, probabilities=v) for k, v in fitted.open_set_ups.items()]
+        more = {"file": path, "calibration": calibration.as_dict(), "not_fitted": unfitted}
+        show.document(CalibrateDocument.of(fitted, left_open=left_open, **more))
+        return
+    _print(fitted)
+    judged = (
+        f"{calibration.inside} of {calibration.points} left-out values in their 90 % intervals"
+        if calibration.points
+        else "one test alone, so that none could be left out"
+    )
+    show.verdict(f"\n{name} calibrated: {judged}. Written to {path}", path)
+
+
+def _check_name(name: str) -> None:
+    if not re.fullmatch(NAME_PATTERN, name):
+        raise DesignError(
+            f"--name is {shown(name)}; use letters, digits, dot, dash and underscore, such as lab"
+        )
+    if name in (NONE, *shipped_names()):
+        raise DesignError(
+            f"--name is {shown(name)}, which stands for another one; give another name"
+        )
+
+
+def _print(fitted: Fit) -> None:
+    calibration = fitted.calibration
+    rows = []
+    for unknown in UNKNOWNS:
+        low, high = calibration.bounds(unknown.field)
+        value = unknown.shown(calibration.values[unknown.field])
+        prior = f"{unknown.shown(unknown.middle)}: {unknown.source}"
+        rows.append((unknown.title, str(value), f"{low:.3g} to {high:.3g}", prior))
+    show.table("Unknowns", ("", "median", "90 % interval", "prior"), rows)
+    for sentence in calibration.sentences:
+        click.echo(f"Not distinguished by the evidence: {sentence}")
+    missed = ", ".join(
+        f"{group} {100 * spread:.0f} %" for group, spread in calibration.discrepancy.items()
+    )
+    click.echo(f"What the models miss beyond that (one standard deviation): {missed}")
+    names = ("", "measured", "predicted", "90 % interval", "")
+    show.table("Left out", names, [*map(_held_out, fitted.points)])
+    for curve, set_ups in fitted.open_set_ups.items():
+        shares = ", ".join(f"{phrase} {100 * share:.0f} %" for phrase, share in set_ups.items())
+        click.echo(f"Left open by {curve}: {shares}")
+    for curve, reason in fitted.left_out:
+        click.echo(f"Not fitted: {curve}: {reason}")
+
+
+def _held_out(point: HeldOutPoint) -> Sequence[str]:
+    at = "" if point.place is None else f" at {point.place:g}"
+    interval = f"{point.low:.3g} to {point.high:.3g} {point.unit}".rstrip()
+    outside = "" if point.is_inside else "outside"
+    return point.curve + at, f"{point.measured:.3g}", f"{point.median:.3g}", interval, outside

@@ -1,0 +1,474 @@
+"""``sbafab find``, ``sweep`` and ``compare``: searches among designs, and two side by side."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from sbafab.actuators import load_design
+from sbafab.cli import options as opt
+from sbafab.cli import show
+from sbafab.cli.exit import print_error
+from sbafab.design.files import changed_keys, name_of, template_names
+from sbafab.errors import DesignError
+from sbafab.models.figures import FLAGS
+from sbafab.models.formulas import MOST_PRESSURE, is_near_burst
+from sbafab.process import Progress
+from sbafab.search import compare as comparing
+from sbafab.search import sweep as sweeping
+from sbafab.search.find import (
+    FoundDesign,
+    find_document,
+    found_toml,
+    free_keys,
+    refuse_existing,
+    write_found,
+)
+from sbafab.search.find import find as search
+from sbafab.search.quantities import (
+    Goal,
+    Requirement,
+    quantity_lines,
+    read_all,
+    read_sure,
+    shown_value,
+)
+from sbafab.search.space import FindRequest, figure_text, read_free
+from sbafab.search.sweep import SweepDocument, SweepRequest, SweepStopped
+from sbafab.search.vary import format_keys, format_value, varied_keys
+
+Value = TypeVar("Value")
+FOUND = "found.toml"
+"""The default file name in the folder of ``-o``."""
+HELP = """Find the best design that meets requirements.
+
+Without DESIGN the search starts from every family. If no design meets all requirements, the nearest
+miss is shown, no file is written, and the exit code is 1. A quantity may name its pressure P and
+height H with units, such as force@12.5mm@50kPa or, flat, force@0mm@50kPa. Without a pressure it is
+at the highest that another one names, or at 10 kPa. H in % is of the reference stroke, force@50%,
+which round pockets have of the paper's film alone:
+
+\b
+{quantities}
+"""
+
+
+def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float | None:
+    try:
+        return None if text is None else read_sure(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r} {error}", ctx, param) from None
+
+
+@click.command(help=HELP.format(quantities=quantity_lines()))
+@opt.design_argument(metavar="[DESIGN]", required=False)
+@opt.option(
+    "--min least QUANTITY=VALUE...",
+    'At least this much, e.g. lumen=3, stroke=25 or "force@12.5mm@50kPa=3".',
+)
+@opt.option(
+    "--max most QUANTITY=VALUE...",
+    "At most this much, e.g. overall_diameter=20, mass=0.5 or time=0.5.",
+)
+@opt.option(
+    "--sure P",
+    "Probability with which each requirement on a predicted quantity must hold, e.g. 0.9.",
+    callback=_sure,
+)
+@opt.flow_option("Flow of water in all, for the time")
+@opt.option(
+    "--best QUANTITY",
+    "Goal among the designs that meet all: largest stroke, bend, force, yield or lumen, or "
+    "smallest of another quantity.",
+    default="mass",
+)
+@opt.option(
+    "--free KEY=LOW:HIGH:STEP...",
+    "Vary this key too, beside keys of the family, or set its range; of a key that is a word "
+    "KEY=WORD,WORD.",
+)
+@opt.option("--fix fixed KEY...", "Do not vary this key; keys of --set are not varied either.")
+@opt.option(
+    "--tries N",
+    "Largest number of designs to try, for each family.",
+    click.IntRange(4, 100_000),
+    default=FindRequest.tries,
+)
+@opt.option("--optuna", 'Search with Optuna (pip install "sbafab[optuna]").', bool)
+@opt.option(
+    "--storage URL", "Database of Optuna, to resume the search from, e.g. sqlite:///search.db."
+)
+@opt.folder_option(f"Folder in which {FOUND} is written.")
+@opt.file_option(FOUND)
+@opt.set_option
+@opt.json_option
+def find(source: str | None, **options: Any) -> None:
+    if options["storage"] is not None and not options["optuna"]:
+        raise click.UsageError("--storage goes with --optuna; add it")
+    names = [source] if source else _family_templates()
+    requests = _each(names, partial(_request, options=options))
+    target = opt.design_file(options["to"], options["out"], FOUND)
+    refuse_existing(target)
+    if any(_counts_tabs(request) for request in requests.values()):
+        show.note(TABS_HINT)
+    try:
+        with show.progress(options["as_json"]) as progress:
+            origin, result = _best_result(requests, progress)
+    except KeyboardInterrupt:
+        resume = "; run the same command again to resume it" if options["storage"] else ""
+        print_error(f"the search was stopped, and no file was written{resume}")
+        raise
+    if result.holds:
+        name = name_of(target) or origin
+        write_found(found_toml(origin, options["assignments"], name, result, target), target)
+    if options["as_json"]:
+        show.document(find_document(result, origin, target))
+    else:
+        _print_found(result, origin, target)
+    if not result.holds:
+        show.end_failed()
+
+
+def _request(name: str, options: dict[str, Any]) -> FindRequest:
+    """Return the search from a design. Raises DesignError without a requested quantity."""
+    requirements, goal = read_all(
+        options["least"], options["most"], options["best"], options["flow_ml_min"]
+    )
+    assigned = options["assignments"]
+    design = load_design(name, assigned)
+    free = read_free(design, options["free"], options["fixed"], tuple(changed_keys(assigned)))
+    settings = {name: options[name] for name in ("tries", "optuna", "storage", "sure")}
+    request = FindRequest(design, requirements, goal, free, **settings)
+    free_keys(request)  # raises DesignError for keys that cannot vary
+    return request
+
+
+def _each(names: Iterable[str], value: Callable[[str], Value]) -> dict[str, Value]:
+    """Return a value for each name that has one. Raises DesignError if none has."""
+    values: dict[str, Value] = {}
+    problems = []
+    for name in names:
+        try:
+            values[name] = value(name)
+        except DesignError as error:
+            problems.append(str(error))
+    if not values:
+        raise DesignError("; ".join(dict.fromkeys(problems)))
+    return values
+
+
+def _best_result(requests: dict[str, FindRequest], progress: Progress) -> tuple[str, FoundDesign]:
+    """Run the searches; return the best result and the design that it started from."""
+    names = list(requests)
+
+    def result(name: str) -> FoundDesign:
+        def report(stage: str, done: int, total: int) -> None:
+            progress(stage, names.index(name) * total + done, len(names) * total)
+
+        return search(requests[name], report)
+
+    return min(_each(names, result).items(), key=lambda item: item[1].best.rank)
+
+
+def _family_templates() -> list[str]:
+    """Return the first template of each family."""
+    templates: dict[type, str] = {}
+    for name in template_names():
+        with suppress(DesignError):
+            templates.setdefault(type(load_design(name)), name)
+    return list(templates.values())
+
+
+# Printing of a result.
+
+
+TABS_HINT = (
+    "overall_diameter counts the inlet tabs; use outline_diameter if they may stand out, or add "
+    "--free inlet.tab_length=3:5:0.5"
+)
+
+
+def _counts_tabs(request: FindRequest) -> bool:
+    """Return True if a search limits the diameter with tabs, and may not shorten these."""
+    names = [requirement.quantity.name for requirement in request.requirements]
+    free = [free.key for free in free_keys(request)]
+    return "overall_diameter" in names and "inlet.tab_length" not in free
+
+
+def _print_found(result: FoundDesign, origin: str, target: Path) -> None:
+    """Print the design with its figures, what binds and the front; or the nearest miss."""
+    title = "Best design" if result.holds else "Nearest miss"
+    style = "bold" if result.holds else "bold red"
+    show.line(f"{title}: {format_keys(result.best.values)}, from {origin}", style)
+    _print_quantities(result)
+    for rule in result.best.broken_rules:
+        show.line(f"  {rule}")
+    limits = list(_binding_limits(result))
+    if limits:
+        show.line("Binding limits", "bold")
+    for limit in limits:
+        show.line(f"  {limit}")
+    if result.holds and len(result.front) > 1:
+        _print_front(result)
+    if result.is_cut_short:
+        more = f"--tries {2 * result.tries} may find a better design"
+        show.line(f"All {result.tries} tries were used; {more}")
+    if not result.holds:
+        show.failure(
+            f"Search failed: none of {result.tries} designs meets all requirements; nothing was "
+            f"written. Relax a requirement{_more_pressure(result)}, or vary more keys with --free "
+            "KEY=LOW:HIGH:STEP"
+        )
+        return
+    command = f"sbafab generate {shlex.quote(str(target))}"
+    show.verdict(f"{target} meets {_counted_requirements(result)}. Next: {command}", target)
+
+
+def _binding_limits(result: FoundDesign) -> Iterator[str]:
+    """Yield what single steps would break, ranges, and rules without room of a design that
+    holds.
+    """
+    for bind in result.binds:
+        yield f"{bind.key} = {format_value(bind.value)}: {bind.breaks}"
+    for end in result.ends:
+        low, high = end.wider
+        yield (
+            f"{end.key} = {end.value:g} is at the end of its range, {end.low:g} to {end.high:g}; "
+            f"widen it with --free {end.key}={low:g}:{high:g}:{end.step:g}"
+        )
+    for spare in result.without_room if result.holds else ():
+        yield f"{spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, at its limit"
+
+
+def _counted_requirements(result: FoundDesign) -> str:
+    rows = result.request.requirements
+    is_sure = result.request.sure is not None
+    is_median = not is_sure and any(row.quantity.label in result.intervals for row in rows)
+    every = "the requirement" if len(rows) == 1 else f"all {len(rows)} requirements"
+    return f"{every if rows else 'all rules'}{' in the median' if is_median else ''}"
+
+
+def _print_quantities(result: FoundDesign) -> None:
+    """Print the required quantities and the goal of the best design."""
+    request, best = result.request, result.best
+    is_sure = request.sure is not None
+    shown = set()
+    for row in request.requirements:
+        value = figure_text(request, best, row) + ("" if is_sure else _interval_text(result, row))
+        missed = "" if best.meets(row) else ": MISSED"
+        show.line(f"  {row.quantity.label} {value}; {row.bound}{missed}")
+        shown.add(row.quantity.label)
+        _print_trust(result, row.quantity.label)
+    goal = request.goal
+    label = goal.label if result.holds else goal.quantity.label
+    value = shown_value(goal.quantity, best.value(goal)) + _interval_text(result, goal)
+    show.line(f"  {label}: {value}")
+    if goal.quantity.label not in shown:
+        _print_trust(result, goal.quantity.label)
+    if goal.quantity.label in result.intervals or (result.intervals and not is_sure):
+        hint = "" if is_sure else "; --sure 0.9 requires each requirement with that probability"
+        note = f"in parentheses the 90 % interval of what would be measured{hint}"
+        show.wrapped(note, indent="  ")
+
+
+def _interval_text(result: FoundDesign, subject: Requirement | Goal) -> str:
+    """Return the 90 % interval in parentheses; empty without one."""
+    ends = result.interval_text(subject)
+    return f" ({ends})" if ends else ""
+
+
+def _print_trust(result: FoundDesign, label: str) -> None:
+    """Print the flags of a quantity, and the paper's measured value."""
+    for flag in result.flags.get(label, ()):
+        show.wrapped(f"({FLAGS[flag]})", indent="    ")
+    if label in result.measured:
+        show.wrapped(f"({result.measured[label].sentence()})", indent="    ")
+
+
+USEFUL_KPA = 50.0
+"""Pressure that is proposed for a force, unless it was missed at half of it or more."""
+
+
+def _more_pressure(result: FoundDesign) -> str:
+    """Return the advice for a missed force: the same one at more pressure; empty for others."""
+    for row in result.request.requirements:
+        quantity, laminate = row.quantity, result.best.laminate
+        if quantity.name != "force" or not row.at_least or laminate is None:
+            continue
+        kpa = max(USEFUL_KPA, 2 * (quantity.kpa or 0.0))
+        is_allowed = kpa <= MOST_PRESSURE and not is_near_burst(laminate, kpa)
+        if is_allowed and not result.best.meets(row):
+            return f", ask for the force at more pressure, {replace(quantity, kpa=kpa).label}"
+    return ""
+
+
+def _print_front(result: FoundDesign) -> None:
+    part = f"{len(result.front)} of " if result.on_front > len(result.front) else ""
+    show.line(f"Pareto front, {part}{result.on_front} of the {result.tries} designs tried", "bold")
+    for trial in result.front:
+        figures = ", ".join(f"{name} {value:.4g}" for name, value in trial.figures.items())
+        show.line(f"  {format_keys(trial.values)}: {figures}")
+    for name, measured in result.measured.items():
+        show.wrapped(f"({name}: {measured.sentence()})", indent="    ")
+
+
+# Sweeps.
+
+
+@click.command()
+@opt.run_options()
+@opt.option(
+    "--vary varied KEY=VALUES...",
+    "Vary a key: KEY=START:STOP:STEP or KEY=a,b,c. Repeatable; all combinations of the values are "
+    "swept.",
+    required=True,
+)
+@opt.option(
+    "--samples N",
+    "Sample N designs by Latin hypercube instead of the full grid; ranges need no step.",
+    click.IntRange(1),
+)
+@opt.option("--seed S", "Seed of the sampling.", int, default=SweepRequest.seed)
+@opt.pressures_option("Force and stroke at this pressure", "10, 100")
+@opt.option(
+    "--workers K", "Parallel processes.  [default: one for each processor]", click.IntRange(1, 256)
+)
+@opt.option(
+    "--dask ADDRESS", 'Run on the Dask cluster with this scheduler (pip install "sbafab[dask]").'
+)
+@opt.option(
+    "--timeout seconds S",
+    "Time limit for one design, seconds.",
+    opt.FiniteRange(0, min_open=True),
+    default=SweepRequest.seconds,
+)
+@opt.option(
+    "--all-columns",
+    "Write every key, rule and figure, not only those varied, requested and binding.",
+    bool,
+)
+def sweep(
+    request: opt.Request, varied: tuple[str, ...], pressures: tuple[float, ...], **settings: Any
+) -> None:
+    """Check and predict variants of a design.
+
+    OUT/<name>-sweep/ receives sweep.csv (and sweep.parquet if pyarrow is installed) with a row for
+    each design, times.csv, and the page sweep.html. Run the same command again to resume a sweep
+    that was stopped.
+    """
+    design = load_design(*request.source)
+    wanted = SweepRequest(design, varied_keys(varied), pressures_kpa=pressures, **settings)
+    try:
+        with show.progress(request.as_json) as progress:
+            swept = sweeping.sweep(wanted, request.out, progress)
+    except SweepStopped as stop:
+        print_error(
+            f"{stop.measured} of {stop.designs} designs are computed; run the same command again "
+            "to resume"
+        )
+        raise
+    if request.as_json:
+        show.document(SweepDocument.of(swept))
+        return
+    if swept.no_longer_asked:
+        show.line(
+            f"The tables leave out {swept.no_longer_asked} designs of an earlier sweep; its "
+            "command restores them from the journal"
+        )
+    if not wanted.all_columns:
+        show.line(
+            "columns: varied, requested and binding; --all-columns writes all without computing "
+            "again"
+        )
+    if "sweep.parquet" not in swept.files:
+        show.line('for Parquet as well: pip install "sbafab[parquet]"')
+    words = {"passes": "passed", "fails": "failed"}
+    counts = [f"{count} {words.get(each, each)}" for each, count in swept.outcomes.items()]
+    resumed = swept.designs - swept.measured
+    counts[-1] += f"; {resumed} from an earlier run" if resumed else ""
+    count = show.several(swept.designs, "design")
+    show.verdict(
+        f"{design.name} swept: {count}, {', '.join(counts)}. Written to {swept.folder}: "
+        f"{', '.join(swept.files)}",
+        swept.folder,
+    )
+
+
+# Comparisons.
+
+
+@click.command()
+@opt.design_argument("first", metavar="A")
+@opt.design_argument("second", metavar="B")
+@opt.pressures_option("Pressure of the figures, and the first of them of the pictures", "10")
+@opt.flow_option("Flow for the times")
+@opt.out_option
+@opt.set_option
+@opt.json_option
+def compare(
+    first: str,
+    second: str,
+    pressures: tuple[float, ...],
+    flow_ml_min: float,
+    out: Path,
+    assignments: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Compare two designs: what differs, what each reaches.
+
+    A and B are templates, design files, output folders, or rows of a sweep by number, such as
+    out/1dof-5mm-sweep/sweep.csv:12. OUT/compare/compare.html has pictures of both side by side.
+    """
+    a, b = (comparing.load_compared(source, assignments) for source in (first, second))
+    with show.progress(as_json) as progress:
+        comparison = comparing.compare(
+            a, b, (first, second), pressures or None, flow_ml_min, progress
+        )
+        folder = comparing.write_page(comparison, out)
+    if as_json:
+        show.document({**comparison.as_dict(), "folder": str(folder)})
+        return
+    names = ("", *comparison.names)
+    _print_keys("Keys", names, comparison.keys)
+    margins = [(row.rule, *map(comparing.margin_text, row.margins)) for row in comparison.rules]
+    show.table("Rules", names, margins)
+    _print_figures(comparison, names)
+    keys, rules = (
+        show.several(len(comparison.keys), "key"),
+        show.several(len(comparison.rules), "rule"),
+    )
+    figures = show.several(sum(pair.differs for pair in comparison.figures), "figure")
+    show.verdict(
+        f"{first} and {second} differ in {keys}, {rules} and {figures}. Written to {folder}: "
+        f"{comparing.PAGE}",
+        folder,
+    )
+
+
+def print_changes(reached: comparing.ReachedYield) -> None:
+    """Print the keys that were changed for a yield, and the figures before and after."""
+    if reached.comparison is not None:
+        names = ("", *comparing.DESIGNS)
+        _print_keys("Changed for the yield", names, reached.changes)
+        _print_figures(reached.comparison, names)
+
+
+def _print_keys(title: str, names: Sequence[str], rows: Sequence[comparing.KeyDifference]) -> None:
+    show.table(title, names, [(row.key, *map(format_value, row.values)) for row in rows])
+
+
+def _print_figures(comparison: comparing.DesignComparison, names: Sequence[str]) -> None:
+    """Print the main figures of both designs, below the names of the columns."""
+    main = [
+        (f"{pair.name}, {pair.unit}", *map(comparing.reached_text, pair.figures))
+        for pair in comparison.figures
+        if pair.is_main
+    ]
+    show.table("Figures, in parentheses the 90 % interval", names, main)
