@@ -57,7 +57,7 @@ class Partition(NamedTuple):
         """Triangles (k, 3), counter-clockwise, that fill the union of the chosen cells."""
         from manifold3d import triangulate
 
-        loops = _loops(self.boundary(chosen))
+        loops = loops_of(self.boundary(chosen))
         if not loops:
             return np.empty((0, 3), dtype=np.int64)
         order = np.concatenate(loops)
@@ -99,7 +99,7 @@ def _polygons(region: Region, sagitta: float) -> shapely.MultiPolygon:
     return shapely.multipolygons(pieces)
 
 
-def _loops(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def loops_of(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     """Closed chains formed by the directed edges, none passing a point twice."""
     following: defaultdict[int, list[int]] = defaultdict(list)
     for tail, head in edges.tolist():

@@ -6,7 +6,7 @@ Bonded faces share their nodes. Each mesh is checked: elements, skin, volumes an
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -25,96 +25,99 @@ from sbafab.meshing.conforming.mesh import (
     tetrahedra,
     volumes,
 )
-from sbafab.meshing.conforming.plane import Plane
+from sbafab.meshing.solid import loops_of
 from sbafab.meshing.surface import Surface, unpaired_edges
+
+Numbers = NDArray[np.int64]
+Sets = dict[str, Numbers]
 
 # The sweep: nodes and prisms of every film.
 
 
-NONE = -1
-
-
-@dataclass(frozen=True)
 class Sweep:
-    """Nodes and prisms of the swept films.
+    """Nodes and cells of swept films, numbered as they are added.
 
-    ``prisms`` (m, 18) hold the six nodes of a triangle below, halfway up and above.
     ``lower``, ``middle`` and ``upper`` (plies, plane nodes) number the nodes of each film over
     the plane's, -1 if absent; ``joints`` the nodes halfway up the bond under each film.
-    ``prism_of`` and ``joint_of`` (plies, triangles) number the prisms of films and bonds.
+    ``cell_of`` and ``joint_of`` (plies, triangles) number the cells of films and bonds.
     """
 
-    points: NDArray[np.float64]
-    prisms: NDArray[np.int64]
-    lower: NDArray[np.int64]
-    middle: NDArray[np.int64]
-    upper: NDArray[np.int64]
-    joints: NDArray[np.int64]
-    prism_of: NDArray[np.int64]
-    joint_of: NDArray[np.int64]
+    def __init__(self, stack: Layup) -> None:
+        self.triangles = stack.plane.triangles
+        plies = len(stack.plies)
+        nodes, cells = (plies, len(stack.plane.points)), (plies, len(self.triangles))
+        self.lower, self.middle, self.upper, self.joints = np.full((4, *nodes), -1)
+        self.cell_of, self.joint_of = np.full((2, *cells), -1)
+        self._points = [np.empty((0, 3))]
+        self._cells: list[Numbers] = []
+        self._counts = [0, 0]
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """Points (n, 3) mm."""
+        return np.concatenate(self._points)
+
+    @property
+    def cells(self) -> Numbers:
+        """Prisms (m, 18): six nodes of a triangle below, halfway up and above; or triangles."""
+        return np.concatenate(self._cells)
+
+    def place(self, numbers: Numbers, nodes: Numbers, at: NDArray[np.float64]) -> None:
+        """Add points over nodes of the plane."""
+        numbers[nodes] = self._counts[0] + np.arange(len(nodes))
+        self._points.append(at[nodes])
+        self._counts[0] += len(nodes)
+
+    def fill(self, numbers: Numbers, chosen: NDArray[np.bool_], *levels: Numbers) -> None:
+        """Add a cell over each chosen triangle."""
+        (over,) = np.nonzero(chosen)
+        numbers[over] = self._counts[1] + np.arange(len(over))
+        self._cells.append(np.hstack([level[self.triangles[over]] for level in levels]))
+        self._counts[1] += len(over)
 
 
-def sweep(layup: Layup, forms: Sequence[FormedFilm], full_middles: bool) -> Sweep:
+def sweep(stack: Layup, forms: Sequence[FormedFilm]) -> Sweep:
     """The films as prisms, bottom to top.
 
     If films lie on each other, they share the nodes in the closure of a bond; if gaps are kept,
-    wedges join them. ``full_middles`` adds nodes halfway up over mid-edge nodes too, as
-    tetrahedra need.
+    prisms join them. Nodes halfway up over mid-edge nodes are for tetrahedra.
     """
-    triangles = layup.plane.triangles
-    shape = len(layup.plies), len(layup.plane.points)
-    lower, middle, upper, joints = (np.full(shape, NONE, dtype=np.int64) for _ in range(4))
-    prism_of, joint_of = (np.full((shape[0], len(triangles)), NONE) for _ in range(2))
-    points: list[NDArray[np.float64]] = []
-    prisms: list[NDArray[np.int64]] = []
-    count = prism_count = 0
+    swept, is_tet = Sweep(stack), stack.settings.element == "tet"
 
-    def place(
-        numbers: NDArray[np.int64], nodes: NDArray[np.int64], at: NDArray[np.float64]
-    ) -> None:
-        nonlocal count
-        numbers[nodes] = np.arange(count, count + len(nodes))
-        points.append(at[nodes])
-        count += len(nodes)
+    def half_up(nodes: Numbers) -> Numbers:
+        return nodes if is_tet else nodes[nodes < stack.plane.corners]
 
-    def fill(of: NDArray[np.int64], cells: NDArray[np.bool_], *levels: NDArray[np.int64]) -> None:
-        nonlocal prism_count
-        chosen = np.flatnonzero(cells)
-        of[chosen] = np.arange(prism_count, prism_count + len(chosen))
-        prisms.append(np.hstack([level[triangles[chosen]] for level in levels]))
-        prism_count += len(chosen)
-
-    def half_up(nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-        return nodes if full_middles else nodes[nodes < layup.plane.corners]
-
-    for k, (ply, form) in enumerate(zip(layup.plies, forms, strict=True)):
-        covered = np.unique(triangles[ply.cells])
-        bonded = np.unique(triangles[ply.bonded])
-        if not ply.gap:
-            lower[k, bonded] = upper[k - 1, bonded] if k else NONE
-        place(lower[k], covered[lower[k, covered] < 0], form.at(0.0))
+    for k, (ply, form) in enumerate(zip(stack.plies, forms, strict=True)):
+        lower, middle, upper = swept.lower[k], swept.middle[k], swept.upper[k]
+        covered, bonded = stack.nodes(ply.cells), stack.nodes(ply.bonded)
+        if k and not ply.gap:
+            lower[bonded] = swept.upper[k - 1, bonded]
+        swept.place(lower, covered[lower[covered] < 0], form.at(0.0))
         if ply.gap:
-            below = forms[k - 1].at(layup.plies[k - 1].thickness)
-            place(joints[k], half_up(bonded), (below + form.at(0.0)) / 2)
-            fill(joint_of[k], ply.bonded, upper[k - 1], joints[k], lower[k])
-        place(middle[k], half_up(covered), form.at(ply.thickness / 2))
-        place(upper[k], covered, form.at(ply.thickness))
-        fill(prism_of[k], ply.cells, lower[k], middle[k], upper[k])
-    return Sweep(
-        np.concatenate(points),
-        np.concatenate(prisms),
-        lower,
-        middle,
-        upper,
-        joints,
-        prism_of,
-        joint_of,
-    )
+            below = forms[k - 1].at(stack.plies[k - 1].thickness)
+            joints = swept.joints[k]
+            swept.place(joints, half_up(bonded), (below + form.at(0.0)) / 2)
+            swept.fill(swept.joint_of[k], ply.bonded, swept.upper[k - 1], joints, lower)
+        swept.place(middle, half_up(covered), form.at(ply.thickness / 2))
+        swept.place(upper, covered, form.at(ply.thickness))
+        swept.fill(swept.cell_of[k], ply.cells, lower, middle, upper)
+    return swept
 
 
-def wedges(prisms: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The prisms as wedges (m, 15) of second order."""
-    return prisms[:, [0, 1, 2, 12, 13, 14, 3, 4, 5, 15, 16, 17, 6, 7, 8]]
+def swept_shell(stack: Layup, forms: Sequence[FormedFilm]) -> Sweep:
+    """The films of a thin layup as triangles; bonded films share one."""
+    swept = Sweep(stack)
+    for k, (ply, form) in enumerate(zip(stack.plies, forms, strict=True)):
+        numbers = swept.lower[k]
+        if k:
+            bonded = stack.nodes(ply.bonded)
+            numbers[bonded] = swept.lower[k - 1, bonded]
+            swept.cell_of[k, ply.bonded] = swept.cell_of[k - 1, ply.bonded]
+        covered = stack.nodes(ply.cells)
+        swept.place(numbers, covered[numbers[covered] < 0], form.base)
+        swept.fill(swept.cell_of[k], ply.cells & ~ply.bonded, numbers)
+    swept.upper = swept.lower
+    return swept
 
 
 # Cavities: the faces of a mesh that the air of a chamber presses on, and a closed surface.
@@ -124,12 +127,11 @@ BOTTOM, TOP, SIDES = 0, 1, 2
 """Numbers of a wedge's faces; the sides follow the triangle's edges."""
 
 
-def neighbours(plane: Plane) -> NDArray[np.int64]:
+def neighbours(triangles: Numbers) -> Numbers:
     """The triangle (m, 3) beyond each side of each triangle, -1 without a neighbour."""
-    middles = plane.triangles[:, 3:].ravel()
+    middles = triangles[:, 3:].ravel()
     order = np.argsort(middles, kind="stable")
-    ranked = middles[order]
-    twins = np.flatnonzero(ranked[1:] == ranked[:-1])
+    twins = np.flatnonzero(np.diff(middles[order]) == 0)
     beyond = np.full(len(middles), -1)
     beyond[order[twins]] = order[twins + 1] // 3
     beyond[order[twins + 1]] = order[twins] // 3
@@ -137,125 +139,124 @@ def neighbours(plane: Plane) -> NDArray[np.int64]:
 
 
 def bordering(
-    inside: NDArray[np.bool_], beside: NDArray[np.bool_], beyond: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles of ``inside`` and their sides that lie against a triangle of ``other``."""
+    inside: NDArray[np.bool_], beside: NDArray[np.bool_], beyond: Numbers
+) -> tuple[Numbers, Numbers]:
+    """Triangles of ``inside`` and their sides that lie against a triangle of ``beside``."""
     # The last entry, False, stands for the outside of the plane.
-    padded = np.append(beside, False)
-    cells, sides = np.nonzero(inside[:, None] & padded[beyond])
+    cells, sides = np.nonzero(inside[:, None] & np.append(beside, False)[beyond])
     return cells, sides
 
 
-def wetted(
-    layup: Layup, swept: Sweep, void: MeshedVoid, beyond: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """Prisms and their faces (k, 2) that the air of a void touches."""
-    faces_of_void: list[NDArray[np.int64]] = []
-
-    def add(prisms: NDArray[np.int64], faces: NDArray[np.int64] | int) -> None:
-        faces_of_void.append(np.column_stack([prisms, np.broadcast_to(faces, prisms.shape)]))
-
+def wetted(stack: Layup, swept: Sweep, void: MeshedVoid, beyond: Numbers) -> Numbers:
+    """Cells and their faces (k, 2) that the air of a void touches."""
+    parts: list[tuple[Numbers, Numbers | int]] = []
     for k, cells in sorted(void.under.items()):
-        below, above = layup.plies[k - 1].cells, layup.plies[k].cells
-        add(swept.prism_of[k - 1][cells & below], TOP)
-        add(swept.prism_of[k][cells & above], BOTTOM)
-        if layup.plies[k].gap:
-            bond, sides = bordering(layup.plies[k].bonded, cells, beyond)
-            add(swept.joint_of[k][bond], SIDES + sides)
+        parts.append((swept.cell_of[k - 1][cells & stack.plies[k - 1].cells], TOP))
+        parts.append((swept.cell_of[k][cells & stack.plies[k].cells], BOTTOM))
+        if stack.plies[k].gap:
+            bond, sides = bordering(stack.plies[k].bonded, cells, beyond)
+            parts.append((swept.joint_of[k][bond], SIDES + sides))
     for k, cells in sorted(void.in_films.items()):
-        film, sides = bordering(layup.plies[k].cells, cells, beyond)
-        add(swept.prism_of[k][film], SIDES + sides)
-    return np.concatenate(faces_of_void)
+        film, sides = bordering(stack.plies[k].cells, cells, beyond)
+        parts.append((swept.cell_of[k][film], SIDES + sides))
+    return np.concatenate([np.column_stack(np.broadcast_arrays(*part)) for part in parts])
 
 
-def _sides(
-    plane: Plane, triangles: NDArray[np.int64], sides: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _sides(stack: Layup, triangles: Numbers, sides: Numbers) -> Numbers:
     """Nodes (k, 3) of sides of triangles: start, end, middle."""
-    nodes = plane.triangles[triangles]
-    rows = np.arange(len(nodes))
-    return np.column_stack(
-        [nodes[rows, sides], nodes[rows, (sides + 1) % 3], nodes[rows, 3 + sides]]
-    )
+    nodes = stack.plane.triangles[triangles]
+    places = np.column_stack([sides, (sides + 1) % 3, 3 + sides])
+    return np.take_along_axis(nodes, places, axis=1)
 
 
-def mouths(
-    layup: Layup, void: MeshedVoid, beyond: NDArray[np.int64]
-) -> list[tuple[int, NDArray[np.int64]]]:
-    """Return the places where a void ends without a bond: the ply above, and sides (k, 3) there."""
-    plane = layup.plane
-    on_symmetry = np.zeros((0, len(plane.points)), dtype=bool)
-    if layup.sector is not None:
-        on_symmetry = np.array([on for _, on in layup.sector.on_planes(plane.points)])
-    openings = []
+def mouths(stack: Layup, swept: Sweep, void: MeshedVoid, beyond: Numbers) -> list[Numbers]:
+    """Triangles (k, 3) of mesh nodes over each place where a void ends without a bond."""
+    points = stack.plane.points
+    patches = []
     for k, cells in sorted(void.under.items()):
-        closed = np.append(cells | layup.plies[k].bonded, False)
-        edges = _sides(plane, *np.nonzero(cells[:, None] & ~closed[beyond]))
-        edges = edges[~on_symmetry[:, edges[:, :2]].all(axis=2).any(axis=0)]
+        closed = np.append(cells | stack.plies[k].bonded, False)
+        edges = _sides(stack, *np.nonzero(cells[:, None] & ~closed[beyond]))
+        if stack.sector is not None:
+            on_planes = np.array([on for _, on in stack.sector.on_planes(points)])
+            edges = edges[~on_planes[:, edges[:, :2]].all(axis=2).any(axis=0)]
         if len(edges):
-            openings.append((k, edges))
-    return openings
+            patches.append(_mouth_patch(stack, swept, k, edges))
+    return patches
 
 
-def mouth_patch(
-    layup: Layup, swept: Sweep, ply: int, edges: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """Triangles (k, 3) of mesh nodes between the two films at a void's mouth, out of the void."""
+def _mouth_patch(stack: Layup, swept: Sweep, ply: int, edges: Numbers) -> Numbers:
+    """Triangles (k, 3) between the two films at a void's mouth, out of the void."""
     low, high, half = swept.upper[ply - 1], swept.lower[ply], swept.joints[ply]
     triangles = []
     for a, b, m in edges.tolist():
-        ring = [low[b], half[b], high[b], high[m], high[a], half[a], low[a]]
-        ring = [int(node) for node in ring if node >= 0]
         if min(low[[a, b, m]].min(), high[[a, b, m]].min()) < 0:
-            x, y = layup.plane.points[m]
+            x, y = stack.plane.points[m]
             raise OutputError(
-                f"A pocket under layer {layup.plies[ply].layer.index} opens at x {x:.3f}, "
+                f"A pocket under layer {stack.plies[ply].layer.index} opens at x {x:.3f}, "
                 f"y {y:.3f} where one film only ends; let both films end there."
             )
-        for p, q in pairwise(ring):
-            if len({int(low[m]), p, q}) == 3:
-                triangles.append((int(low[m]), p, q))
+        ring = [low[b], half[b], high[b], high[m], high[a], half[a], low[a]]
+        sides = pairwise(int(node) for node in ring if node >= 0)
+        triangles += [(int(low[m]), p, q) for p, q in sides if len({int(low[m]), p, q}) == 3]
     return np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
-def lids(
-    layup: Layup, swept: Sweep, void: MeshedVoid, beyond: NDArray[np.int64]
-) -> list[NDArray[np.int64]]:
+def lids(stack: Layup, swept: Sweep, void: MeshedVoid, beyond: Numbers) -> list[Numbers]:
     """Return triangles (k, 3) of mesh nodes over holes by which a void leaves it through a film.
 
     Such a hole leads to another chamber of its net, or to a tube; its rim is the lid's. Raises
     OutputError if the film ends at the hole.
     """
-    of_holes = []
+    covers = []
     for k, cells in sorted(void.under.items()):
-        for ply, level, is_above in ((k - 1, swept.upper[k - 1], False), (k, swept.lower[k], True)):
-            hole = cells & ~layup.plies[ply].cells
-            if ply in void.in_films:
-                hole &= ~void.in_films[ply]
-            edges = _sides(layup.plane, *bordering(hole, ~hole, beyond))
-            after = {a: (middle, b) for a, b, middle in edges.tolist()}
-            while after:
-                rim = [next(iter(after))]
-                while rim[-1] in after:
-                    rim += after.pop(rim[-1])
-                lid = level[rim[:-1]]
+        for ply, level, way in ((k - 1, swept.upper[k - 1], -1), (k, swept.lower[k], 1)):
+            hole = cells & ~stack.plies[ply].cells
+            hole &= ~void.in_films.get(ply, np.zeros_like(hole))
+            edges = _sides(stack, *bordering(hole, ~hole, beyond))
+            for rim in loops_of(np.concatenate([edges[:, [0, 2]], edges[:, [2, 1]]])):
+                lid = level[rim]
                 if lid.min() < 0:
-                    x, y = layup.plane.points[rim[int(lid.argmin())]]
+                    x, y = stack.plane.points[rim[int(lid.argmin())]]
                     raise OutputError(
-                        f"Layer {layup.plies[ply].layer.index} ends at x {x:.3f}, y {y:.3f} beside "
+                        f"Layer {stack.plies[ply].layer.index} ends at x {x:.3f}, y {y:.3f} beside "
                         "a pocket; let the film go on round its hole."
                     )
                 fan = [(lid[0], p, q) for p, q in pairwise(lid[1:])]
-                of_holes.append(np.array(fan)[:, :: 1 if is_above else -1])
-    return of_holes
+                covers.append(np.array(fan)[:, ::way])
+    return covers
+
+
+def _air(
+    stack: Layup,
+    swept: Sweep,
+    voids: Mapping[str, MeshedVoid],
+    kind: ElementKind,
+    cells: Numbers,
+    faces_of: Callable[[Numbers], Numbers],
+) -> tuple[Sets, Sets, Sets]:
+    """Node sets, face sets and cavities of a mesh; ``faces_of`` turns faces of prisms into its."""
+    named, face_sets, cavities = node_sets(stack, swept), {}, {}
+    beyond = neighbours(stack.plane.triangles)
+    for name, void in voids.items():
+        faces = faces_of(wetted(stack, swept, void, beyond))
+        face_sets[f"cavity_{name}"] = faces
+        patches = mouths(stack, swept, void, beyond)
+        if patches:
+            named[f"inlet_{name}"] = np.unique(np.concatenate(patches))
+        if stack.sector is None:
+            walls = flat_triangles(kind, cells, faces)[:, ::-1]
+            covers = lids(stack, swept, stack.voids[name], beyond)
+            cavities[name] = np.concatenate([walls, *patches, *covers])
+    return named, face_sets, cavities
+
+
+# Faces of elements.
 
 
 SQUARE_PARTS = ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6), (4, 6, 7))
 
 
-def flat_triangles(
-    kind: ElementKind, cells: NDArray[np.int64], faces: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def flat_triangles(kind: ElementKind, cells: Numbers, faces: Numbers) -> Numbers:
     """The faces (k, 2: cell and face number) as flat triangles through all of their nodes."""
     parts_of_faces = [np.empty((0, 3), dtype=np.int64)]
     for number, local in enumerate(FACES[kind]):
@@ -265,24 +266,40 @@ def flat_triangles(
     return np.concatenate(parts_of_faces)
 
 
-def faces_of_tetrahedra(
-    prisms: NDArray[np.int64], tetrahedra: NDArray[np.int64], faces: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def faces_of_tetrahedra(prisms: Numbers, tetrahedra: Numbers, faces: Numbers) -> Numbers:
     """Prism faces (k, 2) as the faces of the three tetrahedra of each prism that lie in them."""
     wedge_corners = [[0, 1, 2], [12, 13, 14], [0, 1, 13, 12], [1, 2, 14, 13], [2, 0, 12, 14]]
-    faces_by_side = []
+    found = []
     for number, local in enumerate(wedge_corners):
         owners = faces[faces[:, 1] == number, 0]
-        nodes = prisms[owners][:, local]
-        for part in range(3):
-            cells = 3 * owners + part
-            for face, of_tetra in enumerate(FACES["tetra10"]):
-                corners = tetrahedra[cells][:, list(of_tetra[:3])]
-                lies_in = (corners[:, :, None] == nodes[:, None, :]).any(axis=2).all(axis=1)
-                chosen = cells[lies_in]
-                faces_by_side.append(np.column_stack([chosen, np.full_like(chosen, face)]))
-    rows = np.concatenate(faces_by_side)
+        nodes = prisms[owners][:, None, None, local]
+        cells = 3 * owners[:, None] + np.arange(3)
+        for face, of_tetra in enumerate(FACES["tetra10"]):
+            corners = tetrahedra[cells][:, :, list(of_tetra[:3]), None]
+            chosen = cells[(corners == nodes).any(axis=3).all(axis=2)]
+            found.append(np.column_stack([chosen, np.full_like(chosen, face)]))
+    rows = np.concatenate(found)
     return rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+
+
+def skin(mesh: Mesh) -> Numbers:
+    """The faces (k, 2: cell and face number) that belong to one cell only."""
+    size, count = len(mesh.points), len(mesh.cells)
+    keys = []
+    for local in FACES[mesh.kind]:
+        corners = np.sort(mesh.cells[:, [n for n in local if n < CORNERS[mesh.kind]]], axis=1)
+        # Three corners identify a quadrilateral face.
+        keys.append((corners[:, 0] * size + corners[:, 1]) * size + corners[:, 2])
+    key = np.concatenate(keys)
+    order = np.argsort(key, kind="stable")
+    twin = np.append(False, np.diff(key[order]) == 0)
+    alone = order[~twin & ~np.append(twin[1:], False)]
+    return np.column_stack([alone % count, alone // count])
+
+
+def skin_surface(mesh: Mesh) -> Surface:
+    """The skin of a volume mesh, cavities included, as flat triangles through all of its nodes."""
+    return mesh.surface(flat_triangles(mesh.kind, mesh.cells, skin(mesh)))[0]
 
 
 # Named parts of a mesh.
@@ -293,22 +310,21 @@ def bond_name(ply: int) -> str:
     return f"bond_{ply:03d}"
 
 
-def node_sets(stack: Layup, swept: Sweep) -> dict[str, NDArray[np.int64]]:
+def node_sets(stack: Layup, swept: Sweep) -> Sets:
     """Bonds, base, tip and symmetry planes."""
-    triangles = stack.plane.triangles
     sets = {}
     for k, ply in enumerate(stack.plies):
         if ply.bonded.any():
-            nodes = np.unique(triangles[ply.bonded])
+            nodes = stack.nodes(ply.bonded)
             sets[bond_name(k)] = np.unique([swept.lower[k, nodes], swept.upper[k - 1, nodes]])
     bottom, top = stack.plies[0], stack.plies[-1]
     seat = bottom.cells if bottom.layer.role == "sheet" else stack.seats & bottom.cells
-    sets["base"] = np.unique(swept.lower[0, np.unique(triangles[seat])])
-    sets["tip"] = np.unique(swept.upper[-1, np.unique(triangles[stack.seats & top.cells])])
+    sets["base"] = np.unique(swept.lower[0, stack.nodes(seat)])
+    sets["tip"] = np.unique(swept.upper[-1, stack.nodes(stack.seats & top.cells)])
     if stack.sector is not None:
+        levels = np.concatenate([swept.lower, swept.middle, swept.upper, swept.joints])
         for name, on_plane in stack.sector.on_planes(stack.plane.points):
-            levels = (swept.lower, swept.middle, swept.upper, swept.joints)
-            numbers = np.concatenate([level[:, on_plane].ravel() for level in levels])
+            numbers = levels[:, on_plane]
             sets[name] = np.unique(numbers[numbers >= 0])
     return sets
 
@@ -340,7 +356,7 @@ def check_mesh(mesh: Mesh, expected: Mapping[str, float]) -> None:
             f"The skin of the {mesh.name} mesh is not closed and manifold; move apart profiles "
             "that touch in one point, or change h."
         )
-    sizes = volumes(mesh.kind, mesh.points, mesh.cells) if expected else np.empty(0)
+    sizes = volumes(mesh.kind, mesh.points, mesh.cells)
     for name, volume in expected.items():
         meshed = float(sizes[mesh.cell_sets[name]].sum())
         if not abs(meshed - volume) <= VOLUME_TOLERANCE * volume:
@@ -349,37 +365,11 @@ def check_mesh(mesh: Mesh, expected: Mapping[str, float]) -> None:
                 f"is {volume:.5f} mm3; ask for a smaller h."
             )
     for name, triangles in mesh.cavities.items():
-        gaps = len(unpaired_edges(triangles))
-        if gaps:
+        if gaps := len(unpaired_edges(triangles)):
             raise OutputError(
                 f"The cavity {name} of the {mesh.name} mesh is open at {gaps} edges; move apart "
                 "profiles that touch in one point."
             )
-
-
-def skin(mesh: Mesh) -> NDArray[np.int64]:
-    """The faces (k, 2: cell and face number) that belong to one cell only."""
-    size = len(mesh.points)
-    keys, cells, numbers = [], [], []
-    for number, local in enumerate(FACES[mesh.kind]):
-        corners = np.sort(mesh.cells[:, [n for n in local if n < CORNERS[mesh.kind]]], axis=1)
-        # Three corners identify a quadrilateral face.
-        keys.append((corners[:, 0] * size + corners[:, 1]) * size + corners[:, 2])
-        cells.append(np.arange(len(corners)))
-        numbers.append(np.full(len(corners), number))
-    key = np.concatenate(keys)
-    order = np.argsort(key, kind="stable")
-    ranked = key[order]
-    twin = np.append(False, ranked[1:] == ranked[:-1])
-    alone = order[~twin & ~np.append(twin[1:], False)]
-    return np.column_stack([np.concatenate(cells)[alone], np.concatenate(numbers)[alone]])
-
-
-def skin_surface(mesh: Mesh) -> Surface:
-    """The skin of a volume mesh, cavities included, as flat triangles through all of its nodes."""
-    triangles = flat_triangles(mesh.kind, mesh.cells, skin(mesh))
-    nodes, faces = np.unique(triangles, return_inverse=True)
-    return Surface(mesh.points[nodes], faces.reshape(-1, 3))
 
 
 # The shell mesh: mid-surfaces of second order, bonded films as one shell.
@@ -395,112 +385,39 @@ def shell_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     """The mid-surfaces of a thin layup, with their sets and cavities.
 
     Bonded films share one triangle, which carries the sum of their thicknesses. Cavities exclude
-    the neck rings, which have the same air on both sides.
-    Raises OutputError if a check fails.
+    the neck rings, which have the same air on both sides. Raises OutputError if a check fails.
     """
     check_apart(stack, forms)
-    forms = round_tube(stack, forms)
-    triangles = stack.plane.triangles
-    numbers = np.full((len(stack.plies), len(stack.plane.points)), NONE)
-    cell_of = np.full((len(stack.plies), len(triangles)), NONE)
-    points: list[NDArray[np.float64]] = []
-    cells: list[NDArray[np.int64]] = []
-    count = cell_count = 0
-    for k, (ply, form) in enumerate(zip(stack.plies, forms, strict=True)):
-        covered = np.unique(triangles[ply.cells])
-        if k:
-            bonded = np.unique(triangles[ply.bonded])
-            numbers[k, bonded] = numbers[k - 1, bonded]
-            cell_of[k, ply.bonded] = cell_of[k - 1, ply.bonded]
-        new = covered[numbers[k, covered] < 0]
-        numbers[k, new] = np.arange(count, count + len(new))
-        points.append(form.base[new])
-        count += len(new)
-        unbonded = np.flatnonzero(ply.cells & ~ply.bonded)
-        cell_of[k, unbonded] = np.arange(cell_count, cell_count + len(unbonded))
-        cells.append(numbers[k][triangles[unbonded]])
-        cell_count += len(unbonded)
-    nothing = np.full_like(numbers, NONE)
-    swept = Sweep(
-        np.concatenate(points),
-        np.concatenate(cells),
-        numbers,
-        nothing,
-        numbers,
-        nothing,
-        cell_of,
-        np.full_like(cell_of, NONE),
-    )
+    swept = swept_shell(stack, round_tube(stack, forms))
     pockets = {name: MeshedVoid({}, void.under) for name, void in stack.voids.items()}
-    nodes, faces, cavities = _air(stack, swept, pockets, "triangle6", swept.prisms, _one_sided)
-    films, sections, thickness = _shell_cell_sets(stack, swept)
+    nodes, faces, cavities = _air(stack, swept, pockets, "triangle6", swept.cells, _one_sided)
+    films, thickness = {}, np.zeros(len(swept.cells))
+    for ply, numbers in zip(stack.plies, swept.cell_of, strict=True):
+        films[ply.name] = np.sort(numbers[numbers >= 0])
+        thickness[films[ply.name]] += ply.thickness
+    microns = np.round(thickness * 1000, 3)
+    names = {f"section_{um:g}um".replace(".", "p"): um for um in np.unique(microns).tolist()}
+    sections = {name: np.flatnonzero(microns == um) for name, um in names.items()}
     mesh = Mesh(
         "shell",
         "triangle6",
         swept.points,
-        swept.prisms,
+        swept.cells,
         nodes,
         {**films, **sections},
         faces,
         cavities,
-        thickness,
+        {name: um / 1000 for name, um in names.items()},
     )
     check_mesh(mesh, {})
     return mesh
 
 
-Sets = dict[str, NDArray[np.int64]]
-
-
-def _air(
-    stack: Layup,
-    swept: Sweep,
-    voids: Mapping[str, MeshedVoid],
-    kind: ElementKind,
-    cells: NDArray[np.int64],
-    faces_of: Callable[[NDArray[np.int64]], NDArray[np.int64]],
-) -> tuple[Sets, Sets, Sets]:
-    """Node sets, face sets and cavities of a mesh; ``faces_of`` turns faces of prisms into its."""
-    named, face_sets, cavities = node_sets(stack, swept), {}, {}
-    beyond = neighbours(stack.plane)
-    for name, void in voids.items():
-        faces = faces_of(wetted(stack, swept, void, beyond))
-        face_sets[f"cavity_{name}"] = faces
-        patches = [
-            mouth_patch(stack, swept, ply, edges) for ply, edges in mouths(stack, void, beyond)
-        ]
-        if patches:
-            named[f"inlet_{name}"] = np.unique(np.concatenate(patches))
-        if stack.sector is None:
-            walls = flat_triangles(kind, cells, faces)[:, ::-1]
-            covers = lids(stack, swept, stack.voids[name], beyond)
-            cavities[name] = np.concatenate([walls, *patches, *covers])
-    return named, face_sets, cavities
-
-
-def _one_sided(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def _one_sided(faces: Numbers) -> Numbers:
     """The faces of cells that the air touches on one side only."""
     _, first, times = np.unique(faces[:, 0], return_index=True, return_counts=True)
-    one_sided: NDArray[np.int64] = faces[np.sort(first[times == 1])]
+    one_sided: Numbers = faces[np.sort(first[times == 1])]
     return one_sided
-
-
-def _shell_cell_sets(
-    stack: Layup, swept: Sweep
-) -> tuple[dict[str, NDArray[np.int64]], dict[str, NDArray[np.int64]], dict[str, float]]:
-    """Cells of each film, cells of each thickness, and the thicknesses in mm."""
-    films = {}
-    total = np.zeros(len(swept.prisms))
-    for ply, numbers in zip(stack.plies, swept.prism_of, strict=True):
-        films[ply.name] = np.sort(numbers[numbers >= 0])
-        total[films[ply.name]] += ply.thickness
-    microns = np.round(total * 1000, 3)
-    sections, thickness = {}, {}
-    for value in np.unique(microns).tolist():
-        name = f"section_{value:g}um".replace(".", "p")
-        sections[name] = np.flatnonzero(microns == value)
-        thickness[name] = value / 1000
-    return films, sections, thickness
 
 
 # The volume mesh with its sets and cavities, checked.
@@ -510,20 +427,34 @@ def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     """The volume mesh with its sets and cavities. Raises OutputError if a check fails."""
     check_apart(stack, forms)
     forms = round_tube(stack, forms)
+    swept = sweep(stack, forms)
+    prisms = swept.cells
     is_tet = stack.settings.element == "tet"
-    kind: ElementKind = "tetra10" if is_tet else "wedge15"
-    swept = sweep(stack, forms, full_middles=is_tet)
-    cells = wedges(swept.prisms)
     if is_tet:
-        cells = tetrahedra(swept.prisms, _corners_under(stack, swept))
+        cells = tetrahedra(prisms, _corners_under(stack, swept))
+    else:
+        cells = prisms[:, [0, 1, 2, 12, 13, 14, 3, 4, 5, 15, 16, 17, 6, 7, 8]]
 
-    def faces_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-        return faces_of_tetrahedra(swept.prisms, cells, faces) if is_tet else faces
+    def faces_of(faces: Numbers) -> Numbers:
+        return faces_of_tetrahedra(prisms, cells, faces) if is_tet else faces
 
+    kind: ElementKind = "tetra10" if is_tet else "wedge15"
     nodes, faces, cavities = _air(stack, swept, stack.voids, kind, cells, faces_of)
-    growths = [form.growth for form in forms]
-    cell_sets, expected = _cell_sets(stack, swept, 3 if is_tet else 1, growths)
-    materials = {name: of for name, of in _materials(stack).items() if name in cell_sets}
+    cell_sets, expected, materials = {}, {}, {}
+    for k, (ply, form) in enumerate(zip(stack.plies, forms, strict=True)):
+        films = [each.layer.film for each in stack.plies[max(k - 1, 0) : k + 1]]
+        # A bond takes the lower film's material if that melts.
+        bond = ([film for film in films if not film.stays_solid] or films)[0]
+        for name, numbers, volume, film in (
+            (bond_name(k), swept.joint_of[k], ply.bond_area * ply.gap, bond),
+            (ply.name, swept.cell_of[k], ply.area * ply.thickness, ply.layer.film),
+        ):
+            parts = 3 if is_tet else 1
+            of_part = np.sort(numbers[numbers >= 0])
+            if len(of_part):
+                cell_sets[name] = (parts * of_part[:, None] + np.arange(parts)).ravel()
+                expected[name] = volume * (1 + form.growth)
+                materials[name] = film.material
     mesh = Mesh(
         "volume",
         kind,
@@ -539,43 +470,9 @@ def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     return mesh
 
 
-def swept_points(stack: Layup, forms: Sequence[FormedFilm]) -> NDArray[np.float64]:
-    """The points of the volume mesh of these films."""
-    return sweep(stack, forms, full_middles=stack.settings.element == "tet").points
-
-
-def _materials(stack: Layup) -> dict[str, str]:
-    """The material of every film and bond; a bond takes the lower film's if that melts."""
-    materials = {ply.name: ply.layer.film.material for ply in stack.plies}
-    for k, (below, above) in enumerate(pairwise(stack.plies), start=1):
-        films = [ply.layer.film for ply in (below, above)]
-        molten = [film for film in films if not film.stays_solid]
-        materials[bond_name(k)] = (molten or films)[0].material
-    return materials
-
-
-def _corners_under(stack: Layup, swept: Sweep) -> NDArray[np.int64]:
+def _corners_under(stack: Layup, swept: Sweep) -> Numbers:
     """The plane's corner nodes (prisms, 3) under each prism."""
-    under = np.empty((len(swept.prisms), 3), dtype=np.int64)
-    for numbers in (*swept.prism_of, *swept.joint_of):
+    under = np.empty((len(swept.cells), 3), dtype=np.int64)
+    for numbers in (*swept.cell_of, *swept.joint_of):
         under[numbers[numbers >= 0]] = stack.plane.triangles[numbers >= 0, :3]
     return under
-
-
-def _cell_sets(
-    stack: Layup, swept: Sweep, parts: int, growths: Sequence[float]
-) -> tuple[dict[str, NDArray[np.int64]], dict[str, float]]:
-    """Cells of every film and bond, and the volume in mm3 that each must have; ``growths`` are the
-    relative growths of the films.
-    """
-    sets, expected = {}, {}
-    for k, ply in enumerate(stack.plies):
-        for name, numbers, volume in (
-            (bond_name(k), swept.joint_of[k], ply.bond_area * ply.gap),
-            (ply.name, swept.prism_of[k], ply.area * ply.thickness),
-        ):
-            prisms = np.sort(numbers[numbers >= 0])
-            if len(prisms):
-                sets[name] = (parts * prisms[:, None] + np.arange(parts)).ravel()
-                expected[name] = volume * (1 + growths[k])
-    return sets, expected

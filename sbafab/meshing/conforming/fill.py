@@ -163,8 +163,8 @@ def _pocket(
 ) -> Pocket:
     plane, plies = stack.plane, stack.plies
     cells = stack.voids[chamber].under[ply]
-    inner = np.unique(plane.triangles[cells])
-    fixed = np.intersect1d(inner, np.unique(plane.triangles[plies[ply].bonded]))
+    inner = stack.nodes(cells)
+    fixed = np.intersect1d(inner, stack.nodes(plies[ply].bonded))
     centres = tuple(i for i, (owner, _) in enumerate(stack.stacks) if owner == chamber)
     places = [stack.centres[i] for i in centres]
 
@@ -200,7 +200,7 @@ def _discs(
     stack: Layup, necks: NDArray[np.bool_], fixed: NDArray[np.int64], places: list[Point]
 ) -> Iterator[tuple[NDArray[np.int64], Point]]:
     """The nodes of each neck disc, and the axis it is on."""
-    nodes = np.setdiff1d(np.unique(stack.plane.triangles[necks]), fixed)
+    nodes = np.setdiff1d(stack.nodes(necks), fixed)
     offsets = stack.plane.points[nodes][:, None] - np.array(places)
     nearest = np.linalg.norm(offsets, axis=2).argmin(axis=1)
     for number, place in enumerate(places):
@@ -267,14 +267,8 @@ FLATNESS = 0.01
 """Fraction of the lift by which necks may deviate from a common plane."""
 
 
-class RigidMotion(NamedTuple):
-    """A rigid motion: ``turn`` (3, 3) first, then ``shift`` (3,) in mm."""
-
-    turn: NDArray[np.float64]
-    shift: NDArray[np.float64]
-
-
-UPRIGHT = RigidMotion(np.eye(3), np.zeros(3))
+RigidMotion = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""A turn (3, 3), then a shift (3,) in mm."""
 
 
 def slopes_of(centres: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -304,12 +298,12 @@ def set_on(
     """The pose of a balloon whose neck discs at heights ``bottom`` meet those at ``top`` of the
     balloon below, ``gap`` mm apart.
     """
+    turned, shift = below
     middle = centres.mean(axis=0)
-    turn = below.turn @ _frame(slopes_of(centres, top)) @ _frame(slopes_of(centres, bottom)).T
-    meeting = below.turn @ np.array([*middle, top.mean()]) + below.shift
-    normal = below.turn @ _frame(slopes_of(centres, top))[:, 2]
-    start = turn @ np.array([*middle, bottom.mean()])
-    return RigidMotion(turn, meeting + gap * normal - start)
+    upright = turned @ _frame(slopes_of(centres, top))
+    turn = upright @ _frame(slopes_of(centres, bottom)).T
+    meeting = turned @ np.array([*middle, top.mean()]) + shift + gap * upright[:, 2]
+    return turn, meeting - turn @ np.array([*middle, bottom.mean()])
 
 
 def _frame(slopes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -329,22 +323,11 @@ HALVINGS = 6
 """Bisection steps for the least fill that keeps films apart: to 1/2^6 of the largest fill."""
 
 
-@dataclass(frozen=True)
-class Fill:
-    """The requested air, in ul per balloon, by chamber; ``largest`` is what the fullest holds."""
-
-    ul: Mapping[str, float]
-
-    @property
-    def largest(self) -> float:
-        return max(self.ul.values())
-
-    @property
-    def is_even(self) -> bool:
-        return len(set(self.ul.values())) == 1
+Fill = Mapping[str, float]
+"""The requested air, in ul per balloon, by chamber."""
 
 
-def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, list[FormedFilm]]:
+def filled(stack: Layup, fill_ul: float | Fill) -> tuple[Fill, list[FormedFilm]]:
     """Every film at the position that the air has moved it to.
 
     ``fill_ul`` is the air in every balloon in ul, or in the balloons of the named chambers; 0 is
@@ -354,30 +337,28 @@ def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, li
     fill = _fill(stack, fill_ul)
     all_pockets = pockets(stack)
     forms = formed(stack, fill, all_pockets)
-    if fill.is_even:
-        return fill, forms
-    worst = crossing(stack, forms)
+    worst = crossing(stack, forms) if len(set(fill.values())) > 1 else None
     if worst is not None:
         least = _least(stack, fill, all_pockets)
-        names = [name for name, ul in fill.ul.items() if ul < least.ul[name]]
-        amounts = ", ".join(f"{name}={ul:g}ul" for name, ul in fill.ul.items())
-        minima = " and ".join(f"{least.ul[name]:.1f} ul in {name}" for name in names)
+        amounts = ", ".join(f"{name}={ul:g}ul" for name, ul in fill.items())
+        minima = [f"{least[name]:.1f} ul in {name}" for name in fill if fill[name] < least[name]]
         raise DesignError(
             f"with fill {amounts} {crossing_clause(stack, worst)}, for balloons lean by what "
-            f"their chambers differ; ask for at least {minima}, or for less in the others"
+            f"their chambers differ; ask for at least {' and '.join(minima)}, or for less in the "
+            "others"
         )
     return fill, forms
 
 
 def _least(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> Fill:
     """The fill raised just enough towards an even one, in steps of 0.1 ul, to keep films apart."""
-    most = fill.largest
+    most = max(fill.values())
 
     def raised(share: float) -> Fill:
         def amount(ul: float) -> float:
             return min(math.ceil(10 * (ul + share * (most - ul)) - 1e-6) / 10, most)
 
-        return Fill({name: ul if ul == most else amount(ul) for name, ul in fill.ul.items()})
+        return {name: ul if ul == most else amount(ul) for name, ul in fill.items()}
 
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
@@ -414,15 +395,15 @@ def _raised(
         _lift(there, fill, centres, places, lifts, necks)
     forms = {}
     poses = _poses(stack, places, necks[:, centres])
-    for k, (ply, rise, pose) in enumerate(zip(stack.plies, lifts, poses, strict=True)):
+    for k, (ply, rise, (turn, shift)) in enumerate(zip(stack.plies, lifts, poses, strict=True)):
         if ply.layer.role != "sheet":
             local = np.column_stack([stack.plane.points, ply.z + rise])
-            up = np.broadcast_to(pose.turn[:, 2], local.shape)
-            forms[k] = FormedFilm(local @ pose.turn.T + pose.shift, up)
+            up = np.broadcast_to(turn[:, 2], local.shape)
+            forms[k] = FormedFilm(local @ turn.T + shift, up)
     return forms
 
 
-def _fill(stack: Layup, fill_ul: float | Mapping[str, float]) -> Fill:
+def _fill(stack: Layup, fill_ul: float | Fill) -> Fill:
     names = [chamber.name for chamber in stack.laminate.chambers]
     given = fill_ul if isinstance(fill_ul, Mapping) else dict.fromkeys(names, fill_ul)
     unknown = [name for name in given if name not in names]
@@ -439,7 +420,7 @@ def _fill(stack: Layup, fill_ul: float | Mapping[str, float]) -> Fill:
     for name, value in amounts.items():
         if not (math.isfinite(value) and value >= 0):
             raise DesignError(f"fill of {name} = {value:g} ul must be 0 ul or more")
-    return Fill(amounts)
+    return amounts
 
 
 def _lift(
@@ -453,7 +434,7 @@ def _lift(
     """Adds the lift of one balloon's two films, and of their necks."""
     lean = np.zeros((2, 2))
     for _ in range(ROUNDS):
-        amounts = np.array([pocket.pressure(fill.ul[pocket.chamber], lean) for pocket in there])
+        amounts = np.array([pocket.pressure(fill[pocket.chamber], lean) for pocket in there])
         heights = np.zeros((2, necks.shape[1]))
         for pocket, amount in zip(there, amounts, strict=True):
             for side, half in enumerate((pocket.lower, pocket.upper)):
@@ -470,14 +451,12 @@ def _poses(
     stack: Layup, places: NDArray[np.float64], necks: NDArray[np.float64]
 ) -> list[RigidMotion]:
     """The pose of every film: a balloon's films move together, each balloon stands on the last."""
-    poses = [UPRIGHT]
-    kinds = [interface.kind for interface in stack.laminate.interfaces]
-    for k, kind in enumerate(kinds, start=1):
-        if kind == "chamber":
+    poses = [(np.eye(3), np.zeros(3))]
+    for k, interface in enumerate(stack.laminate.interfaces, start=1):
+        if interface.kind == "chamber":
             poses.append(poses[-1])
             continue
         below, above = stack.plies[k - 1], stack.plies[k]
         top = necks[k - 1] + below.z + below.thickness * stack.is_thick
-        bottom = necks[k] + above.z
-        poses.append(set_on(poses[-1], places, top, bottom, above.gap))
+        poses.append(set_on(poses[-1], places, top, necks[k] + above.z, above.gap))
     return poses

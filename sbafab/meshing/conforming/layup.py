@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.edges import Point, unit
-from sbafab.geometry.region import Region, disc, polygon
+from sbafab.geometry.edges import Bounds, Point, unit
+from sbafab.geometry.region import Region, disc, polygon, rectangle
 from sbafab.laminate.laminate import Chamber, Interface, Laminate, Layer
 from sbafab.meshing.conforming.plane import Plane, triangulation
 from sbafab.meshing.solid import body_bond, cavity_slabs, parted
@@ -82,35 +82,27 @@ def sector(laminate: Laminate, symmetry: Symmetry) -> Sector | None:
     films = [layer.profile for layer in laminate.tpe_layers]
     bonds = [interface.bond for interface in laminate.interfaces]
     regions = list(dict.fromkeys([*films, *bonds]))
+    count = len(laminate.chambers)
     if symmetry == "half":
         if all(_covers(_flipped_y(region), region) for region in regions):
-            box = polygon([(-far, 0.0), (far, 0.0), (far, far), (-far, far)])
-            return Sector(box, (("symmetry_y", (1.0, 0.0)),))
+            return Sector(rectangle((-far, 0.0), (far, far)), (("symmetry_y", (1.0, 0.0)),))
         if all(_covers(region.mirrored(), region) for region in regions):
-            box = polygon([(-far, -far), (0.0, -far), (0.0, far), (-far, far)])
-            return Sector(box, (("symmetry_x", (0.0, 1.0)),))
+            return Sector(rectangle((-far, -far), (0.0, far)), (("symmetry_x", (0.0, 1.0)),))
     elif symmetry == "quarter":
-        box = polygon([(-far, 0.0), (0.0, 0.0), (0.0, far), (-far, far)])
         # A quarter of a single stack on the axis holds a quarter of its chamber.
         is_on_axis = [chamber.centres for chamber in laminate.chambers] == [((0.0, 0.0),)]
-        if is_on_axis and all(_is_quarter(laminate, layer) for layer in regions):
-            return Sector(box, (("symmetry_x", (0.0, 1.0)), ("symmetry_y", (-1.0, 0.0))))
-    else:
-        count = len(laminate.chambers)
-        if count > 1 and all(_covers(region.turned(360 / count), region) for region in regions):
-            return _lobe(count, far)
+        if is_on_axis and all(_is_quarter(laminate, region, far) for region in regions):
+            planes = ("symmetry_x", (0.0, 1.0)), ("symmetry_y", (-1.0, 0.0))
+            return Sector(rectangle((-far, 0.0), (0.0, far)), planes)
+    elif count > 1 and all(_covers(region.turned(360 / count), region) for region in regions):
+        rays = [unit(180 / count * share) for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+        lobe = polygon([(0.0, 0.0), *((far * x, far * y) for x, y in rays)])
+        ends = ("symmetry_sector_1", rays[0]), ("symmetry_sector_2", rays[-1])
+        return Sector(lobe, ends)
     raise DesignError(
         f"mesh symmetry {symmetry} is not this laminate's: a profile differs from its image; "
         "use full, or leave out parts on one side only, such as ears and inlet tabs"
     )
-
-
-def _lobe(count: int, far: float) -> Sector:
-    half = 180 / count
-    rays = [unit(half * share) for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
-    rim = [(far * x, far * y) for x, y in rays]
-    planes = (("symmetry_sector_1", rays[0]), ("symmetry_sector_2", rays[-1]))
-    return Sector(polygon([(0.0, 0.0), *rim]), planes)
 
 
 def _flipped_y(region: Region) -> Region:
@@ -121,18 +113,14 @@ def _covers(region: Region, image: Region) -> bool:
     return region == image or (image - region).area < SLACK
 
 
-def _is_quarter(laminate: Laminate, region: Region) -> bool:
+def _is_quarter(laminate: Laminate, region: Region, far: float) -> bool:
     """Return True if all four quarters are images of each other, apart from the inlet."""
-    far = 10 * max(map(abs, laminate.bounds)) + 10
-    away = region & polygon([(-far, -far), (0.0, -far), (0.0, far), (-far, far)])
-    if not _covers(_flipped_y(away), away):
-        return False
-    inlet = laminate.inlets[0] if laminate.inlets else None
+    away = region & rectangle((-far, -far), (0.0, far))
     image = away.mirrored()
-    if inlet is not None and inlet.direction[0] > 0:
-        width = inlet.width / 2
-        image = image - polygon([(0.0, -width), (far, -width), (far, width), (0.0, width)])
-    return _covers(region, image)
+    for inlet in laminate.inlets[:1]:
+        if inlet.direction[0] > 0:
+            image -= rectangle((0.0, -inlet.width / 2), (far, inlet.width / 2))
+    return _covers(_flipped_y(away), away) and _covers(region, image)
 
 
 def images(laminate: Laminate, symmetry: Symmetry) -> dict[str, str]:
@@ -165,6 +153,7 @@ def images(laminate: Laminate, symmetry: Symmetry) -> dict[str, str]:
 EDGE = 1e-3
 """mm"""
 MOST_ELEMENTS = 3_000_000
+KINDS = ("separator", "chamber")
 
 
 @dataclass(frozen=True)
@@ -214,6 +203,10 @@ class Layup:
     sector: Sector | None
     is_thick: bool = True
 
+    def nodes(self, cells: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """The plane's nodes of some triangles."""
+        return np.unique(self.plane.triangles[cells])
+
     @property
     def stacks(self) -> list[tuple[str, Point]]:
         """Chamber and axis of each stack that is meshed, chamber by chamber."""
@@ -240,11 +233,10 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
     def clip(region: Region) -> Region:
         return region if part is None else region & part.region
 
-    chambers = laminate.chambers
     films = [clip(layer.profile) for layer in laminate.tpe_layers]
     bonds = [Region(), *(clip(_bond(laminate, interface)) for interface in laminate.interfaces)]
-    slabs = {chamber.name: list(_void_slabs(laminate, chamber)) for chamber in chambers}
-    seats = {chamber.name: list(_seats(laminate, chamber)) for chamber in chambers}
+    slabs = {chamber.name: list(_void_slabs(laminate, chamber)) for chamber in laminate.chambers}
+    seats = {chamber.name: list(_seats(laminate, chamber)) for chamber in laminate.chambers}
     used = [*films, *bonds, *(clip(seat) for of_chamber in seats.values() for seat in of_chamber)]
     used += [clip(region) for of_chamber in slabs.values() for _, _, region in of_chamber]
     regions = [region for region in dict.fromkeys(used) if not region.is_empty]
@@ -256,22 +248,20 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
         covered: NDArray[np.bool_] = np.any(plane.inside[rows], axis=0)
         return covered
 
-    plies = []
-    z = 0.0
-    under = [0.0, *(interface.gap for interface in laminate.interfaces)]
-    for layer, film, bond, gap in zip(laminate.tpe_layers, films, bonds, under, strict=True):
+    plies: list[Ply] = []
+    gaps = [0.0, *(interface.gap for interface in laminate.interfaces)]
+    for layer, film, bond, gap in zip(laminate.tpe_layers, films, bonds, gaps, strict=True):
+        z = sum(ply.thickness for ply in plies)
         places = (layer.z, gap) if settings.gaps else (z, 0.0)
         plies.append(Ply(layer, *places, cells(film), cells(bond), film.area, bond.area))
         _check_apart(plane, plies[-1])
-        z += layer.film.thickness
     voids, shares = {}, {}
-    for chamber in chambers:
-        name = chamber.name
+    for name, of_chamber in slabs.items():
         parts: tuple[dict[int, list[Region]], ...] = ({}, {})
-        for place, is_under, region in slabs[name]:
+        for place, is_under, region in of_chamber:
             parts[is_under].setdefault(place, []).append(region)
         void = MeshedVoid(*({k: cells(*of) for k, of in each.items()} for each in parts))
-        if any(bool(covered.any()) for covered in void.under.values()):
+        if any(covered.any() for covered in void.under.values()):
             voids[name] = void
             whole = sum(seat.area for seat in seats[name])
             shares[name] = sum(clip(seat).area for seat in seats[name]) / whole
@@ -327,10 +317,7 @@ def _open_rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
                     yield side, f"the bond beside the pocket {_between(interface)}"
 
 
-Box = tuple[float, float, float, float]
-
-
-def _margins(outer: Box, inner: Box) -> Box:
+def _margins(outer: Bounds, inner: Bounds) -> Bounds:
     (a, b, c, d), (e, f, g, h) = outer, inner
     return e - a, f - b, c - g, d - h
 
@@ -354,19 +341,14 @@ def _bond(laminate: Laminate, interface: Interface) -> Region:
 
 def _seats(laminate: Laminate, chamber: Chamber) -> Iterator[Region]:
     """The discs on which base and tip stand, one per stack."""
-    necks = [i.bond for i in laminate.interfaces if i.kind == "separator"]
+    bonds = {kind: [i.bond for i in laminate.interfaces if i.kind == kind] for kind in KINDS}
     for centre in chamber.centres:
-        outers = [outer for neck in necks for outer in neck.outers if outer.winding(centre)]
-        if outers and laminate.bores:
-            yield Region((min(outers, key=lambda outer: outer.area),))
+        necks = [n for bond in bonds["separator"] for n in bond.outers if n.winding(centre)]
+        if necks and laminate.bores:
+            yield Region((min(necks, key=lambda outer: outer.area),))
         else:
-            yield disc(centre, _room(laminate, centre) / 2)
-
-
-def _room(laminate: Laminate, centre: Point) -> float:
-    pockets = [i.bond for i in laminate.interfaces if i.kind == "chamber"]
-    distances = [bond.distance_to_edge(centre) for bond in pockets]
-    return min(distance for distance in distances if distance > 0)
+            rooms = [bond.distance_to_edge(centre) for bond in bonds["chamber"]]
+            yield disc(centre, min(room for room in rooms if room > 0) / 2)
 
 
 def _void_slabs(laminate: Laminate, chamber: Chamber) -> Iterator[tuple[int, bool, Region]]:
@@ -468,118 +450,106 @@ def round_tube(stack: Layup, forms: Sequence[FormedFilm]) -> list[FormedFilm]:
     if wrap is None:
         return list(forms)
     x = stack.plane.points[:, 0]
-    placed = []
+    on_tube = list(_bodies(stack, wrap, forms))
+    placed: list[FormedFilm] = []
     for k, (ply, form) in enumerate(zip(stack.plies, forms, strict=True)):
         if ply.layer.role == "sheet":
             lifted = form.base + np.outer(wrap.raised(x), (0.0, 0.0, 1.0))
-            everywhere = np.arange(len(x))
-            moved = _moved(stack, ply, wrap, form._replace(base=lifted), (everywhere, 0.0, 1.0))
+            whole = BodyOnTube(wrap, np.arange(len(x)), 0.0, 1.0)
+            moved = _moved(stack, ply, form._replace(base=lifted), whole)
         else:
             moved = form
-            on_sheet = stack.plies[k - 1].layer.role == "sheet"
-            for nodes, middle, share in _bodies(stack, forms):
-                moved = _moved(stack, ply, wrap, moved, (nodes, middle, share), on_sheet)
+            for body in on_tube:
+                is_laid = stack.plies[k - 1].layer.role == "sheet"
+                moved = _moved(stack, ply, moved, body, is_laid)
         placed.append(moved)
-    _check_room(stack, wrap, placed)
+    _check_room(stack, on_tube, placed)
     return placed
 
 
-def _bodies(
-    stack: Layup, forms: Sequence[FormedFilm]
-) -> Iterator[tuple[NDArray[np.int64], float, float]]:
-    """Nodes of the plane of each body on the sheet, the x it is fixed at, its share of the bend."""
+class BodyOnTube(NamedTuple):
+    """Nodes of the plane of a body on the sheet, the x it is fixed at, its share of the bend."""
+
+    wrap: TubeWrap
+    nodes: NDArray[np.int64]
+    middle: float
+    share: float
+
+    @property
+    def at(self) -> float:
+        """The angle in radians round the tube at which it is fixed."""
+        return self.middle / (self.wrap.radius + self.wrap.neutral)
+
+    @property
+    def bend(self) -> float:
+        """Its curvature, 1/mm."""
+        return self.share / self.wrap.radius
+
+
+def _bodies(stack: Layup, wrap: TubeWrap, forms: Sequence[FormedFilm]) -> Iterator[BodyOnTube]:
     of_node, of_centre = bodies(stack)
     top = forms[-1].base[:, 2] + stack.plies[-1].thickness
+    x = np.array(stack.centres)[:, 0]
     for body in np.unique(of_centre).tolist():
-        nodes = np.flatnonzero(of_node == body)
-        fixed_at = [
-            c[0] for c, owner in zip(stack.centres, of_centre, strict=True) if owner == body
-        ]
+        nodes, fixed_at = np.flatnonzero(of_node == body), x[of_centre == body]
         # One body of several stacks, joined by a manifold, goes all round.
         share = 1.0
         if len(fixed_at) == 1:
             share = min(1.0, stack.laminate.thickness / max(float(top[nodes].max()), 1e-9))
-        yield nodes, sum(fixed_at) / len(fixed_at), share
+        yield BodyOnTube(wrap, nodes, float(fixed_at.mean()), share)
 
 
 def _moved(
-    stack: Layup,
-    ply: Ply,
-    wrap: TubeWrap,
-    form: FormedFilm,
-    body: tuple[NDArray[np.int64], float, float],
-    on_sheet: bool = False,
+    stack: Layup, ply: Ply, form: FormedFilm, body: BodyOnTube, is_laid: bool = False
 ) -> FormedFilm:
-    """The film with the nodes of one body in place."""
-    nodes, middle, share = body
+    """The film with the nodes of one body in place.
+
+    If it ``is_laid`` on the sheet, it is drawn down to the tube at its bond and near it.
+    """
+    wrap, nodes, middle, share = body
     flat = form.base[nodes]
     base, up = form.base.copy(), np.array(form.up)
     base[nodes] = wrap.placed(flat, middle, share)
-    lean = wrap.angle(flat[:, 0], middle, share) + middle / (wrap.radius + wrap.neutral)
+    lean = wrap.angle(flat[:, 0], middle, share) + body.at
     up[nodes] = np.column_stack([np.cos(lean), np.sin(lean), np.zeros(len(lean))])
     # Points farther out than the sheet's middle are stretched round the tube.
-    bend = share / wrap.radius
     height = flat[:, 2] + (ply.thickness / 2 if stack.is_thick else 0.0)
     longer = np.zeros(len(base))
-    longer[nodes] = (1 + bend * height) / (1 + bend * wrap.neutral) - 1
-    moved = FormedFilm(base, up, form.growth)
-    if on_sheet:
-        moved, shorter = _laid(wrap, moved, body, flat)
-        longer += shorter
+    longer[nodes] = (1 + body.bend * height) / (1 + body.bend * wrap.neutral) - 1
+    low, high = flat[:, 2].min(), flat[:, 2].max()
+    if is_laid and high - low > OVERLAP:
+        part = ((high - flat[:, 2]) / (high - low)) ** LAID
+        down = part * ((wrap.placed(flat, middle) - base[nodes]) * up[nodes]).sum(axis=1)
+        base[nodes] += down[:, None] * up[nodes]
+        longer[nodes] += body.bend * down
     cells = stack.plane.triangles[ply.cells]
     sizes = stack.plane.areas()[ply.cells]
     # Only the mid-side nodes carry weight in a second-order triangle.
     growth = float((longer[cells[:, 3:]].mean(axis=1) * sizes).sum() / sizes.sum())
-    return moved._replace(growth=form.growth + growth)
+    return FormedFilm(base, up, form.growth + growth)
 
 
-def _laid(
-    wrap: TubeWrap,
-    moved: FormedFilm,
-    body: tuple[NDArray[np.int64], float, float],
-    flat: NDArray[np.float64],
-) -> tuple[FormedFilm, NDArray[np.float64]]:
-    """A body's film on the sheet, drawn down to the tube at its bond and near it, and how much that
-    shortens it round the tube.
-    """
-    nodes, middle, share = body
-    low, high = flat[:, 2].min(), flat[:, 2].max()
-    base, shorter = moved.base.copy(), np.zeros(len(moved.base))
-    if high - low > OVERLAP:
-        up = moved.up[nodes]
-        part = ((high - flat[:, 2]) / (high - low)) ** LAID
-        down = part * ((wrap.placed(flat, middle) - base[nodes]) * up).sum(axis=1)
-        base[nodes] += down[:, None] * up
-        shorter[nodes] = share / wrap.radius * down
-    return moved._replace(base=base), shorter
-
-
-def _check_room(stack: Layup, wrap: TubeWrap, placed: Sequence[FormedFilm]) -> None:
+def _check_room(stack: Layup, on_tube: list[BodyOnTube], placed: Sequence[FormedFilm]) -> None:
     """Raises DesignError if balloons reach past the middle between them, or into the sheet."""
-    of_node, of_centre = bodies(stack)
-    middles: dict[int, list[float]] = {}
-    for (x, _), body in zip(stack.centres, of_centre.tolist(), strict=True):
-        middles.setdefault(body, []).append(x)
-    least = wrap.radius
+    room, radius = math.pi / len(on_tube), on_tube[0].wrap.radius
+    least = radius
     for ply, form in zip(stack.plies, placed, strict=True):
         if ply.layer.role == "sheet":
-            least = wrap.radius + ply.z + (ply.thickness if stack.is_thick else 0.0)
+            least = radius + ply.z + (ply.thickness if stack.is_thick else 0.0)
             continue
-        covered = np.unique(stack.plane.triangles[ply.cells])
-        for body, fixed_at in middles.items():
-            nodes = covered[of_node[covered] == body]
+        for body in on_tube:
+            nodes = np.intersect1d(stack.nodes(ply.cells), body.nodes)
             x, y, _ = form.base[nodes].T
-            at = (sum(fixed_at) / len(fixed_at)) / (wrap.radius + wrap.neutral)
-            aside = np.abs(np.angle(np.exp(1j * (np.arctan2(y, x) - at))))
-            room = math.pi / len(middles)
-            if len(middles) > 1 and float((aside - room).max() * wrap.radius) > OVERLAP:
+            aside = np.abs(np.angle(np.exp(1j * (np.arctan2(y, x) - body.at))))
+            if len(on_tube) > 1 and float((aside - room).max() * radius) > OVERLAP:
                 raise DesignError(
-                    f"filled balloons meet round the tube of {2 * wrap.radius:g} mm: film "
+                    f"filled balloons meet round the tube of {2 * radius:g} mm: film "
                     f"{ply.layer.index} reaches {math.degrees(aside.max()):.1f} degrees round it "
                     f"where each has {math.degrees(room):.1f}; ask for less fill"
                 )
-            if float(np.hypot(x, y).min()) < least - OVERLAP:
+            depth = least - float(np.hypot(x, y).min())
+            if depth > OVERLAP:
                 raise DesignError(
-                    f"film {ply.layer.index} would pass through its sheet by "
-                    f"{least - float(np.hypot(x, y).min()):.3f} mm; ask for another fill"
+                    f"film {ply.layer.index} would pass through its sheet by {depth:.3f} mm; "
+                    "ask for another fill"
                 )

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import TYPE_CHECKING, Literal
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,8 +85,13 @@ def _monomials(kind: ElementKind) -> tuple[tuple[int, ...], ...]:
 
 
 @cache
-def _slopes(kind: ElementKind, integration: bool) -> NDArray[np.float64]:
-    """Derivatives (places, nodes, dimensions) of the shape functions, at nodes or Gauss points."""
+def _shapes(
+    kind: ElementKind, integration: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Shape functions (places, nodes) and their derivatives (places, nodes, dimensions).
+
+    Places are the element's nodes, or its integration points.
+    """
     corners = np.array(_REFERENCE[kind], dtype=float)
     nodes = np.vstack([corners, [(corners[a] + corners[b]) / 2 for a, b in EDGES[kind]]])
     powers = np.array(_monomials(kind))
@@ -97,7 +103,7 @@ def _slopes(kind: ElementKind, integration: bool) -> NDArray[np.float64]:
         lowered[:, axis] = np.maximum(lowered[:, axis] - 1, 0)
         terms = np.prod(places[:, None, :] ** lowered, axis=2) * powers[:, axis]
         slopes.append(terms @ shape)
-    return np.stack(slopes, axis=2)
+    return np.prod(places[:, None, :] ** powers, axis=2) @ shape, np.stack(slopes, axis=2)
 
 
 def jacobians(
@@ -111,7 +117,7 @@ def jacobians(
     Places are the element's nodes, or its integration points.
     """
     matrices: NDArray[np.float64] = np.einsum(
-        "cni,pnj->cpij", points[cells], _slopes(kind, integration), optimize=True
+        "cni,pnj->cpij", points[cells], _shapes(kind, integration)[1], optimize=True
     )
     return matrices
 
@@ -154,19 +160,19 @@ def aspects(
 
 
 def _determinant(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
-    m = matrices
-    if m.shape[-2:] == (2, 2):
-        flat: NDArray[np.float64] = m[..., 0, 0] * m[..., 1, 1] - m[..., 0, 1] * m[..., 1, 0]
+    columns = np.moveaxis(matrices, -1, 0)
+    if matrices.shape[-2:] == (2, 2):
+        (a, b), (c, d) = np.moveaxis(columns, -1, 1)
+        flat: NDArray[np.float64] = a * d - b * c
         return flat
-    if m.shape[-2:] == (3, 2):
-        normals = np.cross(m[..., 0], m[..., 1])
-        mean = normals.mean(axis=1, keepdims=True)
-        mean = mean / np.linalg.norm(mean, axis=2, keepdims=True)
-        along: NDArray[np.float64] = np.sum(normals * mean, axis=2)
-        return along
-    solid: NDArray[np.float64] = np.einsum(
-        "...i,...i->...", np.cross(m[..., 0], m[..., 1]), m[..., 2]
-    )
+    normals = np.cross(columns[0], columns[1])
+    if len(columns) == 3:
+        third = columns[2]
+    else:
+        # A shell's normals are compared with their mean.
+        third = normals.mean(axis=1, keepdims=True)
+        third = third / np.linalg.norm(third, axis=2, keepdims=True)
+    solid: NDArray[np.float64] = np.sum(normals * third, axis=-1)
     return solid
 
 
@@ -176,21 +182,10 @@ def integrals(
     """Stiffness (cells, 6, 6) and load (cells, 6) of Poisson's equation on plane triangles."""
     matrices = jacobians("triangle6", points, cells, integration=True)
     sizes = _determinant(matrices) * _GAUSS["triangle6"][0]
-    inverse = np.linalg.inv(matrices)
-    slopes = np.einsum(
-        "pnj,cpji->cpni", _slopes("triangle6", integration=True), inverse, optimize=True
-    )
+    shapes, reference = _shapes("triangle6", integration=True)
+    slopes = np.einsum("pnj,cpji->cpni", reference, np.linalg.inv(matrices), optimize=True)
     stiffness = np.einsum("cpni,cpmi,cp->cnm", slopes, slopes, sizes, optimize=True)
-    load = np.einsum("pn,cp->cn", _values(), sizes)
-    return stiffness, load
-
-
-def _values() -> NDArray[np.float64]:
-    """Shape functions (places, 6) of the triangle at its integration points."""
-    r, s = np.array(_GAUSS["triangle6"][1]).T
-    q = 1 - r - s
-    corners = [q * (2 * q - 1), r * (2 * r - 1), s * (2 * s - 1)]
-    return np.column_stack([*corners, 4 * q * r, 4 * r * s, 4 * s * q])
+    return stiffness, np.einsum("pn,cp->cn", shapes, sizes)
 
 
 # Prisms as tetrahedra, second-order triangles as flat ones.
@@ -233,16 +228,6 @@ def tetrahedra(prisms: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray
     return cells.reshape(-1, 10)
 
 
-def split_wedges(corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Three tetrahedra (3 x m, 4) of first order for each wedge (m, 6), in its order.
-
-    The lower nodes' numbers decide the diagonal of a side, so that neighbours agree.
-    """
-    prisms = np.repeat(corners, 3, axis=1)
-    prisms[:, :3], prisms[:, 12:15] = corners[:, :3], corners[:, 3:]
-    return tetrahedra(prisms, corners[:, :3])[:, :4]
-
-
 TRIANGLE_PARTS = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
 """The four flat triangles through the nodes of a second-order one."""
 
@@ -283,10 +268,14 @@ class Mesh:
         names = self.thickness or self.cell_sets
         return {name: self.cell_sets[name] for name in names}
 
+    def surface(self, triangles: NDArray[np.int64]) -> tuple[Surface, NDArray[np.int64]]:
+        """Triangles of nodes as a surface of their own, and the node of each of its points."""
+        nodes, faces = np.unique(triangles, return_inverse=True)
+        return Surface(self.points[nodes], faces.reshape(-1, 3)), nodes
+
     def cavity(self, name: str) -> tuple[Surface, NDArray[np.int64]]:
         """A cavity as a separate surface, and the mesh node of each of its points."""
-        nodes, faces = np.unique(self.cavities[name], return_inverse=True)
-        return Surface(self.points[nodes], faces.reshape(-1, 3)), nodes
+        return self.surface(self.cavities[name])
 
     def node_fields(self) -> dict[str, NDArray[np.uint8]]:
         """Return the node sets other than bonds, each as 0 or 1 per node."""
@@ -313,36 +302,26 @@ class Mesh:
         mid-edge nodes belong to no cell. Tetrahedra keep their second order.
         Raises DesignError without meshio.
         """
-        try:
-            import meshio
-        except ImportError as error:
-            raise _not_installed("meshio") from error
-        cells: tuple[str, NDArray[np.int64]] = self.kind, self.cells
-        if self.kind == "wedge15":
-            cells = "wedge", self.cells[:, : CORNERS["wedge15"]]
-        return meshio.Mesh(
+        kind = "wedge" if self.kind == "wedge15" else self.kind
+        count = CORNERS[self.kind] if kind == "wedge" else None
+        mesh: meshio.Mesh = _library("meshio").Mesh(
             self.points,
-            [cells],
+            [(kind, self.cells[:, :count])],
             point_data=self.node_fields(),
             cell_data={name: [values] for name, values in self.cell_fields().items()},
             point_sets=dict(self.node_sets),
             cell_sets={name: [cells] for name, cells in self.cell_sets.items()},
         )
+        return mesh
 
     def pyvista(self) -> pyvista.UnstructuredGrid:
         """Return the mesh for PyVista (extra "python"), with the fields that a VTU file has.
 
         Raises DesignError without pyvista.
         """
-        try:
-            import pyvista
-        except ImportError as error:
-            raise _not_installed("pyvista") from error
-        grid = pyvista.UnstructuredGrid({VTK_TYPES[self.kind]: self.cells}, self.points)
-        for name, values in self.node_fields().items():
-            grid.point_data[name] = values
-        for name, marks in self.cell_fields().items():
-            grid.cell_data[name] = marks
+        grid = _library("pyvista").UnstructuredGrid({VTK_TYPES[self.kind]: self.cells}, self.points)
+        grid.point_data.update(self.node_fields())
+        grid.cell_data.update(self.cell_fields())
         return grid
 
     def linear(self) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
@@ -350,11 +329,13 @@ class Mesh:
 
         Wedges become three tetrahedra each.
         """
-        count = CORNERS[self.kind]
-        corners = self.cells[:, :count]
+        corners = self.cells[:, : CORNERS[self.kind]]
         owner = np.arange(len(corners))
         if self.kind == "wedge15":
-            corners = split_wedges(corners)
+            # The lower nodes' numbers decide the diagonal of a side, so that neighbours agree.
+            prisms = np.repeat(corners, 3, axis=1)
+            prisms[:, :3], prisms[:, 12:15] = corners[:, :3], corners[:, 3:]
+            corners = tetrahedra(prisms, corners[:, :3])[:, :4]
             owner = np.repeat(owner, 3)
         nodes, cells = np.unique(corners, return_inverse=True)
         return self.points[nodes], cells.reshape(corners.shape), owner
@@ -366,5 +347,8 @@ def _marked(count: int, indices: NDArray[np.int64]) -> NDArray[np.uint8]:
     return marks
 
 
-def _not_installed(library: str) -> DesignError:
-    return DesignError(f'{library} is not installed; add it with pip install "sbafab[python]"')
+def _library(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError:
+        raise DesignError(f'{name} is not installed; pip install "sbafab[python]"') from None

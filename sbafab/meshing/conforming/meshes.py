@@ -16,7 +16,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.element_mesh import (
     shell_mesh,
     skin_surface,
-    swept_points,
+    sweep,
     thin,
     volume_mesh,
 )
@@ -54,7 +54,7 @@ class ConformingMeshes:
     """Volume and shell mesh of one triangulation.
 
     ``flat_shell`` is the shell before it was filled (the same one without fill): its rest
-    position. ``fill`` holds the requested air and the resulting positions of the films. Without
+    position. ``fill`` holds the air in ul per balloon by chamber, if asked for. Without
     gaps all mid-surfaces of a flat shell lie at z = 0, and the volume is as high as its TPE films.
     """
 
@@ -73,14 +73,9 @@ class ConformingMeshes:
         """
         return thinning(self.shell, self.flat_shell).mean
 
-    @property
-    def has_air(self) -> bool:
-        """True if any film is separated from another."""
-        return any(self.holds_air(chamber) for chamber in self.volume.cavities)
-
     def holds_air(self, chamber: str) -> bool:
         """Return True if the pockets of a chamber are open: filled, or kept open by gaps."""
-        return self.settings.gaps or (self.fill is not None and self.fill.ul[chamber] > 0)
+        return self.settings.gaps or (self.fill is not None and self.fill[chamber] > 0)
 
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
@@ -106,47 +101,45 @@ def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) 
     sheet = thin(stack)
     as_cut = replace(sheet, settings=replace(settings, wrapped=False))
     flat_shell = shell_mesh(as_cut, flat(sheet))
-    fill = None
-    if settings.fill_ul is None:
-        volume, shell = volume_mesh(stack, flat(stack)), shell_mesh(sheet, flat(sheet))
-    else:
-        fill = filled(stack, settings.fill_ul)[0]
-        volume, shell = (
-            _filled(of, fill, make) for of, make in ((stack, volume_mesh), (sheet, shell_mesh))
-        )
-    rests = swept_points(stack, flat(stack)), flat_shell.points
+    fill = None if settings.fill_ul is None else filled(stack, settings.fill_ul)[0]
+    thick = _filled(stack, fill, volume_mesh)
+    shell = _filled(sheet, fill, shell_mesh)
     notes = tuple(_notes(laminate, settings, fill, thinning(shell, flat_shell)))
+    rests = sweep(stack, flat(stack)).points, flat_shell.points
+    heights = HEIGHTS[settings.gaps], HEIGHT_OF_SHELL
     volume, shell = (
         replace(
             mesh,
             notes=(height, *notes),
             rest=None if np.array_equal(mesh.points, rest) else rest,
         )
-        for mesh, rest, height in zip(
-            (volume, shell), rests, (HEIGHTS[settings.gaps], HEIGHT_OF_SHELL), strict=True
-        )
+        for mesh, rest, height in zip((thick, shell), rests, heights, strict=True)
     )
     return ConformingMeshes(laminate.name, settings, volume, shell, flat_shell, fill)
 
 
-def _filled(stack: Layup, fill: Fill, make: Callable[[Layup, Sequence[FormedFilm]], Mesh]) -> Mesh:
+def _filled(
+    stack: Layup, fill: Fill | None, make: Callable[[Layup, Sequence[FormedFilm]], Mesh]
+) -> Mesh:
     """The mesh whose balloons hold a fill, round a tube as well as flat."""
+    if fill is None:
+        return make(stack, flat(stack))
     all_pockets = pockets(stack)
     mesh = make(stack, formed(stack, fill, all_pockets))
     if stack.laminate.tube is None or not stack.settings.wrapped or stack.sector is not None:
         return mesh
     # Balloons bent round the tube hold a little more than flat ones.
-    amounts, sizes = dict(fill.ul), stack.plane.areas()
+    amounts, sizes = dict(fill), stack.plane.areas()
     for _ in range(ROUNDS):
         for chamber in stack.laminate.chambers:
             name = chamber.name
-            if fill.ul[name]:
+            if fill[name]:
                 films = stack.voids[name].in_films.items() if stack.is_thick else ()
                 bores = sum(sizes[cells].sum() * stack.plies[k].thickness for k, cells in films)
                 balloons = stack.laminate.balloons * len(chamber.centres)
                 volume = (mesh.cavity(name)[0].volume - bores) / balloons
-                amounts[name] *= fill.ul[name] / volume
-        mesh = make(stack, formed(stack, Fill(amounts), all_pockets))
+                amounts[name] *= fill[name] / volume
+        mesh = make(stack, formed(stack, amounts, all_pockets))
     return mesh
 
 
@@ -158,7 +151,7 @@ def _notes(
     if laminate.tube is not None and settings.wrapped:
         yield WRAPPED.format(laminate.tube)
     if fill is not None:
-        amounts = ", ".join(f"{name} {ul:g} ul" for name, ul in fill.ul.items())
+        amounts = ", ".join(f"{name} {ul:g} ul" for name, ul in fill.items())
         yield FILLED.format(amounts, *thin_films)
         yield REST
 
@@ -189,7 +182,7 @@ def write_conforming(
 
 def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path], None]]]:
     """Every possible file, with the function that writes it to a path."""
-    fill = meshes.fill.largest if meshes.fill is not None else 0.0
+    fill = max(meshes.fill.values()) if meshes.fill is not None else 0.0
     kinds: tuple[tuple[MeshKind, Mesh], ...] = (("volume", meshes.volume), ("shell", meshes.shell))
     for kind, mesh in kinds:
         size = meshes.statistics[mesh.name]["volume_mm3"]
@@ -199,11 +192,10 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
                 made = MeshFile(file, kind, None, fill, size, len(mesh.cells))
                 yield made, partial(row.elements, mesh)
     mesh = meshes.volume
-    surfaces: list[tuple[MeshKind, str | None, Surface]] = []
-    if meshes.has_air and mesh.cavities:
-        surfaces.append(("skin", None, skin_surface(mesh)))
     # Films that lie on each other enclose nothing: the surface would have no inside.
     air = [chamber for chamber in mesh.cavities if meshes.holds_air(chamber)]
+    surfaces: list[tuple[MeshKind, str | None, Surface]] = []
+    surfaces += [("skin", None, skin_surface(mesh))] if air else []
     surfaces += [("cavity", chamber, mesh.cavity(chamber)[0]) for chamber in air]
     for kind, chamber, surface in surfaces:
         stem = kind if chamber is None else f"{kind}_{chamber}_conforming"
