@@ -5,14 +5,7 @@ from collections.abc import Iterator
 import pyogrio
 import pytest
 
-from tests.interop import page
 from tests.interop.made import DESIGNS, NAMES, PROFILES, Sheet, sheet_of, write_design
-
-
-def pytest_sessionfinish() -> None:
-    """Writes what was measured for docs/testing.md, where that was asked for."""
-    if page.is_measuring and page.measured:
-        page.write_page()
 
 
 @pytest.fixture(scope="session")
@@ -34,7 +27,7 @@ def sheet(request: pytest.FixtureRequest, sheets: dict[str, Sheet]) -> Sheet:
     return sheets[request.param]
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def fine_arcs() -> Iterator[None]:
     """GDAL turns arcs into chords; those of a quarter degree keep an area to 3e-6."""
     pyogrio.set_gdal_config_options({"OGR_ARC_STEPSIZE": "0.25"})

@@ -49,14 +49,6 @@ def test_both_measure_the_width_that_a_closed_formula_gives(
     assert found.theirs == pytest.approx(expected, abs=TOLERANCE)
 
 
-def test_both_measure_the_slot_between_two_pieces() -> None:
-    region = rectangle((0.0, 0.0), (4.0, 4.0)) | disc((5.6, 2.0), 1.2)
-    found = compared("slot", region, 1, least_gap(region, 15.0))
-    assert found is not None
-    assert found.ours == pytest.approx(0.4)
-    assert found.theirs == pytest.approx(0.4, abs=TOLERANCE)
-
-
 @pytest.mark.parametrize("bottom", [0.1, 0.8])
 def test_both_measure_a_slot_that_tapers_to_a_rounded_bottom(bottom: float) -> None:
     """Fillets of 0.3 meet in a bottom of 0.1; between them some of a bottom of 0.8 is left."""

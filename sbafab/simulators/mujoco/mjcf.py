@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,8 +22,6 @@ LINEAR_SHARE = 0.9
 """Share of that error allowed for the linear tip: joints are exact to third order only."""
 RANGES = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 """Ranges in kPa about the given pressures, tried in this order."""
-DRIVEN_SETTLING = 0.01
-"""s: time constant of the stiffest motion of a level driven by balloons."""
 DT, SETTLING = 0.002, 0.05
 """s: time step, and time constant of each level, set by artificial dampers."""
 MASS = 1e-5
@@ -38,8 +35,6 @@ FREEDOMS: tuple[tuple[str, ...], ...] = (
 )
 """Joints that add up to each freedom of a level."""
 SPRINGS = ("rise", "tilt_x", "tilt_y")
-BY_JOINT, HALVES = np.array([1, 2, 0, 2, 1]), np.array([2.0, 2.0, 1.0, 2.0, 2.0])
-"""The freedom to which each of JOINTS belongs, and the number of joints per freedom."""
 POSE = "pressed"
 
 
@@ -158,38 +153,3 @@ def _joints(level: int, ways: Array) -> list[tuple[str, float]]:
         for joints, way in zip(FREEDOMS, ways.tolist(), strict=True)
         for joint in (joints if abs(way) > least else ())
     ]
-
-
-class PressedChain:
-    """A loaded model of ``chain_text`` driven by a stack's balloons at any pressures.
-
-    The springs of the file are valid about one pose. Here they are removed, and each step applies
-    the forces of the stack's own springs, contacts included, at the joints' values: states at rest
-    are poses of the stack up to its highest pressure. Dampers follow the stiffness: soft motions
-    settle later than stiff ones, and a slack stack without pressure hardly settles.
-    """
-
-    def __init__(self, model: Any, stack: Stack) -> None:
-        """Remove the springs and the actuators' gear from ``model``, a mujoco.MjModel."""
-        self.model, self.stack = model, stack
-        count = len(stack.levels)
-        names = [[f"level{level + 1}_{joint}" for joint in JOINTS] for level in range(count)]
-        joints = np.array([[model.joint(name).id for name in row] for row in names])
-        self.places, self.dofs = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
-        for level in range(count):
-            for spring in SPRINGS:
-                tendon = model.tendon(f"level{level + 1}_{spring}").id
-                model.tendon_stiffness[tendon] = model.tendon_damping[tendon] = 0.0
-        model.actuator_gear[:] = 0.0
-
-    def apply(self, data: Any, pressures: Sequence[float]) -> None:
-        """Set the forces of the next step, ``qfrc_applied`` of a mujoco.MjData, at pressures in
-        kPa, one per chamber. Raises DesignError for pressures outside the stack's maps.
-        """
-        tilt_x, tilt_y, rise, tilt_y_upper, tilt_x_upper = data.qpos[self.places].T
-        at = np.stack([rise, tilt_x + tilt_x_upper, tilt_y + tilt_y_upper], axis=-1)
-        _, gradient, matrices = self.stack.springs(pressures, by_level=True).energy(at)
-        # Both halves of a tilt carry its full moment, and each moves by half.
-        data.qfrc_applied[self.dofs] = -gradient[:, BY_JOINT]
-        stiff = np.einsum("lii->li", matrices)[:, BY_JOINT] * HALVES
-        self.model.dof_damping[self.dofs] = DRIVEN_SETTLING * np.maximum(stiff, 0.0)

@@ -1,18 +1,16 @@
-"""Machine files in other programs: G-code by MeerK40t, Inkscape's size, LibreCAD's print."""
+"""MeerK40t writes G-code of LightBurn projects: what it cuts, in which order, with which power."""
 
 from __future__ import annotations
 
 import math
 import os
 import re
-import shutil
 import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-import pypdfium2
 import pytest
 import shapely
 
@@ -20,12 +18,10 @@ from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.lightburn import ADVICE, runs_text, sheet_layers
-from sbafab.cutting.machine_files import machine_text
-from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, ENGRAVE, PLAIN, Entries
+from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, ENGRAVE, Entries
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.design.recipes import Recipe
-from tests.interop.made import EXACT, LENGTH, WIDTH, Sheet, outline_bounds
-from tests.interop.painting import painted
+from tests.interop.made import LENGTH, WIDTH, Sheet
 
 pytestmark = pytest.mark.long
 
@@ -130,50 +126,3 @@ def test_meerk40t_writes_gcode_of_what_the_project_cuts(
 def line(run: LaserRun) -> shapely.LineString:
     points = [run.edges[0].start, *(e.at(k / 48) for e in run.edges for k in range(1, 49))]
     return shapely.LineString(points)
-
-
-@pytest.mark.skipif(shutil.which("inkscape") is None, reason="no Inkscape here")
-def test_inkscape_finds_epilog_s_outlines_where_the_cut_file_has_them(
-    sheet: Sheet, tmp_path: Path
-) -> None:
-    path = tmp_path / "sheet.svg"
-    path.write_text(machine_text("epilog", runs_of(sheet, PLAIN), (WIDTH, LENGTH), "sheet"))
-    done = subprocess.run(
-        ["inkscape", "--query-all", str(path)],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=True,
-    )
-    boxes = {
-        name: [float(value) * 25.4 / 96 for value in values]
-        for name, *values in (row.split(",") for row in done.stdout.splitlines())
-    }
-    x, y, width, height = boxes["CUT_OUTER"]
-    low_x, low_y, high_x, high_y = outline_bounds(sheet.files["bulges"])
-    # Inkscape counts half a hairline on every side.
-    edge = 0.0127
-    found = x + edge, LENGTH - y - height + edge, x + width - edge, LENGTH - y - edge
-    assert found == pytest.approx((low_x, low_y, high_x, high_y), abs=0.01)
-
-
-@pytest.mark.skipif(shutil.which("librecad") is None, reason="no LibreCAD here")
-def test_librecad_prints_rdworks_s_file_with_the_film_s_area(sheet: Sheet, tmp_path: Path) -> None:
-    (tmp_path / "sheet.dxf").write_text(
-        machine_text("rdworks", runs_of(sheet, PLAIN), (WIDTH, LENGTH), "sheet")
-    )
-    # R12 has no units; LibreCAD takes its own, which are millimetres.
-    subprocess.run(
-        ["librecad", "dxf2pdf", "-s", "1", "sheet.dxf"],
-        cwd=tmp_path,
-        env={**os.environ, "QT_QPA_PLATFORM": "offscreen", "HOME": str(tmp_path)},
-        capture_output=True,
-        timeout=60,
-        check=True,
-    )
-    dots = 600
-    with pypdfium2.PdfDocument(tmp_path / "sheet.pdf") as document:
-        picture = document[0].render(scale=dots / 72).to_pil().convert("RGB")
-    found = painted(picture, dots / 25.4)
-    assert found.film == pytest.approx(sheet.film, rel=EXACT)
-    assert (found.pieces, found.holes) == (len(sheet.outers), len(sheet.holes))
