@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from sbafab.geometry.contour import Contour, circle, tidy
+from sbafab.geometry.contour import tidy
 from sbafab.geometry.edges import (
     EPSILON,
     Arc,
@@ -72,16 +72,6 @@ def test_an_edge_comes_back_from_its_bulge_and_from_its_reverse(edge: Edge) -> N
     assert turned.segment_area == pytest.approx(-edge.segment_area)
     assert turned.bounds == edge.bounds
     assert pickle.loads(pickle.dumps(edge)) == edge
-
-
-def test_a_quarter_and_a_half_by_their_formulas() -> None:
-    assert QUARTER.bulge == pytest.approx(math.tan(math.pi / 8), abs=1e-15)
-    assert HALF.bulge == pytest.approx(1.0, abs=1e-15)
-    assert QUARTER.length == pytest.approx(math.pi)
-    assert QUARTER.segment_area == pytest.approx(4 * (math.pi / 4 - 1 / 2))
-    assert distance_to(QUARTER, (1.0, 1.0)) == 2.0
-    assert distance_to(QUARTER, (-1.0, -1.0)) == pytest.approx(math.hypot(2, 4))
-    assert QUARTER.reversed().offset(2.0) is None
 
 
 def test_edges_that_meet() -> None:
@@ -148,12 +138,6 @@ def test_a_spiral_of_arcs_is_no_circle() -> None:
     for run in runs((*spiral, Line((0.0, 0.0), (1.0, 0.0)))):
         radii = [edge.radius for edge in run if isinstance(edge, Arc)]
         assert max(radii, default=0.0) - min(radii, default=0.0) <= 1.7e-5
-
-
-def test_straight_edges_and_a_circle_are_one_run_each() -> None:
-    square = closed([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)])
-    assert [len(run) for run in runs(square)] == [3, 1, 1, 1]
-    assert len(Contour(circle((0.0, 0.0), 1.0).edges).runs) == 1
 
 
 @pytest.mark.parametrize("turn", [1, -1])

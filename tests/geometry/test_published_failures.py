@@ -18,7 +18,7 @@ from sbafab.geometry.arcs import ellipse, fit_arcs
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Edge, edge_from_bulge
 from sbafab.geometry.offset import grow, shrink
-from sbafab.geometry.region import Region, disc, rectangle, union
+from sbafab.geometry.region import Region, union
 from tests.hunt.oracle import OPERATIONS, complaint, offset_complaint
 
 QUARTER = math.tan(math.pi / 8)
@@ -178,30 +178,6 @@ def test_offsets(case: str) -> None:
     vertices, distances = OFFSETS[case]
     for distance in distances:
         assert offset_complaint(outline(vertices), distance, Random(1)) is None
-
-
-def test_an_offset_that_falls_apart() -> None:
-    """build123d 800: two discs joined by a narrow waist, and a plate whose hole cuts it in two."""
-    waist = disc((0, 0), 2) | disc((3.9, 0), 2)
-    parts = shrink(waist, 0.5)
-    assert len(parts.pieces) == 2
-    # More than the discs of 1.5: each runs out in a tip between the arcs round the waist's corners.
-    assert parts.area > 2 * math.pi * 1.5**2
-    assert offset_complaint(waist, -0.5, Random(1)) is None
-    plate = rectangle((-7.5, -5), (7.5, 5)) - disc((0, 0), 4.9)
-    cut = shrink(plate, 0.15)
-    assert len(cut.pieces) == 2
-    # A rectangle 14.7 x 9.7 less the disc of 5.05, of which two segments 0.2 high reach out of it.
-    half = math.acos(4.85 / 5.05)
-    out = 2 * 5.05**2 * (half - math.sin(half) * math.cos(half))
-    assert cut.area == pytest.approx(14.7 * 9.7 - math.pi * 5.05**2 + out)
-
-
-def test_a_small_circle_shrinks() -> None:
-    """OCCT 1452: circles of 2 mm and less across crashed under a negative offset."""
-    for radius in (0.99, 1.0, 1.005):
-        less = shrink(disc((0, 0), radius), 0.052365194784652756)
-        assert less.contours[0].circle == ((0, 0), pytest.approx(radius - 0.052365194784652756))
 
 
 def test_a_ring_round_an_ellipse_is_closed() -> None:

@@ -76,9 +76,3 @@ def test_an_index_knows_the_edges_in_a_box_and_the_nearest_one(seed: int) -> Non
         assert index.all_within(box) == all(inside)
         for p in ((x, y), draw.choice(edges).at(draw.random())):
             assert index.distance(p) == min(distance_to(edge, p) for edge in edges)
-
-
-def test_an_empty_index_holds_nothing() -> None:
-    index = EdgeIndex([])
-    assert index.numbers((-1.0, -1.0, 1.0, 1.0)) == []
-    assert index.distance((0.0, 0.0)) == math.inf

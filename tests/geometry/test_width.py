@@ -14,7 +14,6 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.overlap_pairs import overlap_pairs
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union
 from sbafab.geometry.width import Width, inscribed_disc, least_gap, least_width
-from tests.quick import few
 
 AXIS = (0.0, 0.0)
 EXACT = 1e-9
@@ -104,54 +103,8 @@ def test_width_and_gap_are_the_closed_formulas(
         assert below is None or below.value == pytest.approx(expected, abs=EXACT)
 
 
-@pytest.mark.parametrize("region", [disc(AXIS, 1.0), rectangle(AXIS, (2.0, 1.0)), Region()])
-def test_a_convex_piece_alone_has_no_gap_and_nothing_no_width(region: Region) -> None:
-    assert least_gap(region) is None
-    assert (least_width(region) is None) == region.is_empty
-
-
-def test_the_place_is_where_the_ring_is_thinnest() -> None:
-    width = least_width(disc(AXIS, 3) - disc((0.6, 0.8), 1.5))
-    assert width is not None
-    assert width.middle == pytest.approx((2.75 * 0.6, 2.75 * 0.8), abs=EXACT)
-
-
-def holes_in_a_plate(seed: int) -> Region:
-    """A 24 mm disc with twelve or fewer holes, discs and turned rectangles, that keep apart."""
-    draw = random.Random(seed)
-    region = disc((0.0, 0.0), 12.0)
-    taken: list[tuple[float, float, float]] = []
-    for _ in range(12):
-        radius, distance = draw.uniform(0.6, 1.5), draw.uniform(0, 10)
-        angle = draw.uniform(0, math.tau)
-        x, y = distance * math.cos(angle), distance * math.sin(angle)
-        if any(math.hypot(x - u, y - v) < radius + r + 0.02 for u, v, r in taken):
-            continue
-        if distance + radius > 11.98:
-            continue
-        taken.append((x, y, radius))
-        if draw.random() < 0.5:
-            hole = disc((x, y), radius)
-        else:
-            half, tall = radius * math.cos(0.6), radius * math.sin(0.6)
-            turn = draw.uniform(0, 180)
-            hole = rectangle((-half, -tall), (half, tall)).turned(turn).moved(x, y)
-        region = region - hole
-    return region
-
-
 def ring_of(contour: Contour) -> shapely.LinearRing:
     return shapely.LinearRing(contour.polygon(sagitta=1e-5))
-
-
-@pytest.mark.parametrize("seed", few(range(12), 4))
-def test_webs_agree_with_shapely(seed: int) -> None:
-    region = holes_in_a_plate(seed)
-    rings = [ring_of(contour) for contour in region.contours]
-    apart = min(a.distance(b) for i, a in enumerate(rings) for b in rings[:i])
-    width = least_width(region)
-    assert width is not None
-    assert width.value == pytest.approx(apart, abs=2.1e-5)
 
 
 def sharp_holes_in_a_plate(seed: int) -> Region:
@@ -181,44 +134,6 @@ def test_webs_between_sharp_corners_agree_with_shapely(seed: int) -> None:
     width = least_width(region, 15.0)
     assert width is not None
     assert width.value == pytest.approx(apart, abs=2.1e-5)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_erosion_by_half_the_width_breaks_the_plate(seed: int) -> None:
-    region = holes_in_a_plate(seed)
-    width = least_width(region)
-    assert width is not None
-    (rings,) = region.polygons(sagitta=1e-4)
-    plate = shapely.Polygon(rings[0], rings[1:])
-
-    def boundaries(share: float) -> int:
-        eroded = plate.buffer(-share * width.value / 2, quad_segs=16)
-        return len(shapely.get_parts(eroded)) + sum(
-            len(part.interiors) for part in shapely.get_parts(eroded)
-        )
-
-    assert boundaries(0.99) == len(region.contours)
-    assert boundaries(1.01) != len(region.contours)
-
-
-def test_the_least_width_of_a_finely_drawn_ring_is_found_among_far_and_near_edges() -> None:
-    """Two polygons of 180 sides about one centre are nearest where their flats lie side by side."""
-
-    def ring(radius: float) -> Region:
-        return polygon(
-            [
-                (radius * math.cos(k * math.pi / 90), radius * math.sin(k * math.pi / 90))
-                for k in range(180)
-            ]
-        )
-
-    width = least_width(ring(6.0) - ring(5.0), 15.0)
-    gap = least_gap(ring(6.0) - ring(5.0), 15.0)
-    flat = math.cos(math.pi / 180)
-    assert width is not None
-    assert width.value == pytest.approx(flat, abs=EXACT)
-    assert gap is not None
-    assert gap.value == pytest.approx(10.0 * flat, abs=EXACT)
 
 
 def _ring(count: int) -> Region:
@@ -276,10 +191,3 @@ def test_slack_says_how_much_wider_a_place_may_be() -> None:
         assert len(ends) == len(pairs)
     # Both ends of the narrowest webs.
     assert {1.5, 4.0} <= {round(pair.middle[1], 6) for pair in facing_pairs(FRAME, 0.1)}
-
-
-def test_the_narrowest_is_the_least_width() -> None:
-    region = FRAME - disc((5.0, 5.0), 0.7)
-    least = least_width(region)
-    assert least is not None
-    assert min(pair.value for pair in facing_pairs(region, 0.5)) == pytest.approx(least.value)
