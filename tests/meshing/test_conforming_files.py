@@ -12,7 +12,7 @@ import trimesh
 
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import MeshSettings
-from sbafab.meshing.conforming.mesh import FACES, volumes
+from sbafab.meshing.conforming.mesh import volumes
 from sbafab.meshing.conforming.meshes import (
     ConformingMeshes,
     conforming_meshes,
@@ -166,19 +166,6 @@ def test_standalone_cavities_are_closed_and_look_outward(written: Written, suffi
     assert read.volume == pytest.approx(meshes.volume.cavity("A")[0].volume, rel=1e-6)
     (listed,) = (file for file in files if file.file.endswith(f"_conforming.{suffix}"))
     assert listed.volume_mm3 == pytest.approx(read.volume, rel=1e-6)
-
-
-def test_faces_of_every_element_look_out() -> None:
-    corners = {
-        "wedge15": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)],
-        "tetra10": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
-    }
-    for kind, places in corners.items():
-        points = np.array(places, dtype=float)
-        for local in FACES[kind]:  # type: ignore[index]
-            face = points[[node for node in local if node < len(points)]]
-            normal = np.cross(face[1] - face[0], face[2] - face[0])
-            assert normal @ (face.mean(axis=0) - points.mean(axis=0)) > 0
 
 
 def test_only_the_formats_asked_for_are_written(two_balloons: Laminate, tmp_path: Path) -> None:

@@ -47,14 +47,6 @@ def test_regions_keep_their_area_without_slivers(plane: Plane) -> None:
     assert scaled_jacobians("triangle6", plane.points, plane.triangles).min() > 0.1
 
 
-def test_triangles_lie_in_the_regions_they_are_filed_under(plane: Plane) -> None:
-    centroids = plane.points[plane.triangles[:, :3]].mean(axis=1)
-    for region, inside in zip(REGIONS, plane.inside, strict=True):
-        found = [region.contains(tuple(centroid)) for centroid in centroids.tolist()]
-        # Where a fillet runs into the plate, an edge is moved by a hundredth of a millimetre.
-        assert np.count_nonzero(np.array(found) != inside) <= 2
-
-
 def test_no_edge_crosses_a_ring_from_side_to_side(plane: Plane) -> None:
     on_border = np.unique(border(plane, 4)[:, :2])
     sides = set(border(plane, 4)[:, 2].tolist())
@@ -73,9 +65,3 @@ def test_triangles_shrink_in_a_narrow_slot_and_bend_with_a_small_hole() -> None:
     assert len(inner) > 20
     area = plane.areas()[plane.inside[0]].sum()
     assert area == pytest.approx((plate - slot - hole).area, rel=3e-4)
-
-
-def test_equal_input_gives_equal_bytes(plane: Plane) -> None:
-    again = triangulation(REGIONS, 0.4)
-    assert again.points.tobytes() == plane.points.tobytes()
-    assert again.triangles.tobytes() == plane.triangles.tobytes()

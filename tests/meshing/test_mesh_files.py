@@ -2,9 +2,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +10,7 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.mesh_files import write_meshes
-from sbafab.meshing.solid import MASKLESS_GAP, cavity_slabs, solid, solid_slabs
-
-TEMPLATES = ["1dof-5mm", "radial-15mm"]
+from sbafab.meshing.solid import MASKLESS_GAP, solid
 
 
 @pytest.fixture(scope="module")
@@ -43,41 +38,12 @@ def test_a_lobed_design_gives_a_solid_in_three_formats_and_a_cavity_a_chamber(
     assert [mesh.chamber for mesh in meshes[3:]] == [c.name for c in lobed.chambers]
 
 
-@pytest.mark.parametrize("template", TEMPLATES)
-def test_volumes_are_the_sums_of_area_times_thickness(template: str, tmp_path: Path) -> None:
-    laminate = build(load_design(template))
-    meshes, _ = write_meshes(laminate, tmp_path)
-    expected = [sum(slab.volume for slab in solid_slabs(laminate))] * 3
-    for chamber in laminate.chambers:
-        expected.append(sum(slab.volume for slab in cavity_slabs(laminate, chamber)))
-    flat = [mesh.volume_mm3 for mesh in meshes if "wrapped" not in mesh.file]
-    assert flat == pytest.approx(expected, rel=5e-4)
-
-
 def test_the_lumen_and_three_necks_a_joint_are_the_only_handles(lobed: Laminate) -> None:
     surface = solid(lobed)
     # Lumen: one. Each of the two joints between balloons adds three neck rings round a lumen
     # that opens between them.
     handles = 1 + 3 * (lobed.balloons - 1)
     assert len(surface.points) - len(surface.faces) // 2 == 2 - 2 * handles
-
-
-def test_same_bytes_again_under_another_hash_seed_and_time_zone(
-    lobed: Laminate, tmp_path: Path
-) -> None:
-    here, there = tmp_path / "here", tmp_path / "there"
-    write_meshes(lobed, here)
-    script = (
-        "import sys; from pathlib import Path\n"
-        "from sbafab.actuators import build, load_design\n"
-        "from sbafab.meshing.mesh_files import write_meshes\n"
-        "laminate = build(load_design('3dof-15mm', ['stack.balloons=3']))\n"
-        "write_meshes(laminate, Path(sys.argv[1]))\n"
-    )
-    environment = {**os.environ, "PYTHONHASHSEED": "4711", "TZ": "Asia/Tokyo"}
-    root = Path(__file__).parents[2]
-    subprocess.run([sys.executable, "-c", script, there], check=True, env=environment, cwd=root)
-    assert digests(here) == digests(there)
 
 
 def test_the_outline_stays_within_a_micrometre(lobed: Laminate) -> None:

@@ -18,7 +18,6 @@ from sbafab.meshing.solid import (
     cavity_slabs,
     closed_surface,
     fuse,
-    partition,
     solid,
     solid_slabs,
 )
@@ -38,17 +37,6 @@ def beyond(radius: float, width: float, reach: float) -> float:
 
 def euler(surface: Surface) -> int:
     return len(surface.points) - len(surface.faces) // 2
-
-
-def test_two_overlapping_squares_make_three_cells() -> None:
-    plane = partition([rectangle((0, 0), (2, 2)), rectangle((1, 1), (3, 3))], 0.002)
-    first, second = plane.inside
-    assert plane.inside.shape == (2, 3)
-    for chosen, area in ((first & second, 1.0), (first & ~second, 3.0), (first | second, 7.0)):
-        a, b, c = plane.points[plane.triangles(chosen)].transpose(1, 0, 2)
-        u, v = b - a, c - a
-        assert (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum() / 2 == pytest.approx(area)
-    assert plane.triangles(np.zeros(3, dtype=bool)).shape == (0, 3)
 
 
 def test_the_solid_is_one_closed_body_of_the_volume_calculated_by_hand(
@@ -84,13 +72,6 @@ def test_it_is_what_manifold3d_makes_of_the_same_prisms(two_balloons: Laminate) 
     assert surface.volume == pytest.approx(union.volume(), rel=2e-4)
     corners = [surface.points.min(axis=0), surface.points.max(axis=0)]
     assert np.ravel(corners) == pytest.approx(union.bounding_box(), abs=0.001)
-
-
-def test_slabs_that_overlap_count_once() -> None:
-    surface = fuse([*CUBE, Slab(rectangle((1, 1), (3, 3)), 1.0, 3.0)], 0.002)
-    assert surface.volume == pytest.approx(8 + 8 - 1)
-    assert len(open_edges(surface)) == 0
-    assert euler(surface) == 2
 
 
 def test_faulty_surfaces_are_found_with_the_place() -> None:
@@ -139,17 +120,6 @@ def test_the_cavity_is_one_closed_body_of_the_volume_calculated_by_hand(
     assert surface.points[:, 0].max() == pytest.approx(8.25, abs=1e-5)
     assert surface.points[:, 2].min() == pytest.approx(0.038)
     assert surface.points[:, 2].max() == pytest.approx(0.038 * 3 + 0.025 * 3)
-
-
-def test_air_and_film_share_no_room(two_balloons: Laminate) -> None:
-    films = solid_slabs(two_balloons)
-    air = cavity_slabs(two_balloons, two_balloons.chambers[0])
-    together = fuse([*films, *air], 0.002)
-    volume = sum(slab.volume for slab in films + air)
-    assert together.volume == pytest.approx(volume, rel=1e-4)
-    # Where they meet they meet face to face, so nothing but the outside is left.
-    assert len(open_edges(together)) == 0
-    assert euler(together) == 2
 
 
 def test_chambers_without_pocket_or_channel_are_named(

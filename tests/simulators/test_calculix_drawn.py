@@ -12,9 +12,7 @@ import numpy as np
 import pytest
 
 from docs.scripts.drawn_runs import DECKS
-from docs.scripts.measured import record
 from sbafab.actuators import build, load_design
-from sbafab.errors import DesignError
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.simulators.calculix.deck import DeckSettings, deck_settings, started, write_deck
@@ -48,12 +46,6 @@ def test_a_vacuum_is_a_negative_load_on_the_same_faces(tmp_path: Path) -> None:
     assert {float(value) for _, value in loads[-5.0]} == {-0.005}
 
 
-def test_no_vacuum_is_larger_than_the_air_outside() -> None:
-    laminate = build(load_design("vacuum"))
-    with pytest.raises(DesignError, match=r"must be from -101\.325 to 1000 kPa"):
-        deck_settings(laminate, SimulationRequest(-102.0))
-
-
 def test_films_that_pass_through_each_other_are_seen() -> None:
     """The gap of eight sheets of 0.05 mm is 0.4 mm; the upper film sinks by more or less."""
     laminate = build(load_design("vacuum"))
@@ -75,6 +67,8 @@ def test_only_a_stack_stands_on_its_base(template: str, free: bool, tmp_path: Pa
     write_deck(mesh, settings, tmp_path)
     text = (tmp_path / "actuator.inp").read_text("ascii")
     assert ("base, 1, 3" in text) is not free
+    # Tubes are glued into the mouths of what is drawn; the paper's balloons have none.
+    assert ("*EQUATION" in text) is free
     if free:
         # As many as a rigid body has freedoms.
         boundary = text.split("*BOUNDARY\n")[1].split("*")[0]
@@ -110,31 +104,6 @@ def _equations(deck: Path) -> list[tuple[tuple[int, int, float], tuple[int, int,
         a, i, p, b, j, q = (float(value) for value in row.split(","))
         terms.append(((int(a) - 1, int(i), p), (int(b) - 1, int(j), q)))
     return terms
-
-
-@pytest.mark.parametrize("balloons", [1, 2])
-def test_the_papers_balloons_have_no_tube(balloons: int, tmp_path: Path) -> None:
-    laminate = build(load_design("1dof-5mm", (f"stack.balloons={balloons}",)))
-    mesh = deck_mesh(laminate, MeshSettings(h=0.75))
-    assert "inlet_chamber1" in mesh.node_sets
-    write_deck(mesh, deck_settings(laminate), tmp_path)
-    assert _equations(tmp_path / "actuator.inp") == []
-
-
-def test_the_array_rose_as_two_clamped_plates() -> None:
-    """2 p a^4 / 64 D of 8 mm pouches, D of 0.2 mm at 300 MPa; the strips give a little."""
-    rise = float(record("drawn_decks").tables["decks"].cell("array", "thicker by, mm"))
-    stiffness = 300 * 0.2**3 / (12 * (1 - 0.3**2))
-    pressure = DECKS["array"].pressure / 1000
-    assert rise == pytest.approx(2 * pressure * 4**4 / (64 * stiffness), rel=0.12)
-
-
-def test_inertia_is_little_where_a_working_pressure_was_reached() -> None:
-    table = record("drawn_decks_furthest").tables["decks"]
-    reached = [row for row in table.rows if row[-1] == "reached"]
-    assert reached
-    for name, *_ in reached:
-        assert float(table.cell(name, "kinetic energy, %")) < 1
 
 
 RUN = ("array", "finger", "folded")

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -19,18 +17,13 @@ from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.simulators.calculix import run as results
 from sbafab.simulators.calculix.deck import DeckSettings
 from sbafab.simulators.calculix.run import (
-    DIVERGED,
-    Ending,
     Frame,
     LoadedState,
-    converged_frames,
     deck_mesh,
     deformed_png,
     history,
     history_csv,
-    history_svg,
     read_frd,
-    read_sta,
     write_deformed,
 )
 
@@ -89,29 +82,6 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     path.write_text(frd(0.25).replace(" 2.50000E+00", "      wrong "))
     with pytest.raises(OutputError, match=r"not a number at time 0\.25 s"):
         read_frd(path, 2)
-
-
-STA = """SUMMARY OF JOB INFORMATION
-  STEP      INC     ATT  ITRS     TOT TIME     STEP TIME      INC TIME
-     1          1     1     8  0.250000E+00  0.250000E+00  0.250000E+00
-     1          2     1U    4  0.250000E+00  0.250000E+00  0.250000E+00
-     1          2     2     7  0.312500E+00  0.312500E+00  0.625000E-01
-     1          3     1     7  0.3125"""
-
-
-def test_sta_counts_what_converged(tmp_path: Path) -> None:
-    path = tmp_path / "actuator.sta"
-    assert read_sta(path) == []
-    path.write_text(STA)
-    assert read_sta(path) == [0.25, 0.3125]
-
-
-def test_frames_after_the_last_converged_step_are_left_out(tmp_path: Path) -> None:
-    path = tmp_path / "actuator.frd"
-    path.write_text(frd(0.25, 0.3125, 0.5))
-    mesh = Mesh("volume", "wedge15", np.zeros((2, 3)), np.zeros((0, 15), int), {}, {}, {}, {})
-    kept = converged_frames(path, mesh, Ending(0.3125, DIVERGED))
-    assert [frame.time for frame in kept] == [0.25, 0.3125]
 
 
 SETTINGS = DeckSettings({"chamber1": 6.0}, imperfection=0.0)
@@ -197,22 +167,6 @@ def test_csv() -> None:
     assert float(last["work_uJ"]) == pytest.approx(3 * came, rel=1e-5)
     assert float(last["stroke_mm"]) == pytest.approx(states[1].stroke, rel=1e-5)
     assert set(first.values()) >= {"0"}
-
-
-def test_plot_draws_every_state_and_names_its_axes() -> None:
-    _, _, (start, end) = states_of("quarter")
-    pressures = {"left": 6.0, "right & up": 3.0}
-    volumes = {"left": 19.0, "right & up": 9.0}
-    states = [
-        replace(start, pressures=dict.fromkeys(pressures, 0.0), volumes=volumes),
-        replace(end, pressures=pressures, volumes=volumes),
-    ]
-    root = ET.fromstring(history_svg("a < b", states))
-    texts = ["".join(text.itertext()) for text in root.iter("{http://www.w3.org/2000/svg}text")]
-    assert {"a < b", "stroke, mm", "volume, ul", "stress, MPa", "left", "right & up"} <= set(texts)
-    assert texts.count("pressure in left, kPa") == 3
-    curves = [g.get("id", "") for g in root.iter("{http://www.w3.org/2000/svg}g")]
-    assert {"curve1.1", "curve2.1", "curve2.2", "curve3.1"} <= set(curves)
 
 
 def test_deformed_vtu_holds_moved_points_and_stress(tmp_path: Path) -> None:

@@ -184,14 +184,6 @@ open("job.sta", "w").write("head\\nhead\\n 1 1 1 8 0.5 0.5 0.5\\n")
 """
 
 
-def test_a_run_that_takes_too_long_is_stopped(tmp_path: Path, stand_in: StandIn) -> None:
-    stand_in("ccx", f"{HALF_WAY}\nimport time\ntime.sleep(600)")
-    told: list[float] = []
-    ending = run_ccx(tmp_path, "job", 1.0, 1.5, told.append)
-    assert ending == (0.5, ("time", "it was stopped after 0.025 minutes"))
-    assert told[-1] == 0.5
-
-
 @pytest.mark.parametrize(
     ("says", "code", "reason"),
     [

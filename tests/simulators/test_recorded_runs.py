@@ -27,7 +27,7 @@ from sbafab.simulators.simulator import (
     read_nodes,
     run_program,
 )
-from sbafab.simulators.sofa.run import read_log, run
+from sbafab.simulators.sofa.run import run
 from sbafab.simulators.sofa.scenes import scenes_of
 from tests.simulators.conftest import StandIn
 
@@ -90,12 +90,6 @@ def test_trouble_in_the_log_voids_a_run_that_ended_with_0(
     stand_in("runSofa", f'{GOOD}print("{line}")')
     with pytest.raises(VoidError, match=f"{words}.*; the tip is known to 0.2 s"):
         ran(tmp_path)
-
-
-def test_other_words_of_a_log_and_other_plugins_void_nothing() -> None:
-    assert read_log("nanometre and banana\n", []) == (None, None)
-    missing = '[ERROR] [PluginManager] Plugin not found: "SofaOpenGL"'
-    assert read_log(missing, ["Sofa.Component.Mass"]) == (None, None)
 
 
 @pytest.mark.parametrize(
