@@ -13,14 +13,13 @@ import bisect
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate
-from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.nest_check import edge_distance
-from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE, Entries
+from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE, LeadIns
 from sbafab.cutting.verify import TOLERANCE
-from sbafab.errors import DesignError, OutputError
+from sbafab.errors import DesignError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to, left_turn, meeting_points
 from sbafab.geometry.region import Region
@@ -83,7 +82,7 @@ def _layer(contour: Contour) -> str:
 
 def beam_runs(
     contours: Sequence[Contour],
-    entries: Entries,
+    lead_ins: LeadIns,
     sheet: Surroundings,
     pins: Sequence[KeepOff] = (),
     name: str = "the sheet",
@@ -92,30 +91,30 @@ def beam_runs(
 
     Raises DesignError with the place if a lead-in or a tab does not fit.
     """
-    if entries.is_plain:
+    if lead_ins.is_plain:
         return list(contour_runs(contours))
-    waste = _Waste(contours, entries.clearance, sheet, pins)
+    waste = _Waste(contours, lead_ins.clearance, sheet, pins)
     runs: list[LaserRun] = []
     for contour in contours:
         lap = _Lap(contour)
         start, lead = 0.0, None
-        if entries.lead_in:
-            start, lead = _lead_in(lap, entries, waste, name)
+        if lead_ins.lead_in:
+            start, lead = _lead_in(lap, lead_ins, waste, name)
             waste.add(lead)
-        runs += _contour_runs(lap, start, lead, entries, name)
+        runs += _contour_runs(lap, start, lead, lead_ins, name)
     return runs
 
 
 def _contour_runs(
-    lap: _Lap, start: float, lead: Line | None, entries: Entries, name: str
+    lap: _Lap, start: float, lead: Line | None, lead_ins: LeadIns, name: str
 ) -> Iterator[LaserRun]:
     """Yield the runs of a contour that is begun at a place along it, mm from its first vertex."""
-    contour, end = lap.contour, start + lap.length + entries.overcut
-    tabs = [] if contour.is_hole or not entries.tabs else _tabs(lap, start, entries, name)
-    if lead is None and not tabs and not entries.overcut:
+    contour, end = lap.contour, start + lap.length + lead_ins.overcut
+    tabs = [] if contour.is_hole or not lead_ins.tabs else _tabs(lap, start, lead_ins, name)
+    if lead is None and not tabs and not lead_ins.overcut:
         yield from contour_runs([contour])
         return
-    half = entries.gap / 2
+    half = lead_ins.gap / 2
     stops = [start, *(side for tab in tabs for side in (tab - half, tab + half)), end]
     for first, last in zip(stops[::2], stops[1::2], strict=True):
         edges = lap.stretch(first, last)
@@ -239,9 +238,9 @@ class _Waste:
         )
 
 
-def _lead_in(lap: _Lap, entries: Entries, waste: _Waste, name: str) -> tuple[float, Line]:
+def _lead_in(lap: _Lap, lead_ins: LeadIns, waste: _Waste, name: str) -> tuple[float, Line]:
     """The first place along a contour where a lead-in has room, and the lead-in."""
-    length = entries.lead_in
+    length = lead_ins.lead_in
     for way in lap.middles:
         edge, (x, y) = lap.place(way)
         ux, uy = edge.direction((x, y))
@@ -254,23 +253,26 @@ def _lead_in(lap: _Lap, entries: Entries, waste: _Waste, name: str) -> tuple[flo
             lead = Line(p, (x, y))
             if waste.takes(lead, lap.contour):
                 return way, lead
-    low_x, low_y, high_x, high_y = lap.contour.bounds
-    kind = "hole" if lap.contour.is_hole else "outline"
+    key, clear = lead_ins.key, lead_ins.clearance
     raise DesignError(
-        f"{entries.key}.lead_in = {length:g} has no room at the {kind} about "
-        f"x {(low_x + high_x) / 2:.1f}, y {(low_y + high_y) / 2:.1f} of {name}, "
-        f"{entries.clearance:g} mm clear of other cuts; make it shorter, or {entries.key}.spacing "
-        "larger"
+        f"{key}.lead_in = {length:g} has no room at the {_about(lap.contour)} of {name}, "
+        f"{clear:g} mm clear of other cuts; make it shorter, or {key}.spacing larger"
     )
 
 
-def _tabs(lap: _Lap, start: float, entries: Entries, name: str) -> list[float]:
+def _about(contour: Contour) -> str:
+    low_x, low_y, high_x, high_y = contour.bounds
+    kind = "hole" if contour.is_hole else "outline"
+    return f"{kind} about x {(low_x + high_x) / 2:.1f}, y {(low_y + high_y) / 2:.1f}"
+
+
+def _tabs(lap: _Lap, start: float, lead_ins: LeadIns, name: str) -> list[float]:
     """The middles of an outline's tabs, in the order of cutting; evenly spread if possible."""
-    gap, pitch = entries.gap, lap.length / entries.tabs
+    gap, pitch = lead_ins.gap, lap.length / lead_ins.tabs
     # A gap's width from a corner, from the start and the overcut, and from another tab.
-    first, last = start + entries.overcut + 1.5 * gap, start + lap.length - 1.5 * gap
+    first, last = start + lead_ins.overcut + 1.5 * gap, start + lap.length - 1.5 * gap
     tabs: list[float] = []
-    for number in range(entries.tabs):
+    for number in range(lead_ins.tabs):
         target = start + (number + 0.5) * pitch
         tries = (
             target + sign * step * pitch / STEPS for step in range(STEPS // 2) for sign in (1, -1)
@@ -285,11 +287,10 @@ def _tabs(lap: _Lap, start: float, entries: Entries, name: str) -> list[float]:
             None,
         )
         if tab is None:
-            low_x, low_y, high_x, high_y = lap.contour.bounds
             raise DesignError(
-                f"{entries.key}.tabs = {entries.tabs} of {entries.tab_width:g} mm have no room on "
-                f"the outline about x {(low_x + high_x) / 2:.1f}, y {(low_y + high_y) / 2:.1f} of "
-                f"{name}, clear of corners and of the start; ask for fewer or narrower tabs"
+                f"{lead_ins.key}.tabs = {lead_ins.tabs} of {lead_ins.tab_width:g} mm have no room "
+                f"on the {_about(lap.contour)} of {name}, clear of corners and of the start; ask "
+                "for fewer or narrower tabs"
             )
         tabs.append(tab)
     return tabs
@@ -317,13 +318,6 @@ class BeamRun(NamedTuple):
 
     layer: str
     curves: Sequence[BeamCurve]
-
-
-def check_runs(path: Path, read: Sequence[BeamRun], expected: Sequence[LaserRun]) -> None:
-    """Raises OutputError with the file and the place of the first run that differs."""
-    difference = run_difference(read, expected)
-    if difference:
-        raise OutputError(f"{path.name}: {difference}; regenerate it")
 
 
 def run_difference(read: Sequence[BeamRun], expected: Sequence[LaserRun]) -> str:

@@ -15,8 +15,6 @@ from sbafab.laminate.films import PTFE_WARNING, Material
 
 Recipes = Mapping[Operation, Recipe]
 """Recipes of a film on the machine, by operation."""
-LaserProgram = Literal["rdworks", "epilog"]
-"""Laser programs beside LightBurn that a sheet's machine file is for."""
 DxfProfile = Literal["bulges", "arcs", "chords"]
 
 
@@ -43,7 +41,7 @@ FOLDER = "layers"
 
 
 @dataclass(frozen=True)
-class Entries:
+class LeadIns:
     """Lead-ins, overcuts and tabs of a film's contours, in mm; 0 turns one off.
 
     Each outline has ``tabs``, each ``tab_width`` of film wide; the beam skips ``gap``, which is
@@ -71,17 +69,16 @@ class Entries:
 
     @property
     def properties(self) -> dict[str, str]:
-        """Text on the entries for machine files."""
-        width = f"{self.tabs} an outline, {self.tab_width:g} mm wide, {self.gap:g} mm uncut"
-        said = {
-            "LEAD_IN": f"{self.lead_in:g} mm" if self.lead_in else "",
-            "OVERCUT": f"{self.overcut:g} mm" if self.overcut else "",
-            "TABS": width if self.tabs else "",
+        """Text on them for files of laser programs."""
+        tabs = f"{self.tabs} an outline, {self.tab_width:g} mm wide, {self.gap:g} mm uncut"
+        return {
+            **({"LEAD_IN": f"{self.lead_in:g} mm"} if self.lead_in else {}),
+            **({"OVERCUT": f"{self.overcut:g} mm"} if self.overcut else {}),
+            **({"TABS": tabs} if self.tabs else {}),
         }
-        return {name: text for name, text in said.items() if text}
 
 
-PLAIN = Entries()
+PLAIN = LeadIns()
 
 
 @dataclass(frozen=True)
@@ -98,7 +95,7 @@ class CutSettings:
     warnings: Mapping[str, str] = field(default_factory=lambda: {"PTFE": PTFE_WARNING})
     machine: str | None = None
     recipes: Mapping[Material, Recipes] = field(default_factory=dict)
-    entries: Mapping[Material, Entries] = field(default_factory=dict)
+    lead_ins: Mapping[Material, LeadIns] = field(default_factory=dict)
     seam_offsets: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def kerf_width(self, material: Material) -> Kerf | None:
@@ -129,22 +126,10 @@ def fixture_properties(settings: CutSettings, notes: Sequence[str] = ()) -> dict
     return {**properties, "HOLES": " / ".join(notes)} if notes else properties
 
 
-def coupon_properties(generator: str) -> dict[str, str]:
-    """Custom properties of the calibration piece: never compensated, for it measures the kerf."""
-    return {
-        "PATTERN": "coupon",
-        "MATERIAL": "any film",
-        "UNITS": "mm",
-        **kerf_properties(None),
-        "GENERATOR": generator,
-        "WARNING": PTFE_WARNING,
-    }
-
-
 def _properties(
     settings: CutSettings, material: str, pattern: str, kerf: Kerf | None
 ) -> dict[str, str]:
-    curves = said_of(settings.curves)
+    curves = curves_text(settings.curves)
     return {
         "DESIGN": settings.design,
         "DESIGN_SHA256": settings.design_sha256,
@@ -203,7 +188,7 @@ def layer_path(name: str, kerf: Kerf | None) -> str:
     return f"{FOLDER}/{name}{kerf_suffix(kerf)}.dxf"
 
 
-def said_of(curves: Curves) -> str | None:
+def curves_text(curves: Curves) -> str | None:
     """Return the statement on chords in files and manifest; None for true arcs."""
     return f"{CHORDS} {curves.chord_error:g} mm" if curves.in_chords else None
 

@@ -11,7 +11,7 @@ from sbafab.actuators.stacking import used_films
 from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.nest import TURNS, NestPart, Stock, parts_of
 from sbafab.cutting.nesting import refuse_unfit
-from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings, Entries, Recipes
+from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings, LeadIns, Recipes
 from sbafab.design.films import Sheet, material
 from sbafab.design.identity import design_sha256
 from sbafab.design.recipes import recipes_for
@@ -149,7 +149,7 @@ def cut_settings(
         warnings=warnings(design),
         machine=design.laser.machine,
         recipes=recipes(design),
-        entries=entries(design),
+        lead_ins=lead_ins(design),
         seam_offsets=design.seam_offsets,
     )
 
@@ -196,7 +196,7 @@ def _sheets(design: Design) -> dict[Material, tuple[str, Sheet]]:
 USUAL_TABS = 3
 
 
-def entries(design: Design) -> dict[Material, Entries]:
+def lead_ins(design: Design) -> dict[Material, LeadIns]:
     """Return lead-ins, overcuts and tabs of the films that have any."""
     kerfs, found = design.kerf_widths, {}
     for name, (key, sheet) in _sheets(design).items():
@@ -204,7 +204,7 @@ def entries(design: Design) -> dict[Material, Entries]:
             continue
         kerf = kerfs.get(name)
         width = max(widths(kerf)) if kerf is not None else 0.0
-        found[name] = Entries(
+        found[name] = LeadIns(
             lead_in=sheet.lead_in or 0.0,
             overcut=sheet.overcut or 0.0,
             tab_width=sheet.tab_width or 0.0,

@@ -20,7 +20,7 @@ from pydantic import TypeAdapter
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import DESIGN_FILE, load_assembly
-from sbafab.cutting.lightburn import ENDING
+from sbafab.cutting.laser_programs import ENDING
 from sbafab.cutting.properties import FOLDER as LAYERS
 from sbafab.cutting.properties import curves_of
 from sbafab.design.records import Design

@@ -24,8 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.cutting.dxf_read import ReadBack, read_profile
-from sbafab.cutting.lightburn import ENDING
-from sbafab.cutting.machine_files import PROGRAMS, rdworks_difference
+from sbafab.cutting.laser_programs import ENDING, PROGRAMS, rdworks_difference
 from sbafab.cutting.properties import CUT_SEQUENCE
 from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.errors import OutputError

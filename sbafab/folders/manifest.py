@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, ConfigDict, Field, ValidationError
 
 from sbafab.cutting.fixture import PATH as FIXTURE
-from sbafab.cutting.properties import CutSettings, layer_path, said_of
+from sbafab.cutting.properties import CutSettings, curves_text, layer_path
 from sbafab.cutting.seam_files import seam_path
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.identity import citation, design_sha256
@@ -309,7 +309,7 @@ def manifest(
     """
     design, laminate, cycles = build.design, build.laminate, build.cycles
     optional = {
-        "curves": said_of(build.curves) if is_cut else None,
+        "curves": curves_text(build.curves) if is_cut else None,
         "batch": None if cycles.copies == 1 else _batch(cycles),
         "seams": _seams(laminate, is_cut) or None,
         "mesh_statistics": statistics,

@@ -24,17 +24,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.cutting.beam_paths import contour_runs, drawn
-from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
+from sbafab.cutting.laser_programs import svg_text
 from sbafab.cutting.lettering import Stroke, strokes
-from sbafab.cutting.machine_files import svg_text
-from sbafab.cutting.properties import coupon_properties
+from sbafab.cutting.properties import kerf_properties
 from sbafab.cutting.sequence import cutting_sequence
-from sbafab.cutting.verify import check_surroundings, verify_file
+from sbafab.cutting.verify import verify_file
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, rectangle, union
 from sbafab.lab.tables import table_rows
+from sbafab.laminate.films import PTFE_WARNING
 from sbafab.spreadsheet import csv_text
 
 MOST_DEGREES = 200
@@ -407,13 +407,21 @@ def write_coupon(folder: Path, generator: str) -> tuple[Path, ...]:
         if path.exists():
             raise DesignError(f"{path} exists; choose another folder or remove it first")
     folder.mkdir(parents=True, exist_ok=True)
-    region, properties = coupon(), coupon_properties(generator)
+    region = coupon()
+    properties = {
+        "PATTERN": "coupon",
+        "MATERIAL": "any film",
+        "UNITS": "mm",
+        # Never compensated, for it measures the kerf.
+        **kerf_properties(None),
+        "GENERATOR": generator,
+        "WARNING": PTFE_WARNING,
+    }
     contours = cutting_sequence(region)
     sheet = Surroundings(engraved=_labels(), frame=(SIZE, SIZE))
     drawing, picture, table = paths
     drawing.write_bytes(dxf_text(contours, properties, sheet=sheet).encode())
-    verify_file(drawing, region, properties)
-    check_surroundings(read_profile(drawing), sheet)
+    verify_file(drawing, region, properties, sheet)
     runs = drawn(contour_runs(contours), sheet)
     picture.write_bytes(svg_text(runs, (SIZE, SIZE), TITLE).encode())
     table.write_bytes(coupon_csv().encode())

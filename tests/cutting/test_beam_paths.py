@@ -10,7 +10,7 @@ import shapely
 
 from sbafab.cutting.beam_paths import BeamRun, beam_runs
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, Entries
+from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, LeadIns
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Edge, Point
@@ -20,11 +20,11 @@ AROUND = Surroundings(frame=(80.0, 60.0))
 RING = disc((20.0, 20.0), 10.0) - disc((20.0, 20.0), 4.0)
 PLATE = rectangle((40.0, 10.0), (60.0, 40.0)) - rectangle((45.0, 15.0), (55.0, 25.0))
 PARTS = Region((*RING.contours, *PLATE.contours))
-ASKED = Entries(lead_in=1.0, overcut=0.5, tab_width=0.6, tabs=2, kerf=0.2, clearance=0.4)
+ASKED = LeadIns(lead_in=1.0, overcut=0.5, tab_width=0.6, tabs=2, kerf=0.2, clearance=0.4)
 
 
-def runs_of(region: Region, entries: Entries) -> list[BeamRun]:
-    runs = beam_runs(cutting_sequence(region), entries, AROUND)
+def runs_of(region: Region, lead_ins: LeadIns) -> list[BeamRun]:
+    runs = beam_runs(cutting_sequence(region), lead_ins, AROUND)
     return [BeamRun(run.layer, run.edges) for run in runs]
 
 
@@ -94,20 +94,20 @@ def on_a_contour(p: Point) -> bool:
 
 
 @pytest.mark.parametrize(
-    "entries",
+    "lead_ins",
     [
-        Entries(lead_in=1.0),
-        Entries(overcut=2.0),
-        Entries(tab_width=1.0, tabs=5),
-        Entries(lead_in=0.3, tab_width=0.2, tabs=1, kerf=0.1),
+        LeadIns(lead_in=1.0),
+        LeadIns(overcut=2.0),
+        LeadIns(tab_width=1.0, tabs=5),
+        LeadIns(lead_in=0.3, tab_width=0.2, tabs=1, kerf=0.1),
     ],
 )
-def test_each_is_there_alone(entries: Entries) -> None:
-    runs = runs_of(PARTS, entries)
-    plain = runs_of(PARTS, Entries())
+def test_each_is_there_alone(lead_ins: LeadIns) -> None:
+    runs = runs_of(PARTS, lead_ins)
+    plain = runs_of(PARTS, LeadIns())
     assert sum(map(length, plain)) == pytest.approx(sum(c.length for c in PARTS.contours))
     outlines = len(PARTS.outers)
-    more = 4 * (entries.lead_in + entries.overcut) - outlines * entries.tabs * entries.gap
+    more = 4 * (lead_ins.lead_in + lead_ins.overcut) - outlines * lead_ins.tabs * lead_ins.gap
     assert sum(map(length, runs)) == pytest.approx(sum(map(length, plain)) + more)
 
 
@@ -115,40 +115,40 @@ def test_each_is_there_alone(entries: Entries) -> None:
 
 
 @pytest.mark.parametrize(
-    ("region", "entries", "says"),
+    ("region", "lead_ins", "says"),
     [
-        (RING, Entries(lead_in=9.0), r"sheets.tpe.lead_in = 9 has no room at the hole about x 20"),
+        (RING, LeadIns(lead_in=9.0), r"sheets.tpe.lead_in = 9 has no room at the hole about x 20"),
         (
             rectangle((0.5, 0.5), (79.5, 59.5)),
-            Entries(lead_in=1.0),
+            LeadIns(lead_in=1.0),
             "no room at the outline about x 40.0, y 30.0 of the sheet",
         ),
         (
             rectangle((10.0, 10.0), (12.0, 12.0)),
-            Entries(tab_width=1.0, tabs=2),
+            LeadIns(tab_width=1.0, tabs=2),
             r"sheets.tpe.tabs = 2 of 1 mm have no room on the outline about x 11.0, y 11.0",
         ),
-        (RING, Entries(tab_width=8.0, tabs=5), "ask for fewer or narrower tabs"),
+        (RING, LeadIns(tab_width=8.0, tabs=5), "ask for fewer or narrower tabs"),
     ],
 )
 def test_what_has_no_room_is_refused_with_its_place(
-    region: Region, entries: Entries, says: str
+    region: Region, lead_ins: LeadIns, says: str
 ) -> None:
     with pytest.raises(DesignError, match=says):
-        runs_of(region, entries)
+        runs_of(region, lead_ins)
 
 
 def test_lead_ins_keep_off_pins_and_engraving() -> None:
     """A bar whose long sides have a pin beside one middle and a stroke beside the other."""
     bar = rectangle((10.0, 20.0), (50.0, 30.0))
-    entries = Entries(lead_in=1.0, clearance=0.2)
+    lead_ins = LeadIns(lead_in=1.0, clearance=0.2)
     engraved = Surroundings(engraved=(((29.0, 19.5), (31.0, 19.5)),), frame=(80.0, 60.0))
     contours = cutting_sequence(bar)
-    [plain] = beam_runs(contours, entries, AROUND)
+    [plain] = beam_runs(contours, lead_ins, AROUND)
     assert plain.edges[0].start == pytest.approx((30.0, 19.0))
-    [other] = beam_runs(contours, entries, engraved)
+    [other] = beam_runs(contours, lead_ins, engraved)
     assert other.edges[0].start == pytest.approx((30.0, 31.0))
-    [third] = beam_runs(contours, entries, engraved, [(30.0, 31.5, 2.0)])
+    [third] = beam_runs(contours, lead_ins, engraved, [(30.0, 31.5, 2.0)])
     assert third.edges[0].start not in (plain.edges[0].start, other.edges[0].start)
     far = shapely.LineString([third.edges[0].start, third.edges[0].end])
     assert far.distance(shapely.Point(30.0, 31.5)) >= 1.2 - 1e-9

@@ -10,15 +10,13 @@ from xml.etree import ElementTree
 
 import pytest
 
-from sbafab.cutting.beam_paths import LaserRun, contour_runs, drawn
+from sbafab.cutting.beam_paths import contour_runs, drawn
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.lightburn import (
-    ADVICE,
-    LaserLayer,
-    read_project,
-    runs_text,
-    sheet_layers,
-    verify_project,
+from sbafab.cutting.laser_programs import (
+    LaserSheet,
+    laser_text,
+    read_laser_file,
+    verify_laser_file,
 )
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
@@ -29,13 +27,13 @@ AROUND = Surroundings(
     parting=(((0.0, 60.0), (50.0, 60.0)),),
     frame=(50.0, 60.0),
 )
-PROPERTIES = {"DESIGN": 'arm "2" & co', "WARNING": "hot"}
+NOTES = 'DESIGN: arm "2" & co'
 
 
-def of_sheet(region: Region, around: Surroundings) -> tuple[list[LaserLayer], list[LaserRun]]:
-    """Return the layers and runs of a sheet without recipes."""
+def of_sheet(region: Region, around: Surroundings) -> LaserSheet:
+    """Return a sheet without recipes."""
     runs = list(drawn(contour_runs(cutting_sequence(region)), around))
-    return sheet_layers({run.layer for run in runs}, {}), runs
+    return LaserSheet(runs, (50.0, 60.0), "arm", notes=NOTES)
 
 
 @pytest.fixture
@@ -48,17 +46,17 @@ def parts(plate: Region) -> Region:
 @pytest.fixture
 def project(parts: Region, tmp_path: Path) -> Path:
     path = tmp_path / "TPE_1.lbrn2"
-    path.write_text(runs_text(*of_sheet(parts, AROUND), PROPERTIES, ADVICE))
+    path.write_text(laser_text("lightburn", of_sheet(parts, AROUND)))
     return path
 
 
 def test_what_is_written_reads_back(project: Path, parts: Region) -> None:
-    verify_project(project, *of_sheet(parts, AROUND))
-    found = read_project(project)
+    verify_laser_file(project, "lightburn", of_sheet(parts, AROUND))
+    found = read_laser_file(project, "lightburn")
     order = ["ENGRAVE", *["CUT_INNER"] * 5, *["CUT_OUTER"] * 2, "CUT_SHEET", "REFERENCE"]
     assert [run.layer for run in found.runs] == order
-    outputs = {index: told["doOutput"] for index, told in found.settings.items()}
-    assert outputs == {0: "1", 1: "1", 2: "1", 7: "1", 8: "0"}
+    outputs = {layer: told["doOutput"] for layer, told in found.settings.items()}
+    assert outputs == {**dict.fromkeys(order, "1"), "REFERENCE": "0"}
 
 
 def test_curves_leave_their_arcs_by_less_than_their_formula_says(tmp_path: Path) -> None:
@@ -66,8 +64,8 @@ def test_curves_leave_their_arcs_by_less_than_their_formula_says(tmp_path: Path)
     region = disc((0.0, 0.0), 400.0)
     half = region - Region((disc((0.0, 0.0), 400.0).contours[0],)).moved(0.0, 300.0)
     path = tmp_path / "large.lbrn2"
-    path.write_text(runs_text(*of_sheet(half, Surroundings()), {}, ADVICE))
-    [run] = read_project(path).runs
+    path.write_text(laser_text("lightburn", of_sheet(half, Surroundings())))
+    [run] = read_laser_file(path, "lightburn").runs
     offs = []
     for curve in run.curves:
         for k in range(33):
@@ -76,7 +74,7 @@ def test_curves_leave_their_arcs_by_less_than_their_formula_says(tmp_path: Path)
     assert 1e-4 < max(offs) < 4.3e-6 * 400
     path.write_text(path.read_text().replace("B1 2", "L1 2"))
     with pytest.raises(OutputError, match="differs from what was written"):
-        verify_project(path, *of_sheet(half, Surroundings()))
+        verify_laser_file(path, "lightburn", of_sheet(half, Surroundings()))
 
 
 def test_no_power_and_no_order_is_left_to_the_reader(project: Path) -> None:
@@ -156,11 +154,12 @@ SPOILT: dict[str, tuple[Callable[[str], str], str]] = {
         changed(
             r'<Shape Type="Ellipse" CutIndex="1" Rx="10".*?</Shape>',
             '<Shape Type="Path" CutIndex="1"><XForm>1 0 0 1 0 0</XForm>'
-            "<VertList>V40 45V40 45</VertList><PrimList>L0 1L1 0</PrimList></Shape>",
+            "<VertList>V40 45c0x1c1x1V40 45c0x1c1x1</VertList>"
+            "<PrimList>L0 1L1 0</PrimList></Shape>",
         ),
         ROUND,
     ),
-    "half of it": (lambda text: text[: len(text) // 2], "no sound project"),
+    "half of it": (lambda text: text[: len(text) // 2], "cannot be read"),
     "words in a path": (changed(r"<VertList>V", "<VertList>W"), "says 'W"),
     "another document": (lambda text: "<svg/>", "no LightBurn project"),
 }
@@ -171,4 +170,4 @@ def test_what_is_not_the_sheet_is_told(name: str, project: Path, parts: Region) 
     change, says = SPOILT[name]
     project.write_text(change(project.read_text()))
     with pytest.raises(OutputError, match=says):
-        verify_project(project, *of_sheet(parts, AROUND))
+        verify_laser_file(project, "lightburn", of_sheet(parts, AROUND))

@@ -14,14 +14,10 @@ import pytest
 import shapely
 import svgelements
 
-from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
+from sbafab.cutting.beam_paths import beam_runs, drawn
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.machine_files import (
-    PROGRAMS,
-    machine_text,
-    verify_machine_file,
-)
-from sbafab.cutting.properties import PLAIN, Entries, LaserProgram
+from sbafab.cutting.laser_programs import PROGRAMS, LaserSheet, laser_text, verify_laser_file
+from sbafab.cutting.properties import PLAIN, LeadIns
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region, disc, stadium
@@ -32,7 +28,7 @@ AROUND = Surroundings(
     parting=(((0.0, 60.0), (80.0, 60.0)),),
     frame=SIZE,
 )
-ASKED = Entries(lead_in=1.0, overcut=0.5, tab_width=0.6, tabs=2)
+ASKED = LeadIns(lead_in=1.0, overcut=0.5, tab_width=0.6, tabs=2)
 RING = disc((20.0, 20.0), 10.0) - disc((20.0, 20.0), 4.0)
 OBLONG = stadium((50.0, 30.0), 16.0, 36.0)
 PARTS = Region((*RING.contours, *OBLONG.contours))
@@ -40,24 +36,24 @@ AREA = math.pi * (10**2 - 4**2) + math.pi * 8**2 + 20 * 16
 """mm2: a ring, and a stadium."""
 
 
-def runs_of(entries: Entries) -> list[LaserRun]:
-    return list(drawn(beam_runs(cutting_sequence(PARTS), entries, AROUND), AROUND))
+def sheet_of(lead_ins: LeadIns) -> LaserSheet:
+    cuts = beam_runs(cutting_sequence(PARTS), lead_ins, AROUND)
+    return LaserSheet(list(drawn(cuts, AROUND)), SIZE, "arm & co <1>")
 
 
-def written(folder: Path, program: LaserProgram, entries: Entries = PLAIN) -> Path:
+def written(folder: Path, program: str, lead_ins: LeadIns = PLAIN) -> Path:
     path = folder / f"TPE_1{PROGRAMS[program].ending}"
-    path.write_text(machine_text(program, runs_of(entries), SIZE, "arm & co <1>"))
+    path.write_text(laser_text(program, sheet_of(lead_ins)))
     return path
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-@pytest.mark.parametrize("entries", [PLAIN, ASKED])
-def test_what_is_written_reads_back(
-    program: LaserProgram, entries: Entries, tmp_path: Path
-) -> None:
-    path = written(tmp_path, program, entries)
-    verify_machine_file(path, program, runs_of(entries))
-    assert "REFERENCE" not in path.read_text(), "what a program sees, it cuts"
+@pytest.mark.parametrize("lead_ins", [PLAIN, ASKED])
+def test_what_is_written_reads_back(program: str, lead_ins: LeadIns, tmp_path: Path) -> None:
+    path = written(tmp_path, program, lead_ins)
+    verify_laser_file(path, program, sheet_of(lead_ins))
+    has_frame = "REFERENCE" in path.read_text()
+    assert has_frame == (program == "lightburn"), "what the others see, they cut"
 
 
 def test_rdworks_gets_a_sound_r12_whose_colours_are_its_layers(tmp_path: Path) -> None:
@@ -125,7 +121,7 @@ def once(old: str, new: str) -> Callable[[str], str]:
     return change
 
 
-FAULTS: list[tuple[LaserProgram, Callable[[str], str], str]] = [
+FAULTS: list[tuple[str, Callable[[str], str], str]] = [
     ("rdworks", once(r" 62\n5\n 10", " 62\n1\n 10"), "is one of CUT_OUTER, not of CUT_INNER"),
     ("rdworks", once(r" 62\n5\n 10", " 62\n3\n 10"), "has the colour 3, which no layer has"),
     ("rdworks", once(r" 40\n4\.0", " 40\n4.002"), "is not the circle that was written"),
@@ -152,9 +148,9 @@ FAULTS: list[tuple[LaserProgram, Callable[[str], str], str]] = [
 
 @pytest.mark.parametrize(("program", "change", "says"), FAULTS)
 def test_a_file_that_is_not_the_sheet_is_told(
-    program: LaserProgram, change: Callable[[str], str], says: str, tmp_path: Path
+    program: str, change: Callable[[str], str], says: str, tmp_path: Path
 ) -> None:
     path = written(tmp_path, program)
     path.write_text(change(path.read_text()))
     with pytest.raises(OutputError, match=says):
-        verify_machine_file(path, program, runs_of(PLAIN))
+        verify_laser_file(path, program, sheet_of(PLAIN))

@@ -138,7 +138,7 @@ def test_engraving_that_runs_through_a_part_is_found(
     def through(*_: object) -> tuple[tuple[tuple[float, float], ...], ...]:
         return (((0.0, 11.0), (60.0, 11.0)), ((7.0, 11.0), (8.0, 11.0)))
 
-    monkeypatch.setattr(module, "_label", through)
+    monkeypatch.setattr(module, "_sheet_label", through)
     with pytest.raises(OutputError, match=r"engraving at .* lies in a part"):
         write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER, PLAIN)
 

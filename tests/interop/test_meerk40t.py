@@ -17,8 +17,8 @@ import shapely
 from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.lightburn import ADVICE, runs_text, sheet_layers
-from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, ENGRAVE, Entries
+from sbafab.cutting.laser_programs import LaserSheet, laser_text
+from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, ENGRAVE, LeadIns
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.design.recipes import Recipe
 from tests.interop.made import LENGTH, WIDTH, Sheet
@@ -26,7 +26,7 @@ from tests.interop.made import LENGTH, WIDTH, Sheet
 pytestmark = pytest.mark.long
 
 AROUND = Surroundings(engraved=(((2.0, 2.0), (30.0, 2.0), (30.0, 5.0)),), frame=(WIDTH, LENGTH))
-HELD = Entries(lead_in=0.3, overcut=0.3, tab_width=0.4, tabs=2, clearance=0.1)
+HELD = LeadIns(lead_in=0.3, overcut=0.3, tab_width=0.4, tabs=2, clearance=0.1)
 CUT, MARK = (
     Recipe(
         film="TPE",
@@ -43,9 +43,9 @@ STEP = 0.0254
 """mm: MeerK40t's grid, a thousandth of an inch."""
 
 
-def runs_of(sheet: Sheet, entries: Entries) -> list[LaserRun]:
+def runs_of(sheet: Sheet, lead_ins: LeadIns) -> list[LaserRun]:
     contours = cutting_sequence(read_profile(sheet.files["bulges"]).region)
-    return list(drawn(beam_runs(contours, entries, AROUND), AROUND))
+    return list(drawn(beam_runs(contours, lead_ins, AROUND), AROUND))
 
 
 class Move(NamedTuple):
@@ -91,8 +91,8 @@ def test_meerk40t_writes_gcode_of_what_the_project_cuts(
 ) -> None:
     """Lengths within 0.2 %, every place within a step of its grid, order, power and speed."""
     runs = runs_of(sheets["3dof-15mm TPE"], HELD)
-    layers = sheet_layers({run.layer for run in runs}, {"cut": CUT, "engrave": MARK})
-    (tmp_path / "TPE_1.lbrn2").write_text(runs_text(layers, runs, {}, ADVICE))
+    drawing = LaserSheet(runs, (WIDTH, LENGTH), "sheet", {"cut": CUT, "engrave": MARK})
+    (tmp_path / "TPE_1.lbrn2").write_text(laser_text("lightburn", drawing))
     # Its y runs down: without this the sheet comes out mirrored.
     meerk40t(tmp_path, "service device start -i grbl", "set -p grbl flip_y False")
     job = "plan copy preprocess validate blob save_job"

@@ -23,7 +23,7 @@ from pyogrio import raw
 from sbafab.cutting.beam_paths import beam_runs, drawn
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.machine_files import machine_text
+from sbafab.cutting.laser_programs import LaserSheet, laser_text
 from sbafab.cutting.properties import PLAIN, LaserProgram
 from sbafab.cutting.sequence import cutting_sequence
 from tests.interop.made import BORDER, EXACT, LENGTH, PROFILES, WIDTH, Sheet, outline_bounds
@@ -170,7 +170,7 @@ def machine_file(sheet: Sheet, laser: LaserProgram, path: Path) -> Path:
     around = Surroundings(engraved=(((2.0, 2.0), (30.0, 2.0), (30.0, 5.0)),), frame=(WIDTH, LENGTH))
     contours = cutting_sequence(read_profile(sheet.files["bulges"]).region)
     runs = list(drawn(beam_runs(contours, PLAIN, around), around))
-    path.write_text(machine_text(laser, runs, (WIDTH, LENGTH), "sheet"))
+    path.write_text(laser_text(laser, LaserSheet(runs, (WIDTH, LENGTH), "sheet")))
     return path
 
 
