@@ -28,7 +28,7 @@ from sbafab.lab.cut_sheet import DrawnSheet
 from sbafab.lab.picture import PictureOutline, ScanPicture
 from sbafab.lab.registration import SMALLEST, Location, PointArray, Warp
 
-Numbers = NDArray[np.float64]
+FloatArray = NDArray[np.float64]
 
 STEP = 0.2
 """Spacing of samples, mm."""
@@ -67,7 +67,7 @@ class Samples:
 
     points: PointArray
     normals: PointArray
-    curvatures: Numbers
+    curvatures: FloatArray
     contours: NDArray[np.int64]
     pieces: NDArray[np.int64]
 
@@ -76,11 +76,11 @@ class Samples:
         sums = [np.bincount(self.pieces, each, count) for each in self.points.T]
         return np.column_stack(sums) / self.numbers(count)[:, None]
 
-    def numbers(self, count: int) -> Numbers:
+    def numbers(self, count: int) -> FloatArray:
         """Return the number of samples of each of ``count`` pieces, at least 1."""
         return np.maximum(np.bincount(self.pieces, minlength=count), 1.0)
 
-    def moved(self, displacements: Numbers) -> Samples:
+    def moved(self, displacements: FloatArray) -> Samples:
         """Return the samples at displaced pieces: mm along x and y, radians about the middle."""
         dx, dy, turns = displacements[self.pieces].T
         middles = self.middles(len(displacements))[self.pieces] @ (1, 1j)
@@ -139,7 +139,7 @@ def _is_corner(before: Edge, after: Edge) -> bool:
 
 def crossings(
     picture: ScanPicture, warp: Warp, samples: Samples, reach: float, expected: float = 0.0
-) -> tuple[Numbers, float]:
+) -> tuple[FloatArray, float]:
     """Return the distance of the film's edge outside each drawn edge, mm; NaN if none is visible.
 
     Of several edges along a normal, the one nearest to ``expected`` mm outside. And the deviation
@@ -149,7 +149,7 @@ def crossings(
 
     step = 0.5 / float(np.hypot(*warp.axes.T).max())
     half = max(6, round(reach / step))
-    offsets: Numbers = np.arange(-half, half + 1, dtype=np.float64) * step
+    offsets: FloatArray = np.arange(-half, half + 1, dtype=np.float64) * step
     places = samples.points[:, None, :] + offsets[None, :, None] * samples.normals[:, None, :]
     pixels = warp(places.reshape(-1, 2)).reshape(places.shape)
     levels = map_coordinates(
@@ -176,7 +176,9 @@ def crossings(
     return outside + blur**2 / 2 * samples.curvatures, blur
 
 
-def _passing(share: Numbers, level: float, offsets: Numbers, expected: Numbers | float) -> Numbers:
+def _passing(
+    share: FloatArray, level: float, offsets: FloatArray, expected: FloatArray | float
+) -> FloatArray:
     """Return the offset where each row falls through a level, nearest to ``expected``, or NaN."""
     falls = (share[:, :-1] >= level) & (share[:, 1:] < level)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -201,16 +203,16 @@ class EdgeFit:
 
     samples: Samples
     warp: Warp
-    outside: Numbers
-    weights: Numbers
+    outside: FloatArray
+    weights: FloatArray
     offset: float
     uncertainty: float
     degrees: int
-    displacements: Numbers
+    displacements: FloatArray
     blur: float
 
     @property
-    def residuals(self) -> Numbers:
+    def residuals(self) -> FloatArray:
         """Residuals of the edges after the common offset, mm."""
         return self.outside - self.offset
 
@@ -235,7 +237,7 @@ def fitted(picture: ScanPicture, sheet: DrawnSheet, location: Location, is_camer
 
 
 def _solved(
-    laid: Samples, warp: Warp, outside: Numbers, displacements: Numbers, looseness: float
+    laid: Samples, warp: Warp, outside: FloatArray, displacements: FloatArray, looseness: float
 ) -> EdgeFit:
     """Solve for the map, the offset and all displacements at once, by Tukey's weights."""
     matrix, arms = _matrix(laid, warp, len(displacements))
@@ -275,7 +277,7 @@ def _solved(
     )
 
 
-def _matrix(laid: Samples, warp: Warp, count: int) -> tuple[Numbers, Numbers]:
+def _matrix(laid: Samples, warp: Warp, count: int) -> tuple[FloatArray, FloatArray]:
     """Return the outward motion of each sample by the unknowns: offset, map, displacements.
 
     And the mean square of the motion by a turn of each of ``count`` pieces, mm2.
@@ -291,7 +293,7 @@ def _matrix(laid: Samples, warp: Warp, count: int) -> tuple[Numbers, Numbers]:
     return np.hstack([offset, *by_map, moves.reshape(len(moves), -1)]), arms
 
 
-def _of_offset(influence: Numbers, pull: Numbers, laid: Samples) -> tuple[float, int]:
+def _of_offset(influence: FloatArray, pull: FloatArray, laid: Samples) -> tuple[float, int]:
     """Return the offset's standard uncertainty from the scatter between pieces, and its degrees.
 
     Errors within a piece are correlated and its displacement is one draw, so pieces are the
