@@ -24,7 +24,7 @@ from sbafab.cutting.beam_paths import beam_runs, drawn
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.laser_programs import LaserSheet, laser_text
-from sbafab.cutting.properties import PLAIN, LaserProgram
+from sbafab.cutting.properties import PLAIN
 from sbafab.cutting.sequence import cutting_sequence
 from tests.interop.made import BORDER, EXACT, LENGTH, PROFILES, WIDTH, Sheet, outline_bounds
 from tests.interop.painting import painted
@@ -165,7 +165,7 @@ PIXELS_PER_MM = 96 / 25.4
 """CSS pixels, as Inkscape and Chromium count."""
 
 
-def machine_file(sheet: Sheet, laser: LaserProgram, path: Path) -> Path:
+def machine_file(sheet: Sheet, laser: str, path: Path) -> Path:
     """The file of a laser program for the same sheet."""
     around = Surroundings(engraved=(((2.0, 2.0), (30.0, 2.0), (30.0, 5.0)),), frame=(WIDTH, LENGTH))
     contours = cutting_sequence(read_profile(sheet.files["bulges"]).region)
@@ -271,7 +271,7 @@ def chromium_svg(drawing: Path, folder: Path) -> Picture:
 )
 def test_painted_sheets_have_the_area_the_contours_and_the_place(
     paint: Callable[[Path, Path], Picture],
-    laser: LaserProgram | None,
+    laser: str | None,
     exact: float | None,
     sheet: Sheet,
     tmp_path: Path,
