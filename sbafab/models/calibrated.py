@@ -11,24 +11,22 @@ number of balloons, more is assumed to be missed.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache, cached_property
-from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
-from sbafab.design.files import listed, read_toml, shown
+from sbafab.design.files import checked, listed, read_toml, shown
+from sbafab.design.toml_table import Section
 from sbafab.errors import DesignError
 from sbafab.models.figures import Factors
-from sbafab.models.unknowns import UNKNOWNS, factors_at
+from sbafab.models.priors import UNKNOWNS
 
-if TYPE_CHECKING:
-    from sbafab.models.film_elements import Array
-
-SCHEMA = "sbafab/calibration@2"
+FOLDER = Path(__file__).parent / "calibrations"
 NONE: Literal["none"] = "none"
 """The name for using no calibration: films as drawn and bought, without intervals."""
 FILE = "calibration.toml"
@@ -65,30 +63,91 @@ def _hull(first: Ends | None, second: Ends | None) -> Ends | None:
     return min(first[0], second[0]), max(first[1], second[1])
 
 
-@dataclass(frozen=True)
-class ModelCalibration:
-    """A posterior: ``mean`` and ``covariance`` (n, n) of the coordinates of ``UNKNOWNS``, and
+Size = Annotated[float, Field(gt=0)]
+Range = Annotated[tuple[Size, Size], Field(strict=False)]
+Row = Annotated[tuple[float, ...], Field(strict=False)]
+Texts = Annotated[tuple[str, ...], Field(strict=False)]
+
+
+class _Sizes(Section):
+    """The table of a SizeRange."""
+
+    diameters: Range | None = None
+    thicknesses: Range
+    balloons: Range
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        for name, ends in self:
+            if ends is not None and ends[0] > ends[1]:
+                raise ValueError(f"has {name} that are not in order; give the least one first")
+        return self
+
+
+class _HeldOut(Section):
+    points: int = Field(ge=0)
+    inside: int = Field(ge=0)
+
+
+class ModelCalibration(Section):
+    """A posterior: ``mean`` and ``covariance`` (n, n) of the coordinates of ``unknowns``, and
     ``discrepancy``, the relative standard deviation that the models miss, by group.
 
     ``film`` is the product of the evidence, ``evidence`` the sources that it was fitted to,
-    ``sizes`` the sizes of its actuators by group of quantities; ``inside`` of ``points`` left-out
-    points lay in their intervals. ``sentences`` state what the evidence cannot distinguish.
+    ``ranges`` the sizes of its actuators by group of quantities; ``held_out`` says how many
+    left-out points lay in their intervals. ``sentences`` state what the evidence cannot
+    distinguish.
     """
 
+    schema_name: Literal["sbafab/calibration@2"] = Field(alias="schema")
     name: str
     about: str
     film: str
-    evidence: tuple[str, ...]
-    mean: tuple[float, ...]
-    covariance: tuple[tuple[float, ...], ...]
-    discrepancy: Mapping[str, float]
-    sizes: Mapping[str, SizeRange]
-    points: int
-    inside: int
-    sentences: tuple[str, ...]
+    evidence: Texts
+    unknowns: Texts
+    mean: Row
+    covariance: Annotated[tuple[Row, ...], Field(strict=False)]
+    sentences: Texts
+    discrepancy: dict[str, Annotated[float, Field(ge=0, le=10)]]
+    sizes: dict[str, _Sizes]
+    held_out: _HeldOut
+
+    @model_validator(mode="after")
+    def _agrees_with_itself(self) -> Self:
+        fields = [unknown.field for unknown in UNKNOWNS]
+        if list(self.unknowns) != fields:
+            raise ValueError(f"has other unknowns than {listed(fields)}, in this order")
+        if len(self.mean) != len(fields):
+            raise ValueError(f"has a mean of {len(self.mean)} numbers; it must be {len(fields)}")
+        if {len(self.covariance), *map(len, self.covariance)} != {len(fields)}:
+            raise ValueError(f"has a covariance that is not {len(fields)} by {len(fields)}")
+        covariance = np.array(self.covariance)
+        if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance).min() <= 0:
+            raise ValueError("has a covariance that is not symmetric and positive definite")
+        for unknown, coordinate in zip(UNKNOWNS, self.mean, strict=True):
+            low, high = unknown.coordinate(unknown.least or 1e-9), unknown.coordinate(unknown.most)
+            if not low - 1e-9 <= coordinate <= high + 1e-9:
+                of = " (a logarithm)" if unknown.is_log else ""
+                raise ValueError(
+                    f"has a mean of {unknown.field}{of} of {coordinate:.3g}; it must be from "
+                    f"{low:.3g} to {high:.3g}"
+                )
+        if set(self.discrepancy) != set(GROUPS) or not set(self.sizes) <= set(GROUPS):
+            raise ValueError(f"must have a discrepancy, and may have sizes, of {listed(GROUPS)}")
+        if self.held_out.inside > self.held_out.points:
+            raise ValueError("has more held-out points inside than there are")
+        return self
 
     @cached_property
-    def values(self) -> dict[str, float]:
+    def ranges(self) -> dict[str, SizeRange]:
+        """The sizes by group."""
+        return {
+            group: SizeRange(sizes.diameters, sizes.thicknesses, sizes.balloons)
+            for group, sizes in self.sizes.items()
+        }
+
+    @cached_property
+    def values(self) -> dict[str, Any]:
         """Median of each unknown, by field of ``Factors``."""
         return {u.field: u.value(z) for u, z in zip(UNKNOWNS, self.mean, strict=True)}
 
@@ -97,8 +156,8 @@ class ModelCalibration:
         """The factors at the median."""
         return self._factors_at(self.values)
 
-    def _factors_at(self, values: Mapping[str, float]) -> Factors:
-        return replace(factors_at(values), press_film=self.film)
+    def _factors_at(self, values: dict[str, Any]) -> Factors:
+        return replace(Factors(**values), press_film=self.film)
 
     def bounds(self, field: str) -> tuple[float, float]:
         """Return the 90 % interval of an unknown."""
@@ -152,24 +211,7 @@ class ModelCalibration:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the tables of the file."""
-        return {
-            "schema": SCHEMA,
-            "name": self.name,
-            "about": self.about,
-            "film": self.film,
-            "evidence": list(self.evidence),
-            "unknowns": [unknown.field for unknown in UNKNOWNS],
-            "mean": list(self.mean),
-            "covariance": [list(row) for row in self.covariance],
-            "sentences": list(self.sentences),
-            "discrepancy": dict(self.discrepancy),
-            "sizes": {group: _listed(sizes) for group, sizes in self.sizes.items()},
-            "held_out": {"points": self.points, "inside": self.inside},
-        }
-
-
-def _listed(sizes: SizeRange) -> dict[str, list[float]]:
-    return {name: list(ends) for name, ends in sizes._asdict().items() if ends is not None}
+        return self.model_dump(mode="json", by_alias=True, exclude_none=True)
 
 
 @cache
@@ -182,10 +224,10 @@ def deviations(share: float) -> float:
     return (low + high) / 2
 
 
+@cache
 def shipped_names() -> list[str]:
     """Return the names of the calibrations that ship."""
-    folder = resources.files("sbafab.models").joinpath("calibrations")
-    return sorted(path.name[:-5] for path in folder.iterdir() if path.name.endswith(".toml"))
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
 def load_calibration(
@@ -221,111 +263,13 @@ def load_calibration(
 
 @cache
 def _shipped(name: str) -> ModelCalibration:
-    file = resources.files("sbafab.models").joinpath("calibrations", f"{name}.toml")
-    with resources.as_file(file) as path:
-        return read_calibration(path)
+    return read_calibration(FOLDER / f"{name}.toml")
 
 
 def read_calibration(path: Path) -> ModelCalibration:
     """Return the calibration of a file. Raises DesignError with one sentence for a fault in it."""
-    tables = read_toml(path)
     try:
-        return _checked(tables)
+        return checked(ModelCalibration, read_toml(path), {}, file="calibration")
     except DesignError as error:
-        raise DesignError(f"{path}: {error}; write it again with sbafab calibrate") from None
-
-
-KEYS = {
-    "schema": str,
-    "name": str,
-    "about": str,
-    "film": str,
-    "evidence": list,
-    "unknowns": list,
-    "mean": list,
-    "covariance": list,
-    "sentences": list,
-    "discrepancy": dict,
-    "sizes": dict,
-    "held_out": dict,
-}
-
-
-def _check_keys(tables: Mapping[str, Any]) -> None:
-    if tables.get("schema") != SCHEMA:
-        raise DesignError(f"schema = {shown(tables.get('schema'))} must be {SCHEMA!r}")
-    for key in tables:
-        if key not in KEYS:
-            raise DesignError(f"{shown(key)} is no key of a calibration; it has {listed(KEYS)}")
-    for key, kind in KEYS.items():
-        if not isinstance(tables.get(key), kind):
-            raise DesignError(f"{key} is missing or not a {kind.__name__}")
-
-
-def _checked(tables: Mapping[str, Any]) -> ModelCalibration:
-    _check_keys(tables)
-    fields = [unknown.field for unknown in UNKNOWNS]
-    if tables["unknowns"] != fields:
-        raise DesignError(f"unknowns must be {listed(fields)}, in this order")
-    count = len(tables["unknowns"])
-    mean = _numbers(tables["mean"], "mean", (count,))
-    covariance = _numbers(tables["covariance"], "covariance", (count, count))
-    if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance).min() <= 0:
-        raise DesignError("covariance must be symmetric and positive definite")
-    for unknown, coordinate in zip(UNKNOWNS, mean, strict=True):
-        low, high = unknown.coordinate(unknown.least or 1e-9), unknown.coordinate(unknown.most)
-        if not low - 1e-9 <= coordinate <= high + 1e-9:
-            raise DesignError(
-                f"mean of {unknown.field} must be from {low:.3g} to {high:.3g}"
-                + (" (a logarithm)" if unknown.is_log else "")
-            )
-    spreads: dict[str, Any] = {group: tables["discrepancy"].get(group) for group in GROUPS}
-    for group, value in spreads.items():
-        if not isinstance(value, int | float) or not 0 <= value <= 10:
-            raise DesignError(f'discrepancy."{group}" must be a number from 0 to 10')
-    held = tables["held_out"]
-    points, inside = held.get("points"), held.get("inside")
-    if not (isinstance(points, int) and isinstance(inside, int) and 0 <= inside <= points):
-        raise DesignError("held_out must have points, and inside, at most as many")
-    return ModelCalibration(
-        tables["name"],
-        tables["about"],
-        tables["film"],
-        tuple(map(str, tables["evidence"])),
-        tuple(mean.tolist()),
-        tuple(tuple(row) for row in covariance.tolist()),
-        spreads,
-        {group: _sizes(group, table) for group, table in tables["sizes"].items()},
-        points,
-        inside,
-        tuple(map(str, tables["sentences"])),
-    )
-
-
-def _sizes(group: str, table: object) -> SizeRange:
-    """Return the sizes of a group's evidence. Raises DesignError."""
-    names = SizeRange._fields
-    if group not in GROUPS or not isinstance(table, dict) or not set(table) <= set(names):
-        raise DesignError(f"sizes.{shown(group)} must be a table of {listed(names)}, by group")
-    ends: list[Ends | None] = []
-    for name in names:
-        given = table.get(name)
-        if given is None and name == "diameters":
-            ends.append(None)
-            continue
-        low, high = _numbers(given, f"sizes.{shown(group)}.{name}", (2,)).tolist()
-        if not 0 < low <= high:
-            raise DesignError(f"sizes.{shown(group)}.{name} must be two numbers above 0, in order")
-        ends.append((low, high))
-    return SizeRange(*ends)  # type: ignore[arg-type]
-
-
-def _numbers(values: object, key: str, shape: tuple[int, ...]) -> Array:
-    try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        array = np.full(0, np.nan)
-    if array.shape != shape or not np.isfinite(array).all():
-        size = " by ".join(map(str, shape))
-        raise DesignError(f"{key} must be {size} finite numbers")
-    return array
+        message = str(error).strip().removeprefix(f"{path} ")
+        raise DesignError(f"{path}: {message}; write it again with sbafab calibrate") from None

@@ -8,6 +8,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from sbafab.design.records import Design, Discs, Form
 from sbafab.laminate.burst import RADIUS, Burst
@@ -24,8 +27,8 @@ from sbafab.models.calibrated import (
 )
 from sbafab.models.figures import EXTRAPOLATION, Factors, Figure, Flag, LeftOut
 from sbafab.models.paper import BALLOONS, CALIBRATED_MODELS
+from sbafab.models.priors import UNKNOWNS
 from sbafab.models.quantity import FigureKey, Quantity
-from sbafab.models.unknowns import UNKNOWNS
 
 Items = Sequence[Figure | LeftOut]
 FLAT = "flat height"
@@ -50,20 +53,16 @@ def for_film(calibration: ModelCalibration, product: str) -> ModelCalibration:
     """
     if product == calibration.film:
         return calibration
-    mean = list(calibration.mean)
-    covariance = [list(row) for row in calibration.covariance]
-    mean[MODULUS_RATIO] = 0.0
-    mean[LOSS] = UNKNOWNS[LOSS].coordinate(UNKNOWNS[LOSS].middle)
-    for row in (MODULUS_RATIO, LOSS):
-        for other in range(len(mean)):
-            covariance[row][other] = covariance[other][row] = 0.0
-        covariance[row][row] = UNKNOWNS[row].spread ** 2
-    return replace(
-        calibration, mean=tuple(mean), covariance=tuple(tuple(row) for row in covariance)
-    )
+    mean, covariance = np.array(calibration.mean), np.array(calibration.covariance)
+    for row, middle in ((MODULUS_RATIO, 1.0), (LOSS, UNKNOWNS[LOSS].middle)):
+        mean[row] = UNKNOWNS[row].coordinate(middle)
+        covariance[row] = covariance[:, row] = 0.0
+        covariance[row, row] = UNKNOWNS[row].spread ** 2
+    changed = {"mean": mean.tolist(), "covariance": covariance.tolist()}
+    return ModelCalibration.model_validate({**calibration.as_dict(), **changed})
 
 
-def given_factors(overrides: Mapping[str, float | None]) -> dict[str, float]:
+def given_factors(overrides: Mapping[str, float | None]) -> dict[str, Any]:
     """Return the values that a user gave, by field of ``Factors``."""
     return {field: value for field, value in overrides.items() if value is not None}
 
@@ -124,8 +123,7 @@ def burst_uncertainty(estimate: Burst, share: float = SHARE) -> tuple[tuple[floa
     return (estimate.kpa / factor, estimate.kpa * factor), missed
 
 
-@dataclass(frozen=True)
-class ActuatorSizes:
+class ActuatorSizes(NamedTuple):
     """The actuator data for intervals: its ``sizes``, the ``products`` of its films that bond, and
     the bounds of its folded height, with all films flown away and with the films as bought.
     """
@@ -138,11 +136,8 @@ class ActuatorSizes:
     def of(cls, form: Form, laminate: Laminate, film: str) -> ActuatorSizes:
         """Return the subject of a design's form and laminate; ``film`` is the one that flows."""
         folded = folded_height(laminate, 1.0, film)
-        return cls(
-            sizes_of(form, laminate),
-            frozenset(layer.film.product for layer in laminate.tpe_layers),
-            (folded.solid, folded.nominal),
-        )
+        products = frozenset(layer.film.product for layer in laminate.tpe_layers)
+        return cls(sizes_of(form, laminate), products, (folded.solid, folded.nominal))
 
 
 @dataclass(frozen=True)
@@ -159,7 +154,7 @@ class Uncertainty:
         """Return the relative standard deviation assumed for a group of quantities, off what the
         calibration's evidence has of it. Folded heights take no diameter.
         """
-        subject, known = self.subject, self.calibration.sizes
+        subject, known = self.subject, self.calibration.ranges
         if subject is None or not known:
             return 0.0
         evidence = known.get(group) or reduce(SizeRange.joined, known.values())
@@ -200,7 +195,7 @@ class Uncertainty:
                 for field, value in values.items()
                 if field != "modulus_ratio"
             )
-        return replace(factors, calibration=label, **values)  # type: ignore[arg-type]
+        return replace(factors, calibration=label, **values)
 
     def interval_of(
         self,
@@ -229,35 +224,28 @@ class Uncertainty:
         ``evaluated`` gives the same figures with other factors. A figure that one of them lacks has
         no interval.
         """
-        moved: list[tuple[float, dict[FigureKey, float]]] = []
-        for change, factors in self.shifted():
-            values = {} if change == 0 else _by_key(evaluated(factors))
-            moved.append((change, values))
+        moved = [
+            (change, {} if change == 0 else _by_key(evaluated(factors)))
+            for change, factors in self.shifted()
+        ]
         return [self._bounded(item, moved) if isinstance(item, Figure) else item for item in items]
 
     def _bounded(
         self, figure: Figure, moved: Sequence[tuple[float, Mapping[FigureKey, float]]]
     ) -> Figure:
         group = discrepancy_group(figure)
-        if group is None:
+        pairs = [
+            (change, figure.value if change == 0 else values.get(figure.key, math.nan))
+            for change, values in moved
+        ]
+        if group is None or not all(math.isfinite(value) for _, value in pairs):
             return figure
-        key = figure.key
-        values = [figure.value if change == 0 else each.get(key) for change, each in moved]
-        present = [value for value in values if value is not None]
-        if len(present) < len(values) or not all(map(math.isfinite, present)):
+        if group == FLAT and all(value == figure.value for _, value in pairs):
             return figure
-        pairs = [(change, value) for value, (change, _) in zip(present, moved, strict=True)]
-        if group == FLAT and all(value == figure.value for value in present):
-            return figure
-        interval = self._interval(
-            group,
-            figure.value,
-            pairs,
-            self._term_slopes(
-                figure.value / (100 if figure.unit == "%" else 1), TERMS.get(figure.quantity, "")
-            ),
-            may_be_negative=figure.quantity in CLEARANCES,
-        )
+        share = figure.value / (100 if figure.unit == "%" else 1)
+        terms = self._term_slopes(share, TERMS.get(figure.quantity, ""))
+        is_signed = figure.quantity in CLEARANCES
+        interval = self._interval(group, figure.value, pairs, terms, may_be_negative=is_signed)
         flags = (*figure.flags, *flags_at(self.farther(group)))
         return replace(figure, interval=interval, flags=flags)
 
@@ -324,18 +312,15 @@ def _by_key(items: Items) -> dict[FigureKey, float]:
     return {item.key: item.value for item in items if isinstance(item, Figure)}
 
 
+GROUP_BY_UNIT = {"N": "force", "mJ": "work", "s": "time", "N/mm": "stiffness"}
+
+
 def discrepancy_group(figure: Figure) -> str | None:
     """Return the group of a figure's discrepancy; None if no calibrated model gives it."""
     if figure.model.id not in CALIBRATED_MODELS:
         return None
-    if figure.quantity is Quantity.FOLDED_HEIGHT:
-        return FLAT
-    if figure.quantity is Quantity.LOST_WORK:
-        return "loss"
-    return GROUP_BY_UNIT.get(figure.unit, "motion")
-
-
-GROUP_BY_UNIT = {"N": "force", "mJ": "work", "s": "time", "N/mm": "stiffness"}
+    named = {Quantity.FOLDED_HEIGHT: FLAT, Quantity.LOST_WORK: "loss"}
+    return named.get(figure.quantity) or GROUP_BY_UNIT.get(figure.unit, "motion")
 
 
 def uncertainty_of(
@@ -363,5 +348,5 @@ def factors_of(design: Design, overrides: Mapping[str, float | None] | None = No
     """
     uncertainty = uncertainty_of(design, overrides)
     if uncertainty is None:
-        return Factors(**given_factors(overrides or {}))  # type: ignore[arg-type]
+        return Factors(**given_factors(overrides or {}))
     return uncertainty.factors

@@ -18,7 +18,7 @@ from sbafab.models.calibrated import GROUPS, SHARE, ModelCalibration, SizeRange
 from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
 from sbafab.models.intervals import sizes_of
-from sbafab.models.unknowns import UNKNOWNS
+from sbafab.models.priors import UNKNOWNS
 from sbafab.process import Progress
 from sbafab.validation.evidence import Evidence, MeasuredCurve
 from sbafab.validation.model_values import ModelledActuator, ModelValues, NoModel, model_values
@@ -274,21 +274,23 @@ def as_calibration(
     sizes: Mapping[str, SizeRange],
 ) -> ModelCalibration:
     """Return the calibration that a posterior stands for."""
-    return ModelCalibration(
-        name=name,
-        about=about,
-        film=film,
-        evidence=tuple(source.id for source in sources),
-        mean=tuple(round(float(value), DIGITS) for value in posterior.mean),
-        covariance=tuple(
-            tuple(round(float(value), DIGITS + 2) for value in row) for row in posterior.covariance
-        ),
-        discrepancy={group: round(value, DIGITS) for group, value in posterior.discrepancy.items()},
-        sizes=sizes,
-        points=len(points),
-        inside=sum(point.is_inside for point in points),
-        sentences=tuple(correlated(posterior.covariance)),
-    )
+    table = {
+        "schema": "sbafab/calibration@2",
+        "name": name,
+        "about": about,
+        "film": film,
+        "evidence": [source.id for source in sources],
+        "unknowns": [unknown.field for unknown in UNKNOWNS],
+        "mean": posterior.mean.round(DIGITS).tolist(),
+        "covariance": posterior.covariance.round(DIGITS + 2).tolist(),
+        "discrepancy": {
+            group: round(each, DIGITS) for group, each in posterior.discrepancy.items()
+        },
+        "sizes": {group: each._asdict() for group, each in sizes.items()},
+        "held_out": {"points": len(points), "inside": sum(point.is_inside for point in points)},
+        "sentences": list(correlated(posterior.covariance)),
+    }
+    return ModelCalibration.model_validate(table)
 
 
 def correlated(covariance: Array) -> Iterator[str]:

@@ -27,10 +27,10 @@ from sbafab.models.formulas import modulus, second_moments, usual_pressures
 from sbafab.models.kinematics import Actuator, actuator
 from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line
 from sbafab.models.prediction import plate_of, predict
+from sbafab.models.priors import UNKNOWNS
 from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count
 from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack
-from sbafab.models.unknowns import UNKNOWNS
 from sbafab.validation.evidence import MeasuredCurve
 
 ModelValue = float | None

@@ -31,10 +31,10 @@ from sbafab.models.figures import Factors, Prediction, PredictionRequest
 from sbafab.models.formulas import modulus
 from sbafab.models.pneumatics import AIR, Line, seconds
 from sbafab.models.prediction import predict
+from sbafab.models.priors import UNKNOWNS
 from sbafab.models.quantity import FigureKey, ModelId
 from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import Stack, stack
-from sbafab.models.unknowns import UNKNOWNS
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.charts import relation_svg
 from sbafab.validation.comparison import (
@@ -377,7 +377,7 @@ class CalibratedDocument(Document):
     """The section of calibrated models for programs."""
 
     calibration: str = attribute("calibration.name")
-    held_out: HeldOut = attribute("calibration")
+    held_out: HeldOut = attribute("calibration.held_out")
     discrepancy: dict[str, float] = attribute("calibration.discrepancy")
     """relative standard deviation that the models miss, by group"""
     curves: list[CurveDocument]

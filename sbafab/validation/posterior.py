@@ -22,7 +22,7 @@ import numpy as np
 from sbafab.errors import DesignError
 from sbafab.models.calibrated import GROUPS
 from sbafab.models.film_elements import Array
-from sbafab.models.unknowns import UNKNOWNS
+from sbafab.models.priors import UNKNOWNS
 
 SHARED = 0.5
 """Share of the discrepancy's variance that the points of a curve have in common."""

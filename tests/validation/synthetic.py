@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.models.calibrated import GROUPS
-from sbafab.models.unknowns import UNKNOWNS
+from sbafab.models.priors import UNKNOWNS
 from sbafab.validation.posterior import (
     NODE_COORDINATES,
     SCALE_MIDDLE,

@@ -22,7 +22,7 @@ from sbafab.models.calibrated import (
 )
 from sbafab.models.figures import Factors
 from sbafab.models.intervals import Uncertainty, calibration_of, factors_of
-from sbafab.models.unknowns import UNKNOWNS
+from sbafab.models.priors import UNKNOWNS
 
 
 @pytest.fixture(scope="module")
@@ -102,14 +102,14 @@ def test_an_interval_by_a_closed_form(paper: ModelCalibration) -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"mean": [1.0]}, "mean must be 6 finite numbers"),
-        ({"covariance": [[1.0] * 6] * 6}, "covariance must be symmetric and positive definite"),
-        ({"discrepancy": {"force": -1}}, 'discrepancy."force" must be a number from 0 to 10'),
-        ({"unknowns": ["modulus_ratio"]}, "unknowns must be "),
-        ({"held_out": {"points": 2, "inside": 3}}, "held_out must have points, and inside"),
+        ({"mean": [1.0]}, "has a mean of 1 numbers; it must be 6"),
+        ({"covariance": [[1.0] * 6] * 6}, "covariance that is not symmetric and positive definite"),
+        ({"discrepancy": {"force": -1}}, "discrepancy.force = -1"),
+        ({"unknowns": ["modulus_ratio"]}, "other unknowns than"),
+        ({"held_out": {"points": 2, "inside": 3}}, "more held-out points inside"),
         ({"schema": "sbafab/kit@1"}, "schema = 'sbafab/kit@1' must be"),
-        ({"colour": "red"}, "'colour' is no key of a calibration"),
-        ({"mean": [9.0, 0.1, -0.6, -1.0, -3.0, -2.0]}, "mean of modulus_ratio must be from"),
+        ({"colour": "red"}, "colour"),
+        ({"mean": [9.0, 0.1, -0.6, -1.0, -3.0, -2.0]}, "mean of modulus_ratio"),
     ],
 )
 def test_a_faulty_file_gets_one_sentence(
@@ -122,6 +122,7 @@ def test_a_faulty_file_gets_one_sentence(
     assert sentence in str(error.value)
     assert str(path) in str(error.value)
     assert "\n" not in str(error.value)
+    assert "design file" not in str(error.value)
 
 
 def test_a_file_is_read_as_it_was_written(paper: ModelCalibration, tmp_path: Path) -> None:
@@ -136,7 +137,7 @@ def test_a_file_of_an_older_version_is_refused(paper: ModelCalibration, tmp_path
     """Its press factor is that of whole laminates."""
     path = tmp_path / "lab.toml"
     path.write_text(tomli_w.dumps({**paper.as_dict(), "schema": "sbafab/calibration@1"}))
-    with pytest.raises(DesignError, match=r"calibration@2'; write it again with sbafab calibrate"):
+    with pytest.raises(DesignError, match=r"calibration@2.*; write it again with sbafab calibrate"):
         read_calibration(path)
 
 

@@ -9,7 +9,7 @@ import pytest
 from sbafab.models.calibrated import ModelCalibration, load_calibration
 from sbafab.models.figures import Factors
 from sbafab.models.intervals import Uncertainty
-from sbafab.models.unknowns import UNKNOWNS
+from sbafab.models.priors import UNKNOWNS
 from sbafab.validation.comparison import curve_intervals, uncertainty_for, widened
 from sbafab.validation.evidence import MeasuredCurve, Setup, StatedError
 from sbafab.validation.model_values import ModelValues

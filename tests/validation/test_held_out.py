@@ -62,7 +62,7 @@ def test_counts_are_those_of_the_points() -> None:
         assert spread > math.sqrt(len(ranks) * share * (1 - share))
     paper = load_calibration("paper")
     assert paper is not None
-    assert (paper.points, paper.inside) == (len(ranks), sum(inside))
+    assert (paper.held_out.points, paper.held_out.inside) == (len(ranks), sum(inside))
 
 
 def test_the_page_says_what_the_record_has() -> None:

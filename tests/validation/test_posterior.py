@@ -9,7 +9,7 @@ import pytest
 
 from docs.scripts.measured import FOLDER, record
 from sbafab.models.calibrated import GROUPS
-from sbafab.models.unknowns import UNKNOWNS
+from sbafab.models.priors import UNKNOWNS
 from sbafab.validation.fit import correlated
 from sbafab.validation.posterior import (
     NODE_COORDINATES,

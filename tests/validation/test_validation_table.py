@@ -10,7 +10,7 @@ from docs.scripts.tables import table
 from docs.scripts.validate import PATH, validation
 from sbafab.models.calibrated import load_calibration
 from sbafab.models.closed_forms import eq_4, eqs_1_to_3
-from sbafab.models.unknowns import UNKNOWNS
+from sbafab.models.priors import UNKNOWNS
 
 MEASURED = (
     # Value as printed in the paper, and a word of its row.
@@ -80,7 +80,7 @@ def test_the_page_says_how_often_the_intervals_held() -> None:
     page = " ".join((PATH.parents[1] / "validation.md").read_text(encoding="utf-8").split())
     calibration = load_calibration("paper")
     assert calibration is not None
-    assert f"{calibration.inside} of {calibration.points} values" in page
+    assert f"{calibration.held_out.inside} of {calibration.held_out.points} values" in page
     for sentence in calibration.sentences:
         assert sentence in page
     for group, spread in calibration.discrepancy.items():

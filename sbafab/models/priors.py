@@ -5,11 +5,7 @@ source.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
-
-from sbafab.models.figures import Factors
 
 
 @dataclass(frozen=True)
@@ -116,8 +112,3 @@ UNKNOWNS = (
     ),
 )
 """In the order of a calibration's mean and covariance."""
-
-
-def factors_at(values: Mapping[str, Any]) -> Factors:
-    """Return the factors with these values, by field; the others leave models unchanged."""
-    return Factors(**values)
