@@ -157,7 +157,7 @@ def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) ->
     path = out / f"{name}.toml"
     out.mkdir(parents=True, exist_ok=True)
     replace_text(path, calibration_text(fitted.calibration))
-    calibration = fitted.calibration
+    calibration, held_out = fitted.calibration, fitted.calibration.held_out
     if as_json:
         unfitted = [{"curve": curve, "reason": reason} for curve, reason in fitted.left_out]
         left_open = [OpenEntry(curve=k, probabilities=v) for k, v in fitted.open_set_ups.items()]
@@ -166,8 +166,8 @@ def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) ->
         return
     _print(fitted)
     judged = (
-        f"{calibration.inside} of {calibration.points} left-out values in their 90 % intervals"
-        if calibration.points
+        f"{held_out.inside} of {held_out.points} left-out values in their 90 % intervals"
+        if held_out.points
         else "one test alone, so that none could be left out"
     )
     show.verdict(f"\n{name} calibrated: {judged}. Written to {path}", path)

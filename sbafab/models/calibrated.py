@@ -63,18 +63,18 @@ def _hull(first: Ends | None, second: Ends | None) -> Ends | None:
     return min(first[0], second[0]), max(first[1], second[1])
 
 
-Size = Annotated[float, Field(gt=0)]
-Range = Annotated[tuple[Size, Size], Field(strict=False)]
-Row = Annotated[tuple[float, ...], Field(strict=False)]
-Texts = Annotated[tuple[str, ...], Field(strict=False)]
+_Size = Annotated[float, Field(gt=0)]
+_Range = Annotated[tuple[_Size, _Size], Field(strict=False)]
+_Row = Annotated[tuple[float, ...], Field(strict=False)]
+_Texts = Annotated[tuple[str, ...], Field(strict=False)]
 
 
 class _Sizes(Section):
     """The table of a SizeRange."""
 
-    diameters: Range | None = None
-    thicknesses: Range
-    balloons: Range
+    diameters: _Range | None = None
+    thicknesses: _Range
+    balloons: _Range
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -103,11 +103,11 @@ class ModelCalibration(Section):
     name: str
     about: str
     film: str
-    evidence: Texts
-    unknowns: Texts
-    mean: Row
-    covariance: Annotated[tuple[Row, ...], Field(strict=False)]
-    sentences: Texts
+    evidence: _Texts
+    unknowns: _Texts
+    mean: _Row
+    covariance: Annotated[tuple[_Row, ...], Field(strict=False)]
+    sentences: _Texts
     discrepancy: dict[str, Annotated[float, Field(ge=0, le=10)]]
     sizes: dict[str, _Sizes]
     held_out: _HeldOut

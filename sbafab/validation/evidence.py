@@ -88,7 +88,7 @@ KINDS = {
 the last digit, is taken as even over its range (JCGM 100:2008, 4.3.7)."""
 
 ShortText = Annotated[str, Field(max_length=400)]
-Numbers = Annotated[tuple[float, ...], Field(strict=False, max_length=MOST_POINTS)]
+_Values = Annotated[tuple[float, ...], Field(strict=False, max_length=MOST_POINTS)]
 Sentences = Annotated[tuple[str, ...], Field(strict=False)]
 
 
@@ -99,7 +99,7 @@ class StatedError(Section):
     value. ``runs``: how often each value was measured; ``source``: the place that states it.
     """
 
-    absolute: Numbers = ()
+    absolute: _Values = ()
     relative: float = Field(default=0.0, ge=0, le=10)
     kind: Literal["standard deviation", "standard error", "largest", "rounding"] = (
         "standard deviation"
@@ -132,7 +132,7 @@ class Setup(Section):
 
 
 class MeasuredCurve(Section):
-    """Values of one quantity by one set-up.
+    """_Values of one quantity by one set-up.
 
     ``place``: figure and section of the source. The actuator is a ``design``, a template's name or
     a file, changed by ``changes`` (dotted key to value); or ``toml``, the text of a whole design;
@@ -151,8 +151,8 @@ class MeasuredCurve(Section):
     changes: dict[str, Any] = Field(default_factory=dict)
     toml: str = ""
     x_name: str = NO_AXIS
-    x: Numbers = ()
-    y: Numbers = Field(min_length=1)
+    x: _Values = ()
+    y: _Values = Field(min_length=1)
     setup: Setup = Setup.model_construct()
     error: StatedError
     comparable: bool = True
