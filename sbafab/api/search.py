@@ -31,8 +31,6 @@ def find(
     flow_ml_min: float = 35.0,
     free: str | Sequence[Free | str] | None = None,
     tries: int = FindRequest.tries,
-    optuna: bool = False,
-    storage: str | None = None,
     sure: float | None = None,
     **tables: Any,
 ) -> FoundDesign:
@@ -52,7 +50,7 @@ def find(
     requirements, goal = read_all(at_least, at_most, best, flow_ml_min)
     design = load(source, *changes, **tables)
     keys = None if free is None else free_of(design, free)
-    return run_find(FindRequest(design, requirements, goal, keys, tries, optuna, storage, sure))
+    return run_find(FindRequest(design, requirements, goal, keys, tries, sure))
 
 
 @command

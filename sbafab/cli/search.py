@@ -101,17 +101,11 @@ def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float
     click.IntRange(4, 100_000),
     default=FindRequest.tries,
 )
-@opt.option("--optuna", 'Search with Optuna (pip install "sbafab[optuna]").', bool)
-@opt.option(
-    "--storage URL", "Database of Optuna, to resume the search from, e.g. sqlite:///search.db."
-)
 @opt.folder_option(f"Folder in which {FOUND} is written.")
 @opt.file_option(FOUND)
 @opt.set_option
 @opt.json_option
 def find(source: str | None, **options: Any) -> None:
-    if options["storage"] is not None and not options["optuna"]:
-        raise click.UsageError("--storage goes with --optuna; add it")
     names = [source] if source else _family_templates()
     requests = _each(names, partial(_request, options=options))
     target = opt.design_file(options["to"], options["out"], FOUND)
@@ -122,8 +116,7 @@ def find(source: str | None, **options: Any) -> None:
         with show.progress(options["as_json"]) as progress:
             origin, result = _best_result(requests, progress)
     except KeyboardInterrupt:
-        resume = "; run the same command again to resume it" if options["storage"] else ""
-        print_error(f"the search was stopped, and no file was written{resume}")
+        print_error("the search was stopped, and no file was written")
         raise
     if result.holds:
         name = name_of(target) or origin
@@ -144,7 +137,7 @@ def _request(name: str, options: dict[str, Any]) -> FindRequest:
     assigned = options["assignments"]
     design = load_design(name, assigned)
     free = read_free(design, options["free"], options["fixed"], tuple(changed_keys(assigned)))
-    settings = {name: options[name] for name in ("tries", "optuna", "storage", "sure")}
+    settings = {name: options[name] for name in ("tries", "sure")}
     request = FindRequest(design, requirements, goal, free, **settings)
     free_keys(request)  # raises DesignError for keys that cannot vary
     return request

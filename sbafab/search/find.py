@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -109,19 +110,24 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
     """Return the best design, or the nearest miss. Raises DesignError for an impossible request."""
     if request.tries < LEAST_TRIES:
         raise DesignError(f"tries = {request.tries} must be at least {LEAST_TRIES}")
-    if request.storage is not None and not request.optuna:
-        raise DesignError("storage is Optuna's; search with optuna = True, or leave it out")
     space = searched(request, free_keys(request), progress)
     point, best = space.best()
     if best.refused:
-        raise DesignError(_commonest_reason(space))
-    shown, count = pareto_front(space, best) if best.holds else ([], 0)
+        # The most common reason, in the words of the nearest candidate that has it.
+        refused = sorted(space.trials.values(), key=lambda trial: trial.rank)
+        counts = Counter(trial.refused_at for trial in refused)
+        nearest = max(refused, key=lambda trial: counts[trial.refused_at])
+        count = counts[nearest.refused_at]
+        raise DesignError(
+            f"no design could be made: {nearest.refused} ({count} of the {len(refused)} tried)"
+        )
+    front, count = pareto_front(space, best) if best.holds else ([], 0)
     found = FoundDesign(
         request,
         best,
         tuple(bindings(space, point, best)),
         tuple(range_ends(space, point, best)),
-        tuple(shown),
+        tuple(front),
         count,
         len(space.trials),
         request.tries <= len(space.trials) < space.size,
@@ -134,29 +140,16 @@ def _with_trust(found: FoundDesign, laminate: Laminate) -> FoundDesign:
     """Return the result with intervals, flags and measured values of its best design."""
     request = found.request
     subject = request.subject(request.design.with_(dict(found.best.values)), laminate)
-    intervals, flags, measured = {}, {}, {}
     for quantity in request.quantities:
         label = quantity.label
-        if each := subject.flags(quantity):
-            flags[label] = each
+        if flags := subject.flags(quantity):
+            found.flags[label] = flags
         if (counterpart := subject.counterpart(quantity)) is not None:
-            measured[label] = counterpart
-        try:
-            interval = subject.interval(quantity)
-        except DesignError:
-            continue
-        if interval is not None:
-            intervals[label] = interval
-    return replace(found, intervals=intervals, flags=flags, measured=measured)
-
-
-def _commonest_reason(space: SearchSpace) -> str:
-    """Return why most candidates were refused, as in the nearest one's message."""
-    refused = sorted(space.trials.values(), key=lambda trial: trial.rank)
-    counts = Counter(trial.refused_at for trial in refused)
-    nearest = max(refused, key=lambda trial: counts[trial.refused_at])
-    count = counts[nearest.refused_at]
-    return f"no design could be made: {nearest.refused} ({count} of the {len(refused)} tried)"
+            found.measured[label] = counterpart
+        with suppress(DesignError):
+            if (interval := subject.interval(quantity)) is not None:
+                found.intervals[label] = interval
+    return found
 
 
 # The free keys of a request, and what no search could answer.
@@ -168,18 +161,17 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
     Raises DesignError, also if the design has no such quantity.
     """
     design = request.design
-    for quantity in request.quantities:
-        refuse_unknown_key(quantity, design)
-    if request.sure is not None:
-        _refuse_unsure(request, request.sure)
     names = {quantity.name for quantity in request.quantities}
     every = design.free if request.free is None else request.free
     free = [key for key in every if not key.asked or key.asked in names]
     keys = [key.key for key in free]
+    for quantity in request.quantities:
+        refuse_unknown_key(quantity, design)
+        _refuse_bend(quantity, design, keys)
+    if request.sure is not None:
+        _refuse_unsure(request, request.sure)
     for requirement in request.requirements:
         _refuse_fixed(requirement, design, keys)
-    for quantity in request.quantities:
-        _refuse_bend(quantity, design, keys)
     if not free:
         raise DesignError(
             f"the search may change no key of {design.name}; name one with --free KEY=LOW:HIGH:STEP"
@@ -259,15 +251,13 @@ def _refuse_fixed(requirement: Requirement, design: Design, free: Sequence[str])
 
 
 def _refuse_bend(quantity: RequestedQuantity, design: Design, free: Sequence[str]) -> None:
-    """Raises DesignError for a bend if the actuator does not bend, or if no chamber would stay
-    empty while their number is fixed.
+    """Raises DesignError for a bend for which no chamber would stay empty, while their number is
+    fixed.
     """
-    if quantity.name != "bend":
-        return
-    if not design.form.is_parallel:
-        raise DesignError(f"{design.name} does not bend; only chambers side by side do")
     stacks = design.form.stacks
-    if quantity.chambers >= stacks and COUNT not in free:
+    if quantity.name == "bend" and quantity.chambers >= stacks and COUNT not in free:
+        if not design.form.is_parallel:
+            raise DesignError(f"{design.name} does not bend; only chambers side by side do")
         raise DesignError(
             f"{quantity.label}: {design.name} has {stacks} chambers and one must stay empty; "
             f"ask for at most {stacks - 1}, or for more chambers with --free {COUNT}=LOW:HIGH:STEP"
@@ -358,39 +348,31 @@ def without_room(best: Trial) -> list[Spare]:
     ]
 
 
-def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> list[Binding]:
-    """Return the binding constraints: what each improving single step breaks.
+def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[Binding]:
+    """Yield the binding constraints: what each improving single step breaks.
 
     For the nearest miss: the steps to designs that cannot be made, or that no model covers.
     """
-    constraints = []
     for axis, neighbour in single_steps(point):
         if not space.holds(axis, neighbour):
             continue
         trial = space.peek(neighbour)
-        if _is_nearer(space, point, neighbour, trial, best):
-            broken = misses(space.request, space.with_rules(trial))
-            if broken:
-                key = space.free[axis].key
-                constraints.append(Binding(key, trial.values[key], "; ".join(broken)))
-    return constraints
+        if not trial.refused:
+            is_nearer = best.holds and trial.cost < best.cost
+        elif best.holds:
+            # A refused one is judged by the step back.
+            back = space.peek(tuple(2 * at - to for at, to in zip(point, neighbour, strict=True)))
+            is_nearer = not back.refused and back.cost > best.cost
+        else:
+            is_nearer = True
+        broken = misses(space.request, space.with_rules(trial)) if is_nearer else []
+        if broken:
+            key = space.free[axis].key
+            yield Binding(key, trial.values[key], "; ".join(broken))
 
 
-def _is_nearer(
-    space: SearchSpace, point: GridPoint, neighbour: GridPoint, trial: Trial, best: Trial
-) -> bool:
-    """Return True if a step improves the design; a refused one is judged by the step back."""
-    if not trial.refused:
-        return best.holds and trial.cost < best.cost
-    if not best.holds:
-        return True
-    back = space.peek(tuple(2 * at - to for at, to in zip(point, neighbour, strict=True)))
-    return not back.refused and back.cost > best.cost
-
-
-def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> list[RangeEnd]:
-    """Return the keys whose range alone prevents a better design, or a nearer miss."""
-    ends = []
+def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[RangeEnd]:
+    """Yield the keys whose range alone prevents a better design, or a nearer miss."""
     for axis, neighbour in single_steps(point):
         free = space.free[axis]
         if space.holds(axis, neighbour) or free.choices or space.is_excluded(axis, neighbour):
@@ -399,8 +381,7 @@ def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> list[RangeE
             steps = space.lows[axis], space.highs[axis]
             low, high = (round(free.low + step * free.step, 6) for step in steps)
             above = neighbour[axis] > point[axis]
-            ends.append(RangeEnd(free.key, space.number(axis, point), low, high, free.step, above))
-    return ends
+            yield RangeEnd(free.key, space.number(axis, point), low, high, free.step, above)
 
 
 def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
@@ -525,7 +506,7 @@ def find_document(found: FoundDesign, origin: str, target: Path) -> dict[str, An
     rows = [
         RequirementEntry.read(
             row,
-            sense="at least" if row.at_least else "at most",
+            sense=row.sense,
             median=best.value(row),
             bound=best.judged(row) if row.quantity.label in best.intervals else None,
             holds=best.meets(row),

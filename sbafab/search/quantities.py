@@ -372,10 +372,13 @@ class Requirement:
         return self.margin(value) >= -CLOSE
 
     @property
+    def sense(self) -> str:
+        return "at least" if self.at_least else "at most"
+
+    @property
     def bound(self) -> str:
         """For example "at least 3 N"."""
-        most = "at least" if self.at_least else "at most"
-        return f"{most} {self.limit:.10g} {self.quantity.unit}".strip()
+        return f"{self.sense} {self.limit:.10g} {self.quantity.unit}".strip()
 
     @property
     def label(self) -> str:

@@ -1,7 +1,7 @@
 """The designs of a search: its free keys, each candidate evaluated once, and which are tried.
 
 Small spaces are evaluated completely; else a coarse grid and local searches from its best points,
-or Optuna, then steps from the best candidate. A local search takes steps along a key, along two
+then steps from the best candidate. A local search takes steps along a key, along two
 keys against each other, and with one key held fixed: if a requirement ties keys together, only a
 step of one key that the others follow makes progress.
 """
@@ -14,11 +14,11 @@ import random
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from sbafab.actuators import build
 from sbafab.design.files import shown
-from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, Free
 from sbafab.design.units import millimetres
 from sbafab.errors import BeyondError, DesignError, GeometryError
@@ -46,8 +46,7 @@ TRIES = 240
 class FindRequest:
     """Requirements and goal of a search, and the design it starts from.
 
-    ``free`` are the keys it may change in place of the family's own, if any. ``optuna`` searches
-    with Optuna; ``storage`` is Optuna's database, in which a search resumes. With ``sure``, a share
+    ``free`` are the keys it may change in place of the family's own, if any. With ``sure``, a share
     above 0.5 and below 1, each requirement on a predicted quantity must hold with that probability.
     """
 
@@ -56,8 +55,6 @@ class FindRequest:
     goal: Goal
     free: tuple[Free, ...] | None = None
     tries: int = TRIES
-    optuna: bool = False
-    storage: str | None = None
     sure: float | None = None
 
     @property
@@ -166,35 +163,26 @@ def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool 
         )
     trial = Trial(values, figures, rules, laminate=laminate, intervals=intervals)
     margin = [row.margin(trial.judged(row)) + CLOSE for row in request.requirements]
-    return replace(
-        trial,
-        missed=sum(-min(0.0, each) for each in margin) + sum(map(_short, (rules or {}).values())),
-        cost=request.goal.cost(trial.value(request.goal)),
-        mass=_mass(laminate),
-    )
-
-
-def _mass(laminate: Laminate) -> float:
-    """The films' mass in g, the tie-breaker; 0 if a density is unknown."""
+    # The share by which each failing rule misses its limit.
+    short = [
+        max(1e-3, -(rule.share or 0.0)) for rule in (rules or {}).values() if rule.verdict == "fail"
+    ]
     try:
-        return film_mass(laminate)
+        mass = film_mass(laminate)
     except DesignError:
-        return 0.0
-
-
-def _short(rule: RuleMargin) -> float:
-    """Return the share by which a failing rule misses its limit."""
-    return max(1e-3, -(rule.share or 0.0)) if rule.verdict == "fail" else 0.0
+        mass = 0.0  # a tie-breaker, without the density of a film
+    missed = sum(-min(0.0, each) for each in margin) + sum(short)
+    cost = request.goal.cost(trial.value(request.goal))
+    return replace(trial, missed=missed, cost=cost, mass=mass)
 
 
 def _intervals(
     request: FindRequest, subject: Subject, sure: float
 ) -> dict[str, tuple[float, float]]:
     """Return intervals whose ends a measured value passes with a probability of ``1 - sure``."""
-    each = {
-        row.quantity: subject.interval(row.quantity, 2 * sure - 1) for row in request.requirements
-    }
-    return {quantity.label: interval for quantity, interval in each.items() if interval is not None}
+    quantities = dict.fromkeys(row.quantity for row in request.requirements)
+    each = {of.label: subject.interval(of, 2 * sure - 1) for of in quantities}
+    return {label: interval for label, interval in each.items() if interval is not None}
 
 
 def figure_text(request: FindRequest, trial: Trial, requirement: Requirement) -> str:
@@ -231,8 +219,8 @@ def numbers_of(value: Any) -> list[float]:
 def read_free(
     design: Design, texts: Sequence[str], fixed: Sequence[str] = (), assigned: Sequence[str] = ()
 ) -> tuple[Free, ...]:
-    """The family's own keys without those ``fixed``, replaced by the keys of the ``texts`` if
-    given.
+    """Return the family's own keys without those ``fixed``, replaced by the keys of the ``texts``
+    if given.
 
     Keys ``assigned`` by hand do not change, except lists, which are scaled as a whole; an envelope
     to fit determines the chamber. Raises DesignError.
@@ -241,14 +229,11 @@ def read_free(
     assigned = [key for key in assigned if not numbers_of(keys.get(key))]
     named = [_free_of(text) for text in texts]
     refuse_unknown(design, [read_varied(text, "--free") for text in texts], "--free")
-    for words in named:
-        for word in words.choices:
-            design.with_({words.key: word})
-    free = {key.key: key for key in design.free}
-    if any(key.startswith("fits.") for key in assigned):
-        free.pop("chamber.diameter", None)
-    for key in assigned:
-        free.pop(key, None)
+    for key, word in ((each.key, word) for each in named for word in each.choices):
+        design.with_({key: word})
+    fits = any(key.startswith("fits.") for key in assigned)
+    unfree = {*assigned, *(["chamber.diameter"] if fits else [])}
+    free = {key.key: key for key in design.free if key.key not in unfree}
     for key in dict.fromkeys(fixed):
         if key not in assigned and free.pop(key, None) is None:
             raise DesignError(
@@ -265,8 +250,8 @@ def read_free(
 
 
 def free_of(design: Design, free: Iterable[Free | str]) -> tuple[Free, ...]:
-    """The keys that a caller names, in place of the family's own: each a ``Free`` or a text, or one
-    text alone. Raises DesignError.
+    """Return the keys that a caller names, in place of the family's own: each a ``Free`` or a text,
+    or one text alone. Raises DesignError.
     """
     each = [free] if isinstance(free, str) else list(free) if isinstance(free, Iterable) else [free]
     for key in each:
@@ -293,13 +278,10 @@ def _free_of(text: str) -> Free:
             "--free chamber.diameter=3:12:0.1 or --free registration.method=channel-pin,ears"
         )
     step = numbers[1] - numbers[0] if len(numbers) > 1 else millimetres(parts[2])
-    return replace(Free(stepped.key, numbers[0], numbers[-1], 1), step=round(step, 9))
+    return Free(stepped.key, numbers[0], numbers[-1], round(step, 9))
 
 
 # The candidates by the steps of their free keys, each evaluated once.
-
-
-PROGRESS_LABEL = "trying designs"
 
 
 class SearchSpace:
@@ -340,11 +322,11 @@ class SearchSpace:
         return itertools.product(*(range(low, high + 1) for low, high in ends))
 
     def number(self, axis: int, point: GridPoint) -> float:
-        """The value of a key at a point; for a list its largest number."""
+        """Return the value of a key at a point; for a list its largest number."""
         return round(self.free[axis].low + point[axis] * self.free[axis].step, 6)
 
     def values(self, point: GridPoint) -> Mapping[str, Any]:
-        """The keys' values at a point, whole numbers if low and step are.
+        """Return the keys' values at a point, whole numbers if low and step are.
 
         A list, such as the diameters of a tapered stack, is scaled as a whole.
         """
@@ -363,26 +345,24 @@ class SearchSpace:
                 values[free.key] = int(value) if is_whole else value
         return values
 
-    def nearest(self) -> GridPoint:
-        """Return the starting design's point, or the nearest to it in the space."""
+    @cached_property
+    def start(self) -> GridPoint:
+        """The starting design's point, or the nearest to it in the space that was asked for."""
         steps = []
         for free in self.free:
             value: Any = self._keys.get(free.key)
             if free.choices:
                 steps.append(free.choices.index(value) if value in free.choices else 0)
                 continue
-            listed = numbers_of(value)
-            at = max(listed) if listed else value
+            at = max(numbers_of(value), default=value)
             at = at if isinstance(at, int | float) else (free.low + free.high) / 2
             steps.append(round((at - free.low) / free.step))
         return self.inside(steps)
 
     def inside(self, steps: Sequence[int]) -> GridPoint:
         """Return the point, or the nearest to it within the keys' ranges."""
-        return tuple(
-            min(max(at, low), high)
-            for at, low, high in zip(steps, self.lows, self.highs, strict=True)
-        )
+        ends = zip(steps, self.lows, self.highs, strict=True)
+        return tuple(min(max(at, low), high) for at, low, high in ends)
 
     def holds(self, axis: int, point: GridPoint) -> bool:
         """Return True if the range of a key holds its value at the point."""
@@ -391,10 +371,8 @@ class SearchSpace:
     def is_excluded(self, axis: int, point: GridPoint) -> bool:
         """Return True if a requirement on the key itself excludes its value at the point."""
         key, at = self.free[axis].key, self.number(axis, point)
-        return any(
-            requirement.quantity.key == key and not requirement.holds(at)
-            for requirement in self.request.requirements
-        )
+        rows = (row for row in self.request.requirements if row.quantity.key == key)
+        return any(not row.holds(at) for row in rows)
 
     def trial(self, point: GridPoint, checks_rules: bool = True) -> Trial:
         """Return the candidate at a point; its rules are checked if it would be the best so far.
@@ -402,7 +380,7 @@ class SearchSpace:
         Without ``checks_rules`` they are not: rules take most of the time.
         """
         if point not in self.trials:
-            self._tell(PROGRESS_LABEL, len(self.trials), self.request.tries)
+            self._tell("trying designs", len(self.trials), self.request.tries)
             candidate = self._evaluated(point)
             ranks = [trial.rank for trial in self.trials.values() if trial.rules]
             if checks_rules and all(candidate.rank < rank for rank in ranks):
@@ -415,10 +393,9 @@ class SearchSpace:
         return self.trials.get(point) or self._evaluated(point)
 
     def _evaluated(self, point: GridPoint) -> Trial:
-        candidate = evaluated(self.request, self.values(point))
-        changes = zip(self.free, point, self.nearest(), strict=True)
+        changes = zip(self.free, point, self.start, strict=True)
         words = sum(free.choices != () and step != start for free, step, start in changes)
-        return replace(candidate, words=words)
+        return replace(evaluated(self.request, self.values(point)), words=words)
 
     def with_rules(self, trial: Trial) -> Trial:
         """Return the candidate with its rules checked, unless they are known or it was refused."""
@@ -438,21 +415,6 @@ class SearchSpace:
             self.trials[best] = self.with_rules(trial)
 
 
-def searched(request: FindRequest, free: tuple[Free, ...], progress: Progress) -> SearchSpace:
-    """Return the space of a request after all tries that lead further."""
-    space = SearchSpace(request, free, progress)
-    if request.optuna:
-        _with_optuna(space)
-    elif space.size <= request.tries:
-        for point in space.points:
-            space.trial(point, checks_rules=False)
-    else:
-        _explore(space)
-    _refine(space)
-    _widen_ranges(space)
-    return space
-
-
 # Strategies: coarse grid, local searches, wider ranges.
 
 
@@ -470,46 +432,56 @@ WIDENINGS = 4
 SEED = 20_240
 
 
+def searched(request: FindRequest, free: tuple[Free, ...], progress: Progress) -> SearchSpace:
+    """Return the space of a request after all tries that lead further."""
+    space = SearchSpace(request, free, progress)
+    if space.size <= request.tries:
+        for point in space.points:
+            space.trial(point, checks_rules=False)
+    else:
+        _explore(space)
+    _refine(space)
+    _widen_ranges(space)
+    return space
+
+
 def _explore(space: SearchSpace) -> None:
-    """Evaluate a coarse grid, then search locally from its best points that lie far apart.
+    """Evaluate a coarse grid, then search locally from its best points that lie far apart, with
+    steps that are halved if none is better.
 
     While no design passes, it restarts from random points, as long as tries are left.
     """
     space.limit = round(WALK_SHARE * space.request.tries)
-    _grid(space)
+    for point in itertools.product(*_grid(space)):
+        if not space.is_over:
+            space.trial(point, checks_rules=False)
     dice = random.Random(SEED)
     starts = _starts(space)
     while not space.is_over:
         if starts:
-            start = starts.pop(0)
+            point = starts.pop(0)
         elif space.best()[1].holds:
             break
         else:
-            start = tuple(map(dice.randint, space.lows, space.highs))
-        _descend(space, start)
+            point = tuple(map(dice.randint, space.lows, space.highs))
+        share = 4
+        while share <= 2 * max(space.counts) and not space.is_over:
+            point = _walk(space, point, [max(1, count // share) for count in space.counts])
+            share *= 2
 
 
-def _grid(space: SearchSpace) -> None:
-    """Evaluate a coarse grid, as fine as its share of the tries allows.
+def _grid(space: SearchSpace) -> Iterator[list[int]]:
+    """Yield the steps of each key on a coarse grid, as fine as its share of the tries allows.
 
     Keys with words keep their starting value: the walks from the grid change them.
     """
     room = max(8.0, GRID_SHARE * space.request.tries)
     numbers = sum(not free.choices for free in space.free)
     levels = max(2, int(room ** (1 / max(1, numbers))))
-    axes = []
-    begin = space.nearest()
-    for axis, (low, count) in enumerate(zip(space.lows, space.counts, strict=True)):
-        if space.free[axis].choices:
-            axes.append([begin[axis]])
-            continue
+    for free, at, low, count in zip(space.free, space.start, space.lows, space.counts, strict=True):
         few = min(levels, count)
         steps = [low + round((count - 1) * number / max(1, few - 1)) for number in range(few)]
-        axes.append(list(dict.fromkeys(steps)))
-    for point in itertools.product(*axes):
-        if space.is_over:
-            return
-        space.trial(point, checks_rules=False)
+        yield [at] if free.choices else list(dict.fromkeys(steps))
 
 
 def _starts(space: SearchSpace) -> list[GridPoint]:
@@ -518,19 +490,11 @@ def _starts(space: SearchSpace) -> list[GridPoint]:
     def is_far(a: GridPoint, b: GridPoint) -> bool:
         return any(abs(x - y) * 3 > count for x, y, count in zip(a, b, space.counts, strict=True))
 
-    starts = [space.nearest()]
+    starts = [space.start]
     for point in sorted(space.trials, key=lambda point: space.trials[point].rank):
         if len(starts) < STARTS and all(is_far(point, start) for start in starts):
             starts.append(point)
     return starts
-
-
-def _descend(space: SearchSpace, start: GridPoint) -> None:
-    """Search locally with steps that are halved if none is better."""
-    point, share = start, 4
-    while share <= 2 * max(space.counts) and not space.is_over:
-        point = _walk(space, point, [max(1, count // share) for count in space.counts])
-        share *= 2
 
 
 def _refine(space: SearchSpace) -> None:
@@ -545,19 +509,17 @@ def _refine(space: SearchSpace) -> None:
 def _has_better_walk(space: SearchSpace, point: GridPoint) -> bool:
     """Return True if a search with a key fixed a step or two away finds a better candidate."""
     counts = space.counts
-    for axis in sorted(range(len(counts)), key=lambda axis: counts[axis]):
-        if not 1 < counts[axis] <= FEW or len(counts) == 1:
+    axes = [axis for axis, count in enumerate(counts) if 1 < count <= FEW and len(counts) > 1]
+    for axis, by in itertools.product(sorted(axes, key=lambda axis: counts[axis]), FIXED_STEPS):
+        start = space.inside(_moved(point, axis, by))
+        if start == point or space.is_over:
             continue
-        for by in FIXED_STEPS:
-            start = space.inside(_moved(point, axis, by))
-            if start == point or space.is_over:
-                continue
-            for share in (32, 128, max(counts)):
-                stride = [max(1, count // share) for count in counts]
-                stride[axis] = 0
-                start = _walk(space, start, stride)
-            if start in space.trials and space.trial(start).rank < space.trial(point).rank:
-                return True
+        for share in (32, 128, max(counts)):
+            stride = [max(1, count // share) for count in counts]
+            stride[axis] = 0
+            start = _walk(space, start, stride)
+        if start in space.trials and space.trial(start).rank < space.trial(point).rank:
+            return True
     return False
 
 
@@ -567,7 +529,14 @@ def _walk(space: SearchSpace, point: GridPoint, stride: Sequence[int]) -> GridPo
     Where two requirements meet, only a step of both keys makes progress. A move that improved is
     repeated. A key whose stride is 0 is held fixed.
     """
-    moves = _moves(stride)
+    still = (0,) * len(stride)
+    moving = [axis for axis, step in enumerate(stride) if step]
+    moves = [_moved(still, axis, sign * stride[axis]) for axis in moving for sign in (-1, 1)]
+    moves += [
+        _moved(_moved(still, a, sign * stride[a]), b, -sign * stride[b])
+        for a, b in itertools.combinations(moving, 2)
+        for sign in (-1, 1)
+    ]
     stale = 0
     while stale < len(moves) and not space.is_over:
         to = space.inside([at + by for at, by in zip(point, moves[0], strict=True)])
@@ -579,25 +548,12 @@ def _walk(space: SearchSpace, point: GridPoint, stride: Sequence[int]) -> GridPo
     return point
 
 
-def _moves(stride: Sequence[int]) -> list[GridPoint]:
-    """The moves: single keys first, down and up, then pairs of keys against each other."""
-    still = (0,) * len(stride)
-    moving = [axis for axis, step in enumerate(stride) if step]
-    single = [_moved(still, axis, sign * stride[axis]) for axis in moving for sign in (-1, 1)]
-    pairs = [
-        _moved(_moved(still, a, sign * stride[a]), b, -sign * stride[b])
-        for a, b in itertools.combinations(moving, 2)
-        for sign in (-1, 1)
-    ]
-    return [*single, *pairs]
-
-
 def _moved(point: GridPoint, axis: int, by: int) -> GridPoint:
     return (*point[:axis], point[axis] + by, *point[axis + 1 :])
 
 
 def single_steps(point: GridPoint) -> list[tuple[int, GridPoint]]:
-    """The points one step of one key away, each with the key's number."""
+    """Return the points one step of one key away, each with the key's number."""
     return [(axis, _moved(point, axis, by)) for axis in range(len(point)) for by in (-1, 1)]
 
 
@@ -606,85 +562,20 @@ def _widen_ranges(space: SearchSpace) -> None:
     for _ in range(WIDENINGS):
         point, before = space.best()
         ends = space.lows[:], space.highs[:]
-        _widen_ends(space, point)
+        counts = space.counts
+        for axis, beyond in single_steps(point):
+            free, is_inside = space.free[axis], space.holds(axis, beyond)
+            is_impossible = space.number(axis, beyond) <= 0 or space.is_excluded(axis, beyond)
+            if not free.widens or is_inside or is_impossible:
+                continue
+            if beyond[axis] > point[axis]:
+                space.highs[axis] += counts[axis]
+            else:
+                below = int(round((free.low + space.lows[axis] * free.step) / free.step, 6)) - 1
+                space.lows[axis] -= min(counts[axis], below)
         if (space.lows, space.highs) == ends:
             return
         _refine(space)
         if not space.best()[1].rank < before.rank:
             space.lows, space.highs = ends
             return
-
-
-def _widen_ends(space: SearchSpace, point: GridPoint) -> None:
-    """Widen the ranges at whose end the point lies."""
-    counts = space.counts
-    for axis, beyond in single_steps(point):
-        free = space.free[axis]
-        if not free.widens or space.holds(axis, beyond):
-            continue
-        if space.number(axis, beyond) <= 0 or space.is_excluded(axis, beyond):
-            continue
-        if beyond[axis] > point[axis]:
-            space.highs[axis] += counts[axis]
-        else:
-            below = int(round((free.low + space.lows[axis] * free.step) / free.step, 6)) - 1
-            space.lows[axis] -= min(counts[axis], below)
-
-
-# Search by Optuna, whose storage resumes it and shares it between machines.
-
-
-def _with_optuna(space: SearchSpace) -> None:
-    """Evaluate designs that Optuna proposes, and keep a share of the tries for the final steps.
-
-    Raises DesignError without the extra, and for a storage that cannot be used.
-    """
-    try:
-        import optuna
-    except ImportError:
-        raise DesignError('Optuna is not installed: pip install "sbafab[optuna]"') from None
-    # If a search is stopped, Optuna would report a failed trial with a traceback.
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    tries, storage = max(1, round(WALK_SHARE * space.request.tries)), space.request.storage
-    sampler = optuna.samplers.TPESampler(seed=SEED, n_startup_trials=tries // 4)
-    name = _study_name(space)
-    try:
-        study = optuna.create_study(
-            storage=storage, study_name=name, load_if_exists=True, sampler=sampler
-        )
-    except Exception as error:
-        message = " ".join(str(error).split())[:200]
-        raise DesignError(
-            f"--storage {storage} cannot be used ({message}); write for example "
-            "--storage sqlite:///search.db"
-        ) from None
-
-    def objective(trial: Any) -> float:
-        ranges = zip(space.free, space.counts, strict=True)
-        steps = (trial.suggest_int(free.key, 0, count - 1) for free, count in ranges)
-        candidate = space.trial(tuple(steps))
-        if candidate.holds:
-            return candidate.cost
-        # A miss is worse than every passing design, by the amount of the miss.
-        return IMPOSSIBLE * (1 + min(candidate.missed, IMPOSSIBLE))
-
-    # Stored trials come from an earlier run: they are looked up again, not tried again.
-    done = study.get_trials(states=[optuna.trial.TrialState.COMPLETE])
-    for old in done:
-        space.trial(tuple(old.params[free.key] for free in space.free))
-    study.optimize(objective, n_trials=max(0, tries - len(done)))
-
-
-def _study_name(space: SearchSpace) -> str:
-    """Name a study by everything that its trials depend on."""
-    request = space.request
-    design = f"{request.design.name} {design_sha256(request.design)[:12]}"
-    limits = [requirement.label for requirement in request.requirements]
-    sure = [] if request.sure is None else [f"sure {request.sure:g}"]
-    keys = [
-        f"{free.key} {', '.join(free.choices)}"
-        if free.choices
-        else f"{free.key} {free.low:g} to {free.high:g} by {free.step:g}"
-        for free in space.free
-    ]
-    return "; ".join([design, *limits, request.goal.label, *sure, *keys])
