@@ -98,7 +98,6 @@ EXTRAS = {
     "dask": ("distributed", "sweep --dask"),
     "mesh": ("netgen", "sbafab mesh, simulate --with calculix"),
     "mujoco": ("mujoco", "simulate --with mujoco"),
-    "parquet": ("pyarrow", "tables of sweeps as Parquet"),
     "python": ("meshio", "meshes for meshio and PyVista"),
     "scan": ("skimage", "sbafab inspect"),
     "studio": ("starlette", "sbafab studio"),

@@ -352,7 +352,7 @@ def sweep(
 ) -> None:
     """Check and predict variants of a design.
 
-    OUT/<name>-sweep/ receives sweep.csv (and sweep.parquet if pyarrow is installed) with a row for
+    OUT/<name>-sweep/ receives sweep.csv with a row for
     each design, times.csv, and the page sweep.html. Run the same command again to resume a sweep
     that was stopped.
     """
@@ -380,8 +380,6 @@ def sweep(
             "columns: varied, requested and binding; --all-columns writes all without computing "
             "again"
         )
-    if "sweep.parquet" not in swept.files:
-        show.line('for Parquet as well: pip install "sbafab[parquet]"')
     words = {"passes": "passed", "fails": "failed"}
     counts = [f"{count} {words.get(each, each)}" for each, count in swept.outcomes.items()]
     resumed = swept.designs - swept.measured

@@ -11,7 +11,7 @@ import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from pydantic import AliasPath, Field
 
@@ -23,7 +23,6 @@ from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError, OutputError
 from sbafab.folders.build import Build, make_build
 from sbafab.folders.swap import replace_text
-from sbafab.markup import environment
 from sbafab.models.balloons import has_balloons
 from sbafab.models.calibrated import Ends
 from sbafab.models.drawn_pockets import model_form
@@ -38,13 +37,12 @@ from sbafab.reports.inflated_picture import WHY, PictureRequest, pictures_at_one
 from sbafab.reports.solid_png import solid_png
 from sbafab.search import advice
 from sbafab.search.advice import YieldDesign, value_of
-from sbafab.search.sweep_report import CSV, JOURNAL
+from sbafab.search.sweep_report import CSV, JOURNAL, Section, page_html
 from sbafab.search.trials import RuleMargin, margins
 from sbafab.search.vary import NOTHING, format_value, key_values
 from sbafab.version import GENERATOR
 
 FOLDER, PAGE = "compare", "compare.html"
-TEMPLATE = "compare.html.j2"
 MAIN = {
     Quantity.OUTLINE_DIAMETER: ANYWHERE,
     Quantity.OVERALL_DIAMETER: ANYWHERE,
@@ -362,14 +360,6 @@ def reached_text(figure: Figure | None) -> str:
 # The page.
 
 
-class PicturePair(NamedTuple):
-    """Pictures of both designs as data URIs, or a sentence in place of one."""
-
-    title: str
-    pictures: tuple[str, str]
-    notes: tuple[str, str] = ("", "")
-
-
 def write_page(comparison: DesignComparison, out: Path) -> Path:
     """Write ``out``/compare/compare.html beside an old one, swap it in, and return its folder.
 
@@ -388,32 +378,45 @@ def write_page(comparison: DesignComparison, out: Path) -> Path:
 
 
 def compare_html(comparison: DesignComparison) -> str:
-    """Return the whole page; style and pictures are inline, nothing is fetched."""
-    return (
-        environment(Path(__file__).parent)
-        .get_template(TEMPLATE)
-        .render(
-            names=comparison.names,
-            designs=comparison.designs,
-            hashes=[design_sha256(each.design)[:12] for each in comparison.designs],
-            keys=[(row.key, *map(format_value, row.values)) for row in comparison.keys],
-            rules=[(row.rule, *map(margin_text, row.margins)) for row in comparison.rules],
-            figures=[
-                (f"{pair.name}, {pair.unit}", *map(reached_text, pair.figures), pair.differs)
-                for pair in sorted(comparison.figures, key=lambda pair: not pair.is_main)
-            ],
-            pictures=[_flat(comparison), _inflated(comparison)],
-            generator=GENERATOR,
-        )
+    """Return the whole page of a comparison."""
+    names, designs = comparison.names, comparison.designs
+    head = ("", *names)
+    keys = [(row.key, *map(format_value, row.values)) for row in comparison.keys]
+    rules = [(row.rule, *map(margin_text, row.margins)) for row in comparison.rules]
+    pairs = sorted(comparison.figures, key=lambda pair: not pair.is_main)
+    figures = [(f"{pair.name}, {pair.unit}", *map(reached_text, pair.figures)) for pair in pairs]
+    grey = [number for number, pair in enumerate(pairs) if not pair.differs]
+    intervals = "In parentheses the 90 % interval of what would be measured; grey figures agree."
+    verdicts = [
+        f"{name}: " + (f"fails {', '.join(each.failed)}" if each.failed else "passes every rule")
+        for name, each in zip(names, designs, strict=True)
+    ]
+    sections = [
+        _flat(comparison),
+        _inflated(comparison),
+        Section("Keys", head=head, rows=keys, note="" if keys else "No key differs."),
+        Section(
+            "Rules",
+            head=head,
+            rows=rules,
+            note="" if rules else "No verdict or margin differs.",
+        ),
+        Section("Figures", head=head, rows=figures, grey=grey, note=intervals),
+    ]
+    first, second = (each.design_sha256[:12] for each in designs)
+    footer = (
+        f"Designs {first} and {second}, {GENERATOR}. Models and validity of each figure: sbafab "
+        "predict -v."
     )
+    return page_html(" and ".join(names), verdicts, sections, footer)
 
 
-def _flat(comparison: DesignComparison) -> PicturePair:
-    first, second = (_uri(solid_png(each.checked.laminate, *SIZE)) for each in comparison.designs)
-    return PicturePair("Flat", (first, second))
+def _flat(comparison: DesignComparison) -> Section:
+    uris = (_uri(solid_png(each.checked.laminate, *SIZE)) for each in comparison.designs)
+    return Section("Flat", pictures=[*zip(comparison.names, uris, ("", ""), strict=True)])
 
 
-def _inflated(comparison: DesignComparison) -> PicturePair:
+def _inflated(comparison: DesignComparison) -> Section:
     """Return pictures at one scale: with several chambers one is filled, otherwise all are."""
     pressure = comparison.pressures_kpa[0]
     bodies, notes = [], ["", ""]
@@ -435,9 +438,9 @@ def _inflated(comparison: DesignComparison) -> PicturePair:
         bodies.append((laminate, together, pose))
     wish = PictureRequest({}, width=SIZE[0], height=SIZE[1])
     drawn = map(_uri, pictures_at_one_scale(bodies, wish))
-    first, second = ("" if note else next(drawn) for note in notes)
+    uris = ["" if note else next(drawn) for note in notes]
     title = f"Inflated at {pressure:g} kPa; of parallel chambers only the first"
-    return PicturePair(title, (first, second), (notes[0], notes[1]))
+    return Section(title, pictures=[*zip(comparison.names, uris, notes, strict=True)])
 
 
 def _uri(png: bytes) -> str:

@@ -1,8 +1,7 @@
-"""Reports of a sweep: its rows as CSV and Parquet, and a page of outcomes and trade-offs.
+"""Reports of searches: the rows of a sweep as CSV, and pages of pictures and tables.
 
-Both tables have the same columns and the same bytes, whoever measured the rows and when; the time
-of each design is in a separate file. The page is self-contained: style and pictures are inline,
-nothing is fetched.
+A table has the same bytes, whoever measured the rows and when; the time of each design is in a
+separate file. Pages are self-contained: style and pictures are inline, nothing is fetched.
 """
 
 from __future__ import annotations
@@ -10,11 +9,11 @@ from __future__ import annotations
 import csv
 import json
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -35,7 +34,7 @@ from sbafab.version import GENERATOR
 # The tables: one design per row, in the order requested.
 
 
-CSV, TIMES, PARQUET = "sweep.csv", "times.csv", "sweep.parquet"
+CSV, TIMES = "sweep.csv", "times.csv"
 PAGE, JOURNAL = "sweep.html", "journal.jsonl"
 """Files of a sweep's folder."""
 PARTS = (("verdict", 0), ("margin", 1), ("measured", 2), ("limit", 3))
@@ -58,8 +57,6 @@ YIELD = ("yield", "yield.low", "yield.high")
 """Share of good builds, with its 95 % interval for this number of random builds."""
 LITTLE = 0.005
 """Largest share of a limit that counts as nothing to spare."""
-BATCH = 1000
-"""Most rows in memory at a time."""
 
 
 class Table:
@@ -210,26 +207,7 @@ def write_tables(table: Table, folder: Path) -> list[str]:
     )
     with replacing(folder / TIMES) as opened:
         write_rows(opened, chain([["number", "sha256", "seconds"]], times))
-    return [CSV, TIMES, *([PARQUET] if _write_parquet(table, folder / PARQUET) else [])]
-
-
-def _write_parquet(table: Table, path: Path) -> bool:
-    """Write the same as Parquet, numbers as doubles; False if pyarrow is not installed."""
-    try:
-        import pyarrow as pa
-        from pyarrow import parquet
-    except ImportError:
-        return False
-    kinds = [pa.float64() if table.columns[name] else pa.string() for name in table.written]
-    schema = pa.schema(list(zip(table.written, kinds, strict=True)))
-    begun = path.with_name(f".{path.name}.part")
-    cells = table.cells(table.written)
-    with parquet.ParquetWriter(begun, schema) as written:
-        while rows := list(islice(cells, BATCH)):
-            arrays = map(pa.array, zip(*rows, strict=True), kinds)
-            written.write_table(pa.table(list(arrays), schema=schema))
-    begun.replace(path)
-    return True
+    return [CSV, TIMES]
 
 
 # The tables of an earlier sweep in the folder.
@@ -381,52 +359,92 @@ def _tick(text: str) -> str:
         return text.strip("'").rpartition("/")[2][:24]
 
 
-TEMPLATE = "sweep.html.j2"
 GOOD_BUILDS = Objective(YIELD[0], "share of good builds", True)
 INTRODUCTION = (Quantity.MASS, Quantity.OVERALL_DIAMETER, Quantity.DEFLATED_DIAMETER)
 MOST_REASONS = 12
 MOST_ROWS = 60
 """Most designs on a front that the page lists; all are in the tables."""
-
-
-class _Cause(NamedTuple):
-    """Cause of failure of this many ``designs``, with the number of one as an example."""
-
-    name: str
-    designs: int
-    example: int
-    reason: str
+WORDS = {
+    "passes": "pass every rule",
+    "fails": "fail a rule",
+    "refused": "cannot be made",
+    "too long": "took too long",
+    "crashed": "crashed",
+}
 
 
 def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
-    """The whole page."""
+    """Return the whole page of a sweep."""
     keys = [swept.key for swept in varied]
     objectives = _objectives(table)
     names = [*keys, *(objective.column for objective in objectives)]
     dots, causes = _read(table, names)
+    outcomes = Counter(dots.outcomes)
+    sections = [Section("Passing designs", svg=passes_svg(dots, keys))]
+    if causes:
+        more = len(causes) - MOST_REASONS
+        note = f"{more} more causes are listed in the tables." if more > 0 else ""
+        rows: Sequence[Sequence[str]] = causes[:MOST_REASONS]
+        named = ["cause", "designs", "example"]
+        sections.append(Section("Causes of failure", head=named, rows=rows, note=note))
     pairs = _pairs(objectives, dots)
-    trades, best = trades_svg(dots, pairs) if pairs else ("", set())
-    listed = sorted(best)[:MOST_ROWS]
-    return (
-        environment(Path(__file__).parent)
-        .get_template(TEMPLATE)
-        .render(
-            name=design.name,
-            sha256=design_sha256(design)[:12],
-            generator=GENERATOR,
-            total=len(table.values),
-            outcomes=Counter(dots.outcomes),
-            keys=[(swept.key, _values_text(swept)) for swept in varied],
-            passes=passes_svg(dots, keys),
-            trades=trades,
-            causes=causes[:MOST_REASONS],
-            more_causes=max(0, len(causes) - MOST_REASONS),
-            head=[*keys, *(objective.label for objective in objectives)],
-            best=[(n + 1, [format_value(dots.columns[name][n]) for name in names]) for n in listed],
-            unlisted=len(best) - len(listed),
-            measured=list(_measured(design, table, objectives)),
-        )
+    if pairs:
+        trades, best = trades_svg(dots, pairs)
+        measured = [f"{label}: {text}." for label, text in _measured(design, table, objectives)]
+        sections.append(Section("Trade-offs", measured, trades))
+        listed = sorted(best)[:MOST_ROWS]
+        rows = [
+            [str(n + 1), *(format_value(dots.columns[name][n]) for name in names)] for n in listed
+        ]
+        head = ("no.", *keys, *(objective.label for objective in objectives))
+        line = "Passing designs that no other one improves on in both values of a picture above."
+        more = len(best) - len(listed)
+        note = f"{more} more designs are in the tables." if more else ""
+        sections.append(Section("Pareto fronts", [line], head=head, rows=rows, note=note))
+    elif outcomes["passes"]:
+        line = "The passing designs do not differ in two figures, so there is no trade-off."
+        sections[-1] = sections[-1]._replace(note=line)
+    else:
+        sections[-1] = sections[-1]._replace(note="No design passes.")
+    footer = (
+        f"Design {design_sha256(design)[:12]}, {GENERATOR}. Values: sweep.csv; all of them: sbafab "
+        "sweep --all-columns. Predictions are models, each with its validity: sbafab predict."
     )
+    lines = [f"{swept.key} {_values_text(swept)}" for swept in varied]
+    tiles = [
+        (LOOKS[outcome], outcomes[outcome], words)
+        for outcome, words in WORDS.items()
+        if outcomes[outcome] or outcome == "passes"
+    ]
+    title = f"{design.name}: {len(table.values)} designs"
+    return page_html(title, lines, sections, footer, tiles)
+
+
+class Section(NamedTuple):
+    """A part of a page: ``lines``, a drawing, ``pictures`` side by side (name, data URI, or a note
+    in place of one), and a table, of which rows in ``grey`` are of no interest.
+    """
+
+    title: str
+    lines: Sequence[str] = ()
+    svg: str = ""
+    pictures: Sequence[tuple[str, str, str]] = ()
+    head: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    grey: Collection[int] = ()
+    note: str = ""
+
+
+def page_html(
+    title: str,
+    lines: Sequence[str],
+    sections: Sequence[Section],
+    footer: str,
+    tiles: Sequence[tuple[str, int, str]] = (),
+) -> str:
+    """Return a whole page; ``tiles`` are counts with their colour and words."""
+    template = environment(Path(__file__).parent).get_template("report.html.j2")
+    return template.render(title=title, lines=lines, sections=sections, footer=footer, tiles=tiles)
 
 
 def _measured(
@@ -468,21 +486,24 @@ def _objectives(table: Table) -> list[Objective]:
     return [*objectives, GOOD_BUILDS] if YIELD[0] in table.columns else objectives
 
 
-def _read(table: Table, wanted_columns: Sequence[str]) -> tuple[Dots, list[_Cause]]:
-    """Return the objectives' columns, and the causes of failure, the most common first."""
+def _read(table: Table, wanted_columns: Sequence[str]) -> tuple[Dots, list[list[str]]]:
+    """Return the objectives' columns, and the causes of failure, the most common first: each with
+    the number of designs, and the first of them with its reason.
+    """
     columns: dict[str, list[Any]] = {name: [] for name in ("outcome", *wanted_columns)}
-    stopped: dict[str, list[tuple[int, str]]] = {}
     for cells in table.cells(columns):
         for column, cell in zip(columns.values(), cells, strict=True):
             column.append(cell)
+    counts: Counter[str] = Counter()
+    examples: dict[str, str] = {}
     for number, row in enumerate(table.rows(), 1):
         failed = row.get("failed", {})
         if row["outcome"] not in ("passes", "fails"):
             failed = {row["outcome"]: row["reason"]}
         for cause, message in failed.items():
-            stopped.setdefault(cause, []).append((number, f"{cause}: {message}"))
-    causes = [_Cause(cause, len(designs), *designs[0]) for cause, designs in stopped.items()]
-    causes.sort(key=lambda cause: -cause.designs)
+            counts[cause] += 1
+            examples.setdefault(cause, f"no. {number}: {cause}: {message}")
+    causes = [[cause, str(count), examples[cause]] for cause, count in counts.most_common()]
     return Dots(columns["outcome"], columns), causes
 
 

@@ -134,7 +134,6 @@ find 1dof-5mm --max deflated_diameter=3 | only radial designs
 find 1dof-5mm --free chamber.diameter=6:3:1 | --free 'chamber.diameter=6:3:1' stops below
 find 1dof-5mm --free registration.method=ears,glue | 'glue' must be 'channel-pin' or 'ears'
 find 1dof-5mm --min registration.method=3 | is a word, 'channel-pin', and has no least or most
-find 1dof-5mm --storage sqlite:///a.db | --storage goes with --optuna
 record | give the DESIGN that was built, --find or --report
 record 1dof-5mm | a result needs its serial
 record 1dof-5mm --serial A1 | A1 has no result; give leak

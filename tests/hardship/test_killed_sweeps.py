@@ -18,7 +18,7 @@ ARGUMENTS = [
     *("--vary", "bond.width=0.7,0.75", "--vary", "stack.balloons=2:5:1"),
     *("--set", "rules.yield_builds=100"),
 ]
-FILES = ("sweep.csv", "sweep.parquet", "sweep.html")
+FILES = ("sweep.csv", "sweep.html")
 
 
 def _stopped_at(runs: Runs, folder: Path, lines: int, number: int) -> tuple[int, str, int]:

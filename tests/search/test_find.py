@@ -190,37 +190,6 @@ def test_what_equals_the_best_is_told_by_its_mass(monkeypatch: pytest.MonkeyPatc
     assert [one.values["stack.balloons"] for one in found.front] == [4, 9]
 
 
-@pytest.mark.long
-def test_a_search_by_optuna_that_is_stopped_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """The design at which it was stopped is none of those that are stored."""
-    optuna = pytest.importorskip("optuna")
-    storage = f"sqlite:///{tmp_path / 'search.db'}"
-    request = _request(["stroke@50kPa=25"], tries=20, optuna=True, storage=storage)
-    seen: list[Mapping[str, Any]] = []
-
-    def stopping(wanted: FindRequest, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
-        seen.append(values)
-        if len(seen) == 8:
-            raise KeyboardInterrupt
-        return _made_up(wanted, values, with_rules)
-
-    monkeypatch.setattr(module, "evaluated", stopping)
-    with pytest.raises(KeyboardInterrupt):
-        find(request)
-    assert "Traceback" not in capfd.readouterr().err
-    monkeypatch.setattr(module, "evaluated", _made_up)
-    find(request)
-    (study,) = optuna.get_all_study_summaries(storage)
-    kept = optuna.load_study(study_name=study.study_name, storage=storage)
-    # 0.6 of the tries are Optuna's, each told to the end.
-    assert [trial.state.name for trial in kept.trials].count("COMPLETE") == 12
-    # A design that was changed is another search, whatever its name.
-    find(replace(request, design=sbafab.load("1dof-5mm", "inlet.tab_length=6")))
-    assert len(optuna.get_all_study_summaries(storage)) == 2
-
-
 @pytest.mark.parametrize(
     ("low", "above", "wider"), [(7, True, (7, 8)), (7, False, (6, 7)), (1, False, (0, 1))]
 )
@@ -389,7 +358,6 @@ def test_a_bound_is_shown_beside_its_median(tmp_path: Path) -> None:
     [
         ({"tries": 0}, "at least 4"),
         ({"sure": 0.5}, "above 0.5 and below 1"),
-        ({"storage": "sqlite:///search.db"}, "optuna = True"),
         ({"free": ()}, "no key of 1dof-5mm"),
         ({"free": FREE, "least": {"chamber.diameter": 20}}, "its range is 3 to 12"),
     ],

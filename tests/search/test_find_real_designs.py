@@ -1,10 +1,9 @@
-"""Searches among real designs: what others have built, every design of a grid, and Optuna."""
+"""Searches among real designs: what others have built, every design of a grid."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -12,7 +11,6 @@ from click.testing import CliRunner
 import sbafab
 from sbafab.cli import app
 from sbafab.design.records import Free
-from sbafab.errors import DesignError
 from sbafab.process import ignore_progress
 from sbafab.search.quantities import read_all
 from sbafab.search.space import FindRequest, SearchSpace, evaluated
@@ -86,20 +84,3 @@ def test_no_real_design_is_better(least: dict[str, float], best: str) -> None:
     assert found.holds
     assert found.best.rank == min(every)
     assert found.tries < len(every)
-
-
-@pytest.mark.long
-def test_optuna_finds_it_too_and_goes_on_from_its_storage(tmp_path: Path) -> None:
-    pytest.importorskip("optuna")
-    storage = f"sqlite:///{tmp_path / 'search.db'}"
-    free = ("chamber.diameter=4:6:0.2", "stack.balloons=4:10:1")
-    asked: dict[str, Any] = {"least": {"stroke@10kPa": 7}, "most": {"outline_diameter": 6.5}}
-    asked |= {"free": free, "tries": 20}
-    plain = sbafab.find("1dof-5mm", **asked)
-    first = sbafab.find("1dof-5mm", optuna=True, storage=storage, **{**asked, "tries": 10})
-    more = sbafab.find("1dof-5mm", optuna=True, storage=storage, **asked)
-    assert more.holds
-    assert more.best.rank <= first.best.rank
-    assert more.best.cost <= 1.3 * plain.best.cost
-    with pytest.raises(DesignError, match="--storage nowhere cannot be used"):
-        sbafab.find("1dof-5mm", optuna=True, storage="nowhere", **asked)

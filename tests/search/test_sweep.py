@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,6 @@ from sbafab.search.sweep_report import Table, _objectives
 from sbafab.search.trials import MeasureJob, measured
 from tests.site.formats import hold
 
-HAS_PARQUET = find_spec("pyarrow") is not None
 VARY = ("chamber.diameter=2,5", "bond.width=0.7,0.75")
 QUICK: dict[str, Any] = {"rules": {"yield_builds": 100}, "pressures_kpa": (10.0,)}
 
@@ -117,16 +115,6 @@ def test_each_row_says_what_check_and_predict_say(found: SweptDesigns) -> None:
     assert rows[3]["mask.overhang"] == "0.5"
     assert "seconds" not in rows[3]
     assert all(float(row["seconds"]) > 0 for row in _rows(found, "times.csv"))
-
-
-def test_parquet_holds_what_the_csv_holds(found: SweptDesigns) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
-    table = parquet.read_table(found.folder / "sweep.parquet")
-    rows = _rows(found)
-    assert table.column_names == list(rows[0])
-    for name in table.column_names:
-        for cell, text in zip(table[name].to_pylist(), [row[name] for row in rows], strict=True):
-            assert text == "" if cell is None else str(cell) == text or float(text) == cell
 
 
 def test_the_page_stands_alone_and_counts_right(found: SweptDesigns) -> None:
