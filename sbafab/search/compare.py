@@ -37,7 +37,7 @@ from sbafab.reports.inflated_picture import WHY, PictureRequest, pictures_at_one
 from sbafab.reports.solid_png import solid_png
 from sbafab.search import advice
 from sbafab.search.advice import YieldDesign, value_of
-from sbafab.search.sweep_report import CSV, JOURNAL, Section, page_html
+from sbafab.search.sweep_report import CSV, JOURNAL, PageSection, page_html
 from sbafab.search.trials import RuleMargin, margins
 from sbafab.search.vary import NOTHING, format_value, key_values
 from sbafab.version import GENERATOR
@@ -394,14 +394,14 @@ def compare_html(comparison: DesignComparison) -> str:
     sections = [
         _flat(comparison),
         _inflated(comparison),
-        Section("Keys", head=head, rows=keys, note="" if keys else "No key differs."),
-        Section(
+        PageSection("Keys", head=head, rows=keys, note="" if keys else "No key differs."),
+        PageSection(
             "Rules",
             head=head,
             rows=rules,
             note="" if rules else "No verdict or margin differs.",
         ),
-        Section("Figures", head=head, rows=figures, grey=grey, note=intervals),
+        PageSection("Figures", head=head, rows=figures, grey=grey, note=intervals),
     ]
     first, second = (each.design_sha256[:12] for each in designs)
     footer = (
@@ -411,12 +411,12 @@ def compare_html(comparison: DesignComparison) -> str:
     return page_html(" and ".join(names), verdicts, sections, footer)
 
 
-def _flat(comparison: DesignComparison) -> Section:
+def _flat(comparison: DesignComparison) -> PageSection:
     uris = (_uri(solid_png(each.checked.laminate, *SIZE)) for each in comparison.designs)
-    return Section("Flat", pictures=[*zip(comparison.names, uris, ("", ""), strict=True)])
+    return PageSection("Flat", pictures=[*zip(comparison.names, uris, ("", ""), strict=True)])
 
 
-def _inflated(comparison: DesignComparison) -> Section:
+def _inflated(comparison: DesignComparison) -> PageSection:
     """Return pictures at one scale: with several chambers one is filled, otherwise all are."""
     pressure = comparison.pressures_kpa[0]
     bodies, notes = [], ["", ""]
@@ -440,7 +440,7 @@ def _inflated(comparison: DesignComparison) -> Section:
     drawn = map(_uri, pictures_at_one_scale(bodies, wish))
     uris = ["" if note else next(drawn) for note in notes]
     title = f"Inflated at {pressure:g} kPa; of parallel chambers only the first"
-    return Section(title, pictures=[*zip(comparison.names, uris, notes, strict=True)])
+    return PageSection(title, pictures=[*zip(comparison.names, uris, notes, strict=True)])
 
 
 def _uri(png: bytes) -> str:

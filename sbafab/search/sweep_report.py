@@ -380,18 +380,18 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
     names = [*keys, *(objective.column for objective in objectives)]
     dots, causes = _read(table, names)
     outcomes = Counter(dots.outcomes)
-    sections = [Section("Passing designs", svg=passes_svg(dots, keys))]
+    sections = [PageSection("Passing designs", svg=passes_svg(dots, keys))]
     if causes:
         more = len(causes) - MOST_REASONS
         note = f"{more} more causes are listed in the tables." if more > 0 else ""
         rows: Sequence[Sequence[str]] = causes[:MOST_REASONS]
         named = ["cause", "designs", "example"]
-        sections.append(Section("Causes of failure", head=named, rows=rows, note=note))
+        sections.append(PageSection("Causes of failure", head=named, rows=rows, note=note))
     pairs = _pairs(objectives, dots)
     if pairs:
         trades, best = trades_svg(dots, pairs)
         measured = [f"{label}: {text}." for label, text in _measured(design, table, objectives)]
-        sections.append(Section("Trade-offs", measured, trades))
+        sections.append(PageSection("Trade-offs", measured, trades))
         listed = sorted(best)[:MOST_ROWS]
         rows = [
             [str(n + 1), *(format_value(dots.columns[name][n]) for name in names)] for n in listed
@@ -400,7 +400,7 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
         line = "Passing designs that no other one improves on in both values of a picture above."
         more = len(best) - len(listed)
         note = f"{more} more designs are in the tables." if more else ""
-        sections.append(Section("Pareto fronts", [line], head=head, rows=rows, note=note))
+        sections.append(PageSection("Pareto fronts", [line], head=head, rows=rows, note=note))
     elif outcomes["passes"]:
         line = "The passing designs do not differ in two figures, so there is no trade-off."
         sections[-1] = sections[-1]._replace(note=line)
@@ -420,7 +420,7 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
     return page_html(title, lines, sections, footer, tiles)
 
 
-class Section(NamedTuple):
+class PageSection(NamedTuple):
     """A part of a page: ``lines``, a drawing, ``pictures`` side by side (name, data URI, or a note
     in place of one), and a table, of which rows in ``grey`` are of no interest.
     """
@@ -438,7 +438,7 @@ class Section(NamedTuple):
 def page_html(
     title: str,
     lines: Sequence[str],
-    sections: Sequence[Section],
+    sections: Sequence[PageSection],
     footer: str,
     tiles: Sequence[tuple[str, int, str]] = (),
 ) -> str:

@@ -21,7 +21,7 @@ from sbafab.reports.inflated_picture import PictureRequest, pictures_at_one_scal
 from sbafab.search import compare as module
 from sbafab.search import sweep as sweep_module
 from sbafab.search.compare import compare, compare_html, load_compared
-from sbafab.search.sweep_report import Section
+from sbafab.search.sweep_report import PageSection
 from tests.search.test_sweep import QUICK, _here
 from tests.site.formats import hold
 
@@ -160,7 +160,7 @@ def test_a_page_that_cannot_be_written_is_said(tmp_path: Path) -> None:
 def test_names_are_escaped(monkeypatch: pytest.MonkeyPatch) -> None:
     design = sbafab.load("1dof-5mm", "rules.yield_builds=100")
     found = compare(design, design, ("<b>", "b.toml"))
-    nothing = Section("Flat")
+    nothing = PageSection("Flat")
     monkeypatch.setattr(module, "_flat", lambda _: nothing)
     monkeypatch.setattr(module, "_inflated", lambda _: nothing)
     text = compare_html(found)
