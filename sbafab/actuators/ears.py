@@ -49,24 +49,26 @@ class Ray:
     long: bool
     joint: Point | None = None
 
-    def at(self, distance: float) -> Point:
-        return (
-            self.start[0] + self.direction[0] * distance,
-            self.start[1] + self.direction[1] * distance,
-        )
+    def at(self, distance: float, aside: float = 0.0) -> Point:
+        """A point on the ray, or to the left of it."""
+        (x, y), (dx, dy) = self.start, self.direction
+        return x + dx * distance - dy * aside, y + dy * distance + dx * aside
+
+    def reach(self, body: Region, width: float) -> float:
+        """Reach of a body along the ray, in a band of this width, mm."""
+        band = strip(self.start, self.at(FAR), width) & body
+        return max((e.farthest_along(self.start, self.direction) for e in band.edges), default=0.0)
 
 
 @dataclass(frozen=True)
 class Ear:
-    """An ear on its ray: masks leave it free from ``root`` on, the hole's centre is at ``hole``."""
+    """An ear on its ray: masks leave it free from ``root`` to its ``end``; its ``pin``."""
 
     ray: Ray
     root: float
-    hole: float
     end: float
     width: float
-    pin_diameter: float
-    clearance: float
+    pin: Pin
 
     @property
     def name(self) -> str:
@@ -75,10 +77,6 @@ class Ear:
     @property
     def strip(self) -> Region:
         return strip(self.ray.start, self.ray.at(self.end), self.width)
-
-    @property
-    def pin(self) -> Pin:
-        return Pin(self.ray.name, self.ray.at(self.hole), self.pin_diameter, self.clearance)
 
 
 def film_setback(design: Design) -> float:
@@ -97,6 +95,8 @@ def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) ->
     than one overhang, or if fillets fill all the room beside an ear.
     """
     overhang, radius = design.mask.overhang, design.fillet.radius
+    # In the way of an ear and the mask round it.
+    band = _width(design) + 4 * overhang
     for ray in rays:
         if ray.holder == "film" and not plates.contains(ray.start):
             x, y = ray.start
@@ -104,49 +104,47 @@ def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) ->
                 f"the ear {ray.name} starts at x {x:.3f}, y {y:.3f}, outside the films; make the "
                 'chamber larger there, or use registration.method = "channel-pin"'
             )
-    least = radius + overhang
-    ears = [
-        _ear(ray, _reach(ray, body, design) + least + LONGER[ray.holder][ray.long], design)
-        for ray in rays
-    ]
+    roots = [r.reach(body, band) + radius + overhang + LONGER[r.holder][r.long] for r in rays]
+    ears = [_ear(ray, root, design) for ray, root in zip(rays, roots, strict=True)]
     # At a sharp angle to its neighbour, an ear's fillet reaches farther out.
     spread = filleted(plates, ears, radius)
     ears = [
-        _ear(ear.ray, max(ear.root, _reach(ear.ray, spread, design) + overhang), design)
-        for ear in ears
+        _ear(ear.ray, max(ear.root, ear.ray.reach(spread, band) + overhang), design) for ear in ears
     ]
     spread = filleted(plates, ears, radius)
     for ear in ears:
-        if _reach(ear.ray, spread, design) + overhang > ear.root + ROUNDING:
+        if ear.ray.reach(spread, band) + overhang > ear.root + ROUNDING:
             raise DesignError(
                 f"fillet.radius = {radius:g} fills the room beside {ear.name}; make it smaller, "
                 'or use registration.method = "channel-pin"'
             )
-    check_apart(combinations([(ear.name, _outer(ear)) for ear in ears], 2), overhang)
+    outer = [(e.name, strip(e.ray.at(e.root), e.ray.at(e.end), e.width)) for e in ears]
+    check_apart(combinations(outer, 2), overhang)
     return tuple(ears)
 
 
+def _width(design: Design) -> float:
+    """Width of an ear or a tail's head: a hole, and a bond round it."""
+    return design.registration.hole_diameter + 2 * design.bond.width
+
+
 def _ear(ray: Ray, root: float, design: Design) -> Ear:
-    bond, pin = design.bond.width, design.registration.hole_diameter
-    hole = root + bond + pin / 2
-    size = design.registration.pin_diameter, design.registration.pin_clearance
-    return Ear(ray, root, hole, hole + pin / 2 + bond, pin + 2 * bond, *size)
+    width = _width(design)
+    return Ear(ray, root, root + width, width, _pin(ray.name, ray.at(root + width / 2), design))
 
 
-def _reach(ray: Ray, body: Region, design: Design) -> float:
-    """Reach of the body along a ray, in the way of an ear and its surrounding mask, mm."""
-    width = design.registration.hole_diameter + 2 * design.bond.width
-    band = strip(ray.start, ray.at(FAR), width + 4 * design.mask.overhang) & body
-    return max((edge.farthest_along(ray.start, ray.direction) for edge in band.edges), default=0.0)
+def _pin(name: str, place: Point, design: Design) -> Pin:
+    registration = design.registration
+    return Pin(name, place, registration.pin_diameter, registration.pin_clearance)
 
 
 def with_film_ears(outline: Region, ears: Sequence[Ear], radius: float) -> Region:
     """A TPE outline with its ears, their concave corners filleted; every piece by itself."""
     if not ears:
         return outline
-    film_ears = [ear for ear in ears if ear.ray.holder == "film"]
+    strips = [(ear.ray.start, ear.strip) for ear in ears if ear.ray.holder == "film"]
     return union(
-        fillet(union([piece, *(e.strip for e in film_ears if piece.contains(e.ray.start))]), radius)
+        fillet(union([piece, *(s for start, s in strips if piece.contains(start))]), radius)
         for piece in outline.pieces
     )
 
@@ -162,8 +160,11 @@ def film_holes(ears: Sequence[Ear]) -> Region:
 
 
 def _holes(ears: Sequence[Ear], holder: Holder) -> Region:
-    holders = [ear for ear in ears if ear.ray.holder == holder]
-    return union(disc(ear.pin.centre, ear.pin.hole / 2) for ear in holders) if holders else Region()
+    return _openings(ear.pin for ear in ears if ear.ray.holder == holder)
+
+
+def _openings(pins: Iterable[Pin]) -> Region:
+    return union(disc(pin.centre, pin.hole / 2) for pin in pins)
 
 
 def with_mask_ears(mask: Region, ears: Sequence[Ear], overhang: float) -> Region:
@@ -198,11 +199,6 @@ def check_apart(pairs: Iterable[tuple[Named, Named]], overhang: float) -> None:
                 f"{name} and {name_b} meet; make the chambers larger or registration.pin_diameter "
                 'smaller, or use registration.method = "channel-pin"'
             )
-
-
-def _outer(ear: Ear) -> Region:
-    """The part of an ear that lies beyond its root."""
-    return strip(ear.ray.at(ear.root), ear.ray.at(ear.end), ear.width)
 
 
 # Tails: inlet strips continue past the tabs' ends to tooling holes, if ears register the layers.
@@ -256,41 +252,25 @@ def head_reach(design: Design) -> float:
 
 
 def _tail(number: int, inlet: Inlet, body: Region, design: Design) -> Tail:
-    bond, overhang = design.bond.width, design.mask.overhang
-    pin = design.registration.hole_diameter
-    pin_size = design.registration.pin_diameter, design.registration.pin_clearance
-    width = pin + 2 * bond
-    (x, y), (dx, dy) = inlet.mouth, inlet.direction
-
-    def at(distance: float, aside: float = 0.0) -> Point:
-        return x + dx * distance - dy * aside, y + dy * distance + dx * aside
-
-    ahead = strip(at(0.0), at(FAR), width + 2 * (ASIDE * pin + 2 * overhang)) & body
-    reach = max((edge.farthest_along(at(0.0), (dx, dy)) for edge in ahead.edges), default=0.0)
-    root = reach + overhang
-    first = root + bond + pin / 2
+    overhang, width = design.mask.overhang, _width(design)
+    aside = ASIDE * design.registration.hole_diameter
+    axis = Ray(inlet.chamber, "mask", inlet.mouth, inlet.direction, False)
+    root = axis.reach(body, width + 2 * (aside + 2 * overhang)) + overhang
+    first = root + width / 2
     # Two holes in line are far apart, so that their play turns the mask little.
-    places = [first] if design.stack.balloons > 1 else [first, first + 2 * width]
-    end = places[-1] + pin / 2 + bond
-    aside = ASIDE * pin
-    names = [f"strip{number}"] if len(places) == 1 else [f"strip{number}.{n}" for n in (1, 2)]
+    places = {f"strip{number}": first}
+    if design.stack.balloons == 1:
+        places = {f"strip{number}.1": first, f"strip{number}.2": first + 2 * width}
+    end = max(places.values()) + width / 2
     return Tail(
         f"the tail of the inlet strip of {inlet.chamber}",
-        strip(at(0.0), at(end), inlet.width),
-        strip(at(root, aside), at(end, aside), width),
-        tuple(
-            Pin(name, at(place, aside), *pin_size)
-            for name, place in zip(names, places, strict=True)
-        ),
+        strip(inlet.mouth, axis.at(end), inlet.width),
+        strip(axis.at(root, aside), axis.at(end, aside), width),
+        tuple(_pin(name, axis.at(place, aside), design) for name, place in places.items()),
     )
 
 
-def with_tails(pockets: Region, inlet_tails: Iterable[Tail]) -> Region:
+def with_tails(pockets: Region, inlet_tails: Sequence[Tail]) -> Region:
     """Return the bottom balloon's masks with their tails and the holes of these."""
-    inlet_tails = tuple(inlet_tails)
-    if not inlet_tails:
-        return pockets
-    grown = union([pockets, *(part for tail in inlet_tails for part in (tail.strip, tail.head))])
-    return grown - union(
-        disc(pin.centre, pin.hole / 2) for tail in inlet_tails for pin in tail.pins
-    )
+    parts = [part for tail in inlet_tails for part in (tail.strip, tail.head)]
+    return union([pockets, *parts]) - _openings(pin for tail in inlet_tails for pin in tail.pins)

@@ -11,9 +11,10 @@ from pydantic import Field
 from sbafab.actuators import Family
 from sbafab.actuators.ears import film_setback
 from sbafab.actuators.fits import Fits, fitted
-from sbafab.actuators.footprint import Footprint, build_footprint
 from sbafab.actuators.stacking import (
+    Footprint,
     RoundChamber,
+    build_footprint,
     free_of_round,
     pocket_shapes,
     reach,

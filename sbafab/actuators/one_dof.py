@@ -6,10 +6,11 @@ from typing import Literal, Self
 
 from sbafab.actuators import Family
 from sbafab.actuators.fits import Fits, fitted
-from sbafab.actuators.footprint import Footprint, build_footprint
 from sbafab.actuators.stacking import (
+    Footprint,
     RoundChamber,
     bonded,
+    build_footprint,
     free_of_round,
     pocket_shapes,
     round_pockets,

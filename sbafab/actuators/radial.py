@@ -125,9 +125,15 @@ class RadialDesign(Design):
         return math.pi * self.tube.outer_diameter / self.chamber.count
 
     @property
+    def pocket(self) -> tuple[float, float]:
+        """Width round the tube and length along it of an oblong pocket."""
+        bonds = 2 * self.bond.width
+        return self.chamber.width - bonds, self.chamber.length - bonds
+
+    @property
     def form(self) -> Form:
         drawn = self.chamber.outline is not None
-        width, length = _slot(self)
+        width, length = sorted(self.pocket)
         pockets = Drawn() if drawn else Slots(width, length - width)
         wrap = Wrap(self.tube.outer_diameter, self.pitch, self.tube.glue, self.sheet.overlap)
         words = "radial expansion stacked balloon actuator"
@@ -186,26 +192,24 @@ def build(design: RadialDesign) -> Laminate:
     return replace(laminate, tube=design.tube.outer_diameter)
 
 
-def _slot(design: RadialDesign) -> tuple[float, float]:
-    """Width and length of an oblong pocket, the smaller one first."""
-    sides = design.chamber.width, design.chamber.length
-    width, length = sorted(side - 2 * design.bond.width for side in sides)
-    return width, length
+def _slot(width: float, length: float) -> Region:
+    """A slot with round ends, along whichever side is the longer."""
+    slot = stadium((0.0, 0.0), min(width, length), max(width, length))
+    return slot if width <= length else slot.turned(90)
 
 
 def _pocket(design: RadialDesign) -> Region:
     drawn = drawn_pocket(design)
     if drawn is not None:
         return drawn
-    bond = design.bond.width
-    width, length = _slot(design)
-    if width <= 0:
+    width, length = design.pocket
+    if min(width, length) <= 0:
         raise DesignError(
             f"chamber.width = {design.chamber.width:g} and chamber.length = "
-            f"{design.chamber.length:g} must both exceed two bond widths, {2 * bond:g}"
+            f"{design.chamber.length:g} must both exceed two bond widths, "
+            f"{2 * design.bond.width:g}"
         )
-    pocket = stadium((0.0, 0.0), width, length)
-    return pocket if design.chamber.width <= design.chamber.length else pocket.turned(90)
+    return _slot(width, length)
 
 
 def _check_pitch(design: RadialDesign, outline: Region) -> None:
@@ -229,9 +233,7 @@ def _window_size(design: RadialDesign, pocket: Region) -> tuple[float, float]:
 
 def _window(design: RadialDesign, pocket: Region, outline: Region) -> Region:
     width, length = _window_size(design, pocket)
-    window = stadium((0.0, 0.0), min(width, length), max(width, length))
-    if width > length:
-        window = window.turned(90)
+    window = _slot(width, length)
     if not (window - outline).is_empty:
         raise DesignError(
             f"window.width = {width:g} and window.length = {length:g} reach past the outline of "
@@ -294,16 +296,16 @@ def _ears(
     if design.registration.method != "ears":
         return ()
     low_x, low_y, high_x, high_y = sheet.bounds
-    films, masks = film_feet(design, outline), mask_feet(design, outline, head_reach(design))
+    feet = _Feet(design, outline)
+    films, masks = feet.of_films(), feet.of_masks()
     rays = []
     for number, (x, _) in enumerate(centres, start=1):
         for end, film, (mask, joint) in zip((1, 2), films, masks, strict=True):
-            long = end == 2
             foot, start = (x + film[0], film[1]), (x + mask[0], mask[1])
             joined = joint and (x + joint[0], joint[1])
             rays += [
-                Ray(f"film{number}.{end}", "film", foot, (0.0, -1.0), long),
-                Ray(f"mask{number}.{end}", "mask", start, (0.0, 1.0), long, joined),
+                Ray(f"film{number}.{end}", "film", foot, (0.0, -1.0), end == 2),
+                Ray(f"mask{number}.{end}", "mask", start, (0.0, 1.0), end == 2, joined),
             ]
     middle, off = (low_y + high_y) / 2, (high_y - low_y) / 6
     rays += [
@@ -313,113 +315,98 @@ def _ears(
     return placed(rays, bottom.outline | sheet, bottom.outline, design)
 
 
-# Starts of ears on an outline of any shape: two below, and two above beside its tab, which is on
-# the upper side at x = 0.
-
-
-Side = Literal[-1, 1]
 STEP = 0.25
 """Step between positions tried along an outline, mm."""
 
 
-def film_feet(design: Design, outline: Region) -> tuple[Point, Point]:
-    """Return starts of two film ears at the lower side, a quarter of the width beside its middle.
-
-    Raises DesignError if the outline has no room for both.
+class _Feet:
+    """Starts of ears on an outline of any shape: two below, and two above beside its tab, which is
+    on the upper side at x = 0. A ``side`` is 1 above, -1 below.
     """
-    low_x, _, high_x, _ = outline.bounds
-    middle, apart = round((low_x + high_x) / 2, 6), _apart(design)
-    beside = max(round((high_x - low_x) / 4, 6), apart)
-    first = _nearest(outline, middle - beside, -1, design)
-    second = first and _nearest(outline, middle + beside, -1, design, first[0])
-    if first is None or second is None:
-        raise DesignError(_no_room(2 * apart + design.bond.width))
-    return first, second
 
+    def __init__(self, design: RadialDesign, outline: Region) -> None:
+        self.outline, self.bond, self.overhang = outline, design.bond.width, design.mask.overhang
+        self.half = design.registration.hole_diameter / 2 + self.bond
+        """Half the width of an ear."""
+        self.apart = self.half + design.fillet.radius + self.overhang / 2
+        """Half the distance of two film ears: the fillets beside both, plus a margin."""
+        self.tab = max(design.strip_width / 2 + self.bond, head_reach(design))
+        """Reach of the tab and its tail's head to either side."""
 
-def mask_feet(
-    design: Design, outline: Region, head: float
-) -> tuple[tuple[Point, Point | None], ...]:
-    """Starts of two mask ears at the upper side, clear of the tab and the ``head`` of its tail.
+    def of_films(self) -> tuple[Point, Point]:
+        """Return starts of two film ears, a quarter of the width beside the outline's middle.
 
-    Each comes with the point of the outline that it is joined from, if it starts beside the
-    outline.
-    """
-    half, overhang = _half(design), design.mask.overhang
-    tab = max(design.strip_width / 2 + design.bond.width, head)
-    beside = tab + 2 * overhang + half
-    feet: list[tuple[Point, Point | None]] = []
-    for x in (-beside, beside):
-        # A mask reaches past the outline: an ear may be half beside it.
-        inner = x - math.copysign(half - design.bond.width, x)
-        start = _foot(outline, x, 1, design) or _foot(outline, inner, 1, design)
-        joint = None if start else _nearest(outline, x, 1, design)
-        start = start or joint
-        if start is None:
-            raise DesignError(_no_room(design.bond.width))
-        feet.append(((x, start[1]), joint))
-    return tuple(feet)
+        Raises DesignError if the outline has no room for both.
+        """
+        low_x, _, high_x, _ = self.outline.bounds
+        middle = round((low_x + high_x) / 2, 6)
+        beside = max(round((high_x - low_x) / 4, 6), self.apart)
+        first = self._nearest(middle - beside, -1)
+        second = first and self._nearest(middle + beside, -1, first[0])
+        if first is None or second is None:
+            raise self._no_room(2 * self.apart + self.bond)
+        return first, second
 
+    def of_masks(self) -> list[tuple[Point, Point | None]]:
+        """Return starts of two mask ears, clear of the tab and the head of its tail.
 
-def _no_room(width: float) -> str:
-    return (
-        f"the outline of an SBA has no room for ears, which take {width:.3f} mm of its width; make "
-        "the chamber wider or registration.pin_diameter smaller, or use "
-        'registration.method = "channel-pin"'
-    )
+        Each comes with the point of the outline that it is joined from, if it starts beside it.
+        """
+        beside = self.tab + 2 * self.overhang + self.half
+        feet: list[tuple[Point, Point | None]] = []
+        for x in (-beside, beside):
+            # A mask reaches past the outline: an ear may be half beside it.
+            inner = x - math.copysign(self.half - self.bond, x)
+            start = self._foot(x, 1) or self._foot(inner, 1)
+            joint = None if start else self._nearest(x, 1)
+            start = start or joint
+            if start is None:
+                raise self._no_room(self.bond)
+            feet.append(((x, start[1]), joint))
+        return feet
 
+    def _no_room(self, width: float) -> DesignError:
+        return DesignError(
+            f"the outline of an SBA has no room for ears, which take {width:.3f} mm of its width; "
+            "make the chamber wider or registration.pin_diameter smaller, or use "
+            'registration.method = "channel-pin"'
+        )
 
-def _half(design: Design) -> float:
-    """Half the width of an ear."""
-    return design.registration.hole_diameter / 2 + design.bond.width
+    def _foot(self, x: float, side: int) -> Point | None:
+        """A point of the outermost stretch of the outline at ``x``; None if that is too short."""
+        stretches = section(self.outline, (x, 0.0), (0.0, float(side)))
+        if not stretches or stretches[-1][1] - stretches[-1][0] < self.bond:
+            return None
+        start, end = stretches[-1]
+        return x, side * (end - min((end - start) / 2, 2 * self.half))
 
+    def _nearest(self, preferred: float, side: int, clear_of: float | None = None) -> Point | None:
+        """The foot nearest to ``preferred`` with no other part of the outline ahead of it, or the
+        one with the least ahead. ``clear_of``: the x of another ear.
+        """
+        low_x, _, high_x, _ = self.outline.bounds
+        reach = max(high_x, preferred) - min(low_x, preferred)
+        steps = [STEP * k for k in range(round(reach / STEP) + 1)]
+        best: tuple[float, Point] | None = None
+        for x in (preferred + sign * step for step in steps for sign in (1, -1)):
+            if clear_of is not None and abs(x - clear_of) < 2 * self.apart - 1e-9:
+                continue
+            start = self._foot(x, side)
+            if start is None:
+                continue
+            ahead = self._ahead(start, side)
+            if ahead < 4 * self.half:
+                return start
+            if best is None or ahead < best[0]:
+                best = ahead, start
+        return best and best[1]
 
-def _apart(design: Design) -> float:
-    """Half the distance of two film ears: the fillets beside both, plus a margin."""
-    return _half(design) + design.fillet.radius + design.mask.overhang / 2
-
-
-def _foot(outline: Region, x: float, side: Side, design: Design) -> Point | None:
-    """A point of the outermost stretch of the outline at ``x``; None if that is too short."""
-    stretches = section(outline, (x, 0.0), (0.0, float(side)))
-    if not stretches or stretches[-1][1] - stretches[-1][0] < design.bond.width:
-        return None
-    start, end = stretches[-1]
-    return x, side * (end - min((end - start) / 2, 2 * _half(design)))
-
-
-def _nearest(
-    outline: Region, preferred: float, side: Side, design: Design, clear_of: float | None = None
-) -> Point | None:
-    """The foot nearest to ``preferred`` with no other part of the outline ahead of it.
-
-    If every foot has some, the one with the least. ``clear_of``: the x of another ear.
-    """
-    low_x, _, high_x, _ = outline.bounds
-    reach = max(high_x, preferred) - min(low_x, preferred)
-    steps = [STEP * k for k in range(round(reach / STEP) + 1)]
-    best: tuple[float, Point] | None = None
-    for x in (preferred + sign * step for step in steps for sign in (1, -1)):
-        if clear_of is not None and abs(x - clear_of) < 2 * _apart(design) - 1e-9:
-            continue
-        start = _foot(outline, x, side, design)
-        if start is None:
-            continue
-        ahead = _ahead(outline, start, side, design)
-        if ahead < 4 * _half(design):
-            return start
-        if best is None or ahead < best[0]:
-            best = ahead, start
-    return best and best[1]
-
-
-def _ahead(outline: Region, start: Point, side: Side, design: Design) -> float:
-    """Reach of the outline past ``start`` in the way of an ear, mm."""
-    half = _half(design) + 2 * design.mask.overhang
-    _, low, _, high = outline.bounds
-    band = outline & rectangle((start[0] - half, low - 1), (start[0] + half, high + 1))
-    _, low, _, high = band.bounds
-    return (high - start[1]) if side > 0 else (start[1] - low)
+    def _ahead(self, start: Point, side: int) -> float:
+        """Reach of the outline past ``start`` in the way of an ear, mm."""
+        half = self.half + 2 * self.overhang
+        _, low, _, high = self.outline.bounds
+        band = self.outline & rectangle((start[0] - half, low - 1), (start[0] + half, high + 1))
+        return band.bounds[3] - start[1] if side > 0 else start[1] - band.bounds[1]
 
 
 FAMILY = Family(RadialDesign, build)
