@@ -9,16 +9,14 @@ from typing import Any
 import pytest
 
 import sbafab
-from sbafab.actuators import build, load_design
+from sbafab.actuators import load_design
 from sbafab.design.files import templates_folder
 from sbafab.design.films import Films
 from sbafab.design.identity import OTHER_TUBE, citation, design_sha256, tube_name
 from sbafab.design.kits import read_kit, write_kit
-from sbafab.design.records import Design, design_toml
+from sbafab.design.records import Design, design_toml, dotted
 from sbafab.design.sections import Acceptance, Laser, Press, Registration, Rules, Sheets
 from sbafab.errors import DesignError
-from sbafab.reports.traveller.times import times
-from sbafab.reports.traveller.work import Work
 
 SECTIONS = {
     "films": Films(),
@@ -31,14 +29,9 @@ SECTIONS = {
 }
 
 
-def numbers(table: dict[str, Any], prefix: str) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for key, value in table.items():
-        if isinstance(value, dict):
-            found |= numbers(value, f"{prefix}{key}.")
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            found[f"{prefix}{key}"] = value
-    return found
+def numbers(table: dict[str, Any]) -> dict[str, object]:
+    rows = dotted(table)
+    return {k: v for k, v in rows if isinstance(v, int | float) and not isinstance(v, bool)}
 
 
 def at(table: Any, key: str) -> Any:
@@ -73,10 +66,8 @@ def lab(tmp_path: Path) -> Path:
 
 def test_the_papers_kit_says_every_number_that_a_design_has_by_default() -> None:
     kit = read_kit(templates_folder() / "kits" / "paper.toml")
-    usual = {}
-    for section, record in SECTIONS.items():
-        usual |= numbers(record.model_dump(mode="json"), f"{section}.")
-    for key, value in usual.items():
+    usual = {section: record.model_dump(mode="json") for section, record in SECTIONS.items()}
+    for key, value in numbers(usual).items():
         assert at(kit.tables, key) == value, key
         assert kit.sources[key].strip()
     tube = Design.model_fields["inlet"].default
@@ -108,18 +99,6 @@ def test_a_tube_of_another_size_does_not_keep_the_name_of_the_kits(lab: Path) ->
         assert tube_name(load_design("1dof-5mm", changes)) == name
 
 
-def test_the_time_of_curing_is_that_of_the_kits_adhesive(lab: Path) -> None:
-    hours = 'cure_hours = { value = 6, source = "its package" }'
-    lab.write_text(lab.read_text().replace('use = "a small drop', f'{hours}\nuse = "a small drop'))
-    for changes, cure in (
-        ([], 24),
-        ([f"kit={lab}"], 6),
-        ([f"kit={lab}", "order.cure_hours=2"], 2),
-    ):
-        design = load_design("1dof-5mm", changes)
-        assert times(Work(design, build(design), ())).cure == 60 * cure
-
-
 def test_the_kits_sources_count_in_the_hash(lab: Path) -> None:
     first = design_sha256(load_design("1dof-5mm", [f"kit={lab}"]))
     lab.write_text("# a remark\n" + lab.read_text())
@@ -133,16 +112,6 @@ BAD = {
         'thickness = { value = 0.038, source = "paper, Sec. 2" }',
         "thickness = 0.038",
         r"films.tpe.thickness = 0.038 has no source; write films.tpe.thickness = \{ value",
-    ),
-    "modulus in another unit": (
-        "value = 10.0",
-        'value = "1450 psi"',
-        r"modulus = '1450 psi' must be a number, in MPa, or a text with its unit \(or kPa, GPa\)",
-    ),
-    "value out of range": (
-        "value = 0.038",
-        "value = 38",
-        r"films.tpe.thickness = 38 must be at most 1 mm",
     ),
     "unknown key": (
         "cutting_error =",
@@ -182,13 +151,6 @@ def test_a_bad_kit_is_refused_in_one_sentence(case: str, tmp_path: Path) -> None
         load_design("1dof-5mm", [f"kit={path}"])
     assert str(path) in str(raised.value)
     assert "\n" not in str(raised.value)
-
-
-def test_a_kit_is_never_written_over(tmp_path: Path) -> None:
-    path = write_kit(tmp_path / "our-lab.toml")
-    assert read_kit(path).name == "our-lab"
-    with pytest.raises(DesignError, match="exists"):
-        write_kit(path)
 
 
 def test_another_product_shares_no_property_of_the_papers_film(tmp_path: Path) -> None:

@@ -20,14 +20,8 @@ def laminate() -> Laminate:
 
 
 def told(step: LayUpStep) -> tuple[object, ...]:
-    return (
-        step.number,
-        step.name,
-        step.bond,
-        step.stacks,
-        step.adds,
-        [pin.name for pin in step.pins],
-    )
+    pins = [pin.name for pin in step.pins]
+    return step.number, step.name, step.bond, step.stacks, step.adds, pins
 
 
 def test_three_balloons_take_four_steps(laminate: Laminate) -> None:

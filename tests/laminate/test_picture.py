@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
@@ -11,7 +10,6 @@ from shapely.geometry import Polygon
 from svgelements import Arc, Move, Path
 
 from sbafab.actuators import build, load_design
-from sbafab.geometry.region import rectangle
 from sbafab.laminate.laminate import Laminate, Layer
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -51,29 +49,11 @@ def test_every_pattern_is_drawn_with_its_exact_area(laminate: Laminate) -> None:
         assert "A" in data
 
 
-def test_the_view_has_a_margin_of_three_hundredths(laminate: Laminate) -> None:
-    # Its bounds are off the axis both ways: 20 x 10 mm, a margin of 0.6 all round.
-    layer = replace(laminate.layer(1), profile=rectangle((5.0, 30.0), (25.0, 40.0)))
-    root = drawing(layer)
-    box = [float(part) for part in root.attrib["viewBox"].split()]
-    assert box == pytest.approx([4.4, -40.6, 21.2, 11.2])
-    [group] = root.iter(f"{SVG}g")
-    # A line of 0.3 mm as shown, where 21.2 mm are 80 mm wide.
-    assert float(group.attrib["stroke-width"]) == pytest.approx(0.3 * 21.2 / 80, rel=1e-4)
-
-
 def test_only_the_laminate_is_see_through(laminate: Laminate) -> None:
     [alone] = drawing(laminate.layer(1)).iter(f"{SVG}path")
     assert float(alone.attrib["fill-opacity"]) == 1.0
     for path in drawing(laminate).iter(f"{SVG}path"):
         assert 0.2 < float(path.attrib["fill-opacity"]) < 0.8
-
-
-def test_a_name_with_markup_is_escaped(laminate: Laminate) -> None:
-    named = replace(laminate, name="<b> & co")
-    title = drawing(named).find(f"{SVG}title")
-    assert title is not None
-    assert str(title.text).startswith("<b> & co: 7 layers")
 
 
 def test_notebooks_get_a_scale_and_a_legend(laminate: Laminate) -> None:

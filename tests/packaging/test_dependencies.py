@@ -6,12 +6,13 @@ import re
 import sys
 import tomllib
 from pathlib import Path
-from typing import Any
 
 from sbafab.cli import EXTRAS
 from tests.packaging.sources import sources
 
 ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+EXTRA = PROJECT["optional-dependencies"]
 INSTALLED_AS = {
     "PIL": "pillow",
     "netgen": "netgen-mesher",
@@ -51,35 +52,24 @@ def third_party(folder: Path) -> set[str]:
     return {INSTALLED_AS.get(name, name) for name in modules} - OUR_OWN
 
 
-def _testing(project: dict[str, Any]) -> set[str]:
-    return {name for extra in TESTING for name in names(project["optional-dependencies"][extra])}
+def _testing() -> set[str]:
+    return {name for extra in TESTING for name in names(EXTRA[extra])}
 
 
 def test_the_package_needs_what_it_imports_and_no_more() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = {
-        name
-        for extra, needed in project["optional-dependencies"].items()
-        if extra not in APART
-        for name in names(needed)
+        name for extra, needed in EXTRA.items() if extra not in APART for name in names(needed)
     }
-    assert third_party(ROOT / "sbafab") | BY_SCRIPTS == names(project["dependencies"]) | extras
-    assert extras <= _testing(project)
+    assert third_party(ROOT / "sbafab") | BY_SCRIPTS == names(PROJECT["dependencies"]) | extras
+    assert extras <= _testing()
 
 
 def test_the_tests_need_nothing_undeclared() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    declared = names(project["dependencies"]) | _testing(project)
+    declared = names(PROJECT["dependencies"]) | _testing()
     assert third_party(ROOT / "tests") <= declared
 
 
-def test_the_extra_all_is_all_that_the_package_can_use() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    extras = project["optional-dependencies"]
-    (said,) = extras["all"]
-    assert said == f"sbafab[{','.join(sorted(extras.keys() - APART))}]"
-
-
-def test_help_names_every_extra_that_the_package_can_use() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert set(EXTRAS) == project["optional-dependencies"].keys() - APART
+def test_the_extra_all_and_help_have_every_extra() -> None:
+    (said,) = EXTRA["all"]
+    assert said == f"sbafab[{','.join(sorted(EXTRA.keys() - APART))}]"
+    assert set(EXTRAS) == EXTRA.keys() - APART
