@@ -129,8 +129,10 @@ def _width(design: Design) -> float:
 
 
 def _ear(ray: Ray, root: float, design: Design) -> Ear:
-    width = _width(design)
-    return Ear(ray, root, root + width, width, _pin(ray.name, ray.at(root + width / 2), design))
+    half = design.registration.hole_diameter / 2
+    hole = root + design.bond.width + half
+    end = hole + half + design.bond.width
+    return Ear(ray, root, end, _width(design), _pin(ray.name, ray.at(hole), design))
 
 
 def _pin(name: str, place: Point, design: Design) -> Pin:
@@ -256,12 +258,13 @@ def _tail(number: int, inlet: Inlet, body: Region, design: Design) -> Tail:
     aside = ASIDE * design.registration.hole_diameter
     axis = Ray(inlet.chamber, "mask", inlet.mouth, inlet.direction, False)
     root = axis.reach(body, width + 2 * (aside + 2 * overhang)) + overhang
-    first = root + width / 2
+    bond, half = design.bond.width, design.registration.hole_diameter / 2
+    first = root + bond + half
     # Two holes in line are far apart, so that their play turns the mask little.
     places = {f"strip{number}": first}
     if design.stack.balloons == 1:
         places = {f"strip{number}.1": first, f"strip{number}.2": first + 2 * width}
-    end = max(places.values()) + width / 2
+    end = max(places.values()) + half + bond
     return Tail(
         f"the tail of the inlet strip of {inlet.chamber}",
         strip(inlet.mouth, axis.at(end), inlet.width),

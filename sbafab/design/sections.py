@@ -574,6 +574,14 @@ class Rules(Section):
     waive: tuple[Annotated[str, *name_of(rule_names)], ...] = Field(default=(), strict=False)
     """Rules whose failure does not stop the cut files; every file then says so."""
 
+    @field_validator("waive", mode="before")
+    @classmethod
+    def _without_removed_rules(cls, names: object) -> object:
+        # Earlier design files waive the rules of registered sheets, which need no waiver.
+        if isinstance(names, list | tuple):
+            return [name for name in names if name not in ("bridges", "scrap")]
+        return names
+
     @property
     def channels_open_at_kpa(self) -> float:
         """Pressure at which a channel of a net must open."""
