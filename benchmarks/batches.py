@@ -34,7 +34,7 @@ def pose_seconds(is_dragged: bool) -> float:
     """Processor time of one of ``STATES`` equilibria: from poses of a little other pressures, or
     from nothing.
     """
-    from sbafab.models.stack_batch import StackBatch
+    from sbafab.models.stack import StackBatch
 
     batch, numbers = StackBatch(sbafab.stack(DESIGN)), np.random.default_rng(1)
     pressures = numbers.uniform(0.1, 0.98 * MOST, (STATES, 3))
@@ -61,7 +61,7 @@ def places(load: str) -> Any:
 
 def reach_seconds(load: str) -> float:
     """Processor time of bringing the tip to one of ``PLACES``, all at once."""
-    from sbafab.models.stack_batch import StackBatch
+    from sbafab.models.stack import StackBatch
 
     batch, loads = StackBatch(sbafab.stack(DESIGN)), (LOADS | PLATES)[load]
     tips = places(load)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from sbafab.design.records import Design
     from sbafab.errors import DesignError
     from sbafab.laminate.laminate import Laminate
-    from sbafab.models.stack_batch import StackBatch
+    from sbafab.models.stack import StackBatch
     from sbafab.rules.finding import Findings
 
 __all__ = [
@@ -94,7 +94,7 @@ MODULES = {
     "api.predictions": ("grip", "motion", "predict", "predict_assembly", "stack"),
     "api.runs": ("cut", "generate", "import_design", "mesh", "nest", "press", "simulate"),
     "api.search": ("compare", "find", "reach_yield", "sweep"),
-    "models.stack_batch": ("StackBatch",),
+    "models.stack": ("StackBatch",),
     "rules.finding": ("Findings",),
 }
 """Functions and records by module; a module is loaded on first use. ``api.designs`` has the rest.

@@ -29,8 +29,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sbafab.models.film_elements import Array
+    from sbafab.models.stack import Stack
+    from sbafab.models.stack_balance import Pose
     from sbafab.models.stack_loads import Load, LoadedEnergy
-    from sbafab.models.stack_poses import Pose, PosedStack
 
 RIGID = 1e-9
 """Share of the largest compliance below which a motion of the tip counts as impossible."""
@@ -133,7 +134,7 @@ class Linearised(NamedTuple):
 
 
 def derivatives(
-    stack: PosedStack, pose: Pose, load: Load | None = None, sucked: bool = False
+    stack: Stack, pose: Pose, load: Load | None = None, sucked: bool = False
 ) -> Derivatives:
     """Return the derivatives of a pose of a stack under the load that it was found with. Raises
     DesignError for a pose that is about to buckle.
@@ -160,7 +161,7 @@ def derivatives(
 
 
 def linearised(
-    stack: PosedStack, pose: Pose, load: Load | None = None, sucked: bool = False
+    stack: Stack, pose: Pose, load: Load | None = None, sucked: bool = False
 ) -> Linearised:
     """Return a stack linearised about a pose under the load that it was found with."""
     each = stack.springs(pose.pressures, sucked, by_level=True, orders=3)

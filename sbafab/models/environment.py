@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from sbafab.errors import DesignError
 from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import Line
-from sbafab.models.stack import Stack
-from sbafab.models.stack_batch import StackBatch
+from sbafab.models.stack import Stack, StackBatch
 
 
 class ReachEnvironment(gymnasium.Env[Any, Any]):

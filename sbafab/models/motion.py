@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,17 +19,23 @@ from sbafab.errors import DesignError
 from sbafab.models.derivatives import derivatives, hessian
 from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import ATMOSPHERE_KPA, Line
-from sbafab.models.stack_balance import Balance, is_positive_definite, put, step_limit
-from sbafab.models.stack_loads import Load, loaded_energy
-from sbafab.models.stack_poses import (
+from sbafab.models.stack_balance import (
     CHUNK,
     LOADED_CHUNK,
+    Balance,
     BatchPoses,
     Equilibria,
     Pose,
-    PosedStack,
+    is_positive_definite,
+    put,
+    step_limit,
 )
+from sbafab.models.stack_loads import Load, loaded_energy
 from sbafab.process import one_blas_thread
+
+if TYPE_CHECKING:
+    from sbafab.models.stack import Stack
+
 
 MOTION_STEPS = 16
 """Maximum Newton steps of freedoms and pressures together."""
@@ -104,7 +110,7 @@ class Supply(NamedTuple):
 class SupplyStep(NamedTuple):
     """States of a ``stack`` under a ``load`` that take in a supply."""
 
-    stack: PosedStack
+    stack: Stack
     load: Load | None
 
     def after(self, begin: Balance, pressures: Array, supply: Supply) -> tuple[Balance, Array]:
@@ -119,7 +125,7 @@ class SupplyStep(NamedTuple):
                 part = slice(first, first + size)
                 is_solved[part] = self._together(at[part], p[part], supply.at(part))
         is_solved &= stack.excess(at, self.load) <= 0
-        found = Balance.stable(at)
+        found = Balance.of(at)
         for number in np.flatnonzero(~is_solved):
             one = slice(number, number + 1)
             start = stack.by_level(begin.freedoms[one])
@@ -358,7 +364,7 @@ class Motion:
     as well.
     """
 
-    stack: PosedStack
+    stack: Stack
     line: Line
     load: dict[str, Any]
     pose: Pose
@@ -414,7 +420,7 @@ class BatchMotion:
     ``times`` (N,) in s; ``line`` feeds each chamber.
     """
 
-    stack: PosedStack
+    stack: Stack
     line: Line
     load: Load | None
     start: Equilibria

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import permutations, product, takewhile
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,14 @@ from numpy.typing import NDArray
 from sbafab.errors import DesignError, UnreachableError
 from sbafab.models.derivatives import derivatives, hessian
 from sbafab.models.film_elements import Array
-from sbafab.models.stack_balance import Balance, is_positive_definite, put, step_limit
+from sbafab.models.stack_balance import (
+    Balance,
+    Equilibria,
+    Pose,
+    is_positive_definite,
+    put,
+    step_limit,
+)
 from sbafab.models.stack_loads import (
     WALL_STIFFNESS,
     Load,
@@ -39,7 +46,9 @@ from sbafab.models.stack_loads import (
     plate_chain,
     with_diagonal_blocks,
 )
-from sbafab.models.stack_poses import Equilibria, Pose, PosedStack
+
+if TYPE_CHECKING:
+    from sbafab.models.stack import Stack
 
 P0 = 0.1
 """Pressure in kPa below which pressures are counted evenly, above in their logarithm."""
@@ -123,7 +132,7 @@ class Linearisation(NamedTuple):
 class Search:
     """Inverse kinematics of a ``stack`` under a ``load``, with asinh(p / P0) up to ``most``."""
 
-    stack: PosedStack
+    stack: Stack
     load: Load | None
     most: float
 
@@ -484,7 +493,7 @@ def bounded_steps(rates: Array, missing: Array, damping: Array, room: tuple[Arra
 # Starts.
 
 
-def starts(stack: PosedStack, places: Array, most: float) -> Array:
+def starts(stack: Stack, places: Array, most: float) -> Array:
     """Return asinh(p / P0), up to ``most``, of chambers as long as on arcs from the base to places
     (n, 3) in mm: (n, chambers).
 
@@ -507,7 +516,7 @@ def _arcs(places: Array) -> tuple[Array, Array, Array]:
 
 
 @lru_cache(maxsize=16)
-def _column_rises(stack: PosedStack, most: float) -> tuple[Array, Array]:
+def _column_rises(stack: Stack, most: float) -> tuple[Array, Array]:
     """Return by how many mm all balloons of a chamber rise freely, and at which asinh(p / P0)."""
     grid = np.linspace(0.0, most, 33)
     kinds = np.stack([kind.rises(P0 * np.sinh(grid)) for kind in stack.maps])

@@ -1,10 +1,13 @@
-"""Equilibrium of a stack by Newton's method: levels alone and all together under a load, of many
-states at once, and against an outer plate, of one.
+"""Equilibrium of a stack at given pressures by Newton's method with a line search, of many states
+at once: levels that do not act on each other, all levels under a load, and against an outer plate.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,63 +15,36 @@ from numpy.typing import NDArray
 
 from sbafab.models.film_elements import Array
 from sbafab.models.stack_loads import (
+    Chain,
     Load,
-    LoadedEnergy,
     OuterPlate,
-    PlateContact,
     Springs,
     loaded_energy,
+    plate_chain,
     with_diagonal_blocks,
 )
 
+CHUNK, LOADED_CHUNK = 512, 48
+"""States solved together, without and with a load: more bring no speed, and cost memory."""
 LARGEST_MOVE = np.array([0.4, 0.15, 0.15])
-LEAST_LIMIT = float(LARGEST_MOVE.min())
-"""Largest rise (mm) and tilts (rad) in one step, and the least of these."""
-SMALLEST_STEP = 1e-6
-"""Step (mm, rad) below which an equilibrium counts as converged."""
-SOFT_PLATES = ((1e3, 1e5), (1e3, 1e4, 1e5), (1e4, 1e5))
+"""Largest rise (mm) and tilts (rad) in one step."""
+FINE = 5e-8
+"""Error (mm, rad) at which a descent ends; those of all levels add up."""
+NEAR_FINE = 1e-6
+"""The same for loaded states from a start nearby, and against a plate."""
+SOFT_PLATES = ((2e3, 6e4), (1e3, 1e4, 1e5), (1e4,))
 """Stiffness in mN/mm of an outer plate in the first solutions, for paths tried in turn."""
 MOST_STEPS, HALVINGS = 300, 14
 RESIDUAL = 1e-7
 """Tolerance of the residual, mN or mN mm."""
-SMALLEST_SUM_STEP = 5e-8
-"""Smallest step where the errors of all levels add up: tilts under a load, volumes without."""
 PLATE_LAST_STEP, PLATE_LAST_GAIN = 3e-5, 1e-7
 """Largest last step (mm, rad) against an outer plate, and its energy (uJ): the plate's force is to
 converge as well.
 """
-ROUGH_STEP = 0.01
-"""Last step (mm, rad) against a soft plate."""
 RIM_ROUNDS = 2
 """Times that a step is limited by rims that it would meet."""
-CORRECTIONS, SMALL_CORRECTION = 16, 0.8
-"""Corrections of a step by the springs at its end, and the share of it that is small: the next step
-makes up for the rest.
-"""
-STRAIGHT = 6e-3
-"""Step (mm, rad) along which springs are linear enough."""
-REUSED_STEP, REUSED_PRODUCT, SPRING_CHANGE = 2e-3, 1e-9, 0.2
-"""Step whose tangent stiffness the next may use again, the product of both steps at which that one
-is the last, and the relative change of springs in between.
-"""
-FEW_STEPS = 12
-"""Steps within which a far start must meet an outer plate."""
-PLATE_STEPS = 12
-"""Steps against an outer plate before another method is tried."""
-PLATE_SMALLEST_STEP = 1e-7
-"""Step (mm, rad) against an outer plate below which an equilibrium counts as converged."""
-PLATE_RESIDUAL = 1e-4
-"""Tolerance of the residual, mN or mN mm, and as a share of the plate's force."""
-FIRST_STEP = 1e-3
-"""Assumed step (mm, rad) before the first one."""
-PLATE_CORRECTIONS, PLATE_SMALL_CORRECTION = 24, 0.2
-"""Corrections of a step by springs and contacts at its end, and the share of it that is small."""
-CONTACT_ROUNDS, CONTACT_RIM_ROUNDS = 8, 2
-"""Rounds of the active set of contacts, and those with further rims in contact."""
-STEP_SHARES = 0.5 ** np.arange(12)
-"""Shares of a step to an active set other than its own."""
-PUSH_RATIO = 2.0
-"""Largest initial force on a plate over the largest push of a level."""
+ROUGH_STEP = 0.01
+"""Last step (mm, rad) against a soft plate."""
 
 
 class Balance(NamedTuple):
@@ -82,466 +58,324 @@ class Balance(NamedTuple):
     is_found: NDArray[np.bool_]
 
     @classmethod
-    def none(cls, start: Array) -> Balance:
-        """Return as many that are not found."""
-        count = len(start)
-        false = np.zeros(count, dtype=bool)
-        return cls(start.copy(), np.zeros(count), false, false.copy())
+    def of(cls, freedoms: Array, pushes: Array | None = None, is_found: bool = True) -> Balance:
+        """Return stable equilibria, or as many that are not found."""
+        count = len(freedoms)
+        each = np.zeros(count) if pushes is None else pushes
+        return cls(freedoms.copy(), each, *np.full((2, count), is_found))
+
+
+@dataclass(frozen=True)
+class Plate:
+    """An outer plate that the tip may push on: through ``point`` (mm), ``normal`` pointing away.
+
+    ``Plate.at(height)`` lies level. With ``sticks`` friction holds the middle of the tip on the
+    line through the point along the normal; without, it slides along the plate.
+    """
+
+    point: tuple[float, float, float]
+    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    sticks: bool = True
 
     @classmethod
-    def stable(cls, freedoms: Array, pushes: Array | None = None) -> Balance:
-        """Return stable equilibria."""
-        true = np.ones(len(freedoms), dtype=bool)
-        return cls(
-            freedoms, np.zeros(len(freedoms)) if pushes is None else pushes, true, true.copy()
-        )
+    def at(cls, height: float) -> Plate:
+        """Return a level plate at a height in mm above the base."""
+        return cls((0.0, 0.0, height))
 
-    def keep(self, which: Any, freedoms: Array, pushes: Any, is_stable: Any) -> None:
-        """Note states that are found."""
-        self.freedoms[which], self.pushes[which] = freedoms, pushes
-        self.is_stable[which], self.is_found[which] = is_stable, True
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A stack in equilibrium at ``pressures`` (kPa, one a chamber).
+
+    ``pitch`` is the height of a flat level in mm, ``freedoms`` (levels, 3) are rise in mm and tilt
+    in rad of each level; ``gaps`` (levels, chambers) by how many mm each balloon has risen at its
+    own centre; ``volumes`` ul a chamber; ``force`` N on the outer plate; ``energy`` uJ stored in
+    the films. A pose that is not ``stable`` is an unstable equilibrium, such as a straight column
+    that would buckle.
+    """
+
+    pressures: tuple[float, ...]
+    freedoms: Array
+    gaps: Array
+    volumes: Array
+    force: float
+    energy: float
+    stable: bool
+    pitch: float
+
+    @cached_property
+    def _chain(self) -> Chain:
+        return plate_chain(self.freedoms, self.pitch)
+
+    @property
+    def frames(self) -> tuple[Array, Array]:
+        """Origins (n, 3) in mm and axes (n, 3, 3) of the plates, the base first; the columns of
+        ``axes[i]`` are the x, y and z of plate i.
+        """
+        return self._chain.places, self._chain.axes
+
+    @property
+    def tip(self) -> Array:
+        """Middle of the top plate (3,) in mm."""
+        return np.asarray(self._chain.places[-1])
+
+    @property
+    def height(self) -> float:
+        """Height of the middle of the top plate above the base, mm."""
+        return float(self.tip[2])
+
+    @property
+    def bend(self) -> float:
+        """Degrees from base to top; along the stack, so that it may be more than half a turn."""
+        return math.degrees(math.hypot(*self.freedoms[:, 1:].sum(0)))
+
+    @property
+    def direction(self) -> float:
+        """Degrees round the base, from x, towards which it bends; 0 where it stands straight."""
+        x, y = self.freedoms[:, 1:].sum(0)
+        return math.degrees(math.atan2(-x, y)) if math.hypot(x, y) > 1e-9 else 0.0
+
+
+class Equilibria(NamedTuple):
+    """States of a stack: ``pressures`` (n, chambers) in kPa and ``freedoms`` (n, rows, 3), a row
+    per kind of balloon without a load and per level under one; ``volumes`` (n, chambers) ul,
+    ``energies`` (n) uJ in the films, ``pushes`` (n) mN on an outer plate, which are stable and
+    which have been found (n); ``excess`` (n) mm by which a balloon rises above its map.
+    """
+
+    pressures: Array
+    freedoms: Array
+    volumes: Array
+    energies: Array
+    pushes: Array
+    is_stable: NDArray[np.bool_]
+    is_found: NDArray[np.bool_]
+    excess: Array
+
+    def part(self, which: Any) -> Equilibria:
+        """Return some of the states."""
+        return Equilibria(*(part[which] for part in self))
+
+    @property
+    def balance(self) -> Balance:
+        """The freedoms in balance."""
+        return Balance(self.freedoms, self.pushes, self.is_stable, self.is_found)
+
+    @property
+    def is_met(self) -> NDArray[np.bool_]:
+        """Which have been found, with all balloons on their maps: (n)."""
+        return np.asarray(self.is_found & (self.excess <= 0))
+
+
+@dataclass(frozen=True, eq=False)
+class BatchPoses:
+    """N poses of a stack at ``pressures`` (N, chambers) in kPa.
+
+    ``freedoms`` (N, levels, 3) are rise in mm and tilt in rad of each level; ``volumes``
+    (N, chambers) ul; ``tips`` (N, 3) the middles of the top plates in mm; ``forces`` (N,) N on an
+    outer plate.
+    """
+
+    pressures: Array
+    freedoms: Array
+    volumes: Array
+    tips: Array
+    forces: Array
+
+    @property
+    def heights(self) -> Array:
+        """Heights of the middles of the top plates above the base in mm: (N,)."""
+        return np.asarray(self.tips[:, 2])
+
+    @cached_property
+    def bends(self) -> Array:
+        """Degrees from base to top, along the stack: (N,)."""
+        return np.asarray(np.degrees(np.hypot(*self.freedoms[:, :, 1:].sum(1).T)))
+
+
+class LocalEnergy(NamedTuple):
+    """Energies (n, groups) of groups of levels that do not act on each other, with gradients (n,
+    groups, size), second derivatives (n, groups, size, size), and the push on a plate (n).
+    """
+
+    value: Array
+    gradient: Array
+    matrix: Array
+    push: Array
+
+
+Energies = Callable[[Any, Array], LocalEnergy]
+"""The energies of some of the states, by freedoms (n, groups, size)."""
 
 
 def put(record: Any, which: Any, other: Any) -> None:
     """Replace some of the states of a record of arrays by another's."""
     for mine, its in zip(record, other, strict=True):
-        if isinstance(mine, np.ndarray):
-            mine[which] = its
-        elif mine is not None:
-            put(mine, which, its)
+        mine[which] = its
 
 
 def free_equilibrium(springs: Springs, start: Array) -> Balance:
     """Return the equilibria without external load of n states, (n, rows, 3), whose rows do not act
     on each other: the energy of a level alone is convex.
     """
-    found, live, at = Balance.none(start), np.arange(len(start)), start
-    before = np.full(len(start), SMALLEST_STEP)
-    now = springs.energy(at)
-    for _ in range(MOST_STEPS):
-        value, gradient, matrix = now
-        move = newton_step(gradient, matrix)
-        largest = np.abs(move).max((1, 2))
-        is_over = is_last_step(largest, before, SMALLEST_SUM_STEP)
-        is_over |= np.abs(gradient).max((1, 2)) < RESIDUAL
-        if is_over.any():
-            found.keep(live[is_over], (at + move)[is_over], 0.0, True)
-            if is_over.all():
-                break
-            rest = ~is_over
-            live, at, move, largest = live[rest], at[rest], move[rest], largest[rest]
-            value, springs = value[rest], springs.at(rest)
-        share = step_limit(move, largest)
-        now = springs.energy(at + share[..., None] * move)
-        for _ in range(HALVINGS):
-            is_far = _rises(now[0], value)
-            if not is_far.any():
-                break
-            share = np.where(is_far, share / 2, share)
-            far = np.flatnonzero(is_far.any(1))
-            put(now, far, springs.at(far).energy((at + share[..., None] * move)[far]))
-        before = largest * (share == 1).all(1)
-        at = at + share[..., None] * move
-    return found
 
+    def energies(which: Any, at: Array) -> LocalEnergy:
+        return LocalEnergy(*springs.at(which).energy(at), np.zeros(len(at)))
 
-def _rises(after: Array, before: Array) -> NDArray[np.bool_]:
-    """Return which energies rise by more than rounding."""
-    return np.asarray(~(after <= before + 1e-11 * (1 + np.abs(before))))
+    return _descent(energies, start, start.shape)
 
 
 def loaded_equilibrium(
     springs: Springs, pitch: float, load: Load, start: Array, is_near: bool
 ) -> Balance:
-    """Return the equilibria under a load of n states, (n, levels, 3); of one state against an outer
-    plate.
+    """Return the equilibria under a load of n states, (n, levels, 3).
 
-    An outer plate that is not met soon is stiffened gradually, since steps without contact would
-    run far into it; ``is_near`` marks a start that may be in contact.
+    An outer plate is stiffened gradually unless the start, which ``is_near``, may be in contact:
+    steps without contact would run far into it.
     """
     wall = load.wall
-    if wall is not None:
-        return _plate_equilibrium(springs.at(0), pitch, load, wall, start[0], is_near)
-    fine = SMALLEST_STEP if is_near else SMALLEST_SUM_STEP
-    found = _energy_descent(springs, pitch, load, start, FEW_STEPS, quick=fine)
-    rest = np.flatnonzero(~found.is_found)
-    if rest.size:
-        put(found, rest, _energy_descent(springs.at(rest), pitch, load, start[rest], MOST_STEPS))
+    if wall is None or is_near:
+        found = _loaded(springs, pitch, load, start, NEAR_FINE if is_near else FINE)
+    else:
+        start = start_below(springs, start, pitch, wall, load.stiffness)
+        found = Balance.of(start, is_found=False)
+    for path in () if wall is None else SOFT_PLATES:
+        rest = np.flatnonzero(~found.is_found)
+        at = start[rest]
+        for stiffness in path if rest.size else ():
+            softer = load._replace(stiffness=stiffness)
+            soft = _loaded(springs.at(rest), pitch, softer, at, enough=ROUGH_STEP)
+            rest, at = rest[soft.is_found], soft.freedoms[soft.is_found]
+        put(found, rest, _loaded(springs.at(rest), pitch, load, at))
     return found
 
 
-def _plate_equilibrium(
-    springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array, is_near: bool
-) -> Balance:
-    """Return the equilibrium of one state against an outer plate, from freedoms (levels, 3)."""
-    at = start if is_near else start_below(springs, start, pitch, wall, load.stiffness)
-    balance = _contact_descent(springs, pitch, load, wall, at)
-    if balance is None:
-        most = MOST_STEPS if is_near else FEW_STEPS
-        balance = _one_descent(springs, pitch, load, at, most)
-    return balance or _by_softer_plates(springs, pitch, load, wall, at) or Balance.none(at[None])
-
-
-def _one_descent(
-    springs: Springs, pitch: float, load: Load, start: Array, most: int, enough: float = 0.0
-) -> Balance | None:
-    """Return the ``_energy_descent`` of one state from freedoms (levels, 3), None if it fails."""
-    found = _energy_descent(springs.at(None), pitch, load, start[None], most, enough)
-    return found if found.is_found[0] else None
-
-
-def _by_softer_plates(
-    springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
-) -> Balance | None:
-    """Return the loaded equilibrium against a plate by continuation in plate stiffness; None if it
-    fails.
-    """
-    for way in SOFT_PLATES:
-        at = start
-        for stiffness in way:
-            softer = load._replace(stiffness=stiffness)
-            soft = _one_descent(springs, pitch, softer, at, MOST_STEPS, ROUGH_STEP)
-            if soft is None:
-                break
-            at = soft.freedoms[0]
-        else:
-            balance = _contact_descent(springs, pitch, load, wall, at)
-            balance = balance or _one_descent(springs, pitch, load, at, MOST_STEPS)
-            if balance is not None:
-                return balance
-    return None
-
-
-def _energy_descent(
+def _loaded(
     springs: Springs,
     pitch: float,
     load: Load,
     start: Array,
-    most: int,
+    fine: float = NEAR_FINE,
     enough: float = 0.0,
-    quick: float = 0.0,
 ) -> Balance:
-    """Return the loaded equilibria of n states that at most ``most`` steps reach.
+    """Return the ``_descent`` of n states under a load."""
 
-    A step no larger than ``enough`` ends it. ``quick`` makes fewer and larger steps, until the
-    error is below it.
-    """
-    found, live, at = Balance.none(start), np.arange(len(start)), start
-    before, now = np.full(len(at), quick or SMALLEST_STEP), loaded_energy(springs, pitch, load, at)
-    last: tuple[Array, Array] | None = None
-    for _ in range(most):
-        if quick and last is not None and 0 < before.min() <= before.max() < REUSED_STEP:
-            flat, is_last = _last_step(now, *last, before)
-            if is_last:
-                found.keep(live, at + flat.reshape(at.shape), 0.0, True)
+    def energies(which: Any, at: Array) -> LocalEnergy:
+        levels = at.reshape(len(at), -1, 3)
+        now = loaded_energy(springs.at(which), pitch, load, levels)
+        matrix = with_diagonal_blocks(now.rest(), now.blocks)
+        return LocalEnergy(now.value[:, None], now.gradient[:, None], matrix[:, None], now.push)
+
+    def limited(which: Any, at: Array, move: Array, now: LocalEnergy) -> Array:
+        """Limit steps to where rims just meet that they would drive into each other: without their
+        contact a step would run far past them (a primal-dual active set).
+        """
+        for _ in range(RIM_ROUNDS):
+            levels = (len(at), *start.shape[1:])
+            met = springs.at(which).meeting(at.reshape(levels), move.reshape(levels))
+            if met is None:
                 break
-        rest = now.rest()
-        matrix = with_diagonal_blocks(rest, now.blocks)
-        flat = newton_step(now.gradient, matrix, None if quick else is_positive_definite(matrix))
-        flat = _rim_limited(springs, at, flat, now.gradient, rest, now.blocks)
-        largest = np.abs(flat).max(-1)
-        if quick and largest.max() > STRAIGHT:
-            flat = _refined(springs, at, flat, now, rest)
-            largest = np.abs(flat).max(-1)
-        move, value, last = flat.reshape(at.shape), now.value, (matrix, now.blocks)
-        is_last = is_last_step(largest, before, quick or SMALLEST_STEP)
-        if load.wall is not None:
-            gain = -(flat * now.gradient).sum(-1)
+            some = np.flatnonzero(met[1].any((1, 2, 3)))
+            push, stiffer = (part[some] for part in met)
+            matrix = with_diagonal_blocks(now.matrix[some, 0], stiffer)
+            gradient = now.gradient[some, 0]
+            tried = newton_step(gradient + push.reshape(gradient.shape), matrix)
+            is_downhill = (tried * gradient).sum(-1) < 0
+            move[some[is_downhill], 0] = tried[is_downhill]
+        return move
+
+    begin = start.reshape(len(start), 1, 3 * start.shape[1])
+    return _descent(energies, begin, start.shape, fine, enough, load.wall is not None, limited)
+
+
+def _descent(
+    energies: Energies,
+    start: Array,
+    shape: tuple[int, ...],
+    fine: float = FINE,
+    enough: float = 0.0,
+    is_at_plate: bool = False,
+    limited: Callable[[Any, Array, Array, LocalEnergy], Array] | None = None,
+) -> Balance:
+    """Return the equilibria downhill of freedoms (n, groups, size), in another shape, once their
+    errors are below ``fine`` or a step is no larger than ``enough``; steps may be ``limited``.
+    """
+    found = Balance.of(start.reshape(shape), is_found=False)
+    if not len(start):
+        return found
+    live, at, now = np.arange(len(start)), start, energies(slice(None), start)
+    before = np.full(len(at), fine)
+    for _ in range(MOST_STEPS):
+        is_firm = is_positive_definite(now.matrix) if is_at_plate else None
+        move = newton_step(now.gradient, now.matrix, is_firm)
+        if limited is not None:
+            move = limited(live, at, move, now)
+        largest, value = np.abs(move).max((1, 2)), now.value
+        is_last = largest * largest < fine * before
+        is_still = np.abs(now.gradient).max((1, 2)) < RESIDUAL * (1 + 1e-3 * now.push)
+        if is_at_plate:
+            gain = -(move * now.gradient).sum((1, 2))
             is_last &= (largest < PLATE_LAST_STEP) & (gain < PLATE_LAST_GAIN)
-        is_still = np.zeros_like(is_last) if quick else _is_still(now, flat)
+            is_still |= gain < 1e-12 * (1 + np.abs(now.value[:, 0]))
         is_over = is_last | is_still | (largest <= enough)
         if is_over.any():
             is_stable = is_over.copy()
-            is_stable[is_over] = is_positive_definite(matrix[is_over])
+            is_stable[is_over] = is_positive_definite(now.matrix[is_over]).all(1)
             is_over &= is_still | is_stable
             end, pushes = at + np.where(is_stable[:, None, None], move, 0.0), now.push
-            if load.wall is not None:
-                pushes = loaded_energy(springs, pitch, load, end).push
-            found.keep(live[is_over], end[is_over], pushes[is_over], is_stable[is_over])
-            if is_over.all():
-                break
-            if is_over.any():
-                goes = ~is_over
-                live, at, move, largest, value = (
-                    part[goes] for part in (live, at, move, largest, value)
-                )
-                springs, last = springs.at(goes), (last[0][goes], last[1][goes])
-        now, share = _searched(springs, pitch, load, at, move, largest, value)
-        before = largest * (share == 1)
-        at = at + share[:, None, None] * move
-    return found
-
-
-def _is_still(now: LoadedEnergy, flat: Array) -> NDArray[np.bool_]:
-    """Return which states (n) a step (n, freedoms) hardly changes."""
-    is_still = np.abs(now.gradient).max(-1) < RESIDUAL * (1 + 1e-3 * now.push)
-    slope = (flat * now.gradient).sum(-1)
-    return np.asarray(is_still | (slope > -1e-12 * (1 + np.abs(now.value))))
-
-
-def _last_step(
-    now: LoadedEnergy, matrix: Array, blocks: Array, before: Array
-) -> tuple[Array, bool]:
-    """Return the steps (n, freedoms) by the tangent stiffness and springs' ``blocks`` of the last
-    ones, of size ``before`` (n), and True if that is good enough: not where rims meet or part.
-    """
-    flat = np.asarray(-np.linalg.solve(matrix, now.gradient[..., None])[..., 0])
-    is_small = (np.abs(flat).max(-1) * before).max() < REUSED_PRODUCT
-    change = np.abs(now.blocks - blocks).max((1, 2, 3)) - SPRING_CHANGE * np.abs(blocks).max(
-        (1, 2, 3)
-    )
-    return flat, bool(is_small and change.max() < 0 and is_positive_definite(matrix).all())
-
-
-def _searched(
-    springs: Springs, pitch: float, load: Load, at: Array, move: Array, largest: Array, value: Array
-) -> tuple[LoadedEnergy, Array]:
-    """Return the energy at the end of a share of each step (n, levels, 3) that does not raise it
-    above ``value`` (n), and this share (n).
-    """
-    share = step_limit(move, largest).min(-1)
-    now = loaded_energy(springs, pitch, load, at + share[:, None, None] * move)
-    for _ in range(HALVINGS):
-        is_far = _rises(now.value, value)
-        if not is_far.any():
-            break
-        share, (far,) = np.where(is_far, share / 2, share), is_far.nonzero()
-        ahead = (at + share[:, None, None] * move)[far]
-        again = loaded_energy(springs.at(far), pitch, load, ahead)
-        if len(far) == len(share):
-            now = again
-        else:
-            put(now, far, again)
-    return now, share
-
-
-def _rim_limited(
-    springs: Springs, at: Array, flat: Array, gradient: Array, rest: Array, blocks: Array
-) -> Array:
-    """Return the steps (n, freedoms) to where rims just touch that they would drive into each
-    other.
-
-    A step without their contact would run far past them (a primal-dual active set).
-    """
-    for _ in range(RIM_ROUNDS):
-        met = springs.meeting(at, flat.reshape(at.shape))
-        if met is None:
-            break
-        push, stiffer = met
-        some = np.flatnonzero(stiffer.any((1, 2, 3)))
-        matrix = with_diagonal_blocks(rest[some], (blocks + stiffer)[some])
-        gradients = gradient[some]
-        pushes = gradients + push[some].reshape(gradients.shape)
-        tried = newton_step(pushes, matrix, is_positive_definite(matrix))
-        goes = (tried * gradients).sum(-1) < 0  # others would lead uphill
-        if not goes.any():
-            break
-        flat = flat.copy()
-        flat[some[goes]] = tried[goes]
-    return flat
-
-
-def _refined(springs: Springs, at: Array, flat: Array, now: LoadedEnergy, rest: Array) -> Array:
-    """Return the steps (n, freedoms), of the long ones those at whose end springs are in
-    equilibrium, with all else linear.
-
-    Films, and rims that meet on the way, are most of the nonlinearity.
-    """
-    live = np.flatnonzero(np.abs(flat).max(-1) > STRAIGHT)
-    found, outside = flat.copy(), now.gradient - now.spring_gradient.reshape(flat.shape)
-    if len(live) < len(flat):
-        at, rest, outside, springs = at[live], rest[live], outside[live], springs.at(live)
-        flat = flat[live]
-    best, least = flat, np.full(len(live), math.inf)
-    for _ in range(CORRECTIONS):
-        value, spring_gradient, blocks = springs.energy(at + flat.reshape(at.shape))
-        follows = outside + (rest @ flat[..., None])[..., 0]
-        total = value.sum(-1) + ((outside + follows) * flat).sum(-1) / 2
-        is_worse, halfway = total > least, (best + flat) / 2
-        if is_worse.any():
-            flat = np.where(is_worse[:, None], best, flat)
-        best, least = flat, np.minimum(total, least)
-        gradient = follows + spring_gradient.reshape(flat.shape)
-        matrix = with_diagonal_blocks(rest, blocks)
-        more = np.asarray(-np.linalg.solve(matrix, gradient[..., None])[..., 0])
-        more = _rim_limited(springs, at + best.reshape(at.shape), more, gradient, rest, blocks)
-        flat = best + more
-        is_over = np.abs(more).max(-1) < SMALL_CORRECTION * np.abs(best).max(-1)
-        if is_worse.any():
-            flat, is_over = np.where(is_worse[:, None], halfway, flat), is_over & ~is_worse
-        if is_over.any():
-            found[live[is_over]] = flat[is_over]
-            if is_over.all():
-                return found
+            if is_at_plate and is_over.any():
+                pushes = pushes.copy()
+                pushes[is_over] = energies(live[is_over], end[is_over]).push
+            these, true = live[is_over], np.ones(int(is_over.sum()), bool)
+            ends = end[is_over].reshape(-1, *shape[1:])
+            put(found, these, (ends, pushes[is_over], is_stable[is_over], true))
             goes = ~is_over
-            live, at, flat, best, least = live[goes], at[goes], flat[goes], best[goes], least[goes]
-            outside, rest, springs = outside[goes], rest[goes], springs.at(goes)
-    found[live] = best
+            if not goes.any():
+                break
+            live, at, move = live[goes], at[goes], move[goes]
+            largest, value = largest[goes], value[goes]
+        share = step_limit(move.reshape(*move.shape[:2], -1, 3), largest).min(-1)
+        now = energies(live, at + share[..., None] * move)
+        for _ in range(HALVINGS):
+            is_far = ~(now.value <= value + 1e-11 * (1 + np.abs(value)))
+            if not is_far.any():
+                break
+            share, far = np.where(is_far, share / 2, share), np.flatnonzero(is_far.any(1))
+            put(now, far, energies(live[far], (at + share[..., None] * move)[far]))
+        before = largest * (share == 1).all(1)
+        at = at + share[..., None] * move
     return found
-
-
-# Against an outer plate, with its contact forces as unknowns beside the freedoms.
 
 
 def start_below(
     springs: Springs, start: Array, pitch: float, wall: OuterPlate, stiffness: float
 ) -> Array:
-    """Return a start a little past a level plate, so that it is met all round."""
+    """Return starts (n, levels, 3) a little past a level plate, so that it is met all round."""
+    if not wall.is_level:
+        return start
     at = start.copy()
-    if wall.is_level:
-        room = max(wall.point[2] / len(at) - pitch, 0.0)
-        is_high = at[:, 0] > room
-        straight = wall.sticks | (np.abs(at[:, 1:]) < 1e-9)
-        at[:, 1:] = np.where(straight, 0.0, at[:, 1:])
-        at[:, 0] = np.where(is_high, room, at[:, 0])
-        past = 1e-4
-        if wall.sticks and is_high.all():
-            # As far as the plate gives way to them.
-            push = float(-springs.energy(at)[1][:, 0].mean())
-            past = max(push, 0.0) / stiffness / len(at) + 1e-9
-        at[:, 0] += np.where(is_high, past, 0.0)
+    room = max(wall.point[2] / at.shape[1] - pitch, 0.0)
+    is_high = at[..., 0] > room
+    if wall.sticks:
+        at[..., 1:] = 0.0
+    at[..., 1:][np.abs(at[..., 1:]) < 1e-9] = 0.0
+    at[..., 0] = np.minimum(at[..., 0], room)
+    # As far as the plate gives way to them.
+    push = np.maximum(-springs.energy(at)[1][..., 0].mean(-1, keepdims=True), 0.0)
+    past = np.where(wall.sticks & is_high.all(-1, keepdims=True), push / stiffness, 0.0)
+    at[..., 0] += np.where(is_high, np.maximum(past / at.shape[1] + 1e-9, 0.0), 0.0)
     return at
-
-
-def _contact_descent(
-    springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
-) -> Balance | None:
-    """Return the equilibrium of one state from freedoms (levels, 3); None if the steps pass an
-    unstable place, or are too many.
-
-    A mixed method: a plate is stiff, so the contact forces are unknowns beside the freedoms, found
-    with each step and handed to the next. The set of points in contact is found within a step, with
-    the springs at its end.
-    """
-    at, before = start, FIRST_STEP
-    now = loaded_energy(springs, pitch, load, at)
-    touch = now.touch
-    if touch is not None and touch.push > PUSH_RATIO * np.abs(now.spring_gradient[:, 0]).max():
-        # Too deep to estimate the force, or for the first step to show stability.
-        before = 0.0
-        now = loaded_energy(springs, pitch, load, at, np.zeros(len(touch.deep)))
-    for _ in range(PLATE_STEPS):
-        touch = now.touch
-        assert touch is not None
-        step = _contact_step(springs, at, now, touch)
-        if step is None:
-            return None
-        flat, touch, is_found = step
-        move = flat.reshape(-1, 3)
-        largest = float(np.abs(move).max())
-        if is_last_step(largest, before, PLATE_SMALLEST_STEP):
-            if is_found:
-                return Balance.stable((at + move)[None], touch.push[None])
-            # A rim or a point that just touches is met in one round and parts in the next.
-            end = loaded_energy(springs, pitch, load, at + move)
-            if np.abs(end.gradient).max() < PLATE_RESIDUAL * (1 + end.push):
-                return Balance.stable((at + move)[None], end.push[None])
-        share = float(step_limit(move).min())
-        if share < 1.0 and not wall.sticks:
-            return None
-        before = largest if share == 1.0 else 0.0
-        at = at + share * move
-        now = loaded_energy(springs, pitch, load, at, touch.forces)
-    return None
-
-
-def _contact_step(
-    springs: Springs, at: Array, now: LoadedEnergy, touch: PlateContact
-) -> tuple[Array, PlateContact, bool] | None:
-    """Return the step (freedoms) to equilibrium, linear except for springs and contacts, the
-    contact there, and True for converged; None if the tangent stiffness is indefinite.
-    """
-    lines, turned = now.deeper(touch), now.turned()
-    outside = now.gradient - now.spring_gradient.ravel() - touch.forces @ lines
-    spring_gradient, blocks = now.spring_gradient, now.blocks
-    flat = best = np.zeros(now.gradient.size)
-    has_converged = False
-    deep, least = touch.deep, np.inf
-    for number in range(PLATE_CORRECTIONS):
-        follows = outside + turned @ flat
-        if number:
-            value, spring_gradient, blocks = springs.energy(at + flat.reshape(-1, 3))
-            deep = touch.deep + lines @ flat
-            total = float(value.sum() + (outside + follows) @ flat / 2)
-            total += float(touch.resists(deep) @ deep) / 2
-            if total > least:
-                flat = (best + flat) / 2
-                continue
-            best, least = flat, total
-        matrix, gradient = with_diagonal_blocks(turned, blocks), follows + spring_gradient.ravel()
-        correction = _active_set_step(
-            springs, at + flat.reshape(-1, 3), matrix, gradient, touch, lines, deep
-        )
-        if correction is None:
-            return None
-        more, is_settled = correction
-        flat = best + more
-        little = PLATE_SMALL_CORRECTION * np.abs(best).max() if number else STRAIGHT
-        has_converged = is_settled and float(np.abs(more).max()) < little
-        if has_converged:
-            break
-    deep = touch.deep + lines @ flat
-    return flat, touch._replace(deep=deep, forces=touch.resists(deep)), has_converged
-
-
-def _active_set_step(
-    springs: Springs,
-    at: Array,
-    matrix: Array,
-    gradient: Array,
-    touch: PlateContact,
-    lines: Array,
-    deep: Array,
-) -> tuple[Array, bool] | None:
-    """Return the step at whose end the points and rims in contact are in equilibrium, and True if
-    these are the contacts that it was made with.
-    """
-
-    def energy(trial: Array) -> float:
-        after = deep + lines @ trial
-        return float((gradient + matrix @ trial / 2) @ trial + touch.resists(after) @ after / 2)
-
-    touches, met, held_off = deep > touch.least, None, 0
-    tried = []
-    for _ in range(CONTACT_ROUNDS):
-        stiff = touch.stiff * touches
-        against = (lines.T * stiff) @ lines
-        pushes = gradient + (stiff * deep) @ lines
-        if met is not None:
-            against = with_diagonal_blocks(against, met[1])
-            pushes = pushes + met[0].ravel()
-        if not is_positive_definite(matrix + against):
-            return None
-        step = np.asarray(-np.linalg.solve(matrix + against, pushes))
-        ahead = deep + lines @ step > touch.least
-        if (ahead == touches).all():
-            met = springs.meeting(at, step.reshape(-1, 3))
-            if met is None or held_off == CONTACT_RIM_ROUNDS:
-                return step, met is None
-            held_off += 1
-        touches = ahead
-        tried.append(step)
-    # Otherwise take the best place on the paths there; the first one leads downhill.
-    return min((share * trial for trial in tried for share in STEP_SHARES), key=energy), False
-
-
-# Safeguarded Newton steps.
-
-
-def is_last_step(largest: Any, before: Any, fine: float = SMALLEST_STEP) -> Any:
-    """Return True if the step after this one would be below ``fine``, by quadratic convergence from
-    ``before``, the largest move of the full step before it.
-    """
-    return largest * largest < fine * before
 
 
 def newton_step(gradient: Array, matrix: Array, is_firm: NDArray[np.bool_] | None = None) -> Array:
     """Return Newton's step of each row (..., size), a descent direction even where the tangent
-    stiffness (..., size, size) is not positive definite, ``is_firm``; without it, where the plain
+    stiffness (..., size, size) is not positive definite, ``is_firm``; by default, where the plain
     step leads uphill.
     """
     step = np.asarray(-np.linalg.solve(matrix, gradient[..., None])[..., 0])
-    uphill = (step * gradient).sum(-1) >= 0 if is_firm is None else ~is_firm
+    if is_firm is None:
+        is_firm = (step * gradient).sum(-1) < 0
+    uphill = ~is_firm
     if uphill.any():
         values, vectors = np.linalg.eigh(matrix[uphill])
         least = 1e-6 * np.abs(values).max(-1, keepdims=True) + 1e-9
@@ -555,7 +389,7 @@ def step_limit(move: Array, largest: Array | None = None) -> Array:
     """Return the share of each row's step (..., 3) that stays within ``LARGEST_MOVE``; ``largest``
     are the largest components of the steps, if they are known.
     """
-    if largest is not None and largest.max() <= LEAST_LIMIT:
+    if largest is not None and largest.max() <= LARGEST_MOVE.min():
         return np.ones(move.shape[:-1])
     return np.asarray(np.minimum(1.0, (LARGEST_MOVE / np.maximum(np.abs(move), 1e-12)).min(-1)))
 

@@ -71,7 +71,7 @@ def printed(code: str) -> list[str]:
         ("sbafab.models.rippled.equilibrium", "rippled.rippled(Balloon(pocket=5.0), 8.0)"),
         ("np.linalg.pinv", "inflate(Balloon(mate=Balloon(thickness=0.1)), 8.0)"),
         (
-            "sbafab.models.stack_poses.free_equilibrium",
+            "sbafab.models.stack.free_equilibrium",
             "StackBatch(sbafab.stack('1dof-5mm')).poses([[8]])",
         ),
     ],
@@ -82,9 +82,9 @@ def test_models_are_solved_on_one_thread_and_the_caller_keeps_its_own(
     module, _, name = solver.rpartition(".")
     lines = printed(
         f"""
-from sbafab.models import rippled, stack_poses
+from sbafab.models import rippled, stack
 from sbafab.models.balloon import Balloon, inflate
-from sbafab.models.stack_batch import StackBatch
+from sbafab.models.stack import StackBatch
 solve, within = {solver}, set()
 
 def watched(*arguments, **options):

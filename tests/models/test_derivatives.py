@@ -65,7 +65,7 @@ def settled(stack: Stack, pressures: Array, load: Load, start: Array) -> Pose:
         at = at - move
         if np.abs(move).max() < 1e-13:
             break
-    balance = Balance.stable(at[None], now.push[None])
+    balance = Balance.of(at[None], now.push[None])
     return stack.pose_of(stack.settled(pressures[None], balance, load))
 
 

@@ -11,8 +11,7 @@ import pytest
 import sbafab
 from sbafab.errors import DesignError, UnreachableError
 from sbafab.models.reach import _Alone
-from sbafab.models.stack import Plate, Stack
-from sbafab.models.stack_batch import StackBatch
+from sbafab.models.stack import Plate, Stack, StackBatch
 
 MOST = 10.0
 """kPa to which chambers may be filled."""
@@ -109,7 +108,7 @@ def test_a_folded_stack_is_met_among_its_equilibria(three: Stack, pressures: Any
     """
     load = LOADS["level slippery plate"]
     target = three.pose(pressures, **load)
-    assert target.force > 0.2
+    assert target.force > 0.1
     reached = three.reach(target.tip, most_pressure=MOST, **load)
     assert np.linalg.norm(reached.tip - target.tip) < CLOSE
     assert reached.stable

@@ -13,8 +13,7 @@ from sbafab.errors import DesignError
 from sbafab.models import motion as motions
 from sbafab.models.derivatives import hessian
 from sbafab.models.pneumatics import AIR, WATER, Line
-from sbafab.models.stack import Plate, Stack
-from sbafab.models.stack_batch import StackBatch
+from sbafab.models.stack import Plate, Stack, StackBatch
 from sbafab.models.stack_loads import loaded_energy
 
 
