@@ -26,12 +26,10 @@ from sbafab.models.stack_loads import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from sbafab.models.film_elements import Array
     from sbafab.models.stack import Stack
     from sbafab.models.stack_balance import Pose
-    from sbafab.models.stack_loads import Load, LoadedEnergy
+    from sbafab.models.stack_loads import Load, LoadedEnergy, PlateContact, Springs
 
 RIGID = 1e-9
 """Share of the largest compliance below which a motion of the tip counts as impossible."""
@@ -41,6 +39,56 @@ RESIDUAL = 1e-7
 CORRECTIONS = 6
 """Maximum Newton steps to reach it; one suffices unless contacts open or close."""
 UNIT, QUARTER_TURN = np.eye(2), np.array([[0.0, 1.0], [-1.0, 0.0]])
+
+
+class Tangent(NamedTuple):
+    """n states linearised: the ``gradient`` of the energy (n, freedoms), its second derivatives (n,
+    groups, size, size) of groups of levels that do not act on each other, and the force on an outer
+    plate (n) in mN; ``energy`` is that of loaded states.
+    """
+
+    springs: Springs
+    gradient: Array
+    matrix: Array
+    push: Array
+    energy: LoadedEnergy | None
+
+    @property
+    def touch(self) -> PlateContact | None:
+        """Contact with an outer plate."""
+        return None if self.energy is None else self.energy.touch
+
+    def solved(self, right: Array) -> Array:
+        """Return the solutions (n, freedoms, k) of the second derivatives by right sides."""
+        groups = self.matrix.shape[:3]
+        moves = np.linalg.solve(self.matrix, right.reshape(*groups, -1))
+        return np.asarray(moves.reshape(right.shape))
+
+    def top(self, stack: Stack, at: Array) -> tuple[Array, Array]:
+        """Return tips (n, 3) in mm, and the turn and move of the top by the freedoms (n, freedoms,
+        6).
+        """
+        if self.energy is not None:
+            return self.energy.plates.tip, self.energy.flat_motions
+        plates = plate_chain(at[:, stack.levels], stack.pitch)
+        motions = level_motions(plates)
+        kinds = (stack.levels == np.arange(len(stack.maps))[:, None]).astype(float)
+        by_kind = kinds @ motions.reshape(*motions.shape[:2], 18)
+        return plates.tip, by_kind.reshape(len(at), -1, 6)
+
+
+def tangent(
+    stack: Stack, springs: Springs, load: Load | None, at: Array, forces: Array | None = None
+) -> Tangent:
+    """Return n states linearised at freedoms (n, rows, 3), each kind of balloon without a load and
+    each level under one; ``forces`` of an outer plate as of ``loaded_energy``.
+    """
+    if load is None:
+        _, gradient, matrix = springs.energy(at)
+        return Tangent(springs, gradient.reshape(len(at), -1), matrix, np.zeros(len(at)), None)
+    now = loaded_energy(springs, stack.pitch, load, at, forces)
+    matrix = hessian(now, now.rest(), at, stack.pitch)[:, None]
+    return Tangent(springs, now.gradient, matrix, now.push, now)
 
 
 class Rates(NamedTuple):
@@ -218,19 +266,12 @@ def _solved(matrices: Array, right: Array) -> Array:
 # Second derivatives of the energy under a load.
 
 
-def hessian(
-    now: LoadedEnergy,
-    rest: Array,
-    freedoms: Array,
-    pitch: float,
-    is_exact: NDArray[np.bool_] | None = None,
-) -> Array:
+def hessian(now: LoadedEnergy, rest: Array, freedoms: Array, pitch: float) -> Array:
     """Return the second derivatives (..., freedoms, freedoms) of the energy of a stack under a
-    load; ``rest`` are those of all but the springs. They are as of ``LoadedEnergy.turned`` except
-    where ``is_exact`` (n).
+    load; ``rest`` are those of all but the springs, as of ``LoadedEnergy.rest``.
     """
-    blocks, works = now.blocks.copy(), _tilt_works(now, freedoms, pitch)
-    blocks[..., 1:, 1:] -= works if is_exact is None else works * is_exact[:, None, None, None]
+    blocks = now.blocks.copy()
+    blocks[..., 1:, 1:] -= _tilt_works(now, freedoms, pitch)
     return with_diagonal_blocks(rest, blocks)
 
 

@@ -64,6 +64,10 @@ class Balance(NamedTuple):
         each = np.zeros(count) if pushes is None else pushes
         return cls(freedoms.copy(), each, *np.full((2, count), is_found))
 
+    def part(self, which: Any) -> Balance:
+        """Return some of the states."""
+        return Balance(*(part[which] for part in self))
+
 
 @dataclass(frozen=True)
 class Plate:
@@ -326,9 +330,9 @@ def _descent(
             if is_at_plate and is_over.any():
                 pushes = pushes.copy()
                 pushes[is_over] = energies(live[is_over], end[is_over]).push
-            these, true = live[is_over], np.ones(int(is_over.sum()), bool)
-            ends = end[is_over].reshape(-1, *shape[1:])
-            put(found, these, (ends, pushes[is_over], is_stable[is_over], true))
+            ends = Balance.of(end[is_over].reshape(-1, *shape[1:]), pushes[is_over])
+            ends.is_stable[:] = is_stable[is_over]
+            put(found, live[is_over], ends)
             goes = ~is_over
             if not goes.any():
                 break

@@ -10,7 +10,6 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError, UnreachableError
-from sbafab.models.reach import _Alone
 from sbafab.models.stack import Plate, Stack, StackBatch
 
 MOST = 10.0
@@ -68,17 +67,6 @@ def missed(stack: Stack, count: int, loads: dict[str, Any], every: int = 1) -> i
 @pytest.mark.parametrize("load", LOADS)
 def test_random_reachable_targets_are_met(three: Stack, load: str) -> None:
     assert missed(three, 8 if "plate" in load else 20, LOADS[load]) == 0
-
-
-@pytest.mark.parametrize("load", ["tip", "plate", "level slippery plate"])
-def test_few_of_many_targets_are_left_to_be_met_alone(
-    three: Stack, load: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    tips, alone = np.array(list(targets(three, 8, LOADS[load]))), []
-    reached = _Alone.reached
-    monkeypatch.setattr(_Alone, "reached", lambda *each: alone.append(1) or reached(*each))
-    StackBatch(three).reach(tips, MOST, **LOADS[load])
-    assert len(alone) <= 1
 
 
 @pytest.mark.parametrize(
