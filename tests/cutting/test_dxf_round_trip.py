@@ -18,7 +18,7 @@ from sbafab.geometry.contour import in_reading_order
 from sbafab.geometry.offset import shrink
 from sbafab.geometry.region import Region, disc, union
 from sbafab.geometry.width import least_gap
-from tests.properties.test_geometry import shapes
+from tests.cutting.shapes import shapes
 
 
 @given(

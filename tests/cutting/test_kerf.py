@@ -15,7 +15,7 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.edges import Line
 from sbafab.geometry.offset import Kerf, fillet, shrink
 from sbafab.geometry.region import Region, disc, rectangle, stadium, union
-from tests.properties.test_geometry import shapes
+from tests.cutting.shapes import shapes
 
 
 def test_chords_leave_a_mask_no_more_but_at_the_corners_of_its_part() -> None:
