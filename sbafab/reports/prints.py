@@ -32,52 +32,52 @@ from sbafab.reports.traveller.lay_up import Bed, beds
 # every version of every library. Arcs become Bezier curves, within 5e-6 of their radius.
 
 
-POINTS = 72 / 25.4
-"""PDF points per mm."""
+POINTS = 72 / 25.4  # of PDF per mm
 MOST_SWEEP = math.pi / 4
-ENCODING = "cp1252"
-"""Encoding of the fonts that every reader has; other characters become "?"."""
-Rgb = tuple[float, float, float]
-Dashes = tuple[float, ...]
-BLACK: Rgb = (0.0, 0.0, 0.0)
-FILM: Rgb = (0.05, 0.25, 0.55)
-MASK: Rgb = (0.85, 0.4, 0.0)
-GREY: Rgb = (0.55, 0.55, 0.55)
-DASHED: Dashes = (1.0, 0.6)
-THIN = 0.1
+ENCODING = "cp1252"  # of the fonts that every reader has; other characters become "?"
+FONT = "<< /Type /Font /Subtype /Type1 /BaseFont /%s /Encoding /WinAnsiEncoding >>"
+
+
+def pen(colour: tuple[float, float, float], width: float = 0.1, dashes: str = "") -> str:
+    """Return the operators that set colour (0 to 1), width and dashes (mm) of lines."""
+    return f"{' '.join(map(coord, colour))} RG {coord(width)} w [{dashes}] 0 d"
+
+
+BLACK, GREY = pen((0.0, 0.0, 0.0)), pen((0.55, 0.55, 0.55))
+TRIM_LINE = pen((0.0, 0.0, 0.0), dashes="0.2 0.8")
+
+
+def edge_pen(is_mask: bool, width: float = 0.1) -> str:
+    """Return the pen of a mask's edges or a film's."""
+    return pen((0.85, 0.4, 0.0), width, "1 0.6") if is_mask else pen((0.05, 0.25, 0.55), width)
 
 
 class PdfPage:
     """A page in mm, its lower left corner at (0, 0); later elements cover earlier ones.
 
-    The content of the page ``under``, which several pages may share, lies below.
+    The contents of the page ``under``, which several pages may share, lie below.
     """
 
     def __init__(self, width: float, height: float, under: PdfPage | None = None) -> None:
-        self.width, self.height, self.under = width, height, under
+        self.width, self.height = width, height
+        self._under = under.streams if under else []
         self._drawn = [f"q {POINTS:.10f} 0 0 {POINTS:.10f} 0 0 cm 1 J 1 j"]
 
-    def stroke(self, colour: Rgb, width: float = THIN, dashes: Dashes = ()) -> None:
-        """Set colour, width and dashes (mm) of the following lines."""
-        shades, on = (" ".join(map(coord, values)) for values in (colour, dashes))
-        self._drawn.append(f"{shades} RG {coord(width)} w [{on}] 0 d")
-
-    def contours(self, contours: Iterable[Contour], by: Point = (0.0, 0.0)) -> None:
+    def contours(self, look: str, contours: Iterable[Contour], by: Point = (0.0, 0.0)) -> None:
         """Closed lines of straight edges and arcs, shifted by an offset in mm."""
-        self._paths([contour.edges for contour in contours], by, "h S")
+        self.chains(look, [contour.edges for contour in contours], by, "h S")
 
-    def chains(self, chains: Iterable[Sequence[Edge]], by: Point = (0.0, 0.0)) -> None:
+    def chains(
+        self, look: str, chains: Iterable[Sequence[Edge]], by: Point, end: str = "S"
+    ) -> None:
         """Open lines of straight edges and arcs, shifted by an offset in mm."""
-        self._paths(chains, by, "S")
-
-    def _paths(self, chains: Iterable[Sequence[Edge]], by: Point, end: str) -> None:
         paths = [
             " ".join([f"{_at(edges[0].start)} m", *map(_curve, edges), end]) for edges in chains
         ]
-        self._drawn.append(f"q 1 0 0 1 {_at(by)} cm {' '.join(paths)} Q")
+        self._drawn += [look, f"q 1 0 0 1 {_at(by)} cm {' '.join(paths)} Q"]
 
-    def lines(self, *ends: tuple[Point, Point]) -> None:
-        self._drawn += [f"{_at(start)} m {_at(end)} l S" for start, end in ends]
+    def lines(self, look: str, *ends: tuple[Point, Point]) -> None:
+        self._drawn += [look, *(f"{_at(start)} m {_at(end)} l S" for start, end in ends)]
 
     def text(self, at: Point, words: str, size: float, bold: bool = False) -> None:
         """Words that begin at a point, ``size`` mm."""
@@ -85,46 +85,38 @@ class PdfPage:
         self._drawn.append(f"BT /{font} {coord(size)} Tf {_at(at)} Td {_string(words)} Tj ET")
 
     @property
-    def contents(self) -> list[str]:
+    def streams(self) -> list[str]:
         """The content streams, lowest first."""
-        return [*(self.under.contents if self.under else ()), "\n".join([*self._drawn, "Q"])]
+        return [*self._under, "\n".join([*self._drawn, "Q"])]
 
 
 def pdf(pages: Sequence[PdfPage], title: str) -> bytes:
     """The whole file, set to print at actual size."""
-    font = "<< /Type /Font /Subtype /Type1 /BaseFont /%s /Encoding /WinAnsiEncoding >>"
-    streams = list(dict.fromkeys(content for page in pages for content in page.contents))
-    numbers = {content: 5 + len(pages) + n for n, content in enumerate(streams)}
+    streams = list(dict.fromkeys(stream for page in pages for stream in page.streams))
+    numbers = {stream: f"{5 + len(pages) + n} 0 R" for n, stream in enumerate(streams)}
     kids = " ".join(f"{5 + n} 0 R" for n in range(len(pages)))
     objects = [
         "<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
         f"<< /Type /Pages /Kids [{kids}] /Count {len(pages)} >>",
-        font % "Helvetica",
-        font % "Helvetica-Bold",
+        FONT % "Helvetica",
+        FONT % "Helvetica-Bold",
     ]
     for page in pages:
         box = f"[0 0 {page.width * POINTS:.4f} {page.height * POINTS:.4f}]"
-        contents = " ".join(f"{numbers[content]} 0 R" for content in page.contents)
+        contents = " ".join(numbers[stream] for stream in page.streams)
         objects.append(
             f"<< /Type /Page /Parent 2 0 R /MediaBox {box} /Contents [{contents}] /Resources "
             "<< /Font << /F1 3 0 R /F2 4 0 R >> >> >>"
         )
     objects += [f"<< /Length {len(s)} >>\nstream\n{s}\nendstream" for s in streams]
-    return _file([*objects, f"<< /Title {_string(title)} >>"])
-
-
-def _file(objects: Iterable[str]) -> bytes:
-    """Numbered objects with the table of their offsets; the last one is the file's title."""
-    data = bytearray(b"%PDF-1.4\n%\xe2\xe3\xcf\xd3\n")
-    places = ["0000000000 65535 f \n"]
-    for index, body in enumerate(objects, 1):
+    data, places = bytearray(b"%PDF-1.4\n%\xe2\xe3\xcf\xd3\n"), ["0000000000 65535 f \n"]
+    for index, body in enumerate([*objects, f"<< /Title {_string(title)} >>"], 1):
         places.append(f"{len(data):010d} 00000 n \n")
         data += f"{index} 0 obj\n{body}\nendobj\n".encode(ENCODING, "replace")
     start, count = len(data), len(places)
     data += f"xref\n0 {count}\n{''.join(places)}trailer\n".encode()
     data += f"<< /Size {count} /Root 1 0 R /Info {count - 1} 0 R >>\n".encode()
-    data += f"startxref\n{start}\n%%EOF\n".encode()
-    return bytes(data)
+    return bytes(data + f"startxref\n{start}\n%%EOF\n".encode())
 
 
 def _string(words: str) -> str:
@@ -156,57 +148,65 @@ def _curve(edge: Edge) -> str:
 
 PAPER = (210.0, 279.4)
 """mm: as wide as A4 and as long as Letter, so that either prints it whole at 100 %."""
-BAR = 100.0
-"""Length of the bars that check the size of a print, mm."""
-CLOSE = 0.3
-"""Tolerance of a bar, mm: at 15 mm from the middle the print is then 0.05 mm off."""
-SIDE, HEAD = 25.0, 52.0
-"""Margins of a page to work on: left and right, and above, mm."""
+BAR = 100.0  # length of the bars that check the size of a print, mm
+CLOSE = 0.3  # tolerance of a bar, mm: at 15 mm from the middle the print is then 0.05 mm off
+SIDE, HEAD = 25.0, 52.0  # margins of a page to work on: left and right, and above, mm
 LEFT = 14.0
 SMALL, WORDS, TITLE, ROW = 2.2, 3.0, 5.0, 4.5
 
 
-def _head(page: PdfPage, at: Point, title: str, lines: Sequence[str], size: float = TITLE) -> None:
+def _head(page: PdfPage, at: Point, title: str, lines: Iterable[str], size: float = TITLE) -> None:
     page.text(at, title, size, bold=True)
-    _lines(page, (at[0], at[1] - 1 - ROW), lines)
-
-
-def _lines(page: PdfPage, at: Point, lines: Iterable[str]) -> None:
-    for number, line in enumerate(lines):
-        page.text((at[0], at[1] - ROW * number), line, WORDS)
+    for number, line in enumerate(lines, 1):
+        page.text((at[0], at[1] - 1 - ROW * number), line, WORDS)
 
 
 def _bars(page: PdfPage, across: Point, up: Point) -> None:
     """A bar along each direction of the page, from a point."""
-    page.stroke(BLACK)
     (x0, y), (x, y0) = across, up
-    page.lines(((x0, y), (x0 + BAR, y)), ((x, y0), (x, y0 + BAR)))
-    for end in (0.0, BAR):
-        page.lines(((x0 + end, y - 2), (x0 + end, y + 2)), ((x - 2, y0 + end), (x + 2, y0 + end)))
+    ticks = [((x0 + end, y - 2), (x0 + end, y + 2)) for end in (0.0, BAR)]
+    ticks += [((x - 2, y0 + end), (x + 2, y0 + end)) for end in (0.0, BAR)]
+    page.lines(BLACK, ((x0, y), (x0 + BAR, y)), ((x, y0), (x, y0 + BAR)), *ticks)
 
 
-def _work_head(page: PdfPage, title: str, use: Sequence[str]) -> None:
-    """Title, use and bars of a page to work on."""
+def _work_page(
+    size: tuple[float, float],
+    title: str,
+    use: Sequence[str],
+    legend: Sequence[tuple[str, str]],
+    foot: float,
+    sha256: str,
+) -> PdfPage:
+    """Return a page to work on: title, use and bars above, the legend in the foot: words, each
+    after a line of its pen, or from the margin on without one.
+    """
+    page = PdfPage(*size)
     _head(page, (LEFT, page.height - 16), title, use)
     across, up = ((page.width - BAR) / 2, page.height - HEAD + 8), (LEFT, page.height - HEAD - BAR)
     _bars(page, across, up)
     page.text((across[0] + BAR / 2 - 8, across[1] + 1.5), f"{BAR:g} mm", WORDS)
     page.text((up[0] - 4, up[1] - 6), f"{BAR:g} mm", WORDS)
+    y = foot - 8
+    for look, words in legend:
+        if look:
+            page.lines(look, ((LEFT, y + 1), (LEFT + 10, y + 1)))
+        page.text((LEFT + 13 * bool(look), y), words, WORDS)
+        y -= ROW
+    page.text((page.width - 46, y + ROW), f"design {sha256[:12]}", WORDS)
+    return page
 
 
-def _look(page: PdfPage, is_mask: bool, width: float = THIN) -> None:
-    """Set the look of a film's edges, or of a mask's."""
-    page.stroke(MASK if is_mask else FILM, width, DASHED if is_mask else ())
+def _foot(rows: int) -> float:
+    """Room for a legend below the drawing, mm."""
+    return 24 + ROW * rows
 
 
 # The underlay.
 
 
 NAME = "underlay.pdf"
-PLATEN = (152.4, 152.4)
-"""mm: the paper's heated area."""
-BEYOND = 8.0
-"""Length of the cross beyond the outermost line, mm."""
+PLATEN = (152.4, 152.4)  # mm: the paper's heated area
+BEYOND = 8.0  # length of the cross beyond the outermost line, mm
 USE = (
     "Print at 100 % (“actual size”, not “fit to page”) on plain paper. Measure both bars:",
     f"if either is not {BAR:g} mm, {CLOSE:g} more or less, do not use this print.",
@@ -270,23 +270,16 @@ def underlay_pdf(
     """
     outlines = guides(laminate)
     spread = leaves(laminate, places, platen)
+    named = [(edge_pen(guide.is_mask), guide.words) for guide in outlines]
+    foot = _foot(len(outlines) + len(NOTES))
     pages = []
     for number, leaf in enumerate(spread, 1):
-        page = PdfPage(*leaf.size)
-        _draw(page, laminate, outlines, places, leaf)
+        notes = NOTES if leaf.is_plate else (TRIM, *NOTES)
         which = f", page {number} of {len(spread)}" if len(spread) > 1 else ""
         title = f"{laminate.name}: alignment underlay{which}, seen from above, 1:1"
-        _work_head(page, title, USE)
-        y = _foot(outlines) - 8
-        for guide in outlines:
-            _look(page, guide.is_mask)
-            page.lines(((LEFT, y + 1), (LEFT + 10, y + 1)))
-            page.text((LEFT + 13, y), guide.words, WORDS)
-            y -= ROW
-        notes = NOTES if leaf.is_plate else (TRIM, *NOTES)
-        _lines(page, (LEFT, y), notes)
-        y -= ROW * (len(notes) - 1)
-        page.text((page.width - 46, y), f"design {design_sha256[:12]}", WORDS)
+        legend = [*named, *(("", note) for note in notes)]
+        page = _work_page(leaf.size, title, USE, legend, foot, design_sha256)
+        _draw_leaf(page, laminate, outlines, places, leaf)
         pages.append(page)
     return pdf(pages, f"{laminate.name}: alignment underlay") if pages else None
 
@@ -304,42 +297,30 @@ def leaves(
         return ()
     box = box_round([guide.region.bounds for guide in outlines])
     edge = whole_plate(laminate, platen, places).outers[0]
-    plate = edge.bounds
-    margins = 2 * SIDE, HEAD + _foot(outlines)
+    margins = 2 * SIDE, HEAD + _foot(len(outlines) + len(NOTES))
+    room = PAPER[0] - margins[0], PAPER[1] - margins[1]
     columns, rows = (
-        _tiles({place[axis] for place in places}, box, plate, PAPER[axis] - margins[axis], axis)
+        _tiles({place[axis] for place in places}, box, edge.bounds, room[axis], axis)
         for axis in (0, 1)
     )
-    has_room = all(plate[axis + 2] - plate[axis] <= PAPER[axis] - margins[axis] for axis in (0, 1))
+    has_room = all(edge.bounds[axis + 2] - edge.bounds[axis] <= room[axis] for axis in (0, 1))
     is_plate = len(rows) * len(columns) == 1 and has_room
     spread = []
-    for row in rows:
-        for column in columns:
-            numbers = tuple(
-                n for n, (x, y) in enumerate(places, 1) if x in column.steps and y in row.steps
-            )
-            size = max(PAPER[0], column.length + margins[0]), max(PAPER[1], row.length + margins[1])
-            frame = rectangle((column.low, row.low), (column.high, row.high)).outers[0]
+    for ys, length, low, top in rows:
+        for xs, width, left, right in columns:
+            numbers = tuple(n for n, (x, y) in enumerate(places, 1) if x in xs and y in ys)
+            size = max(PAPER[0], width + margins[0]), max(PAPER[1], length + margins[1])
+            frame = rectangle((left, low), (right, top)).outers[0]
             if numbers:
                 spread.append(Leaf(size, numbers, edge if is_plate else frame, is_plate))
     return tuple(spread)
 
 
-class _Tile(NamedTuple):
-    """Columns or rows on one page, the length that they take, and the ends of the paper, mm."""
-
-    steps: Sequence[float]
-    length: float
-    low: float
-    high: float
-
-
 def _tiles(
     steps: Iterable[float], box: Bounds, plate: Bounds, room: float, axis: int
-) -> list[_Tile]:
-    """Rows or columns per page, as even as possible, at least one on each.
-
-    Paper ends midway to the next page; at an end beyond the cross, where the plate has room.
+) -> list[tuple[Sequence[float], float, float, float]]:
+    """Return rows or columns per page, as even as possible, the length that they take, and the ends
+    of the paper, mm: midway to the next page; at an end beyond the cross, if the plate has room.
     """
     every = sorted(steps)
     low, high = box[axis], box[axis + 2]
@@ -356,52 +337,35 @@ def _tiles(
         before = half if first else min(BEYOND, max(start - plate[axis], 0.0))
         is_last = here[-1] == every[-1]
         after = min(BEYOND, max(plate[axis + 2] - end, 0.0)) if is_last else half
-        tiles.append(_Tile(here, end - start + 2 * BEYOND, start - before, end + after))
+        tiles.append((here, end - start + 2 * BEYOND, start - before, end + after))
     return tiles
 
 
-def _foot(outlines: Sequence[Guide]) -> float:
-    """Room for the legend below the drawing, mm."""
-    return 24 + ROW * (len(outlines) + len(NOTES))
-
-
-def _draw(
+def _draw_leaf(
     page: PdfPage,
     laminate: Laminate,
     outlines: Sequence[Guide],
     places: Sequence[Point],
     leaf: Leaf,
 ) -> None:
-    """The laminates of a page, numbered if there are several, with its trim frame in the middle."""
-    box = box_round([guide.region.bounds for guide in outlines])
-    foot = _foot(outlines)
-    x0, low, right, top = leaf.trim.bounds
-    x = page.width / 2 - (x0 + right) / 2
-    y = foot + (page.height - HEAD - foot) / 2 - (low + top) / 2
-    for number in leaf.places:
-        place = places[number - 1]
-        at = x + place[0], y + place[1]
-        _laminate(page, laminate, outlines, at)
-        if len(places) > 1:
-            page.text((at[0] + box[0], at[1] + box[1] - 2.3), f"{number}", SMALL)
-    page.stroke(BLACK, dashes=(0.2, 0.8))
-    page.contours([leaf.trim], (x, y))
-
-
-def _laminate(page: PdfPage, laminate: Laminate, outlines: Sequence[Guide], at: Point) -> None:
-    """The cross through the axis, the pins and the lines of one laminate."""
+    """Draw the laminates of a page, numbered if there are several, its trim frame in the middle:
+    the cross through the axis, the pins and the lines of each.
+    """
     low_x, low_y, high_x, high_y = box_round([guide.region.bounds for guide in outlines])
-    x, y = at
-    page.stroke(GREY)
-    page.lines(
-        ((low_x - BEYOND + x, y), (high_x + BEYOND + x, y)),
-        ((x, low_y - BEYOND + y), (x, high_y + BEYOND + y)),
-    )
-    for pin in laminate.pins:
-        page.contours(disc(pin.centre, pin.diameter / 2).contours, at)
-    for guide in outlines:
-        _look(page, guide.is_mask)
-        page.contours(guide.region.contours, at)
+    foot = _foot(len(outlines) + len(NOTES))
+    left, low, right, top = leaf.trim.bounds
+    by = page.width / 2 - (left + right) / 2, foot + (page.height - HEAD - foot - low - top) / 2
+    for number in leaf.places:
+        x, y = at = by[0] + places[number - 1][0], by[1] + places[number - 1][1]
+        level = (low_x - BEYOND + x, y), (high_x + BEYOND + x, y)
+        page.lines(GREY, level, ((x, low_y - BEYOND + y), (x, high_y + BEYOND + y)))
+        for pin in laminate.pins:
+            page.contours(GREY, disc(pin.centre, pin.diameter / 2).contours, at)
+        for guide in outlines:
+            page.contours(edge_pen(guide.is_mask), guide.region.contours, at)
+        if len(places) > 1:
+            page.text((x + low_x, y + low_y - 2.3), f"{number}", SMALL)
+    page.contours(TRIM_LINE, [leaf.trim], by)
 
 
 def guides(laminate: Laminate) -> tuple[Guide, ...]:
@@ -410,13 +374,12 @@ def guides(laminate: Laminate) -> tuple[Guide, ...]:
     parts = press_steps(laminate)
     # A whole stack that is laid down again has no edge to align to.
     for step in (part for part in parts if part.adds):
-        for bed in beds(parts, step):
-            for layer in _loose(laminate, step, bed):
-                outline = Region(tuple(layer.profile.outers))
-                key = outline.key, layer.is_mask
-                _, laid, steps = shapes.setdefault(key, (outline, [], []))
-                laid.append(layer)
-                steps.append(step.number)
+        for layer in (layer for bed in beds(parts, step) for layer in _loose(laminate, step, bed)):
+            outline = Region(tuple(layer.profile.outers))
+            key = outline.key, layer.is_mask
+            _, laid, steps = shapes.setdefault(key, (outline, [], []))
+            laid.append(layer)
+            steps.append(step.number)
     return tuple(
         Guide(
             region,
@@ -442,9 +405,7 @@ def _loose(laminate: Laminate, step: LayUpStep, bed: Bed) -> Iterator[Layer]:
 # Paths of seams on their films.
 
 
-SEAMS = "seams.pdf"
-START = 0.8
-"""Radius of the circle at the start of a path, mm."""
+START = 0.8  # radius of the circle at the start of a path, mm
 SEAM_USE = (
     "Print at 100 % (“actual size”, not “fit to page”). Measure both bars: if either is not",
     f"{BAR:g} mm, {CLOSE:g} more or less, do not use this print. Lay the films over it, edges on",
@@ -478,37 +439,32 @@ def _seam_page(
     offsets: Mapping[str, Point],
 ) -> PdfPage:
     films = union([laminate.layer(index).profile for index in layers])
-    box = box_round([films.bounds, *(seam.region.bounds for _, seam in seams)])
+    low_x, low_y, high_x, high_y = box_round(
+        [films.bounds, *(seam.region.bounds for _, seam in seams)]
+    )
     tools = [tool for tool in dict.fromkeys(seam.tool for _, seam in seams) if tool in offsets]
     words = [
-        *(
-            f"step {step}: seam {seam.name}, {seam.tool}, {seam.width:g} mm wide, layers "
-            f"{seam.below} and {seam.above}; begins at its circle"
-            for step, seam in seams
-        ),
-        *(f"As made: the {shift_words(tool, offsets[tool])}." for tool in tools),
-        f"Blue: edges of {layers_in_words(layers)}. Black: the middle of the tool. Dashed: its "
-        "width.",
+        f"step {step}: seam {seam.name}, {seam.tool}, {seam.width:g} mm wide, layers "
+        f"{seam.below} and {seam.above}; begins at its circle"
+        for step, seam in seams
     ]
-    foot = 24 + ROW * (len(words) + 1)
-    low_x, low_y, high_x, high_y = box
+    words += [f"As made: the {shift_words(tool, offsets[tool])}." for tool in tools]
+    edges = f"Blue: edges of {layers_in_words(layers)}."
+    words += [f"{edges} Black: the middle of the tool. Dashed: its width.", ""]
+    foot = _foot(len(words))
     width = max(PAPER[0], high_x - low_x + 2 * SIDE)
     height = max(PAPER[1], high_y - low_y + HEAD + foot)
-    page = PdfPage(width, height)
+    title = f"{laminate.name}: paths of seams, from above, 1:1"
+    legend = [("", line) for line in words]
+    page = _work_page((width, height), title, SEAM_USE, legend, foot, sha256)
     at = (width - low_x - high_x) / 2, foot + (height - HEAD - foot - low_y - high_y) / 2
-    _look(page, is_mask=False)
-    page.contours(films.contours, at)
+    page.contours(edge_pen(is_mask=False), films.contours, at)
     for step, seam in seams:
-        _look(page, is_mask=True)
-        page.contours(seam.region.contours, at)
-        page.stroke(BLACK)
-        page.chains(seam.path, at)
-        start = seam.path[0][0].start
-        page.contours(disc(start, START).contours, at)
-        page.text((start[0] + at[0] + 1.5, start[1] + at[1] + 1.0), f"{step}", SMALL)
-    _work_head(page, f"{laminate.name}: paths of seams, from above, 1:1", SEAM_USE)
-    _lines(page, (LEFT, foot - 8), words)
-    page.text((width - 46, foot - 8 - ROW * len(words)), f"design {sha256[:12]}", WORDS)
+        x, y = seam.path[0][0].start
+        page.contours(edge_pen(is_mask=True), seam.region.contours, at)
+        page.chains(BLACK, seam.path, at)
+        page.contours(BLACK, disc((x, y), START).contours, at)
+        page.text((x + at[0] + 1.5, y + at[1] + 1.0), f"{step}", SMALL)
     return page
 
 
@@ -519,12 +475,9 @@ TRAY_SIDE, TRAY_HEAD, TRAY_FOOT = 12.0, 34.0, 12.0
 """Margins of the page: left and right, above and below, mm."""
 GAP, LABEL, HEADING = 2.5, 2.6, 3.4
 """mm between two places, and the sizes of labels and of a step's heading."""
-BELOW = 3.6
-"""Height of a place's label below its part, mm."""
-LETTER = 0.58
-"""Mean width of a label's letters, in font sizes: slightly above Helvetica's digits."""
-MOST_NAMED = 8
-"""Up to this many serials of a place are in its heading; otherwise the first and the last."""
+BELOW = 3.6  # height of a place's label below its part, mm
+LETTER = 0.58  # mean width of a label's letters, in font sizes: slightly above Helvetica's digits
+MOST_NAMED = 8  # up to this many serials of a place are in its heading; else the first and the last
 TRAY_USE = (
     f"Print at 100 %: both bars must be {BAR:g} mm, {CLOSE:g} more or less. Lay each part, "
     "upper side up, on its outline; its",
@@ -550,19 +503,9 @@ class TrayPart(NamedTuple):
         return max(high_x - low_x, LETTER * LABEL * len(self.label)), high_y - low_y + BELOW
 
 
-class TraySheet(NamedTuple):
-    """One page of a laminate: its size in mm, and its parts and the headings of its steps, each
-    with its place: where a part's frame has its origin, or where words begin.
-    """
-
-    size: tuple[float, float]
-    parts: list[tuple[Point, TrayPart]]
-    headings: list[tuple[Point, str]]
-
-
 def tray_pdf(laminate: Laminate, runs: Runs, design_sha256: str, batch: str | None = None) -> bytes:
     """Return the pages of all places of a cycle."""
-    sheets = [_tray_page(sheet) for sheet in tray_sheets(laminate)]
+    sheets = tray_sheets(laminate)
     pages = []
     for place in range(1, runs.together + 1):
         for number, under in enumerate(sheets, 1):
@@ -578,34 +521,41 @@ def tray_pdf(laminate: Laminate, runs: Runs, design_sha256: str, batch: str | No
     return pdf(pages, f"{laminate.name}: tray plan")
 
 
-def tray_sheets(laminate: Laminate) -> list[TraySheet]:
-    """Return the pages of one laminate; a part wider than the paper gets a wider page."""
+def tray_sheets(laminate: Laminate) -> list[PdfPage]:
+    """Return the pages of one laminate, common to all places of a cycle; a part wider than the
+    paper gets a wider page.
+    """
     steps = [*_laid(laminate)]
     boxes = [part.region.bounds for _, parts in steps for part in parts]
     wide = max(box[2] - box[0] for box in boxes) + 2 * TRAY_SIDE
     high = max(box[3] - box[1] for box in boxes) + BELOW + HEADING + 3 + TRAY_HEAD + TRAY_FOOT
     size = max(PAPER[0], wide), max(PAPER[1], high)
-    sheets = [TraySheet(size, [], [])]
-    top = size[1] - TRAY_HEAD
+    pages: list[PdfPage] = []
+    top = 0.0
     for heading, parts in steps:
         words = heading
         for row in _in_rows(parts, size[0] - 2 * TRAY_SIDE):
             high = max(part.size[1] for part in row)
-            if sheets[-1].parts and top - (HEADING + 3 if words else 0) - high < TRAY_FOOT:
-                sheets.append(TraySheet(size, [], []))
-                top = size[1] - TRAY_HEAD
+            if top - (HEADING + 3 if words else 0) - high < TRAY_FOOT:
                 words = words or f"{heading} (continued)"
+                pages.append(PdfPage(*size))
+                top = size[1] - TRAY_HEAD
             if words:
-                sheets[-1].headings.append(((TRAY_SIDE, top - HEADING), words))
-                top -= HEADING + 3
-                words = ""
-            x = TRAY_SIDE
-            for part in row:
-                low_x, low_y = part.region.bounds[:2]
-                sheets[-1].parts.append(((x - low_x, top - high + BELOW - low_y), part))
-                x += part.size[0] + GAP
+                pages[-1].text((TRAY_SIDE, top - HEADING), words, HEADING, bold=True)
+                top, words = top - HEADING - 3, ""
+            _draw_row(pages[-1], row, top - high)
             top -= high + GAP
-    return sheets
+    return pages
+
+
+def _draw_row(page: PdfPage, row: Sequence[TrayPart], foot: float) -> None:
+    x = TRAY_SIDE
+    for part in row:
+        low_x, low_y = part.region.bounds[:2]
+        at = x - low_x, foot + BELOW - low_y
+        page.contours(edge_pen(part.layer.is_mask, 0.15), part.region.contours, at)
+        page.text((x, foot + 0.6), part.label, LABEL)
+        x += part.size[0] + GAP
 
 
 def _laid(laminate: Laminate) -> Iterator[tuple[str, list[TrayPart]]]:
@@ -644,16 +594,3 @@ def _place_words(runs: Runs, place: int, batch: str | None) -> str:
     if len(names) > MOST_NAMED:
         names = [names[0], "...", names[-1]]
     return f", place {place} ({', '.join(names)})"
-
-
-def _tray_page(sheet: TraySheet) -> PdfPage:
-    """Return the content common to all laminates of a cycle: the places with their labels."""
-    page = PdfPage(*sheet.size)
-    for at, words in sheet.headings:
-        page.text(at, words, HEADING, bold=True)
-    for at, part in sheet.parts:
-        _look(page, part.layer.is_mask, 0.15)
-        page.contours(part.region.contours, at)
-        low_x, low_y = part.region.bounds[:2]
-        page.text((at[0] + low_x, at[1] + low_y - BELOW + 0.6), part.label, LABEL)
-    return page
