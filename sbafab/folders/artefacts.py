@@ -360,7 +360,7 @@ def _tray_pdf(folder: DesignFolder) -> bytes | None:
 
 def _tray_html(folder: DesignFolder) -> str | None:
     # Only a batch, or a design that asks for it, has a page for the phone.
-    from sbafab.reports.traveller.batch import tray_html
+    from sbafab.reports.traveller.page import tray_html
 
     return tray_html(folder.work) if _has_tray(folder) else None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from io import BytesIO
 from textwrap import wrap
 from typing import TYPE_CHECKING, NamedTuple
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 RGB = tuple[int, int, int]
 
 COLOURS: dict[str, RGB] = {
@@ -40,12 +41,9 @@ PAPER: RGB = (255, 255, 255)
 INK: RGB = (40, 44, 50)
 BAR_INK: RGB = (34, 34, 34)
 BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
-ENLARGED = 2
-"""Pictures are painted larger by this factor and reduced, which smooths their edges."""
-DENSITY = 1.45
-"""Samples per pixel along a triangle's side: more than the root of 2, so none is missed."""
-MOST = 4_000_000
-"""Most samples in memory at once."""
+ENLARGED = 2  # pictures are painted larger by this and reduced, which smooths their edges
+DENSITY = 1.45  # samples per pixel along a triangle's side: above the root of 2, none is missed
+MOST = 4_000_000  # samples in memory at once
 AMBIENT = 0.58
 
 
@@ -133,8 +131,7 @@ def rasterize(
             light = np.repeat(_lit(normal @ view.axes.T, lamp)[:, None], 3, axis=1)
         else:
             light = _lit(normals[body] @ view.axes.T, lamp)[faces]
-        for part in _samples(corners[front], light, twice[front]):
-            _paint(buffer, body, front, part)
+        _paint(buffer, body, front, corners[front], light)
     return buffer
 
 
@@ -144,22 +141,13 @@ def _lit(normals: Floats, lamp: Sequence[float]) -> Floats:
     return light
 
 
-class _Samples(NamedTuple):
-    """Triangles (by number), their corners (n, 3, 3) and light (n, 3), and points of each: shares
-    ``s`` along the first side and ``t`` from there to the third corner.
+def _paint(buffer: Buffer, body: int, front: Ints, corners: Floats, light: Floats) -> None:
+    """Paint triangles (n, 3, 3) of twice these areas at points that cover them, those of similar
+    size together; ``light`` (n, 3) is that of their corners, ``front`` their numbers.
     """
-
-    triangles: NDArray[np.int64]
-    corners: Floats
-    light: Floats
-    s: Floats
-    t: Floats
-
-
-def _samples(corners: Floats, light: Floats, twice: Floats) -> Iterator[_Samples]:
-    """Yield points that cover triangles of twice these areas, those of similar size together."""
     sides = np.roll(corners, -1, axis=1)[:, :, :2] - corners[:, :, :2]
     lengths = np.hypot(sides[:, :, 0], sides[:, :, 1])
+    twice = np.abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])
     # The longest side comes first.
     order = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
     corners = np.take_along_axis(corners, order[:, :, None], axis=1)
@@ -168,17 +156,23 @@ def _samples(corners: Floats, light: Floats, twice: Floats) -> Iterator[_Samples
     counts = np.column_stack([long, twice / np.maximum(long, 1e-9)])
     grids = 2 ** np.ceil(np.log2(np.ceil(DENSITY * counts) + 2)).astype(np.int64)
     for n, m in np.unique(grids, axis=0):
+        # Shares along the first side, and from there to the third corner.
         s, t = (grid.ravel() for grid in np.meshgrid(*(np.linspace(0, 1, k) for k in (n, m))))
+        shares = np.stack([(1 - t) * (1 - s), (1 - t) * s, t], axis=-1)
         alike = np.flatnonzero((grids == (n, m)).all(axis=1))
         for part in np.array_split(alike, max(1, len(alike) * n * m // MOST)):
-            yield _Samples(part, corners[part], light[part], s, t)
+            number, at = _nearest(buffer, shares @ corners[part])
+            place, which = number, part[at // len(shares)]
+            buffer.light.reshape(-1)[place] = (light[which] * shares[at % len(shares)]).sum(axis=1)
+            buffer.face.reshape(-1)[place] = front[which]
+            buffer.body.reshape(-1)[place] = body
 
 
-def _paint(buffer: Buffer, body: int, front: NDArray[np.int64], part: _Samples) -> None:
-    """Paint the points that are nearest to the eye."""
-    a, b, c = (part.corners[:, i, None, :] for i in range(3))
-    s, t = part.s[:, None], part.t[:, None]
-    x, y, depth = ((1 - t) * (a + s * (b - a)) + t * c).reshape(-1, 3).T
+def _nearest(buffer: Buffer, points: Floats) -> tuple[Ints, Ints]:
+    """Enter the depths of points (n, m, 3), and return the pixels in which one is now the nearest
+    to the eye, with its number.
+    """
+    x, y, depth = points.reshape(-1, 3).T
     height, width = buffer.body.shape
     column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     inside = np.flatnonzero((column >= 0) & (column < width) & (row >= 0) & (row < height))
@@ -186,13 +180,7 @@ def _paint(buffer: Buffer, body: int, front: NDArray[np.int64], part: _Samples) 
     nearest = buffer.depth.reshape(-1)
     np.maximum.at(nearest, place, depth)
     won = depth == nearest[place]
-    place = place[won]
-    number, at = np.divmod(inside[won], len(part.s))
-    p, q = part.s[at], part.t[at]
-    shares = np.stack([(1 - q) * (1 - p), (1 - q) * p, q], axis=-1)
-    buffer.light.reshape(-1)[place] = (part.light[number] * shares).sum(axis=1)
-    buffer.face.reshape(-1)[place] = front[part.triangles[number]]
-    buffer.body.reshape(-1)[place] = body
+    return place[won], inside[won]
 
 
 def edges(buffer: Buffer, step: float, borders: bool = False) -> NDArray[np.bool_]:

@@ -330,7 +330,7 @@ def _tiles(
     pages = -(-len(every) // most)
     each = -(-len(every) // pages)
     half = (pitch - (high - low)) / 2
-    tiles = []
+    tiles: list[tuple[Sequence[float], float, float, float]] = []
     for first in range(0, len(every), each):
         here = every[first : first + each]
         start, end = here[0] + low, here[-1] + high

@@ -8,7 +8,7 @@ import pytest
 
 from sbafab.design.sections import Acceptance
 from sbafab.laminate.burst import burst
-from sbafab.reports.traveller.acceptance import proof, values
+from sbafab.reports.traveller.page import acceptance, proof
 from tests.reports.pages import TPU, work_of
 
 
@@ -45,12 +45,14 @@ def test_proof_pressure_stays_well_below_the_burst(
 def test_the_needle_holds_in_the_tubes_bore() -> None:
     """0.02825 in of 22 gauge over the tube's 0.025 in: 13 % wider."""
     assert "22 G (outer diameter 0.718 mm)" in Acceptance().fitting
-    assert values(work_of("3dof-15mm"))["bore"] == 0.635 == pytest.approx(0.718 / 1.13, abs=1e-3)
+    assert (
+        acceptance(work_of("3dof-15mm"))["bore"] == 0.635 == pytest.approx(0.718 / 1.13, abs=1e-3)
+    )
 
 
 def test_chambers_of_one_net_are_filled_by_its_first_tube() -> None:
     """What comes out of the other is no leak between chambers."""
-    diode, gripper = (values(work_of(name)) for name in ("diode", "gripper"))
+    diode, gripper = (acceptance(work_of(name)) for name in ("diode", "gripper"))
     assert diode["shared"] == {"through": ["in", "out"]}
     assert diode["filled"] == []
     # The channel lies between base and wall, the pocket between wall and cap.

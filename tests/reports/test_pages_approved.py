@@ -15,9 +15,8 @@ from sbafab.assemblies.checks import run_checks
 from sbafab.assemblies.files import assembly_of
 from sbafab.design.files import read_toml, templates_folder
 from sbafab.reports.traveller.assembly_page import AssemblyWork, assembly_html
-from sbafab.reports.traveller.batch import tray_html
 from sbafab.reports.traveller.bench import bench_html
-from sbafab.reports.traveller.page import traveller_html
+from sbafab.reports.traveller.page import traveller_html, tray_html
 from sbafab.reports.traveller.work import Work
 from sbafab.rules.finding import Finding, Place
 from tests.reports.pages import APPROVED, DOUBLE, EARS, TPU, lines_of, work_of

@@ -15,9 +15,9 @@ import shapely
 from sbafab.laminate.lay_up import press_steps
 from sbafab.reports.drawing import text_width
 from sbafab.reports.prints import seams_pdf
-from sbafab.reports.traveller.acceptance import straight_run
 from sbafab.reports.traveller.bench import film_classes, pressure_range
 from sbafab.reports.traveller.lay_up import beds
+from sbafab.reports.traveller.page import straight_run
 from sbafab.reports.traveller.pictures import plan
 from sbafab.reports.traveller.steps import FoldPage, PressPage, SeamPage, joint_pages, step_pages
 from tests.reports.pages import DOUBLE, EARS, bench, built, page, words_of, work_of

@@ -23,7 +23,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.cycles import Runs, design_runs, runs_of
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.prints import guides, leaves, tray_pdf, underlay_pdf
-from sbafab.reports.traveller.batch import tray_html
+from sbafab.reports.traveller.page import tray_html
 from sbafab.reports.traveller.work import Work
 
 SHA = "0123456789abcdef" * 4

@@ -29,7 +29,7 @@ from sbafab.reports.traveller.bench import cutting, held_films
 from sbafab.reports.traveller.materials import cut_list, release_films
 from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS
-from sbafab.reports.traveller.times import HANDLING_MINUTES, times
+from sbafab.reports.traveller.work import HANDLING_MINUTES, times
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding, Place
 from tests.quick import few
@@ -166,8 +166,8 @@ def test_the_cut_list_counts_every_pattern(sheet_files: Any) -> None:
         for _, pattern, count in sheet.counts:
             on_sheets[pattern] += count
     for row in cut_list(work):
-        assert row.count * row.pieces == on_sheets[row.pattern]
-    assert sum(row.count for row in cut_list(work)) == 3 * len(work.laminate.layers)
+        assert row.parts * row.pieces == on_sheets[row.pattern]
+    assert sum(row.parts for row in cut_list(work)) == 3 * len(work.laminate.layers)
     # Two spares of two patterns, each in three pieces.
     more = {"P02": 6, "P06": 6}
     sheets = [

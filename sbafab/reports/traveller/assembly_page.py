@@ -23,8 +23,7 @@ from sbafab.reports.traveller.materials import THREAD, Item, film_items, items_o
 from sbafab.reports.traveller.page import code_svg, context, preparations, record_text
 from sbafab.reports.traveller.pictures import definitions, part_regions, pattern_regions, sheet_rows
 from sbafab.reports.traveller.steps import step_rows
-from sbafab.reports.traveller.times import assembly_times
-from sbafab.reports.traveller.work import Work
+from sbafab.reports.traveller.work import Work, assembly_times
 from sbafab.rules.finding import Finding
 
 _NAMES = re.compile(r'(\b(?:id|aria-labelledby)="|\bhref="#|url\(#)')

@@ -21,8 +21,7 @@ from sbafab.pressing.dowels import push_out
 from sbafab.pressing.plate_heating import MELTING, PATIENCE, START
 from sbafab.pressing.schedule import plate_holes
 from sbafab.reports.traveller.formatting import NEWTONS_PER_POUND, frame, render
-from sbafab.reports.traveller.materials import has_underlay
-from sbafab.reports.traveller.times import laser
+from sbafab.reports.traveller.materials import films_of, has_underlay
 from sbafab.reports.traveller.work import Work
 from sbafab.rules.pin_fit import NAME as PIN_FIT
 from sbafab.rules.pin_fit import most_on_a_pin
@@ -43,7 +42,7 @@ class HeldFilm(NamedTuple):
 
 def held_films(works: Sequence[Work]) -> Iterator[HeldFilm]:
     """Yield every film of sheets whose parts all come free; masks are held like PTFE."""
-    for film in dict.fromkeys(film for work in works for film in work.films):
+    for film in films_of(works):
         count, area = 0, math.inf
         for work in works:
             laminate = work.laminate
@@ -77,50 +76,54 @@ class TightPin(NamedTuple):
         return most_on_a_pin(self.work.laminate)
 
 
-def _tight_pin(works: Sequence[Work]) -> TightPin | None:
-    """Return the pin of the design whose films stretch most; None if rule pin-fit is silent."""
+def cutting(works: Sequence[Work]) -> dict[str, Any]:
+    """Return the facts of the section on cutting, for designs on common sheets.
+
+    The laser's minutes, metres of cut and travel, and contours are those of all sheets.
+    ``tight_pin`` is of the design whose films stretch most; None if rule pin-fit is silent.
+    ``loose`` and ``spare`` count the pieces of masks in several pieces.
+    """
+    sheets = works[0].sheets
     tight = [
         TightPin(finding.measured, finding.limit or 0.0, work)
         for work in works
         for finding in work.findings
         if finding.rule == PIN_FIT and finding.measured
     ]
-    return max(tight, key=lambda pin: pin.stretch, default=None)
+    loose = [
+        (pieces * needed, pieces * work.design.order.spare_parts(needed))
+        for work, pieces, needed in _loose_masks(works)
+    ]
+    return {
+        "laser": {
+            "minutes": sum(sheet.minutes for sheet in sheets),
+            "cut": sum(sheet.cut_length for sheet in sheets) / 1000,
+            "travel": sum(sheet.travel for sheet in sheets) / 1000,
+            "contours": sum(sheet.contours for sheet in sheets),
+        },
+        "program": works[0].design.sheets.program,
+        "kerf_notes": _kerf_notes(works),
+        "held": list(held_films(works)),
+        "tight_pin": max(tight, key=lambda pin: pin.stretch, default=None),
+        "loose": sum(needed for needed, _ in loose),
+        "spare": sum(spare for _, spare in loose),
+    }
 
 
-def _loose(works: Sequence[Work]) -> tuple[int, int]:
-    """Return the numbers of needed and spare pieces of masks with several pieces."""
-    loose = spare = 0
+def _loose_masks(works: Sequence[Work]) -> Iterator[tuple[Work, int, int]]:
+    """Yield the masks in several pieces: their pieces, and the layers needed."""
     for work in works:
         for layers in work.laminate.patterns.values():
             pieces = len(layers[0].profile.pieces)
             if layers[0].is_mask and pieces > 1:
-                needed = len(layers) * work.copies
-                loose += pieces * needed
-                spare += pieces * work.design.order.spare_parts(needed)
-    return loose, spare
+                yield work, pieces, len(layers) * work.copies
 
 
-def cutting(works: Sequence[Work]) -> dict[str, Any]:
-    """Return the facts of the section on cutting, for designs on common sheets."""
-    loose, spare = _loose(works)
-    return {
-        "laser": laser(works[0]),
-        "program": works[0].design.sheets.program,
-        "kerf_notes": kerf_notes(works),
-        "held": list(held_films(works)),
-        "tight_pin": _tight_pin(works),
-        "loose": loose,
-        "spare": spare,
-    }
-
-
-def kerf_notes(works: Sequence[Work]) -> dict[str, list[str]]:
+def _kerf_notes(works: Sequence[Work]) -> dict[str, list[str]]:
     """Return the materials by the note on the kerf of their cut files."""
     notes: dict[str, list[str]] = {}
-    widths = works[0].design.kerf_widths
-    for film in dict.fromkeys(film for work in works for film in work.films):
-        kerf = widths.get(film.material)
+    for film in films_of(works):
+        kerf = works[0].design.kerf_widths.get(film.material)
         words = "uncalibrated: edges are nominal"
         if isinstance(kerf, tuple):
             words = f"compensated for {kerf[0]:g} mm along x, {kerf[1]:g} mm along y"
@@ -133,7 +136,7 @@ def kerf_notes(works: Sequence[Work]) -> dict[str, list[str]]:
 def nominal(works: Sequence[Work]) -> list[str]:
     """Return the materials whose kerf was not measured."""
     widths = works[0].design.kerf_widths
-    materials = dict.fromkeys(film.material for work in works for film in work.films)
+    materials = dict.fromkeys(film.material for film in films_of(works))
     return [material for material in materials if widths.get(material) is None]
 
 
@@ -173,14 +176,10 @@ def film_classes(low: float, high: float) -> list[FilmClass]:
 # The page.
 
 
-WANTED = 0.05
-"""Accuracy of setting the pressure on a gauge, as a share: ours."""
-MOST_RAISED = 5.0
-"""Excess in C that the platens may have over the schedule's temperature: ours."""
-MOST_LISTED = 9
-"""Up to this many places of a plate each is listed."""
-PUNCH_PLAY = 0.1
-"""Difference in mm between the push-out hole and the punch."""
+WANTED = 0.05  # accuracy of setting the pressure on a gauge, as a share: ours
+MOST_RAISED = 5.0  # excess in C that the platens may have over the schedule's temperature: ours
+MOST_LISTED = 9  # up to this many places of a plate each is listed
+PUNCH_PLAY = 0.1  # difference in mm between the push-out hole and the punch
 
 
 def punch(diameter: float) -> float:
@@ -193,7 +192,7 @@ def bench_html(
 ) -> str:
     """Return the page of work done once per bench, for all designs of a folder."""
     pressed = [work for work in works if work.schedule.steps]
-    films = list(dict.fromkeys(film for work in works for film in work.films))
+    films = films_of(works)
     hands = [w.design.registration for w in works if w.laminate.registration == "channel-pin"]
     return render(
         "bench.html.j2",
@@ -218,11 +217,10 @@ def _trials(works: Sequence[Work]) -> dict[str, object]:
     """Return the films whose bond and adhesive need a trial: all but the paper's and masks."""
     papers = [(PAPER_PRODUCT, PAPER_THICKNESS)]
     bonded = [film for work in works for film in films_without_minutes(work.laminate, papers)]
-    films = [film for work in works for film in work.laminate.glued_films]
-    glued = [film.product for film in films if film.product != PAPER_PRODUCT]
+    glued = [film.product for work in works for film in work.laminate.glued_films]
     return {
         "bonded": list(dict.fromkeys(film.said for film in bonded)),
-        "glued": list(dict.fromkeys(glued)),
+        "glued": [product for product in dict.fromkeys(glued) if product != PAPER_PRODUCT],
         "adhesive": adhesive_for(works[0].design, works[0].laminate.glued_films),
     }
 
@@ -236,8 +234,8 @@ def _tools(works: Sequence[Work], films: Iterable[Film]) -> dict[str, object]:
         seams.setdefault(seam.tool, set()).add(seam.width_mm)
     pins = sorted({pin.diameter for laminate in laminates for pin in laminate.pins})
     return {
-        "holds": {_hold(work, film) for work in works for film in work.films},
-        "has_loose": _loose(works)[0] > 0,
+        "holds": {_hold(works[0], film) for film in films},
+        "has_loose": any(_loose_masks(works)),
         "pins": [(diameter, punch(diameter)) for diameter in pins],
         "pricks_paper": any(step.pin_settings and has_underlay(step) for step in steps),
         "seam_tools": seams,
@@ -249,13 +247,12 @@ def _tools(works: Sequence[Work], films: Iterable[Film]) -> dict[str, object]:
 
 def _plate(work: Work) -> dict[str, Any]:
     """Return the base plate of a design: the accuracy of its holes and their table, mm."""
-    design, laminate, runs = work.design, work.laminate, work.cycles
+    design, laminate, places = work.design, work.laminate, work.cycles.places
     machine, pin = design.registration.plate_made_by, design.thickest_pin
     several = len(laminate.pins) > 1
     finer = several and design.registration.pin_error is None and machine == "jig-borer"
-    corner_x, corner_y = plate_corner(laminate, design.press.platen, runs.places)
-    low_x, low_y, high_x, high_y = whole_plate(laminate, design.press.platen, runs.places).bounds
-    xs, ys = (sorted({place[axis] for place in runs.places}) for axis in (0, 1))
+    low_x, low_y, high_x, high_y = whole_plate(laminate, design.press.platen, places).bounds
+    xs, ys = (sorted({place[axis] for place in places}) for axis in (0, 1))
     return {
         "work": work,
         "size": (high_x - low_x, high_y - low_y),
@@ -265,10 +262,10 @@ def _plate(work: Work) -> dict[str, Any]:
         "counted": design.pin_error if several else design.lone_pin_error,
         "coarse": pin_error(pin, "cnc-mill"),
         "command": for_a_cnc_mill("design.toml") if finer else "",
-        "corner": (corner_x, corner_y),
+        "corner": plate_corner(laminate, design.press.platen, places),
         "holes": plate_holes(laminate, design),
-        "places": runs.places,
-        "is_listed": len(runs.places) <= MOST_LISTED,
+        "places": places,
+        "is_listed": len(places) <= MOST_LISTED,
         "columns": len(xs),
         "pitch": [steps[1] - steps[0] if len(steps) > 1 else 0.0 for steps in (xs, ys)],
     }

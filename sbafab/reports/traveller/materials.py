@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from sbafab.design.identity import adhesive_for, tube_name
-from sbafab.laminate.films import FIRST
+from sbafab.laminate.films import FIRST, Film
 from sbafab.laminate.laminate import Layer
 from sbafab.pressing.build_up import BASE_PLATE, PAD, RELEASE, UNDERLAY, pad_sheets
 from sbafab.pressing.dowels import pin_holes
@@ -25,8 +25,7 @@ SPARE_TUBES = 1
 BILL_COLUMNS = ("item", "specification", "needed", "area_m2", "quantity")
 
 
-@dataclass(frozen=True)
-class Item:
+class Item(NamedTuple):
     """A row of the bill of materials.
 
     ``quantity`` is a text, ``number`` the count needed, None if it is not counted; ``area`` in m2
@@ -48,25 +47,29 @@ def bill_csv(work: Work) -> str | None:
     if work.cycles.copies == 1:
         return None
     rows: list[Sequence[object]] = [BILL_COLUMNS]
-    for item in bill(work):
-        area = None if item.area is None else f"{item.area:.4f}"
-        rows.append((item.name, item.what, item.number, area, item.quantity))
+    for name, what, quantity, number, area in bill(work):
+        rows.append((name, what, number, None if area is None else f"{area:.4f}", quantity))
     return csv_text(rows)
 
 
 def bill(work: Work) -> list[Item]:
     """Return everything needed before the work starts, for all copies."""
-    return [*film_items([work]), *_tubes(work), *_wrap(work), *supplies(work)]
+    return [*film_items([work]), *_tubes(work), *_wrap(work), *_supplies(work)]
 
 
 def items_of_part(work: Work) -> list[Item]:
     """Return the needs of a design in an assembly beside films; its wrap is the assembly's part."""
-    return [*_tubes(work), *supplies(work)]
+    return [*_tubes(work), *_supplies(work)]
+
+
+def films_of(works: Sequence[Work]) -> list[Film]:
+    """Return every film of designs once, in the order of the layers."""
+    return list(dict.fromkeys(film for work in works for film in work.films))
 
 
 def film_items(works: Sequence[Work]) -> Iterator[Item]:
     """Yield each film of designs on common sheets."""
-    for film in dict.fromkeys(film for work in works for film in work.films):
+    for film in films_of(works):
         layers = [(w, layer) for w in works for layer in w.laminate.layers if layer.film == film]
         area = sum(work.copies * layer.profile.area for work, layer in layers) / 100
         sheets = [sheet for sheet in works[0].sheets if sheet.material == film.material]
@@ -112,7 +115,7 @@ def _wrap(work: Work) -> Iterator[Item]:
         yield THREAD
 
 
-def supplies(work: Work) -> Iterator[Item]:
+def _supplies(work: Work) -> Iterator[Item]:
     """Yield what the press needs: pins, plate, films, pad, and prints to lay up on."""
     if work.schedule.steps:
         yield from _pins(work)
@@ -123,7 +126,7 @@ def supplies(work: Work) -> Iterator[Item]:
         yield Item("Tape", words)
     if work.cycles.together > 1:
         words = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
-        yield Item("Tray", words, str(trays(work)), trays(work))
+        yield Item("Tray", words, str(_trays(work)), _trays(work))
         if work.design.order.tray is not False:
             pages = len(tray_sheets(work.laminate)) * work.cycles.together
             words = "tray.pdf printed at 100 % on plain paper; its bars must measure 100 mm"
@@ -138,54 +141,43 @@ def _pins(work: Work) -> Iterator[Item]:
         if pin.name in holes
         for length in holes[pin.name].lengths
     )
-    standard = work.design.registration.pin_standard
     for (diameter, length), number in sorted(sizes.items()):
         spare = max(2, number // 2)
-        yield Item(
-            "Dowel pins",
-            f"{standard}, ⌀{millimetres(diameter)} m6, {millimetres(length)} long; spares to "
-            "choose from",
-            f"{number} + {spare} spare",
-            number + spare,
+        words = (
+            f"{work.design.registration.pin_standard}, ⌀{millimetres(diameter)} m6, "
+            f"{millimetres(length)} long; spares to choose from"
         )
+        yield Item("Dowel pins", words, f"{number} + {spare} spare", number + spare)
 
 
 def _build_up(work: Work) -> Iterator[Item]:
     first = work.schedule.steps[0]
-    plate, release, pad = (
-        next(item for item in first.build_up if item.part == part)
-        for part in (BASE_PLATE, RELEASE, PAD)
-    )
+    parts = {item.part: item for item in first.build_up}
     platen = size(*first.platen_mm)
+
+    def made(part: str, more: str = "") -> str:
+        item = parts[part]
+        return f"{item.material}, {millimetres(item.thickness_mm)}{more}, {platen}"
+
     holes = f"stepped holes from {work.fixture} and the table in bench.html"
-    yield Item(
-        "Base plate",
-        f"{plate.material}, {millimetres(plate.thickness_mm)}, {platen}; "
-        f"{holes if work.fixture else 'no holes'}",
-        "1",
-        1,
-    )
+    holes = holes if work.fixture else "no holes"
+    yield Item("Base plate", f"{made(BASE_PLATE)}; {holes}", "1", 1)
     has_tpe = any(film.material == FIRST[0] for film in work.films)
     turned = "; one of them for films that are turned over" if turns_over(work) else ""
+    words = (
+        f"{made(RELEASE)}; {'TPE' if has_tpe else 'films'} must not stick to it at press "
+        f"temperature (our advice; the paper names none){turned}"
+    )
     number = release_films(work)
-    yield Item(
-        "Release film",
-        f"{release.material}, {millimetres(release.thickness_mm)}, {platen}; "
-        f"{'TPE' if has_tpe else 'films'} must not stick to it at press temperature (our advice; "
-        f"the paper names none){turned}",
-        str(number),
-        number,
-        number * first.platen_mm[0] * first.platen_mm[1] / 1e6,
-    )
-    sheets = pad_sheets(pad.thickness_mm)
+    area = number * first.platen_mm[0] * first.platen_mm[1] / 1e6
+    yield Item("Release film", words, str(number), number, area)
+    sheets = pad_sheets(parts[PAD].thickness_mm)
     piled = f", a pile of {sheets} sheets" if sheets > 1 else ""
-    yield Item(
-        "Press pad",
-        f"{pad.material}, {millimetres(pad.thickness_mm)}{piled}, {platen}, for "
-        f"{first.temperature_c:g} °C in continuous use (our advice; the paper names none)",
-        str(sheets),
-        sheets,
+    words = (
+        f"{made(PAD, piled)}, for {first.temperature_c:g} °C in continuous use (our advice; the "
+        "paper names none)"
     )
+    yield Item("Press pad", words, str(sheets), sheets)
 
 
 def _underlay(work: Work, path: str) -> Item:
@@ -196,14 +188,14 @@ def _underlay(work: Work, path: str) -> Item:
     if (width, height) != PAPER:
         paper = f"at least {size(math.ceil(width), math.ceil(height))}"
     join = "; cut out along their dotted frames and laid edge to edge" if len(spread) > 1 else ""
-    linings = trays(work)
+    linings = _trays(work)
     tray = f", and one to line {'the tray' if linings == 1 else 'each tray'}" if linings else ""
-    closings = prints(work) - linings
     words = (
         f"{path} printed at 100 % on plain paper "
         f"{millimetres(work.design.press.underlay_thickness)} thick, {paper}; its bars must "
-        f"measure 100 mm{join}. A fresh print for each of {count(closings, 'closing')} of the "
-        f"press, as paper dries there and shrinks{tray}"
+        f"measure 100 mm{join}. A fresh print for each of "
+        f"{count(prints(work) - linings, 'closing')} of the press, as paper dries there and "
+        f"shrinks{tray}"
     )
     pages = len(spread) * prints(work)
     return Item("Underlay", words, count(pages, "page"), pages)
@@ -217,10 +209,10 @@ def prints(work: Work) -> int:
     """Return the number of underlay prints needed: one per hot closing, one per tray."""
     if work.underlay is None:
         return 0
-    return work.cycles.count * sum(map(has_underlay, work.schedule.steps)) + trays(work)
+    return work.cycles.count * sum(map(has_underlay, work.schedule.steps)) + _trays(work)
 
 
-def trays(work: Work) -> int:
+def _trays(work: Work) -> int:
     """Return the number of trays for films between steps: one per cycle of several laminates."""
     return work.cycles.count if work.cycles.together > 1 else 0
 
@@ -240,8 +232,7 @@ def turns_over(work: Work) -> bool:
 # The parts to cut.
 
 
-@dataclass(frozen=True)
-class Cut:
+class Cut(NamedTuple):
     """A row of the cut list: one pattern. ``cut_length`` in mm, of one layer."""
 
     pattern: str
@@ -249,7 +240,7 @@ class Cut:
     material: str
     roles: str
     layers: str
-    count: int
+    parts: int
     spares: int
     pieces: int
     cut_length: float
@@ -272,14 +263,13 @@ def _cut(work: Work, same: Sequence[Layer]) -> Cut:
     is_flat = len(halves) > 1 or first.turned
     profile = laminate.as_cut(first) if is_flat else first.profile
     layers = [*same, *(half for half in halves if half is not first)]
-    parts = len(layers) - len(halves) + 1
     on_sheets = {
         sheet.path.rpartition("/")[2].removesuffix(".dxf"): number
         for sheet in work.sheets
         for design, pattern, number in sheet.counts
         if (design, pattern) == (work.design.name, first.pattern)
     }
-    needed = parts * work.copies
+    needed = (len(layers) - len(halves) + 1) * work.copies
     return Cut(
         first.pattern,
         thumbnail(first.pattern, is_flat, first.film, profile.bounds),
@@ -299,8 +289,7 @@ def _cut_length(work: Work, layer: Layer) -> float:
 
     Equal pieces are one part of a nest with a higher count.
     """
-    laminate = work.laminate
-    profile = laminate.as_cut(layer) if laminate.folds else layer.profile
+    profile = work.laminate.as_cut(layer) if work.laminate.folds else layer.profile
     parts = {
         part.piece: part
         for sheet in work.sheets

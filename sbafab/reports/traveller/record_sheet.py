@@ -42,12 +42,9 @@ HISTORY_FIELDS = (
     HistoryField("initials", "Initials", 5, "Who did it."),
 )
 """In the order of the page, the form and a table's columns."""
-MATERIAL_FIELDS = ("item", "lot", "expires", "kerf_mm", "initials")
-PRESS_FIELDS = (
-    *("step", "temperature_c", "press_force_n", "minutes"),
-    *("decision", "reason", "initials"),
-)
-DEVICE_FIELDS = ("step", "decision", "reason", "photograph", "note", "initials")
+MATERIAL = "item lot expires kerf_mm initials"
+PRESS = "step temperature_c press_force_n minutes decision reason initials"
+DEVICE = "step decision reason photograph note initials"
 
 
 class RecordTable(NamedTuple):
@@ -67,34 +64,24 @@ def record_tables(
 ) -> tuple[RecordTable, ...]:
     """Return the tables of a design's record page: materials, press steps, tests."""
     films = {layer.film.material: layer.film for layer in laminate.layers}
-    items = [*films, *([ADHESIVE] if laminate.tube_count else [])]
-    products = ["" if film.written == film.material else film.product for film in films.values()]
-    glue = adhesive_for(design, laminate.glued_films) or ""
+    products = {m: "" if film.written == m else film.product for m, film in films.items()}
+    if laminate.tube_count:
+        products[ADHESIVE] = adhesive_for(design, laminate.glued_films) or ""
     unsorted: list[Step | SeamStep] = [*schedule.steps, *schedule.seams]
-    steps = sorted(unsorted, key=lambda step: step.step)
-    tables = (
-        _table("Materials", MATERIAL_FIELDS, "item", items, [*products, glue]),
-        _table(
-            "Steps",
-            PRESS_FIELDS,
-            "step",
-            [str(step.step) for step in steps],
-            [_nominal(step) for step in steps],
-        ),
-        TESTS_TABLE,
-    )
+    steps = {str(step.step): _set_values(step) for step in sorted(unsorted, key=lambda s: s.step)}
+    tables = _table("Materials", MATERIAL, products), _table("Steps", PRESS, steps), TESTS_TABLE
     return tuple(table for table in tables if table.rows)
 
 
-def _table(
-    title: str, names: Sequence[str], key: str, values: Sequence[str], nominal: Sequence[str]
-) -> RecordTable:
+def _table(title: str, names: str, rows: Mapping[str, str]) -> RecordTable:
+    """Return a table with rows of the first field, each with its set values."""
     fields = {field.name: field for field in HISTORY_FIELDS}
-    rows = tuple({key: value} for value in values)
-    return RecordTable(title, tuple(fields[n] for n in names), rows, tuple(nominal[: len(rows)]))
+    columns: Sequence[HistoryField] = [fields[name] for name in names.split()]
+    cells = tuple({columns[0].name: value} for value in rows)
+    return RecordTable(title, tuple(columns), cells, tuple(rows.values()))
 
 
-def _nominal(step: Step | SeamStep) -> str:
+def _set_values(step: Step | SeamStep) -> str:
     """Return the values set by the schedule, as text."""
     heat = "" if step.temperature_c is None else f"{step.temperature_c:g} °C"
     if isinstance(step, SeamStep):
@@ -103,5 +90,5 @@ def _nominal(step: Step | SeamStep) -> str:
     return f"{heat}, {step.force_n:.0f} N{time}"
 
 
-TESTS_TABLE = _table("Tests", DEVICE_FIELDS, "step", TESTS, ["" for _ in TESTS])
+TESTS_TABLE = _table("Tests", DEVICE, dict.fromkeys(TESTS, ""))
 """The part of the record page common to all devices."""
