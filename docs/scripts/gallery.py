@@ -14,8 +14,7 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.models.figures import LEFT_OUT, Figure, Prediction
 from sbafab.models.mechanisms import NOT_CALIBRATED
-from sbafab.reports.assembly_png import assembly_png
-from sbafab.reports.solid_png import solid_png
+from sbafab.reports.solid_png import assembly_png, solid_png
 from sbafab.rules.finding import counted
 
 DESIGNS = Path(__file__).parents[1] / "gallery"

@@ -18,11 +18,10 @@ from PIL import Image
 
 import sbafab
 from sbafab.cutting.sheets import STROKE
-from sbafab.reports.assembly_png import assembly_png
 from sbafab.reports.charts import relation_svg
 from sbafab.reports.inflated_picture import PictureRequest, write_picture
 from sbafab.reports.layers_svg import layers_svg
-from sbafab.reports.solid_png import solid_png
+from sbafab.reports.solid_png import assembly_png, solid_png
 from sbafab.reports.stack_svg import stack_svg
 
 IMAGES = Path(__file__).parents[1] / "images"

@@ -145,7 +145,7 @@ def _write_assembly(
     has beside a job's.
     """
     # A design has no picture of an assembly.
-    from sbafab.reports.assembly_png import assembly_pngs
+    from sbafab.reports.solid_png import assembly_pngs
 
     progress("assembled", 0, 1)
     (path / "preview").mkdir()

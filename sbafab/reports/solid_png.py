@@ -1,4 +1,5 @@
-"""preview/solid.png: the flat actuator in shaded 3D, cut open at one chamber.
+"""preview/solid.png: the flat actuator in shaded 3D, cut open at one chamber; and
+preview/assembled.png: an assembly at true proportions, one colour per part, with a length bar.
 
 A laminate is a stack of prisms seen from above, so painting it from the bottom up gives correct
 occlusion; within one prism the walls go far to near, then its top face.
@@ -7,13 +8,15 @@ occlusion; within one prism the walls go far to near, then its top face.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sbafab.assemblies.build import Assembled
+from sbafab.assemblies.shapes import colours, placed_surface
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, polygon
 from sbafab.laminate.laminate import Laminate
@@ -27,9 +30,13 @@ from sbafab.reports.canvas import (
     RGB,
     Floats,
     View,
+    draw_length_bar,
+    edges,
     framed,
+    image_of,
     inscribe,
     png,
+    rasterize,
     view_of,
 )
 
@@ -38,8 +45,7 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw as Draw
 
 ELEVATION = 36.0
-TURN = math.radians(62.0)
-"""Angle of the eye from the face of the cut that runs through the inlet."""
+TURN = math.radians(62.0)  # of the eye from the face of the cut that runs through the inlet
 LIGHT = math.radians(-50.0)
 FACTORS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30)
 HEIGHT_SHARE = 0.6
@@ -60,18 +66,12 @@ class Prism(NamedTuple):
     bond: bool
 
 
-class Wall(NamedTuple):
-    """One facet of a prism's side that faces the eye: its foot at z = 0, in pixels."""
-
-    start: Point
-    end: Point
-    colour: RGB
-
-
 class Shape(NamedTuple):
-    """A prism seen at z = 0: walls far to near, tops and their shaded places, outlines of tops."""
+    """A prism seen at z = 0, in pixels: the facets of its side that face the eye, each with its
+    colour, far to near; tops and their shaded places; outlines of tops.
+    """
 
-    walls: list[Wall]
+    walls: list[tuple[Point, Point, RGB]]
     tops: list[list[Point]]
     shades: list[list[Point]]
     rings: list[list[list[Point]]]
@@ -89,43 +89,31 @@ def solid_png(laminate: Laminate, width: int = 1600, height: int = 1200) -> byte
     most = HEIGHT_SHARE * breadth / laminate.thickness
     factor = max(step for step in FACTORS if step <= max(most, 1.0))
     size = width * ENLARGED, height * ENLARGED
-    view = _view(laminate, cut, factor, size)
-    shapes: dict[str, Shape] = {}
+    top = factor * laminate.thickness
+    films = [layers[0] for layers in laminate.patterns.values() if not layers[0].is_mask]
+    outlines = [contour.polygon(0.05) for film in films for contour in film.profile.outers]
+    corners = [(*p, z) for outline in outlines for p in outline for z in (0.0, top)]
+    outline = Surface(np.array(corners), np.empty((0, 3), dtype=np.int64))
+    box = framed(*size, MARGIN, FOOT)
+    view = view_of([outline], ELEVATION, math.degrees(cut.last - TURN), box)
     prisms = list(_prisms(laminate))
-    for prism in prisms:
-        if prism.name not in shapes:
-            shapes[prism.name] = _shape(prism, cut, view)
-    base = shapes[prisms[0].name]
-    picture = _backdrop([rings[0] for rings in base.rings], size)
+    distinct = {prism.name: prism for prism in reversed(prisms)}
+    shapes = {name: _shape(prism, cut, view) for name, prism in distinct.items()}
+    picture = _backdrop([rings[0] for rings in shapes[prisms[0].name].rings], size)
     draw = ImageDraw.Draw(picture)
     for prism in prisms:
         _paint(prism, shapes[prism.name], factor * view.axes[1, 2] * view.scale, draw)
     picture = picture.reduce(ENLARGED)
-    films = laminate.bonded_materials
+    material = laminate.bonded_materials
     content = f"{laminate.balloons} balloons" if laminate.balloons > 1 else "one balloon"
     caption = (
-        f"{laminate.name}: {films} solid of {content} before inflation, cut "
+        f"{laminate.name}: {material} solid of {content} before inflation, cut "
         f"open at {cut.chamber}; height exaggerated {factor} times"
         + "".join(f"; {note}" for note in laminate.notes)
     )
-    legend = [(COLOURS[tone], films if tone == "film" else words) for tone, words in KEY]
+    legend = [(COLOURS[tone], material if tone == "film" else words) for tone, words in KEY]
     inscribe(picture, [caption], max(15, round(height / 52)), legend)
     return png(picture)
-
-
-def _view(laminate: Laminate, cut: RemovedSector, factor: int, size: tuple[int, int]) -> View:
-    """The view into the cut that fills the picture."""
-    outlines = [
-        (*p, z)
-        for layers in laminate.patterns.values()
-        if not layers[0].is_mask
-        for contour in layers[0].profile.outers
-        for p in contour.polygon(0.05)
-        for z in (0.0, factor * laminate.thickness)
-    ]
-    outline = Surface(np.array(outlines), np.empty((0, 3), dtype=np.int64))
-    azimuth = math.degrees(cut.last - TURN)
-    return view_of([outline], ELEVATION, azimuth, framed(*size, MARGIN, FOOT))
 
 
 def _backdrop(footprint: Sequence[Sequence[Point]], size: tuple[int, int]) -> Image:
@@ -171,7 +159,7 @@ def _shape(prism: Prism, cut: RemovedSector, view: View) -> Shape:
         for wall in _walls(np.array(contour.polygon(sagitta)), prism.bond, cut, view)
     ]
     return Shape(
-        sorted(walls, key=lambda wall: wall.start[1] + wall.end[1]),
+        sorted(walls, key=lambda wall: wall[0][1] + wall[1][1]),
         [] if prism.bond else [keyhole(piece) for piece in rings],
         [keyhole(piece) for piece in shades],
         rings,
@@ -184,7 +172,9 @@ def _flat(view: View, points: Sequence[Point] | Floats) -> list[Point]:
     return list(map(tuple, pixels[:, :2].tolist()))
 
 
-def _walls(points: Floats, bond: bool, cut: RemovedSector, view: View) -> Iterator[Wall]:
+def _walls(
+    points: Floats, bond: bool, cut: RemovedSector, view: View
+) -> Iterator[tuple[Point, Point, RGB]]:
     """The facets that face the eye; material lies on the left of each, so right is outward."""
     along = np.roll(points, -1, axis=0) - points
     normals = np.column_stack([along[:, 1], -along[:, 0]])
@@ -200,7 +190,7 @@ def _walls(points: Floats, bond: bool, cut: RemovedSector, view: View) -> Iterat
     for i in np.flatnonzero(normals @ toward > 1e-6):
         tone = COLOURS[f"cut {kind}" if on_cut[i] else kind]
         r, g, b = (min(255, round(part * levels[i])) for part in tone)
-        yield Wall(pixels[i], pixels[(i + 1) % len(pixels)], (r, g, b))
+        yield pixels[i], pixels[(i + 1) % len(pixels)], (r, g, b)
 
 
 def _paint(prism: Prism, shape: Shape, rise: float, draw: Draw) -> None:
@@ -287,3 +277,63 @@ def cutaway(laminate: Laminate) -> RemovedSector:
     rays = [first, (first + last) / 2, last]
     tips = [(apex[0] + reach * math.cos(a), apex[1] + reach * math.sin(a)) for a in rays]
     return RemovedSector(name, apex, first, last, polygon([apex, *tips]))
+
+
+# An assembly before inflation.
+
+
+SEEN_FROM = 22.0, -58.0  # elevation over the bench, and azimuth from x, degrees
+LAMP = (-0.35, 0.55, 0.76)
+RIM, LEGEND = 0.06, 0.17
+STEP_MM = 0.25  # jump in depth that is drawn as an edge
+
+
+def assembly_png(
+    assembled: Assembled, note: str = "", width: int = 1040, height: int = 780
+) -> bytes:
+    """The assembly before inflation, seen from the front above, as PNG; ``note`` ends its caption.
+
+    Inlet tubes and what the films enclose are not shown.
+    """
+    return assembly_pngs(assembled, note, width, height)[0]
+
+
+def assembly_pngs(
+    assembled: Assembled, note: str = "", width: int = 1040, height: int = 780
+) -> tuple[bytes, bytes]:
+    """Return that picture, and one without caption and legend for pages with their own."""
+    from PIL import ImageDraw, ImageFont
+
+    surfaces = [placed_surface(placed, filled=True) for placed in assembled.parts]
+    size = width * ENLARGED, height * ENLARGED
+    view = view_of(surfaces, *SEEN_FROM, framed(*size, RIM, LEGEND))
+    length = math.hypot(*LAMP)
+    buffer = rasterize(surfaces, view, *size, [part / length for part in LAMP])
+    paints = colours(assembled)
+    # The content of a tube does not show through: no part is transparent.
+    palette = np.array([*(paints[placed.name] for placed in assembled.parts), PAPER], dtype=float)
+    rgb = palette[buffer.body] * np.where(buffer.body < 0, 1.0, buffer.light)[:, :, None]
+    # Darker where one body or one step ends against another.
+    rgb[edges(buffer, STEP_MM, borders=True)] *= 0.45
+    picture = image_of(rgb)
+    bare = picture.crop((0, 0, width, round((1 - LEGEND / 2) * height)))
+    # Alone, the bar has letters that stay legible when the picture is printed small.
+    font, scale = ImageFont.load_default(round(width / 32)), view.scale / ENLARGED
+    right, low = 0.97 * width, 0.96 * bare.height
+    draw_length_bar(ImageDraw.Draw(bare), right, low, width / 4, scale, font)
+    caption = f"{assembled.assembly.name}, before inflation, nominal films, true proportions{note}"
+    legend = _legend(assembled, paints)
+    inscribe(picture, [caption], max(10, round(height / 46)), legend, scale)
+    return png(picture), png(bare)
+
+
+def _legend(assembled: Assembled, paints: Mapping[str, RGB]) -> list[tuple[RGB, str]]:
+    """One line per colour: the parts that have it, and what they are."""
+    lines: dict[tuple[RGB, str], list[str]] = {}
+    for placed in assembled.parts:
+        kind = placed.part.kind if placed.made is None else placed.made.design.name
+        lines.setdefault((paints[placed.name], kind), []).append(placed.name)
+    return [
+        (colour, ", ".join(names) if [kind] == names else f"{', '.join(names)} ({kind})")
+        for (colour, kind), names in lines.items()
+    ]

@@ -24,7 +24,6 @@ from sbafab.geometry.region import disc, rectangle
 from sbafab.laminate.laminate import Laminate, outline_diameter
 from sbafab.meshing.solid import Slab, fuse
 from sbafab.models.stack import Stack
-from sbafab.reports.assembly_png import assembly_png
 from sbafab.reports.canvas import COLOURS, View, rasterize
 from sbafab.reports.inflated import InflatedPart, inflated, pressed
 from sbafab.reports.inflated_picture import (
@@ -33,7 +32,7 @@ from sbafab.reports.inflated_picture import (
     pose_of,
     write_picture,
 )
-from sbafab.reports.solid_png import cutaway, keyhole, solid_png
+from sbafab.reports.solid_png import assembly_png, cutaway, keyhole, solid_png
 
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 CHANGES = ("stack.balloons=4",)
