@@ -35,8 +35,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Solids = list[manifold3d.Manifold]
 
-SCHEMA = "sbafab/assembly-predict@1"
-"""Id of a prediction of an assembly as JSON."""
+SCHEMA = "sbafab/assembly-predict@1"  # id of a prediction of an assembly as JSON
 GRAVITY = 9.80665
 MARBLE_G = 1.2  # the paper's brace lifts this marble (Sec. 5)
 LENS = f"{ModelId.LENS.words}, virtual work p dV/dh"

@@ -27,16 +27,12 @@ MARKERS = (
 )
 """Round the place of a measured point."""
 REFERENCE, GRID = "#555555", "#dddddd"
-AXES = 88.0, 64.0
-"""Width and height of a panel's axes."""
+AXES = 88.0, 64.0  # width and height of a panel's axes
 HEAD, FOOT, RIM = 16.0, 12.0, 6.0
 """Titles above the axes, numbers and label below them, and the rim right of them."""
-ROW, SIGN = 4.4, 11.0
-"""Height of a row of the key, and length of its curve sample."""
-MOST_STEPS = 8
-"""Steps between the numbers at an axis."""
-MARGIN = 0.05
-"""Margin of an axis, as a share of the values' range."""
+ROW, SIGN = 4.4, 11.0  # height of a row of the key, and length of its curve sample
+MOST_STEPS = 8  # steps between the numbers at an axis
+MARGIN = 0.05  # margin of an axis, as a share of the values' range
 SPECKS = (
     "m-.7 0a.7 .7 0 1 0 1.4 0a.7 .7 0 1 0-1.4 0z",
     "m-.7-.5l.2-.2l.5.5l.5-.5l.2.2l-.5.5l.5.5l-.2.2l-.5-.5l-.5.5l-.2-.2l.5-.5z",
@@ -45,12 +41,9 @@ SPECKS = (
     "m0 .8l.7-1.3h-1.4z",
 )
 """Filled marks of many values, from their middle."""
-SPECK_GRID = 4
-"""Specks of one colour in the same 1/4 mm are drawn once."""
-BAR = 0.4
-"""Half of a bar's width, as a share of the distance between two."""
-MOST_NAMES = 8
-"""Names below bars, as many as have room."""
+SPECK_GRID = 4  # specks of one colour in the same 1/4 mm are drawn once
+BAR = 0.4  # half of a bar's width, as a share of the distance between two
+MOST_NAMES = 8  # names below bars, as many as have room
 
 
 class ChartCurve(NamedTuple):

@@ -23,16 +23,14 @@ TEXT = 3.0
 SMALL = 2.6
 THIN = 0.15
 ARROW = 1.7
-KEY_SIGN = 7.6
-"""mm from the sign of a legend's row to its words."""
+KEY_SIGN = 7.6  # mm from the sign of a legend's row to its words
 TIMES = "\u00d7"
 DARK = "#1a1a1a"
 GREY = "#5a5a5a"
 BOND = "#2a7ab9"
 FONT = "Helvetica, Arial, 'Liberation Sans', sans-serif"
 FOLD = "fold: the film goes on in its other half"
-HATCHES = "PTFE", "mask2", "mask3"
-"""Patterns of the masks' inks."""
+HATCHES = "PTFE", "mask2", "mask3"  # patterns of the masks' inks
 
 
 def document(width: float, height: float, title: str, elements: Iterable[str]) -> str:

@@ -31,24 +31,15 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-FINE, COARSE = 56, 28
-"""Facets of a balloon around its axis."""
-SAGITTA = 0.02
-"""Largest distance of the web's chords from their arc, mm."""
-INSIDE = 0.05
-"""Distance from the end of a tab at which its width is measured, mm."""
-HIDDEN = 0.3
-"""Overlap of the web into a pocket, between its films, mm."""
-REACH = 2.5
-"""Distance over which the inward displacement of a pocket's edge fades out, mm."""
-LEAST_GAP = 0.02
-"""Least opening of a balloon, mm, so that its films stay separate."""
-SAME = 100
-"""Pressures and gaps that agree to 1 / SAME kPa and mm share a meridian."""
-SUCTION = 1e-3
-"""Pressure below 0 in kPa that counts as none."""
-FLATTEST = 0.12
-"""Least share of its height that a film keeps under tilted plates."""
+FINE, COARSE = 56, 28  # facets of a balloon around its axis
+SAGITTA = 0.02  # largest distance of the web's chords from their arc, mm
+INSIDE = 0.05  # distance from the end of a tab at which its width is measured, mm
+HIDDEN = 0.3  # overlap of the web into a pocket, between its films, mm
+REACH = 2.5  # distance over which the inward displacement of a pocket's edge fades out, mm
+LEAST_GAP = 0.02  # least opening of a balloon, mm, so that its films stay separate
+SAME = 100  # pressures and gaps that agree to 1 / SAME kPa and mm share a meridian
+SUCTION = 1e-3  # pressure below 0 in kPa that counts as none
+FLATTEST = 0.12  # least share of its height that a film keeps under tilted plates
 
 
 class InflatedPart(NamedTuple):

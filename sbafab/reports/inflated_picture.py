@@ -13,6 +13,7 @@ import numpy as np
 
 from sbafab.assemblies.shapes import linear
 from sbafab.errors import DesignError
+from sbafab.geometry.edges import Arc
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.formats import Node, write_glb, write_scene
 from sbafab.meshing.solid import solid
@@ -47,8 +48,7 @@ ENDINGS = (".png", ".gif", ".webp", ".glb")
 MOVING = (".gif", ".webp")
 FRAMES = 30
 FRAME_MS = 70
-SHADES = 96
-"""Colours of a GIF."""
+SHADES = 96  # colours of a GIF
 WEB: RGB = (205, 222, 232)
 EMPTY: RGB = (172, 205, 229)
 FULL: RGB = (244, 156, 62)
@@ -245,8 +245,17 @@ def _colour(part: InflatedPart, pose: Pose, most: float) -> RGB:
 def _model(laminate: Laminate, calibration: str) -> str:
     model = "elastic stack" + (f", calibration {calibration}" if calibration else "")
     model += ", ears snipped off" if laminate.registration == "ears" else ""
-    drawn = any(note.startswith("drawn outline") for note in laminate.notes)
-    return model + (", drawn pockets as discs" if drawn else "")
+    return model + (", drawn pockets as discs" if _has_drawn_pockets(laminate) else "")
+
+
+def _has_drawn_pockets(laminate: Laminate) -> bool:
+    """Return True if masks lie in the pockets and none is round about the middle of its pocket."""
+    masks = [layers[0] for layers in laminate.patterns.values() if layers[0].role == "chamber-mask"]
+    centres = [centre for chamber in laminate.chambers for centre in chamber.centres]
+    edges = [edge for mask in masks for outer in mask.profile.outers for edge in outer.edges]
+    arcs = [edge for edge in edges if isinstance(edge, Arc)]
+    is_round = any(math.dist(arc.centre, centre) < 1e-6 for arc in arcs for centre in centres)
+    return bool(masks) and not is_round
 
 
 def _caption(laminate: Laminate, pose: Pose, calibration: str) -> list[str]:
@@ -289,12 +298,10 @@ def write_flat_picture(laminate: Laminate, path: Path, width: int, height: int) 
 # Smooth surfaces as a picture: lit, with shade in crevices and on the ground, anti-aliased.
 
 
-LAMP = (-0.42, 0.62, 0.66)
-"""Direction to the light: right, up, toward the eye."""
+LAMP = (-0.42, 0.62, 0.66)  # direction to the light: right, up, toward the eye
 CREVICES = ((0.35, 0.5), (1.2, 0.35))
 """Radius in mm within which nearer surfaces shade a place, and the most by which they do."""
-EDGE_MM = 0.5
-"""Jump in depth that is drawn as an edge."""
+EDGE_MM = 0.5  # jump in depth that is drawn as an edge
 EDGE = 0.72
 GLOSS, SHARPNESS = 0.22, 14.0
 SHADOW, SOFT_MM = 0.34, 0.9

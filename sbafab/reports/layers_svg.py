@@ -35,10 +35,8 @@ SCALES = (20.0, 15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0
 LEAST_DRAWN = 30.0
 TICKS = {1: 2, 2: 4, 5: 5, 10: 5, 20: 4, 50: 5, 100: 5, 200: 4}
 """Lengths of the scale bar, mm, and into how many parts each is divided."""
-MOST_NAMES = 3
-"""Most seams that a caption names."""
-PAST_FOLD = 3.0
-"""Length by which a fold's line extends past the film, mm on the page."""
+MOST_NAMES = 3  # most seams that a caption names
+PAST_FOLD = 3.0  # length by which a fold's line extends past the film, mm on the page
 CAPTION, LEFT, UNDER, PAD = 17.0, 11.0, 10.0, 3.0
 ROW = 4.8
 LEAD = 5.0

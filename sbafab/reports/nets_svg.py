@@ -22,8 +22,7 @@ Okabe and K. Ito (2008) chose to be distinct in colour blindness."""
 NO_NET = "#bbbbbb"
 FAULT = "#c00000"
 WIDE = 180.0
-MOST_COLUMNS, KEYS = 3, 6
-"""Plans and rows of the key beside each other."""
+MOST_COLUMNS, KEYS = 3, 6  # plans and rows of the key beside each other
 GAP, HEAD, ROW = 4.0, 7.0, 5.0
 RADIUS = 2.2
 

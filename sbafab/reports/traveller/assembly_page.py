@@ -126,8 +126,7 @@ def _with_marks(assembly: AssemblyWork) -> AssemblyWork:
 # The bill of materials.
 
 
-POUR = 10.0
-"""Smallest amount of silicone that can be weighed and mixed well, ml: ours."""
+POUR = 10.0  # smallest amount of silicone that can be weighed and mixed well, ml: ours
 
 
 def _bill(assembly: AssemblyWork) -> list[Item]:

@@ -16,10 +16,8 @@ from sbafab.rules.measures import Measures
 from sbafab.rules.nets import connectivity
 from sbafab.rules.registration_yield import simulate
 
-ROUGHER = (0.5, 1.5, 2.0, 2.5)
-"""Factors on the stated hand placement error."""
-BUILDS = 1000
-"""Enough builds for a slope: the 95 % interval is at most 3 in a hundred."""
+ROUGHER = (0.5, 1.5, 2.0, 2.5)  # factors on the stated hand placement error
+BUILDS = 1000  # enough builds for a slope: the 95 % interval is at most 3 in a hundred
 YIELD = "registration-yield"
 
 

@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 HERE = Path(__file__).parent
 SHORT_HASH = 12
 NEWTONS_PER_POUND = 4.4482216152605
-BLANK = "________"
-"""A blank to fill in by hand."""
-ROUND = 10.0
-"""Above this many minutes tenths are dropped."""
+BLANK = "________"  # a blank to fill in by hand
+ROUND = 10.0  # above this many minutes tenths are dropped
 DIRECTIONS = (
     "to the right",
     "to the back right",
