@@ -11,7 +11,6 @@ import pytest
 
 import sbafab
 from sbafab.reports.charts import (
-    COLOURS,
     ChartBars,
     ChartCurve,
     ChartPoints,
@@ -86,13 +85,6 @@ def test_words_are_as_given_and_the_key_has_room_below_the_axes() -> None:
     assert float(key[0].attrib["x"]) + text_width(labels[0], SMALL) < wide
 
 
-def test_curves_differ_in_colour_and_in_dashes() -> None:
-    svg = panel([curve(0.0, float(n)) for n in range(6)])
-    styles = [next(group(svg, f"curve1.{n}").iter(f"{SVG}path")).attrib for n in range(1, 7)]
-    assert [style["stroke"] for style in styles] == list(COLOURS[:6])
-    assert len({style.get("stroke-dasharray") for style in styles}) == 6
-
-
 def test_error_bars_are_as_long_as_the_errors() -> None:
     svg = panel(points=[ChartPoints("m", [1.0, 2.0], [5.0, 10.0], [1.0, 2.0])])
     up = ticks(svg, "y")
@@ -148,12 +140,3 @@ def test_specks_lie_where_the_ticks_say_and_equal_ones_are_drawn_once() -> None:
     # To a quarter of a millimetre.
     for found, expected in zip(places, [(across[1], up[2]), (across[4], up[3])], strict=True):
         assert found == pytest.approx(expected, abs=0.13)
-
-
-def test_panels_stand_in_rows_below_each_other() -> None:
-    panels = [Panel(name, "x", "y", [curve(0.0, 1.0)]) for name in "abcd"]
-    (wide, low), (narrow, high) = (
-        map(float, ET.fromstring(chart_svg("t", panels, count)).attrib["viewBox"].split()[2:])
-        for count in (4, 2)
-    )
-    assert (narrow, high) == pytest.approx((wide / 2, 2 * low))

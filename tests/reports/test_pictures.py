@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner
-from PIL import Image, ImageDraw
-from shapely.geometry import Polygon
+from PIL import Image
 
 import sbafab
 from sbafab.assemblies.shapes import BOUGHT, FILMS, linear
@@ -32,7 +31,7 @@ from sbafab.reports.inflated_picture import (
     pose_of,
     write_picture,
 )
-from sbafab.reports.solid_png import assembly_png, cutaway, keyhole, solid_png
+from sbafab.reports.solid_png import assembly_png, cutaway, solid_png
 
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 CHANGES = ("stack.balloons=4",)
@@ -113,26 +112,6 @@ def test_the_cut_takes_its_share_of_a_symmetric_cap(
     cap = laminate.layers[-1].profile
     left = cap - cutaway(laminate).removed
     assert left.area == pytest.approx((1 - share) * cap.area, rel=1e-6)
-
-
-def test_a_keyhole_encloses_and_paints_a_piece_with_its_holes_open() -> None:
-    plate = disc((0.0, 0.0), 10.0) - disc((4.0, 0.0), 1.0) - disc((-4.0, 0.0), 1.0)
-    [rings] = (plate - disc((0.0, 0.0), 2.0) - disc((0.0, 6.0), 1.5)).polygons(0.01)
-    ring = keyhole(rings)
-    pairs = zip(ring, [*ring[1:], ring[0]], strict=True)
-    shoelace = sum(a[0] * b[1] - b[0] * a[1] for a, b in pairs) / 2
-    assert shoelace == pytest.approx(Polygon(rings[0], rings[1:]).area, rel=1e-9)
-    square = [(10.0, 10.0), (90.0, 10.0), (90.0, 90.0), (10.0, 90.0)]
-    holes = [
-        [(x + 8 * math.cos(-t), y + 8 * math.sin(-t)) for t in (0.1, 1.7, 3.2, 4.8)]
-        for x, y in [(30.0, 50.0), (50.0, 50.0), (70.0, 50.0)]
-    ]
-    image = Image.new("L", (100, 100))
-    ImageDraw.Draw(image).polygon(keyhole([square, *holes]), fill=255)
-    # A slit led through another hole would leave a line of film across it.
-    assert {image.getpixel((x, y)) for x in (30, 50, 70) for y in range(46, 55)} == {0}
-    assert [image.getpixel((x, 30)) for x in (30, 50, 70)] == [255, 255, 255]
-    assert image.getpixel((5, 50)) == image.getpixel((95, 50)) == 0
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -20,30 +19,9 @@ from sbafab.reports.traveller.lay_up import beds
 from sbafab.reports.traveller.page import straight_run
 from sbafab.reports.traveller.pictures import plan
 from sbafab.reports.traveller.steps import FoldPage, PressPage, SeamPage, joint_pages, step_pages
-from tests.reports.pages import DOUBLE, EARS, bench, built, page, words_of, work_of
+from tests.reports.pages import DOUBLE, EARS, bench, built, words_of, work_of
 
 TPE, PTFE, BOND, OVERHANG = 0.038, 0.025, 0.75, 0.5
-
-
-def test_pins_are_drawn_filled_where_they_are_in() -> None:
-    work = work_of("3dof-15mm")
-    for step, article in zip(work.schedule.steps, page(work).findall(".//article"), strict=True):
-        drawn = article.findall(".//svg")[0]
-        fills = Counter(circle.get("fill") for circle in drawn.iter("circle"))
-        # One circle of each kind belongs to the key.
-        assert fills["#1a1a1a"] == len(step.pins) + 1
-        assert fills["#ffffff"] == len(work.laminate.pins) - len(step.pins) + 1
-
-
-@pytest.mark.parametrize("template", ["1dof-5mm", "3dof-15mm", "radial-15mm"])
-def test_what_the_force_means_is_said(template: str) -> None:
-    work = work_of(template)
-    rings = work.laminate.layers[-1].profile.polygons(1e-4)
-    top = sum(shapely.Polygon(outer, holes).area for outer, *holes in rings)
-    found = re.search(r"laminate alone: ([\d.]+) MPa on the (\d+) mm²", words_of(bench(work)))
-    assert found is not None
-    assert float(found[2]) == pytest.approx(top, abs=0.51)
-    assert float(found[1]) == pytest.approx(110e-3 * 152.4**2 / top, abs=0.051)
 
 
 def hole_rows(tree: Any) -> list[list[str]]:
@@ -205,15 +183,6 @@ def test_the_indicating_film_covers_what_the_films_get() -> None:
     assert max(one.high for one in classes) >= high
     assert [one.product for one in classes] == ["4LW", "LLLW"]
     assert [one.product for one in film_classes(110, 190)] == ["4LW"]
-
-
-def test_what_a_pound_on_the_gauge_is_on_the_platen() -> None:
-    """2.555 kN are 574 lbf on 6 x 6 in: a pound-force is 1 / 36 psi, 0.19 kPa."""
-    words = words_of(bench(work_of("1dof-5mm")))
-    assert "2555 N = 2.555 kN = 574 lbf; 1 lbf is 0.19 kPa" in words
-    assert pytest.approx(0.1915, abs=1e-4) == 6.894757 / 36
-    # Half a division within 5 % of 574 lbf.
-    assert "a division every 57 lbf" in words
 
 
 # Seams and folds of drawn layers.

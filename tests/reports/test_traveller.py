@@ -9,24 +9,21 @@ import re
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 import shapely
 from lxml import html as lxml_html
-from pydantic import BaseModel
 
-from sbafab.actuators import FAMILIES
 from sbafab.cutting.properties import COLOURS, CUT_SEQUENCE, REFERENCE
 from sbafab.design.sections import Acceptance
 from sbafab.geometry.region import Region
 from sbafab.lab.recording import entries_of
 from sbafab.reports.traveller import formatting
 from sbafab.reports.traveller.bench import cutting, held_films
-from sbafab.reports.traveller.materials import cut_list, release_films
+from sbafab.reports.traveller.materials import cut_list
 from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS
 from sbafab.reports.traveller.work import HANDLING_MINUTES, times
@@ -121,14 +118,6 @@ def test_the_same_design_gives_the_same_bytes() -> None:
         for seed in ("1", "2")
     }
     assert len(printed) == 1
-
-
-@pytest.mark.parametrize(("copies", "cycles"), [(1, 1), (3, 1), (9, 3)])
-def test_release_films_count_every_press_cycle(copies: int, cycles: int) -> None:
-    """Two new ones each time the press closes, one below what is turned over."""
-    work = work_of("1dof-5mm", f"order.copies={copies}", "order.at_once=4")
-    assert work.cycles.count == cycles
-    assert release_films(work) == 2 * cycles * len(work.schedule.steps) + 1
 
 
 def test_the_bill_counts_what_is_needed(sheet_files: Any) -> None:
@@ -267,40 +256,6 @@ def test_every_blank_of_the_record_page_can_be_entered() -> None:
     [entry] = entries_of(values)
     assert entry.readings == {"temperature_c": 12.0, "press_force_n": 12.0, "minutes": 12.0}
     assert (entry.item, entry.lot, entry.reason, entry.photograph) == ("text",) * 4
-
-
-def keys_of(section: type[BaseModel], before: str = "") -> Iterator[str]:
-    """Dotted keys of a design file."""
-    for name, field in section.model_fields.items():
-        for kind in (field.annotation, *get_args(field.annotation)):
-            if isinstance(kind, type) and issubclass(kind, BaseModel):
-                yield from keys_of(kind, f"{before}{name}.")
-        yield f"{before}{name}"
-
-
-@pytest.mark.parametrize(
-    "design",
-    few(
-        [
-            ("1dof-5mm", *TPU, EARS, "order.copies=5"),
-            ("folded",),
-            ("gripper",),
-            ("1dof-5mm", "bore.pin_diameter=0.7", "press.temperature_c=155"),
-        ],
-        3,
-    ),
-    ids=" ".join,
-)
-def test_keys_of_a_design_file_are_not_for_the_bench(design: tuple[str, ...]) -> None:
-    """They are the designer's; commands may have them, and stand as code."""
-    keys = {key for family in FAMILIES.values() for key in keys_of(family.record) if "." in key}
-    assert {"press.time_constant", "press.minutes_for", "registration.pin_lengths"} <= keys
-    work = work_of(*design)
-    for tree in (page(work), bench(work)):
-        for code in tree.xpath("//code | //style | //script"):
-            code.drop_tree()
-        words = words_of(tree)
-        assert [key for key in sorted(keys) if re.search(rf"(?<![\w.]){key}\b", words)] == []
 
 
 @pytest.mark.parametrize("program", [None, "rdworks", "epilog"])

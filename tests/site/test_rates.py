@@ -7,19 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.sections import rate
-from benchmarks.timing import Row, Section
-from benchmarks.versions import Compared
-from docs.scripts.benchmark_runs import growth, other_program, told, versions_table
 from docs.scripts.measured import BLOCK, record
-from docs.scripts.rates import speed, statistic
-from docs.scripts.tables import Table
 
 ROOT = Path(__file__).parents[2]
 README = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
 TABLES = record("benchmarks").tables
-TURNS = [1.0, 9.0, 2.0]
-"""Its median is 2, its mean 4, its least 1."""
 RATE = re.compile(r"[\d,]+ (?:poses|designs|equilibria) a second")
 
 
@@ -42,21 +34,6 @@ def test_the_readme_s_seconds_are_the_record_s() -> None:
     assert generate == pytest.approx(now, rel=0.05)
     (usage,) = stated(r"`sbafab --help` ([\d.]+) s")
     assert usage == pytest.approx(recorded("commands", "sbafab --help"), rel=0.05)
-
-
-def test_a_statistic_is_called_by_its_name() -> None:
-    for name in ("plates", "decks", "processes", "poses", "commands", "versions"):
-        assert statistic(TABLES[name]) in {"median", "least"}, name
-    assert re.search(
-        rf"{statistic(TABLES['versions'])} (?:processor )?time of several rounds", README
-    )
-    record_of_medians = record("benchmarks")._replace(
-        tables={
-            name: Table([column.replace("least", "median") for column in table.columns], table.rows)
-            for name, table in TABLES.items()
-        }
-    )
-    assert "median" in speed(record_of_medians)
 
 
 def test_factors_on_the_page_are_the_record_s() -> None:
@@ -87,26 +64,3 @@ def test_no_rate_stands_in_a_text_by_hand() -> None:
     for path in (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(pages)):
         by_hand = BLOCK.sub("", path.read_text(encoding="utf-8"))
         assert RATE.findall(" ".join(by_hand.split())) == [], path
-
-
-def test_what_is_measured_is_recorded_as_its_median() -> None:
-    section = Section("decks", "", [Row("design", TURNS, rate(TURNS, "designs"))])
-    plates = Section("plates", "", [Row("sbafab", [1.0]), Row("slow", [8.0]), Row("quick", TURNS)])
-    table = told(section, other_program([section, plates]))
-    assert statistic(table) == "median"
-    assert list(table.rows) == [
-        ["design", "2", "1", "3", "0.5 designs a second"],
-        ["quick in the same run", "2", "1", "3", "40 lobed plates, a DXF each"],
-    ]
-    assert rate([0.001, 0.009, 0.002], "designs") == "500 designs a second"
-    compared = versions_table([Compared("work", TURNS, [0.5, 0.5, 4.0])])
-    assert statistic(compared) == "median"
-    assert compared.rows == [["work", "2.000", "0.500", ""]]
-    grown = growth([Section("sizes", "work", [Row("1 a", TURNS), Row("9 a", TURNS)], power=0.0)])
-    assert grown.rows == [["work", "1 to 9 sizes", "2.00 to 2.00", "0.00"]]
-
-
-def test_without_another_program_none_is_told() -> None:
-    section = Section("decks", "", [Row("design", TURNS)])
-    assert other_program([section]) is None
-    assert len(told(section, None).rows) == 1

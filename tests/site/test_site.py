@@ -54,11 +54,6 @@ def test_links_between_the_pages_of_the_source_lead_somewhere() -> None:
     assert lost == []
 
 
-def test_no_page_takes_the_name_of_one_that_sphinx_writes() -> None:
-    own = {"search", "genindex", "modindex", "py-modindex"}
-    assert not own & {page.stem for page in (ROOT / "docs").glob("*.md")}
-
-
 def test_a_site_that_asks_another_host_or_leads_nowhere_is_told(tmp_path: Path) -> None:
     (tmp_path / "a.html").write_text(
         '<p id="x"></p><a href="b.html#y">b</a><a href="https://example.org">away</a>'
