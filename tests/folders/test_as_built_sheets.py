@@ -17,7 +17,7 @@ from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import RunRequest, generate
-from sbafab.geometry.region import Region, disc
+from sbafab.geometry.region import Region
 from sbafab.rules.finding import Finding
 from tests.folders.doctoring import Doctor
 from tests.quick import few
@@ -67,14 +67,6 @@ def test_a_piece_agrees_within_a_micrometre(off: float, is_told: bool, lobed: Do
     assert bool(told(lobed)) == is_told
 
 
-def test_a_stranger_is_told_with_the_sheet(doctor: Doctor) -> None:
-    redraw(doctor, lambda pieces: [*pieces, disc((130.0, 130.0), 2.0)])
-    (found,) = told(doctor)
-    assert found.rule == "as-designed"
-    assert "sheets/TPE_1.dxf" in found.message
-    assert "outlines, not" in found.message
-
-
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -94,13 +86,6 @@ def test_absurd_claims_of_sheets_are_one_sentence(wrong: Claims, doctor: Doctor)
     with pytest.raises(OutputError, match=r"sheets\.0\.") as refused:
         check_folder(doctor.folder)
     assert "\n" not in str(refused.value)
-
-
-def test_a_sheet_of_an_earlier_run_is_told(doctor: Doctor) -> None:
-    """The cut shop must not find a sheet that is none of this run's."""
-    sheets = doctor.folder / "sheets"
-    shutil.copy(sheets / "TPE_1.dxf", sheets / "TPE_2.dxf")
-    assert any("TPE_2.dxf lies in the folder" in finding.message for finding in told(doctor))
 
 
 @pytest.fixture(scope="module")
@@ -149,13 +134,6 @@ def test_wrong_claims_of_a_job_are_told(
     doctor = Doctor(Path(shutil.copytree(clean_job, tmp_path / "batch")))
     doctor.set_manifest(change)
     assert rules_failing(doctor.folder) == {"manifest-claims"}
-
-
-def test_a_design_left_out_of_a_job_is_told(clean_job: Path, tmp_path: Path) -> None:
-    doctor = Doctor(Path(shutil.copytree(clean_job, tmp_path / "batch")))
-    doctor.set_manifest(lambda m: m["designs"].pop())
-    # The sheets hold more than what is left of the job makes.
-    assert rules_failing(doctor.folder) == {"manifest-claims", "as-designed"}
 
 
 def test_a_piece_missing_on_a_jobs_sheet_is_told(clean_job: Path, tmp_path: Path) -> None:

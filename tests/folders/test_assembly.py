@@ -133,40 +133,6 @@ def test_the_page_makes_every_design_and_joins_every_part(brace: Run) -> None:
     assert "3M 1587" in page
 
 
-def test_no_pattern_of_two_designs_has_one_name(brace: Run) -> None:
-    """Both have a P03: in steps, tables and sheets it is told by its design's letter."""
-    tree = lxml_html.fromstring((brace.folder / "traveller.html").read_text(encoding="utf-8"))
-    for picture in tree.xpath("//svg[contains(@class, 'shapes')]"):
-        picture.drop_tree()
-    body = words(tree.find("body"))
-    assert {"A P03", "B P03"} <= set(re.findall(r"[AB] P\d+", body))
-    assert re.findall(r"(?<![AB] )\bP\d\d\b", body) == []
-    radial, tip = tree.find_class("chapter")
-    assert "B P" not in words(radial)
-    assert "A P" not in words(tip)
-
-
-def test_all_that_joining_takes_is_among_materials_and_tools(brace: Run) -> None:
-    tree = lxml_html.fromstring((brace.folder / "traveller.html").read_text(encoding="utf-8"))
-    rows = tree.get_element_by_id("materials").getparent().findall(".//tbody/tr")
-    bill = {words(row[1]): (words(row[2]), words(row[3])) for row in rows}
-    assert {"Thread", "Ecoflex 00-30 silicone", "Mould of “cup”"} <= set(bill)
-    assert bill["Tube (3dof-15mm)"][1] == "3 pieces + 1 spare"
-    moulds = re.findall(r"mesh/\S+\.stl", bill["Mould of “cup”"][0])
-    assert len(moulds) == 2
-    assert all(trimesh.load(brace.folder / path).is_watertight for path in moulds)
-    bench = lxml_html.fromstring((brace.folder / "bench.html").read_text(encoding="utf-8"))
-    tools = [words(row[1]) for row in bench.xpath("//section[@aria-labelledby='tools']//tbody/tr")]
-    assert any(tool.startswith("Protractor") for tool in tools)
-
-
-@pytest.mark.long
-def test_three_copies_share_a_lamination(standing: Run) -> None:
-    page = (standing.folder / "traveller.html").read_text(encoding="utf-8")
-    assert "3dof-15mm, 3 copies: 1 lamination, all at once" in page
-    assert "45 min in the press instead of 135" in page
-
-
 def test_the_total_counts_what_is_known_where_press_minutes_are_not(
     aperture: Run, tmp_path: Path
 ) -> None:
@@ -195,15 +161,6 @@ def test_a_failed_check_leaves_findings_and_nothing_to_cut(tmp_path: Path) -> No
     told = json.loads((run.folder / "checks.json").read_text(encoding="utf-8"))
     failed = {f["rule"] for f in told["findings"] if f["verdict"] == "fail"}
     assert failed == {"seat"}
-
-
-@pytest.mark.long
-def test_a_failed_rule_of_one_design_stops_all(tmp_path: Path) -> None:
-    keys = [*BRACE, "parts.arm.set.bond.width=0.4"]
-    run = generate(RunRequest(load_assembly("brace", keys), tmp_path))
-    assert run.failed
-    assert {f.rule for f in run.between or () if f.verdict == "fail"} == set()
-    assert not list(run.folder.rglob("*.dxf"))
 
 
 @pytest.mark.long
@@ -262,17 +219,6 @@ def test_a_moved_part_is_found(standing: Run, tmp_path: Path) -> None:
     path.write_text(json.dumps(told), encoding="utf-8")
     said = claims_failed(folder)
     assert said.startswith("manifest-claims: manifest.json: parts.2.shift.1 is 16.0, not 15.0")
-
-
-@pytest.mark.long
-def test_another_design_file_is_found(standing: Run, tmp_path: Path) -> None:
-    folder = doctored(standing, tmp_path)
-    path = folder / "design.toml"
-    path.write_text(path.read_text("utf-8").replace("angle = 60.0", "angle = 30.0"), "utf-8")
-    said = claims_failed(folder)
-    assert "manifest-claims: manifest.json: " in said
-    assert "as-designed: traveller.html is not what design.toml makes" in said
-    assert "design.toml was changed" in said
 
 
 def test_a_broken_design_file_is_found(aperture: Run, tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ from sbafab.actuators import load_design
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import Run, RunRequest, generate
 from sbafab.rules.deck import has_failed
-from tests.folders.doctoring import Doctor
 
 COPIES = 5
 
@@ -77,96 +76,3 @@ def test_the_bill_counts_what_the_batch_takes(run: Run) -> None:
         # 6 x 6 in.
         area = len(files) * 0.1524**2
         assert float(bill[f"{material} film"]["area_m2"]) == pytest.approx(area, abs=5e-5)
-
-
-@pytest.fixture
-def doctor(run: Run) -> Doctor:
-    return Doctor(run.folder)
-
-
-def doctored(doctor: Doctor, file: str, change: object) -> set[str]:
-    """The rules that fail once a file of the folder is changed; it is put back."""
-    paths = [doctor.folder / "manifest.json", doctor.folder / file]
-    before = [path.read_bytes() for path in paths]
-    try:
-        change()  # type: ignore[operator]
-        doctor.rehash()
-        return {f.rule for f in check_folder(doctor.folder) if f.verdict == "fail"}
-    finally:
-        for path, data in zip(paths, before, strict=True):
-            path.write_bytes(data)
-
-
-def test_a_plate_without_a_hole_of_one_place_fails(doctor: Doctor) -> None:
-    from sbafab.cutting.dxf_read import read_profile
-    from sbafab.cutting.dxf_write import dxf_text
-    from sbafab.cutting.sequence import cutting_sequence
-    from sbafab.geometry.region import Region
-
-    file = doctor.manifest["fixture"]
-    path = doctor.folder / file
-
-    def put() -> None:
-        found = read_profile(path)
-        holes = found.region.holes
-        left = Region(tuple(c for c in found.region.contours if c is not holes[-1]))
-        path.write_text(dxf_text(cutting_sequence(left), found.properties), newline="\n")
-
-    assert doctored(doctor, file, put) == {"as-designed"}
-
-
-def test_a_plate_with_other_notes_of_its_holes_fails(doctor: Doctor) -> None:
-    """A shop that bores to another depth, or to none, has pins that stand off their height."""
-    from sbafab.cutting.dxf_read import read_profile
-    from sbafab.cutting.dxf_write import dxf_text
-    from sbafab.cutting.sequence import cutting_sequence
-
-    file = doctor.manifest["fixture"]
-    path = doctor.folder / file
-    found = read_profile(path)
-    notes = [[edges[0].start, *(edge.end for edge in edges)] for _, edges in found.strokes[2:]]
-    assert notes
-    deeper = {**found.properties, "HOLES": found.properties["HOLES"].replace("2.", "4.")}
-    for properties, strokes, is_right in (
-        (found.properties, notes, True),
-        (deeper, notes, False),
-        (found.properties, notes[:-1], False),
-        (found.properties, (), False),
-    ):
-        text = dxf_text(cutting_sequence(found.region), properties, notes=strokes)
-
-        def put(text: str = text) -> None:
-            path.write_text(text, newline="\n")
-
-        assert doctored(doctor, file, put) == (set() if is_right else {"as-designed"})
-
-
-def test_places_that_are_too_near_fail_though_the_plate_agrees(doctor: Doctor) -> None:
-    from sbafab.actuators import build
-    from sbafab.cutting.dxf_read import read_profile
-    from sbafab.cutting.dxf_write import dxf_text
-    from sbafab.cutting.fixture import fixture
-    from sbafab.cutting.sequence import cutting_sequence
-
-    file = doctor.manifest["fixture"]
-    path = doctor.folder / file
-    laminate = build(load_design(doctor.folder / "design.toml"))
-
-    def put() -> None:
-        said = [(p["x"], p["y"]) for p in doctor.manifest["batch"]["places"]]
-        near = [(x - 0.01 if n % 2 else x, y) for n, (x, y) in enumerate(said)]
-        plate = fixture(laminate, (152.4, 152.4), near)
-        assert plate is not None
-        properties = read_profile(path).properties
-        path.write_text(dxf_text(cutting_sequence(plate), properties), newline="\n")
-        places = [{"x": x, "y": y} for x, y in near]
-        doctor.set_manifest(lambda m: m["batch"].update(places=places))
-
-    assert doctored(doctor, file, put) == {"manifest-claims", "as-designed"}
-
-
-def test_cycles_that_leave_a_copy_out_fail(doctor: Doctor) -> None:
-    def put() -> None:
-        doctor.set_manifest(lambda m: m["batch"].update(cycles=[4]))
-
-    assert "manifest-claims" in doctored(doctor, "press.json", put)

@@ -122,39 +122,6 @@ def test_edges_stay_within_the_chord_error(
         assert (gained if layer.role == "chamber-mask" else lost) <= room
 
 
-def test_sheets_are_cut_as_the_layers_are(tmp_path: Path) -> None:
-    doctor = written(
-        "1dof-5mm",
-        (
-            "order.spares=0",
-            "order.spare_share=0",
-        ),
-        0.1,
-        tmp_path,
-    )
-    pieces = sorted(
-        (layer["material"], piece.area, len(piece.exterior.coords))
-        for layer in doctor.manifest["layers"]
-        for piece in shapely.get_parts(part(doctor.path(layer["index"])))
-    )
-    laid = []
-    for sheet in doctor.manifest["sheets"]:
-        model = ezdxf.readfile(doctor.folder / sheet["file"]).modelspace()
-        cut = {"CUT_OUTER": [], "CUT_INNER": []}  # type: dict[str, list[Polygon]]
-        for entity in model.query("LWPOLYLINE"):
-            if entity.dxf.layer in cut:
-                cut[entity.dxf.layer].append(Polygon(entity.get_points("xy")))
-        shape = shapely.union_all(cut["CUT_OUTER"]) - shapely.union_all(cut["CUT_INNER"])
-        laid += [
-            (sheet["material"], piece.area, len(piece.exterior.coords))
-            for piece in shapely.get_parts(shape)
-        ]
-    for one, other in zip(sorted(laid), pieces, strict=True):
-        assert one[0] == other[0]
-        assert one[1] == pytest.approx(other[1], abs=1e-6)
-        assert one[2] == other[2]
-
-
 def test_chords_too_coarse_are_refused_by_name(tmp_path: Path) -> None:
     """A ring of chamber mask round the bore is just as wide as the laser can cut."""
     fits = load_design("1dof-5mm", [*FEW, "bore.diameter=2", "laser.least_feature=1.49"])

@@ -89,19 +89,6 @@ def test_a_file_of_another_design_fails_with_its_hash_in_line(
     assert failing(folder), f"{name} from {donor}"
 
 
-@pytest.mark.parametrize(
-    "name", ["layers/010_TPE_wall.dxf", "sheets/TPE_2.dxf", "sheets/TPE_2.lbrn2"]
-)
-def test_the_files_that_once_got_past_are_named(
-    name: str, folders: list[Path], tmp_path: Path
-) -> None:
-    folder = Path(shutil.copytree(folders[0], tmp_path / "doctored"))
-    put(folder, name, next((folders[1] / "layers").glob("*TPE*")))
-    (found,) = failing(folder)
-    assert found.rule == "as-designed"
-    assert found.message.startswith(f"{name} is listed and is no file of this design")
-
-
 @pytest.mark.parametrize("ending", few(OPENED, 6))
 def test_what_a_laser_program_opens_fails_among_the_cut_files(
     ending: str, folders: list[Path], tmp_path: Path
@@ -190,14 +177,3 @@ def test_a_foreign_file_of_a_job_is_named(folders: list[Path], tmp_path: Path) -
     assert [f.message.partition(" ")[0] for f in failing(folder / "1dof-5mm")] == [
         "layers/012_TPE_wall.dxf"
     ]
-
-
-def test_a_job_is_compared_whatever_its_designs_are_called(tmp_path: Path) -> None:
-    """The folder of layer files is told by its place, not by letters in another folder's name."""
-    design = load_design("1dof-5mm", [*FEW, "name=multilayers"])
-    folder = generate(RunRequest([design], tmp_path, name="batch")).folder
-    press = folder / "multilayers" / "press.json"
-    press.write_text(press.read_text().replace("135", "270"))
-    Doctor(folder / "multilayers").rehash()
-    Doctor(folder).rehash()
-    assert any("multilayers/press.json" in finding.message for finding in failing(folder))

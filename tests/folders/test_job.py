@@ -70,11 +70,6 @@ def test_the_manifest_lists_designs_sheets_and_files(job: Run) -> None:
     assert {part["design"] for part in parts} == {"1dof-5mm", "3dof-15mm"}
 
 
-def test_travellers_name_the_shared_sheets(job: Run) -> None:
-    page = (job.folder / "1dof-5mm" / "traveller.html").read_text(encoding="utf-8")
-    assert "../sheets/TPE_1.dxf" in page
-
-
 def test_the_same_job_gives_the_same_bytes(job: Run, tmp_path: Path) -> None:
     again = generate(
         RunRequest(
@@ -95,23 +90,6 @@ def test_a_failing_design_stops_the_whole_job(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("others", "name", "said"),
-    [
-        (["1dof-5mm"], "batch", "two designs are named 1dof-5mm"),
-        (["1dof-10mm"], "1dof-10mm", "as one of its folders"),
-        (["1dof-10mm"], "sheets", "as one of its folders"),
-        (["1dof-10mm"], "../up", "--name"),
-    ],
-)
-def test_unfit_names_are_refused(others: list[str], name: str, said: str, tmp_path: Path) -> None:
-    with pytest.raises(DesignError, match=said):
-        generate(
-            RunRequest([load_design("1dof-5mm"), *map(load_design, others)], tmp_path, name=name)
-        )
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
     ("own", "name", "said"),
     [
         ("sheets", "batch", "a design is named sheets, as the job's folder of film sheets is"),
@@ -120,6 +98,8 @@ def test_unfit_names_are_refused(others: list[str], name: str, said: str, tmp_pa
         ("1DOF-5mm", "batch", "two designs are named 1dof-5mm and 1DOF-5mm, which is one folder"),
         ("other", "OTHER", "the job is named OTHER as one of its folders; choose another --name"),
         ("other", "Sheets", "the job is named Sheets as one of its folders"),
+        ("1dof-5mm", "batch", "two designs are named 1dof-5mm"),
+        ("other", "../up", "--name"),
     ],
 )
 def test_a_name_that_the_job_needs_is_refused(

@@ -119,17 +119,6 @@ def test_lowered_limits_stand_in_every_file(tmp_path: Path) -> None:
     assert not [f for f in check_folder(run.folder) if f.verdict == "fail"]
 
 
-def test_usual_limits_are_not_spoken_of(tmp_path: Path) -> None:
-    run = generate(
-        RunRequest(load_design("1dof-5mm", ["stack.balloons=2"]), tmp_path, ["cut", "press"])
-    )
-    assert manifest_of(run.folder)["lowered_limits"] == []
-    for path in run.folder.rglob("*.*"):
-        if path.suffix in (".dxf", ".csv") or path.name in ("press.json", "checks.json"):
-            assert "LIMITS" not in path.read_text(), path.name
-            assert "lowered" not in path.read_text(), path.name
-
-
 def test_a_waiver_that_was_not_needed_is_not_claimed(tmp_path: Path) -> None:
     waive = 'rules.waive=["bond-width", "mask-overhang"]'
     run = generate(RunRequest(load_design("1dof-5mm", [waive]), tmp_path, ["cut"]))

@@ -149,11 +149,6 @@ def test_an_unsound_seam_file_is_named(
     ("name", "value"),
     [
         ("TOOL", "laser"),
-        ("LAYERS", "2, 3"),
-        ("ORDER", "2"),
-        ("SEAM", "other"),
-        ("KIND", "fin"),
-        ("UNITS", "inch"),
         ("DESIGN_SHA256", "0" * 64),
         ("TOOL_OFFSET", "1, 2"),
     ],

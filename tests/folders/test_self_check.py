@@ -128,18 +128,6 @@ def test_a_prediction_is_asked_for_again(tmp_path: Path) -> None:
     assert as_designed(doctor.folder)[0].startswith("predict.json is not what design.toml makes")
 
 
-def test_a_job_is_made_again_whole(tmp_path: Path) -> None:
-    designs = [load_design("1dof-5mm", [*FEW, f"name={name}"]) for name in ("one", "two")]
-    folder = generate(RunRequest(designs, tmp_path, name="both")).folder
-    assert as_designed(folder) == []
-    doctor = Doctor(folder / "two")
-    path = doctor.folder / "press.json"
-    path.write_text(path.read_text().replace('"temperature_c": 135', '"temperature_c": 270'))
-    doctor.rehash()
-    Doctor(folder).rehash()
-    assert as_designed(folder)[0].startswith("two/press.json is not what design.toml makes")
-
-
 @pytest.mark.parametrize(
     ("shift", "said"), [((0.5, 0.0), "mm apart at x"), ((-4.5, 0.0), "into the border")]
 )

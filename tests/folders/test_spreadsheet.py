@@ -10,9 +10,6 @@ from pathlib import Path
 import pytest
 
 import sbafab
-from sbafab.actuators import build
-from sbafab.pressing.schedule import schedule
-from sbafab.pressing.schedule_files import press_csv
 from sbafab.spreadsheet import csv_text, plain_text
 
 PACKAGE = Path(sbafab.__file__).parent
@@ -105,9 +102,3 @@ def test_a_sweep_s_table_holds_no_formula(tmp_path: Path) -> None:
     rows = list(csv.DictReader(io.StringIO(text, newline="")))
     assert [row["order.note"] for row in rows] == [f"'{note}"] * 2
     assert [int(row["order.copies"]) for row in rows] == [1, 2]
-
-
-def test_a_press_table_holds_no_formula() -> None:
-    design = sbafab.load("1dof-5mm", {"press.plate_material": "x;=1+1"})
-    plan = schedule(build(design), design)
-    assert formulas(press_csv(plan)) == []
