@@ -31,8 +31,8 @@ from sbafab.models.paper import Counterpart, CounterpartEntry
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Place
 from sbafab.search.quantities import (
-    AS_DRAWN,
     AT_PRESSURE,
+    NAMES,
     Goal,
     RequestedQuantity,
     Requirement,
@@ -223,7 +223,9 @@ def _refuse_unsure(request: FindRequest, sure: float) -> None:
             f'"{design.models.calibration}"; name one such as "paper", or leave sure out'
         )
     for quantity in (requirement.quantity for requirement in request.requirements):
-        is_exact = quantity.key is not None or quantity.name in (*AS_DRAWN, "burst")
+        name = NAMES.get(quantity.name)
+        is_exact = quantity.key is not None or quantity.name == "burst"
+        is_exact = is_exact or (name is not None and name.is_drawn)
         if not is_exact and group_of(quantity, design.form) is None:
             instead = "; ask for stroke@10kPa" if quantity.name == "reference_stroke" else ""
             raise DesignError(

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import permutations
-from typing import Any
+from typing import Any, NamedTuple
 
 from sbafab.design.files import key_paths, listed, shown
 from sbafab.design.records import Design, Form, Slots
@@ -72,13 +72,18 @@ from sbafab.models.stack import MOST_PRESSURE, Stack, stack
 from sbafab.search.vary import key_values
 
 
-@dataclass(frozen=True)
-class QuantityName:
-    """A quantity as users write it, with its unit and meaning."""
+class QuantityName(NamedTuple):
+    """A quantity as users write it, with its unit and meaning.
+
+    ``more``: to be maximised; all others are minimised. ``is_drawn``: of the drawing and its
+    tolerances; all others are predicted.
+    """
 
     written: str
     unit: str
     meaning: str
+    more: bool = False
+    is_drawn: bool = False
 
     @property
     def name(self) -> str:
@@ -87,31 +92,31 @@ class QuantityName:
 
 
 QUANTITIES = (
-    QuantityName("overall_diameter", "mm", "the whole outline, inlet tabs included"),
-    QuantityName("outline_diameter", "mm", "the films without tabs and ears"),
+    QuantityName("overall_diameter", "mm", "the whole outline, inlet tabs included", is_drawn=True),
+    QuantityName("outline_diameter", "mm", "the films without tabs and ears", is_drawn=True),
     QuantityName("deflated_diameter", "mm", "flat, round a tube"),
     QuantityName("inflated_diameter", "mm", "round a tube; safer of two models"),
     QuantityName("reached_diameter", "mm", "the lower one of these two"),
-    QuantityName("width", "mm", "of the flat laminate, as length"),
-    QuantityName("length", "mm", ""),
+    QuantityName("width", "mm", "of the flat laminate, as length", is_drawn=True),
+    QuantityName("length", "mm", "", is_drawn=True),
     QuantityName("height", "mm", "folded: what the press leaves of the films"),
-    QuantityName("lumen", "mm", "diameter of the lumen"),
-    QuantityName("mass", "g", "of the films"),
-    QuantityName("yield", "", "share of builds that hold, 0.95 or 95%"),
-    QuantityName("stroke@P", "mm", "free stroke at P kPa, elastic balloon"),
-    QuantityName("reference_stroke", "mm", "what the paper measured, scaled"),
-    QuantityName("bend@P", "deg", "one chamber at P kPa; two: bend@2chambers@P"),
-    QuantityName("force@H@P", "N", "blocked at the stroke H mm or %, at P kPa"),
-    QuantityName("burst", "kPa", "estimate, film stress in proportion"),
-    QuantityName("lateral_stiffness@P", "N/mm", "of the tip, chambers shut at P kPa"),
+    QuantityName("lumen", "mm", "diameter of the lumen", more=True, is_drawn=True),
+    QuantityName("mass", "g", "of the films", is_drawn=True),
+    QuantityName("yield", "", "share of builds that hold, 0.95 or 95%", more=True, is_drawn=True),
+    QuantityName("stroke@P", "mm", "free stroke at P kPa, elastic balloon", more=True),
+    QuantityName("reference_stroke", "mm", "what the paper measured, scaled", more=True),
+    QuantityName("bend@P", "deg", "one chamber at P kPa; two: bend@2chambers@P", more=True),
+    QuantityName("force@H@P", "N", "blocked at the stroke H mm or %, at P kPa", more=True),
+    QuantityName("burst", "kPa", "estimate, film stress in proportion", more=True),
+    QuantityName("lateral_stiffness@P", "N/mm", "of the tip, chambers shut at P kPa", more=True),
     QuantityName("time", "s", "to 10 kPa with water at --flow"),
-    QuantityName("contraction", "mm", "free, of a drawn pouch motor"),
-    QuantityName("pull@P", "N", "of it at P kPa, 10 % shorter"),
-    QuantityName("free_bend", "deg", "of drawn hinges, all of a chamber"),
-    QuantityName("moment@P", "N mm", "of one, straight, at P kPa"),
-    QuantityName("load@P", "N", "that wrinkles a drawn beam at P kPa"),
-    QuantityName("slip@P", "N", "that makes jammed sheets slip, P below 0"),
-    QuantityName("push@P", "N", "of a drawn pouch on a plate, at most"),
+    QuantityName("contraction", "mm", "free, of a drawn pouch motor", more=True),
+    QuantityName("pull@P", "N", "of it at P kPa, 10 % shorter", more=True),
+    QuantityName("free_bend", "deg", "of drawn hinges, all of a chamber", more=True),
+    QuantityName("moment@P", "N mm", "of one, straight, at P kPa", more=True),
+    QuantityName("load@P", "N", "that wrinkles a drawn beam at P kPa", more=True),
+    QuantityName("slip@P", "N", "that makes jammed sheets slip, P below 0", more=True),
+    QuantityName("push@P", "N", "of a drawn pouch on a plate, at most", more=True),
 )
 """In the order of the help."""
 
@@ -119,19 +124,18 @@ QUANTITIES = (
 def quantity_lines() -> str:
     """Return the table as lines for the help of a command."""
     width = max(len(quantity.written) for quantity in QUANTITIES)
-    rows = [
-        f"{quantity.written:{width}}  {quantity.unit:4}  {quantity.meaning}".rstrip()
-        for quantity in QUANTITIES
-    ]
-    return "\n".join([*rows, f"{'KEY':{width}}  {'':4}  any key of the design, chamber.diameter"])
+    rows = [(row.written, row.unit, row.meaning) for row in QUANTITIES]
+    rows.append(("KEY", "", "any key of the design, chamber.diameter"))
+    return "\n".join(
+        f"{written:{width}}  {unit:4}  {meaning}".rstrip() for written, unit, meaning in rows
+    )
 
 
 USUAL_KPA = 10.0
 _CHAMBERS = re.compile(r"\s*([1-9]\d?)\s*chambers?\s*", re.IGNORECASE)
-AT_PRESSURE = {row.name: row.unit for row in QUANTITIES if "@" in row.written}
-"""Units of the quantities that take a pressure."""
-NAMED_AT_PRESSURE = f"{', '.join([*AT_PRESSURE][:-1])} and {[*AT_PRESSURE][-1]}"
-UNPRESSURED = {row.name: row.unit for row in QUANTITIES if row.name not in AT_PRESSURE}
+NAMES = {row.name: row for row in QUANTITIES}
+AT_PRESSURE = tuple(row.name for row in QUANTITIES if "@" in row.written)
+"""Quantities that take a pressure."""
 UNITS = {
     "g": {"g": 1.0, "mg": 0.001, "kg": 1000.0},
     "N": {"N": 1.0, "mN": 0.001, "kN": 1000.0},
@@ -151,8 +155,6 @@ ROUND_A_TUBE = ("deflated_diameter", "inflated_diameter", "reached_diameter")
 REACHED, WIDEST = "reached_diameter", "inflated_diameter"
 """Inflated diameters around a tube: the lower figure, for a wall that it must reach, and the upper
 end, for one that it must not touch."""
-AS_DRAWN = ("overall_diameter", "outline_diameter", "width", "length", "lumen", "mass", "yield")
-"""Quantities of the drawing and its tolerances; all other names are predicted."""
 HOW = (
     'for example overall_diameter, mass, stroke, "stroke@50kPa", "bend@2chambers@5kPa", '
     '"force@12.5mm@50kPa", "force@50%@50kPa" or chamber.diameter'
@@ -201,13 +203,13 @@ def read_quantity(
     if name == "time":
         return _with_flow(places, text, flow_ml_min)
     if places:
-        raise DesignError(f"{shown(text)}: only {NAMED_AT_PRESSURE} take a pressure; {HOW}")
-    if name not in UNPRESSURED and "." not in name:
-        names = list(dict.fromkeys(row.name for row in QUANTITIES))
-        near = difflib.get_close_matches(name, names, 1)
-        mends = f"did you mean {near[0]}?" if near else f"there are {listed(names)} and any key"
+        named = f"{', '.join(AT_PRESSURE[:-1])} and {AT_PRESSURE[-1]}"
+        raise DesignError(f"{shown(text)}: only {named} take a pressure; {HOW}")
+    if name not in NAMES and "." not in name:
+        near = difflib.get_close_matches(name, NAMES, 1)
+        mends = f"did you mean {near[0]}?" if near else f"there are {listed([*NAMES])} and any key"
         raise DesignError(f"{shown(text)} is not a quantity; {mends}")
-    return RequestedQuantity(name, UNPRESSURED.get(name, ""))
+    return RequestedQuantity(name, NAMES[name].unit if name in NAMES else "")
 
 
 def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:
@@ -218,47 +220,52 @@ def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:
 
 
 def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -> RequestedQuantity:
-    pressure: float | None = None
-    stroke: float | None = None
-    share: float | None = None
-    chambers = 1
+    read: dict[str, Any] = {}
     for place in places:
-        count = _CHAMBERS.fullmatch(place)
-        if count is not None and name == "bend":
-            chambers = int(count[1])
-            continue
-        kilopascals = _kilopascals(place)
-        if kilopascals is not None:
-            if pressure is not None:
-                raise DesignError(f"{shown(text)} names two pressures; name one")
-            pressure = kilopascals
-            continue
-        if place.replace(".", "", 1).isdecimal():
-            raise DesignError(
-                f"{shown(text)}: {shown(place)} has no unit; write {place}kPa"
-                f"{f' or {place}mm' if name == 'force' else ''}"
-            )
         try:
-            if place.endswith("%"):
-                share = read_share(place)
-            else:
-                stroke = millimetres(place)
+            key, value = _place(place, name)
         except ValueError as error:
-            problem = error if place.endswith("%") else "is neither a pressure nor a length"
-            raise DesignError(f"{shown(text)}: {shown(place)} {problem}; {HOW}") from None
-    if (stroke, share).count(None) != (1 if name == "force" else 2):
+            raise DesignError(f"{shown(text)}: {shown(place)} {error}") from None
+        if key == "kpa" and key in read:
+            raise DesignError(f"{shown(text)} names two pressures; name one")
+        read[key] = value
+    if len({"stroke", "share"} & read.keys()) != (name == "force"):
         raise DesignError(
             f"{shown(text)}: a force needs one stroke, and only a force takes one; {HOW}"
         )
     is_vacuum = name in UNDER_VACUUM
-    if pressure is None:
-        pressure = -USUAL_KPA if is_vacuum else USUAL_KPA
-        pressure = kpa if kpa is not None and (kpa < 0) == is_vacuum else pressure
+    usual = -USUAL_KPA if is_vacuum else USUAL_KPA
+    read.setdefault("kpa", kpa if kpa is not None and (kpa < 0) == is_vacuum else usual)
     try:
-        refuse_pressure(pressure, is_vacuum)
+        refuse_pressure(read["kpa"], is_vacuum)
     except DesignError as error:
         raise DesignError(f"{shown(text)}: {error}") from None
-    return RequestedQuantity(name, AT_PRESSURE[name], pressure, stroke, chambers, share=share)
+    return RequestedQuantity(name, NAMES[name].unit, **read)
+
+
+def _place(place: str, name: str) -> tuple[str, float]:
+    """Return what a place in a quantity is, a field of ``RequestedQuantity``, and its value.
+
+    Raises ValueError with the end of a sentence.
+    """
+    count = _CHAMBERS.fullmatch(place)
+    if count is not None and name == "bend":
+        return "chambers", int(count[1])
+    kilopascals = _kilopascals(place)
+    if kilopascals is not None:
+        return "kpa", kilopascals
+    if place.replace(".", "", 1).isdecimal():
+        length = f" or {place}mm" if name == "force" else ""
+        raise ValueError(f"has no unit; write {place}kPa{length}")
+    if place.endswith("%"):
+        try:
+            return "share", read_share(place)
+        except ValueError as error:
+            raise ValueError(f"{error}; {HOW}") from None
+    try:
+        return "stroke", millimetres(place)
+    except ValueError:
+        raise ValueError(f"is neither a pressure nor a length; {HOW}") from None
 
 
 def _with_flow(places: list[str], text: str, flow_ml_min: float) -> RequestedQuantity:
@@ -269,14 +276,7 @@ def _with_flow(places: list[str], text: str, flow_ml_min: float) -> RequestedQua
             raise DesignError(f"{shown(text)}: a time takes one flow, such as time@35ml/min")
         flow_ml_min = float(match[1]) * MILLILITRES_PER_MINUTE[match[2]]
     seconds(0.0, flow_ml_min)
-    return RequestedQuantity("time", UNPRESSURED["time"], flow=flow_ml_min)
-
-
-def named_pressure(texts: list[str]) -> float | None:
-    """The highest pressure named by any of the quantities, or the largest vacuum, kPa."""
-    places = [place for text in texts for place in text.split("@")[1:]]
-    named = [kilopascals for place in places if (kilopascals := _kilopascals(place)) is not None]
-    return max(named, key=abs, default=None)
+    return RequestedQuantity("time", NAMES["time"].unit, flow=flow_ml_min)
 
 
 def _kilopascals(place: str) -> float | None:
@@ -296,24 +296,23 @@ def read_limit(quantity: RequestedQuantity, text: str) -> float:
     """Return the limit of a quantity, in its unit. Raises ValueError with the end of a sentence."""
     if quantity.name == "yield":
         return read_share(text)
-    if quantity.unit in UNITS:
-        units = UNITS[quantity.unit]
+    units = UNITS.get(quantity.unit)
+    if units is not None:
         number = in_first_unit(text, units)
         if number is None:
             raise ValueError(
                 f"must be a number, in {quantity.unit} or with one of {', '.join(units)}"
             )
-        limit = number
     else:
         try:
-            limit = millimetres(text)
+            number = millimetres(text)
         except ValueError as error:
             raise ValueError(str(error) if quantity.unit else "must be a number") from None
-    if not math.isfinite(limit):
+    if not math.isfinite(number):
         raise ValueError("must be a finite number")
-    if quantity.key is None and limit < 0:
+    if quantity.key is None and number < 0:
         raise ValueError("must be at least 0")
-    return limit
+    return number
 
 
 def read_share(text: str) -> float:
@@ -380,10 +379,6 @@ class Requirement:
         """For example "at least 3 N"."""
         return f"{self.sense} {self.limit:.10g} {self.quantity.unit}".strip()
 
-    @property
-    def label(self) -> str:
-        return f"{self.quantity.label} {self.bound}"
-
 
 @dataclass(frozen=True)
 class Goal:
@@ -400,27 +395,22 @@ class Goal:
         return f"{'most' if self.more else 'least'} {self.quantity.label}"
 
 
-GOOD_IF_MORE = (
-    *("stroke", "reference_stroke", "bend", "force", "lateral_stiffness", "burst", "yield"),
-    *("lumen", *ASKED),
-)
-"""Quantities to maximise; all others are minimised."""
-
-
 def read_all(
     least: Sequence[str], most: Sequence[str], best: str, flow_ml_min: float = WATER_FLOW
 ) -> tuple[tuple[Requirement, ...], Goal]:
     """The requirements of ``QUANTITY=VALUE`` texts, and the goal. Raises DesignError.
 
-    A quantity without its pressure takes the highest pressure named by any of them, a time without
-    a flow takes ``flow_ml_min``.
+    A quantity without its pressure takes the highest pressure named by any of them, or the largest
+    vacuum, a time without a flow takes ``flow_ml_min``.
     """
     pairs = [(text, True) for text in least] + [(text, False) for text in most]
-    kpa = named_pressure([text.partition("=")[0] for text, _ in pairs] + [best])
+    texts = [*(text.partition("=")[0] for text, _ in pairs), best]
+    named = (_kilopascals(place) for text in texts for place in text.split("@")[1:])
+    kpa = max((pressure for pressure in named if pressure is not None), key=abs, default=None)
     requirements = tuple(_read(text, at_least, kpa, flow_ml_min) for text, at_least in pairs)
     _refuse_contradictions(requirements, [text for text, _ in pairs])
     quantity = read_quantity(best, kpa, flow_ml_min)
-    return requirements, Goal(quantity, quantity.name in GOOD_IF_MORE)
+    return requirements, Goal(quantity, quantity.name in NAMES and NAMES[quantity.name].more)
 
 
 def _read(text: str, at_least: bool, kpa: float | None, flow_ml_min: float) -> Requirement:
@@ -433,10 +423,9 @@ def _read(text: str, at_least: bool, kpa: float | None, flow_ml_min: float) -> R
         )
     quantity = safer(read_quantity(name, kpa, flow_ml_min), at_least)
     try:
-        limit = read_limit(quantity, value)
+        return Requirement(quantity, read_limit(quantity, value), at_least)
     except ValueError as error:
         raise DesignError(f"{option} {shown(text)}: the value {error}") from None
-    return Requirement(quantity, limit, at_least)
 
 
 def _refuse_contradictions(requirements: Sequence[Requirement], texts: Sequence[str]) -> None:
@@ -666,16 +655,17 @@ class Subject:
             return None if is_pressed else (Quantity.FOLDED_HEIGHT, ANYWHERE, ModelId.FILMS)
         if group_of(quantity, self.design.form) is None:
             return None
-        if quantity.name == "stroke":
-            return Quantity.FREE_STROKE, Conditions(kpa=kpa), ModelId.ELASTIC_BALLOON
-        if quantity.name == "bend":
-            at = Conditions(kpa=kpa, chambers=quantity.chambers)
-            return Quantity.BEND, at, ModelId.ELASTIC_STACK
-        if quantity.name == "time":
-            at = Conditions(kpa=FULL_KPA, flow=quantity.flow or WATER_FLOW)
-            return Quantity.WATER_TIME, at, ModelId.STACK_IN_TIME
-        if quantity.name == "lateral_stiffness":
-            return Quantity.SHUT_STIFFNESS, Conditions(kpa=kpa), ModelId.STACK_SHUT
+        match quantity.name:
+            case "stroke":
+                return Quantity.FREE_STROKE, Conditions(kpa=kpa), ModelId.ELASTIC_BALLOON
+            case "bend":
+                at = Conditions(kpa=kpa, chambers=quantity.chambers)
+                return Quantity.BEND, at, ModelId.ELASTIC_STACK
+            case "time":
+                at = Conditions(kpa=FULL_KPA, flow=quantity.flow or WATER_FLOW)
+                return Quantity.WATER_TIME, at, ModelId.STACK_IN_TIME
+            case "lateral_stiffness":
+                return Quantity.SHUT_STIFFNESS, Conditions(kpa=kpa), ModelId.STACK_SHUT
         # The nearest of the three heights at which forces were measured.
         share = self._stroke_of(quantity) / self._actuator.reference_stroke
         near = min(HEIGHTS, key=lambda height: abs(height - share))

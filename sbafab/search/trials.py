@@ -211,7 +211,8 @@ def _answer(job: dict[str, Any]) -> dict[str, Any]:
     return row
 
 
-# Jobs in parallel: in threads of this machine, or on a Dask cluster.
+# Jobs in parallel, in threads of this machine or on a Dask cluster: an executor either way.
+# Each thread hands its jobs to its own process, which is killed after the time limit.
 
 
 AHEAD = 3
@@ -220,13 +221,15 @@ POLL = 1.0
 """Interval of progress calls while waiting, s."""
 CONNECT = 10
 """Time for a scheduler to answer, s."""
-
-
-class Pool(NamedTuple):
-    """Runs ``guarded`` on its workers; ``size`` of them at a time."""
-
-    executor: Executor
-    size: int
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""One numeric thread per process: several processes already share the processors."""
+ATTEMPTS = 2
+"""A process may be killed from outside; a design that kills two in a row is to blame."""
+COMMAND = (sys.executable, "-m", "sbafab.search.trials")
+MeasureJob = dict[str, Any]
+"""The keyword arguments of ``measured``, and the ``program`` version required."""
+Pool = tuple[Executor, int]
+"""An executor that runs ``guarded``, and the number of its workers."""
 
 
 @contextmanager
@@ -236,7 +239,7 @@ def local_pool(workers: int | None = None) -> Iterator[Pool]:
     _may_start.set()
     executor = ThreadPoolExecutor(size)
     try:
-        yield Pool(executor, size)
+        yield executor, size
     finally:
         # Killed processes release the threads that wait for them.
         executor.shutdown(wait=False, cancel_futures=True)
@@ -262,11 +265,8 @@ def dask_pool(address: str) -> Iterator[Pool]:
             f"no Dask scheduler answers at {address} ({message}); start one with `dask scheduler`, "
             "or name its address, such as tcp://127.0.0.1:8786"
         ) from None
-    try:
-        size = sum(client.nthreads().values())
-        yield Pool(client.get_executor(), max(1, size))
-    finally:
-        client.close()
+    with client:
+        yield client.get_executor(), max(1, sum(client.nthreads().values()))
 
 
 def run_jobs(
@@ -281,13 +281,13 @@ def run_jobs(
     Few jobs are pending at any time, so that memory does not grow with their number. ``waiting`` is
     called in every second in which no job ends.
     """
+    executor, size = pool
     remaining = iter(jobs)
     running: dict[Future[SweepRow], str] = {}
-    room = AHEAD * pool.size
     try:
         while True:
-            for key, job in islice(remaining, room - len(running)):
-                running[pool.executor.submit(guarded, job, seconds)] = key
+            for key, job in islice(remaining, AHEAD * size - len(running)):
+                running[executor.submit(guarded, job, seconds)] = key
             if not running:
                 return
             ended, _ = wait(running, timeout=POLL, return_when=FIRST_COMPLETED)
@@ -315,97 +315,12 @@ def _row(future: Future[SweepRow]) -> SweepRow:
     return row
 
 
-# Each thread hands its jobs to its own process, which is killed after the time limit.
-#
-# The same function runs in threads of this process and of a Dask worker.
-
-
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""One numeric thread per process: several processes already share the processors."""
-ATTEMPTS = 2
-"""A process may be killed from outside; a design that kills two in a row is to blame."""
-
-COMMAND = (sys.executable, "-m", "sbafab.search.trials")
-
-MeasureJob = dict[str, Any]
-"""The keyword arguments of ``measured``, and the ``program`` version required."""
-
 _thread = threading.local()
-
-
-_children: set[Child] = set()
+_children: set[subprocess.Popen[str]] = set()
 """The running processes; changed with ``_lock`` held."""
 _lock = threading.Lock()
 _may_start = threading.Event()
 _may_start.set()
-
-
-class Child:
-    """A running process that measures."""
-
-    def __init__(self) -> None:
-        alone = {name: os.environ.get(name, "1") for name in ONE_THREAD}
-        with _lock:
-            if not _may_start.is_set():
-                raise RuntimeError("no process is started any more")
-            self._process = subprocess.Popen(
-                COMMAND,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                text=True,
-                encoding="utf-8",
-                env={**os.environ, **alone, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-            )
-            _children.add(self)
-
-    def answer(self, job: MeasureJob, seconds: float) -> SweepRow:
-        """The row of a job; a row with the reason if the process dies or takes too long."""
-        late = threading.Event()
-
-        def stop() -> None:
-            late.set()
-            self._process.kill()
-
-        clock = threading.Timer(seconds, stop)
-        clock.daemon = True
-        clock.start()
-        try:
-            line = self._exchange(json.dumps(job))
-        finally:
-            clock.cancel()
-        if line.endswith("\n"):
-            row: SweepRow = json.loads(line)
-            return row
-        self.close()
-        if late.is_set():
-            reason = f"stopped after {seconds:g} s; --timeout gives it longer"
-            return {"outcome": "too long", "reason": reason, "seconds": seconds}
-        reason = _exit_reason(self._process.returncode)
-        return {"outcome": "crashed", "reason": reason, "seconds": 0.0}
-
-    def _exchange(self, job: str) -> str:
-        """The answer to a line, truncated if the process died."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        with suppress(OSError, ValueError):
-            self._process.stdin.write(job + "\n")
-            self._process.stdin.flush()
-            return self._process.stdout.readline()
-        return ""
-
-    @property
-    def is_alive(self) -> bool:
-        return self._process.poll() is None
-
-    def close(self) -> None:
-        """Kills the process and waits until it is gone."""
-        self._process.kill()
-        self._process.wait()
-        _children.discard(self)
-        for stream in (self._process.stdin, self._process.stdout):
-            with suppress(OSError):
-                if stream is not None:
-                    stream.close()
 
 
 def guarded(job: MeasureJob, seconds: float) -> SweepRow:
@@ -413,28 +328,79 @@ def guarded(job: MeasureJob, seconds: float) -> SweepRow:
     row: SweepRow = {}
     for _ in range(ATTEMPTS):
         child = getattr(_thread, "child", None)
-        if child is None or not child.is_alive:
-            if child is not None:
-                child.close()
-            child = _thread.child = Child()
-        row = child.answer(job, seconds)
+        if child is None or child.poll() is not None:
+            child = _thread.child = _child()
+        row = _measured_by(child, job, seconds)
         # A crash that Python could still report is reported in the same way on a retry.
-        if row["outcome"] != "crashed" or child.is_alive:
+        if row["outcome"] != "crashed" or child.poll() is None:
             return row
     return row
 
 
+def _child() -> subprocess.Popen[str]:
+    """Start a process that measures."""
+    alone = {name: os.environ.get(name, "1") for name in ONE_THREAD}
+    with _lock:
+        if not _may_start.is_set():
+            raise RuntimeError("no process is started any more")
+        child = subprocess.Popen(
+            COMMAND,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            env={**os.environ, **alone, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        )
+        _children.add(child)
+    return child
+
+
+def _measured_by(child: subprocess.Popen[str], job: MeasureJob, seconds: float) -> SweepRow:
+    """The row of a job; a row with the reason if the process dies or takes too long."""
+    assert child.stdin is not None
+    assert child.stdout is not None
+    clock = threading.Timer(seconds, child.kill)
+    clock.daemon = True
+    clock.start()
+    line = ""
+    with suppress(OSError, ValueError):
+        child.stdin.write(json.dumps(job) + "\n")
+        child.stdin.flush()
+        line = child.stdout.readline()
+    is_late = not clock.is_alive()
+    clock.cancel()
+    if line.endswith("\n"):
+        row: SweepRow = json.loads(line)
+        return row
+    _close(child)
+    if is_late:
+        reason = f"stopped after {seconds:g} s; --timeout gives it longer"
+        return {"outcome": "too long", "reason": reason, "seconds": seconds}
+    return {"outcome": "crashed", "reason": _exit_reason(child.returncode), "seconds": 0.0}
+
+
 def close_all() -> None:
-    """Kills the processes started by threads of this process, and prevents new ones."""
+    """Kill the processes started by threads of this process, and prevent new ones."""
     with _lock:
         _may_start.clear()
         children = list(_children)
     for child in children:
-        child.close()
+        _close(child)
 
 
-def _exit_reason(code: int | None) -> str:
-    if code is None or code >= 0:
+def _close(child: subprocess.Popen[str]) -> None:
+    """Kill a process and wait until it is gone."""
+    child.kill()
+    child.wait()
+    _children.discard(child)
+    for stream in (child.stdin, child.stdout):
+        with suppress(OSError):
+            if stream is not None:
+                stream.close()
+
+
+def _exit_reason(code: int) -> str:
+    if code >= 0:
         return f"its process ended with exit code {code}"
     with suppress(ValueError):
         return f"its process was killed by {signal.Signals(-code).name}"
