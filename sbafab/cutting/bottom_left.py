@@ -12,7 +12,6 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.cutting.lattice import Lattice, lattice_of, lattices_of, most_copies
@@ -22,14 +21,15 @@ from sbafab.cutting.nest import (
     Placement,
     Stock,
     Turn,
-    no_place,
     placed,
 )
+from sbafab.errors import DesignError
 from sbafab.geometry.contour import ticks
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point, distance_to
 from sbafab.geometry.lazy_numpy import np
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, disc
+from sbafab.laminate.films import FIRST, Material
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     Cells = NDArray[np.bool_]
     Counts = NDArray[np.intp]
     Numbers = NDArray[np.float64]
+
+_Copies = tuple[tuple[int, int, int], ...]
 
 MANY = 600
 """Number of parts from which only the first few ways to fill a sheet are tried."""
@@ -69,11 +71,22 @@ def bottom_left(
             break
         window = min(high_y - low_y, 2 * window)
     if best.stuck is not None:
-        raise no_place(parts[best.stuck], stock)
+        part, where = parts[best.stuck], sheet_section(parts[best.stuck].material)
+        raise DesignError(
+            f"pattern {part.pattern} of {part.design} finds no place {stock.spacing:g} mm clear of "
+            f"the {len(stock.pins)} {where}.pins; lower {where}.spacing, move the pins, or enlarge "
+            "the sheet."
+        )
     if lattices and takes_lattices(parts, stock, best.sheets):
         ways = [way for lattices in filler.lattices() for way in _lattice_ways(parts, lattices)]
         best = min([best, *map(filler.filled, ways)], key=_score)
     return best.placements
+
+
+def sheet_section(material: Material) -> str:
+    """Return the section of a design file that describes this material's sheets."""
+    name = material.lower()
+    return f"sheets.{name}" if material in FIRST else f"films.{name}.sheet"
 
 
 @dataclass(frozen=True)
@@ -223,14 +236,10 @@ class _Filler:
     def _clear_lattices(self, shape: Region) -> Iterator[Lattice]:
         """Yield the lattices of a shape without the copies that are too near to pins."""
         stock = self.stock
-        boxes = {turn: placed(shape, turn, (0.0, 0.0)).bounds for turn in TURNS}
+        turned = {turn: placed(shape, turn, (0.0, 0.0)) for turn in TURNS}
         for lattice in lattices_of(shape, stock.spacing, self.grid.area, stock.turns):
             places = (
-                (turn, shift)
-                for turn, shift in lattice.places
-                # A region is moved only if its box is near a pin.
-                if not _is_near_pins(boxes[turn], shift, stock)
-                or is_clear(placed(shape, turn, shift), stock)
+                place for place in lattice.places if _is_clear(turned[place[0]], place[1], stock)
             )
             yield lattice._replace(places=tuple(places))
 
@@ -239,22 +248,41 @@ class _Filler:
 
         Each step puts a copy at an extreme free place and keeps the sheets with most free places.
         """
-        forms = [form for form in self.grid.forms if form.shape == shape]
-        sheets = [_Arrangement(tuple(self.empty[form.number] for form in forms))]
         if _room(self.stock) > FEW * _grown(self.grid.shapes[shape], self.stock):
             return Lattice((), 0.0)
-        best = sheets[0]
+        forms = [form for form in self.grid.forms if form.shape == shape]
+        # Copies, each a form's number, row and column in order, and the free places of each form.
+        sheets: list[tuple[_Copies, list[Cells]]] = [((), [self.empty[f.number] for f in forms])]
+        best: _Copies = ()
         while sheets:
-            best = sheets[0]
-            following = {
-                step.copies: step for sheet in sheets for step in sheet.steps(self.grid, forms)
-            }
-            sheets = sorted(following.values(), key=lambda sheet: -sheet.room)[:BEAM]
-        places = []
-        for number, row, column in best.copies:
-            form = self.grid.forms[number]
-            places.append((form.turn, self.grid.shift(form, row, column)))
-        return lattice_of(self.grid.shapes[shape], places)
+            best = sheets[0][0]
+            steps: dict[_Copies, list[Cells]] = {}
+            for copies, maps in sheets:
+                for form, places in zip(forms, maps, strict=True):
+                    for place in _extremes(places):
+                        more = tuple(sorted((*copies, (form.number, *place))))
+                        if more not in steps:
+                            steps[more] = self._left(forms, maps, form, place)
+            sheets = sorted(steps.items(), key=lambda step: -sum(map(np.count_nonzero, step[1])))
+            sheets = sheets[:BEAM]
+        chosen = [(self.grid.forms[number], row, column) for number, row, column in best]
+        return lattice_of(
+            self.grid.shapes[shape],
+            [(form.turn, self.grid.shift(form, row, column)) for form, row, column in chosen],
+        )
+
+    def _left(
+        self,
+        forms: Sequence[TurnedShape],
+        maps: Sequence[Cells],
+        form: TurnedShape,
+        place: tuple[int, int],
+    ) -> list[Cells]:
+        """Return the free places of forms after one of them is put at a place."""
+        left = [np.copy(places) for places in maps]
+        for other, places in zip(forms, left, strict=True):
+            strike(places, self.grid.clear(form, other), other, place)
+        return left
 
     def filled(self, way: _Way) -> _Filled:
         """Fill sheet after sheet with the remaining parts, in the way's order."""
@@ -353,34 +381,6 @@ class _Filler:
             tops.get((placement.part, placement.turn), math.inf) + placement.shift[1]
             for placement in placements
         )
-
-
-@dataclass(frozen=True)
-class _Arrangement:
-    """Copies of one shape on a sheet, each a form's number, row and column in this order.
-
-    ``maps`` are the places that each form of the shape still has.
-    """
-
-    maps: tuple[Cells, ...]
-    copies: tuple[tuple[int, int, int], ...] = ()
-
-    @cached_property
-    def room(self) -> int:
-        """Number of free places."""
-        return sum(int(np.count_nonzero(places)) for places in self.maps)
-
-    def steps(self, grid: Grid, forms: Sequence[TurnedShape]) -> Iterator[_Arrangement]:
-        """Yield the arrangements with one more copy at an extreme free place."""
-        for form, places in zip(forms, self.maps, strict=True):
-            for place in _extremes(places):
-                maps = []
-                for other, free in zip(forms, self.maps, strict=True):
-                    left = np.copy(free)
-                    strike(left, grid.clear(form, other), other, place)
-                    maps.append(left)
-                copies = sorted((*self.copies, (form.number, *place)))
-                yield _Arrangement(tuple(maps), tuple(copies))
 
 
 def _extremes(places: Cells) -> list[tuple[int, int]]:
@@ -627,26 +627,15 @@ class TurnedShape:
     bounds: Bounds
 
 
-def _is_near_pins(box: Bounds, shift: Point, stock: Stock) -> bool:
-    """Return True if a box that is moved may come nearer to a pin than the spacing."""
-    low_x, low_y, high_x, high_y = box
-    for x, y, diameter in stock.pins:
-        room = diameter / 2 + stock.spacing + ROUNDING
-        u, v = x - shift[0], y - shift[1]
-        if low_x - room < u < high_x + room and low_y - room < v < high_y + room:
-            return True
-    return False
-
-
-def is_clear(region: Region, stock: Stock) -> bool:
-    """Return True if a placed region keeps the spacing from all pins."""
+def _is_clear(region: Region, shift: Point, stock: Stock) -> bool:
+    """Return True if a region that is moved keeps the spacing from all pins."""
     low_x, low_y, high_x, high_y = region.bounds
     for x, y, diameter in stock.pins:
-        room = diameter / 2 + stock.spacing
-        is_near = low_x - room < x < high_x + room and low_y - room < y < high_y + room
+        room, p = diameter / 2 + stock.spacing, (x - shift[0], y - shift[1])
+        is_near = low_x - room < p[0] < high_x + room and low_y - room < p[1] < high_y + room
         if is_near and (
-            Region(region.outers).contains((x, y))
-            or min(distance_to(edge, (x, y)) for edge in region.edges) < room
+            Region(region.outers).contains(p)
+            or min(distance_to(edge, p) for edge in region.edges) < room
         ):
             return False
     return True

@@ -18,10 +18,7 @@ from sbafab.geometry.edges import (
     same_support,
 )
 from sbafab.geometry.region import Region
-from sbafab.geometry.spatial_index import close_pairs, widened
-
-CLEAR = 10 * EPSILON
-"""mm between two circles from which on they surely do not touch."""
+from sbafab.geometry.spatial_index import close_pairs
 
 JOINED = 0.002
 """mm: largest distance of two ends within 1 um of one corner, as cut files promise."""
@@ -118,66 +115,15 @@ def _between(edge: Edge, start: Point, end: Point) -> Edge:
 
 def check_clear(contours: Sequence[Contour]) -> None:
     """Raise OutputError if an edge is drawn twice or contours touch or cross."""
-    rounds = [_full_circle(contour) for contour in contours]
-    for contour, circled in zip(contours, rounds, strict=True):
-        if circled is None:
-            _check_own(contour)
-    for i, j in close_pairs([contour.bounds for contour in contours], EPSILON):
-        if not _are_clear(rounds[i], rounds[j]):
-            _check_two(contours[i], contours[j])
-
-
-def _full_circle(contour: Contour) -> tuple[Point, float] | None:
-    """Centre and radius of a contour that is one circle, run through once, so clear of itself."""
-    if contour.circle is None:
-        return None
-    once = math.pi * contour.circle[1] ** 2
-    return contour.circle if abs(abs(contour.area) - once) < 1e-6 * once else None
-
-
-def _are_clear(a: tuple[Point, float] | None, b: tuple[Point, float] | None) -> bool:
-    """Return True if two circles surely do not meet: one within the other, or each aside of the
-    other.
-    """
-    if a is None or b is None:
-        return False
-    between = math.dist(a[0], b[0])
-    return between > a[1] + b[1] + CLEAR or between < abs(a[1] - b[1]) - CLEAR
-
-
-def _check_own(contour: Contour) -> None:
-    count = len(contour.edges)
-    for i, j in close_pairs(contour.boxes, EPSILON):
-        a, b = contour.edges[i], contour.edges[j]
-        neighbours = (i - j) % count in (1, count - 1)
+    places = [(contour, number) for contour in contours for number in range(len(contour.edges))]
+    for pair in close_pairs([box for contour in contours for box in contour.boxes], EPSILON):
+        (first, i), (second, j) = (places[number] for number in pair)
+        a, b, count = first.edges[i], second.edges[j], len(first.edges)
+        neighbours = first is second and (i - j) % count in (1, count - 1)
         # One goes on where the other ends, and neither is more than half a turn: of neighbours,
         # only those that turn back run along each other.
         if not neighbours or same_support(a, b.reversed()):
             _check_edges(a, b, neighbours)
-
-
-def _check_two(first: Contour, second: Contour) -> None:
-    # The one of more edges first: of a plate hardly one comes near a hole.
-    if len(first.edges) < len(second.edges):
-        first, second = second, first
-    ours = _reaching(first, second)
-    theirs = _reaching(second, first) if ours else []
-    if not theirs:
-        return
-    edges = [*ours, *theirs]
-    for pair in close_pairs([edge.bounds for edge in edges], EPSILON):
-        if min(pair) < len(ours) <= max(pair):
-            _check_edges(edges[pair[0]], edges[pair[1]], False)
-
-
-def _reaching(contour: Contour, neighbour: Contour) -> list[Edge]:
-    """The edges of a contour that reach into the box of another."""
-    left, bottom, right, top = widened(neighbour.bounds, EPSILON)
-    return [
-        edge
-        for edge, (low_x, low_y, high_x, high_y) in zip(contour.edges, contour.boxes, strict=True)
-        if low_x <= right and high_x >= left and low_y <= top and high_y >= bottom
-    ]
 
 
 def _check_edges(a: Edge, b: Edge, neighbours: bool) -> None:

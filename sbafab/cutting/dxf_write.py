@@ -48,25 +48,8 @@ class Surroundings(NamedTuple):
         return (((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)),)
 
 
-class _Entity(NamedTuple):
-    """One DXF entity: its type, layer, subclass marker and group codes."""
-
-    kind: str
-    layer: str
-    subclass: str
-    body: str
-
-
-class Skeleton(NamedTuple):
-    """The empty document, split at the places where files differ."""
-
-    before_properties: str
-    before_extents: str
-    before_seed: str
-    before_entities: str
-    tail: str
-    model_space: str
-    first_handle: int
+_Entity = tuple[str, str, str, str]
+"""One DXF entity: its type, layer, subclass marker and group codes."""
 
 
 def dxf_text(
@@ -106,7 +89,7 @@ def seam_text(path: Sequence[Sequence[Edge]], properties: Mapping[str, str]) -> 
     entities = [*map(_seam_run, runs), *_datum_cross()]
     arm = (-DATUM_ARM, -DATUM_ARM, DATUM_ARM, DATUM_ARM)
     boxes = [edge.bounds for run in runs for edge in run]
-    return _with_seam_layer(_document(entities, [*boxes, arm], properties, spare=1))
+    return _document(entities, [*boxes, arm], properties, has_seam=True)
 
 
 def _seam_run(edges: Sequence[Edge]) -> _Entity:
@@ -115,52 +98,51 @@ def _seam_run(edges: Sequence[Edge]) -> _Entity:
     return _polyline(SEAM, vertices if closed else [*vertices, (*edges[-1].end, 0.0)], closed)
 
 
-def _with_seam_layer(text: str) -> str:
-    """Return a document with the layer SEAM in its table, a copy of the engraving layer before it.
+def _document(
+    entities: Sequence[_Entity],
+    boxes: Sequence[Bounds],
+    properties: Mapping[str, str],
+    has_seam: bool = False,
+) -> str:
+    """Return the packaged empty document with the entities, extents and custom properties."""
+    text = skeleton()
+    space = re.search(r"\nBLOCK_RECORD\n  5\n(\w+)\n(?:(?!  0\n).*\n)*?\*Model_Space\n", text)
+    seed = re.search(r"(?<=\$HANDSEED\n  5\n)\w+", text)
+    if space is None or seed is None:
+        raise ValueError("skeleton.dxf has no model space: regenerate it.")
+    first = int(seed[0], 16)
+    drawn = "".join(
+        f"  0\n{kind}\n  5\n{handle:X}\n330\n{space[1]}\n100\nAcDbEntity\n"
+        f"  8\n{layer}\n100\n{subclass}\n{body}"
+        for handle, (kind, layer, subclass, body) in enumerate(entities, first)
+    )
+    free = first + len(entities)
+    if has_seam:
+        text, free = _with_seam_layer(text, free), free + 1
+    # From the end to the beginning, so that no insertion is searched.
+    for start, stop, new in (
+        ("  2\nENTITIES\n", "", drawn),
+        ("  9\n$HANDSEED\n  5\n", "\n", f"{free:X}"),
+        ("", "  9\n$ORTHOMODE\n", _extents(boxes)),
+        ("", "  9\n$INSBASE\n", _custom_properties(properties)),
+    ):
+        place = text.index(start or stop) + len(start)
+        end = text.index(stop, place)
+        text = text[:place] + new + text[end:]
+    return text
 
-    Its handle is the last one below the next free handle.
-    """
-    seed_tag = "  9\n$HANDSEED\n  5\n"
-    _, _, after = text.partition(seed_tag)
-    handle = f"{int(after.partition(chr(10))[0], 16) - 1:X}"
+
+def _with_seam_layer(text: str, handle: int) -> str:
+    """Return a document with the layer SEAM, a copy of the engraving layer before it."""
     found = re.search(
         rf"  0\nLAYER\n  5\n\w+\n(?:(?!  0\n).*\n)*?  2\n{ENGRAVE}\n(?:(?!  0\n).*\n)*", text
     )
     if found is None:
         raise ValueError("skeleton.dxf has no layer for engraving: regenerate it.")
-    record = re.sub(r"(?<=LAYER\n  5\n)\w+", handle, found[0])
+    record = re.sub(r"(?<=LAYER\n  5\n)\w+", f"{handle:X}", found[0])
     record = record.replace(f"  2\n{ENGRAVE}\n", f"  2\n{SEAM}\n")
     record = record.replace(f" 62\n{COLOURS[ENGRAVE]}\n", f" 62\n{SEAM_COLOUR}\n")
     return text[: found.end()] + record + text[found.end() :]
-
-
-def _document(
-    entities: Sequence[_Entity],
-    boxes: Sequence[Bounds],
-    properties: Mapping[str, str],
-    spare: int = 0,
-) -> str:
-    """The document of the entities, with ``spare`` handles reserved after theirs."""
-    form = skeleton()
-    seed = form.first_handle + len(entities) + spare
-    drawn = "".join(
-        f"  0\n{entity.kind}\n  5\n{handle:X}\n330\n{form.model_space}\n100\nAcDbEntity\n"
-        f"  8\n{entity.layer}\n100\n{entity.subclass}\n{entity.body}"
-        for handle, entity in enumerate(entities, form.first_handle)
-    )
-    return "".join(
-        (
-            form.before_properties,
-            _custom_properties(properties),
-            form.before_extents,
-            _extents(boxes),
-            form.before_seed,
-            f"{seed:X}",
-            form.before_entities,
-            drawn,
-            form.tail,
-        )
-    )
 
 
 def _cuts(contours: Iterable[Contour], profile: DxfProfile) -> Iterator[_Entity]:
@@ -168,7 +150,7 @@ def _cuts(contours: Iterable[Contour], profile: DxfProfile) -> Iterator[_Entity]
         layer = CUT_INNER if contour.is_hole else CUT_OUTER
         if contour.circle is not None:
             centre, radius = contour.circle
-            yield _Entity("CIRCLE", layer, "AcDbCircle", _round(centre, radius))
+            yield "CIRCLE", layer, "AcDbCircle", _round(centre, radius)
         else:
             edges = [part for edge in contour.edges for part in _quarters(edge)]
             if profile == "chords" and any(isinstance(edge, Arc) for edge in edges):
@@ -201,7 +183,7 @@ def _polyline(
         rows.append(f" 10\n{number(x)}\n 20\n{number(y)}\n")
         if bulge:
             rows.append(f" 42\n{number(bulge)}\n")
-    return _Entity("LWPOLYLINE", layer, "AcDbPolyline", "".join(rows))
+    return "LWPOLYLINE", layer, "AcDbPolyline", "".join(rows)
 
 
 def _edge_entity(layer: str, edge: Edge) -> _Entity:
@@ -212,7 +194,7 @@ def _edge_entity(layer: str, edge: Edge) -> _Entity:
         f"100\nAcDbArc\n 50\n{number(_degrees(edge.centre, first))}\n"
         f" 51\n{number(_degrees(edge.centre, last))}\n"
     )
-    return _Entity("ARC", layer, "AcDbCircle", _round(edge.centre, edge.radius) + span)
+    return "ARC", layer, "AcDbCircle", _round(edge.centre, edge.radius) + span
 
 
 def _line(layer: str, start: Point, end: Point) -> _Entity:
@@ -220,7 +202,7 @@ def _line(layer: str, start: Point, end: Point) -> _Entity:
         f" 10\n{number(start[0])}\n 20\n{number(start[1])}\n 30\n0.0\n"
         f" 11\n{number(end[0])}\n 21\n{number(end[1])}\n 31\n0.0\n"
     )
-    return _Entity("LINE", layer, "AcDbLine", body)
+    return "LINE", layer, "AcDbLine", body
 
 
 def _round(centre: Point, radius: float) -> str:
@@ -269,32 +251,6 @@ def _extents(boxes: Sequence[Bounds]) -> str:
     )
 
 
-@cache
-def skeleton() -> Skeleton:
-    """The packaged empty document, split at the places where files differ."""
-    text = SKELETON.read_text(encoding="utf-8")
-    before_properties, base, text = text.partition("  9\n$INSBASE\n")
-    before_extents, _, text = text.partition("  9\n$EXTMIN\n")
-    _, after_extents, text = text.partition("  9\n$ORTHOMODE\n")
-    before_seed, seed_tag, text = text.partition("  9\n$HANDSEED\n  5\n")
-    seed, line_end, text = text.partition("\n")
-    before_entities, entities_tag, tail = text.partition("  2\nENTITIES\n")
-    record = re.search(
-        r"\nBLOCK_RECORD\n  5\n(\w+)\n(?:(?!  0\n).*\n)*?\*Model_Space\n", before_entities
-    )
-    if record is None:
-        raise ValueError("skeleton.dxf has no model space: regenerate it.")
-    return Skeleton(
-        before_properties,
-        base + before_extents,
-        after_extents + before_seed + seed_tag,
-        line_end + before_entities + entities_tag,
-        tail,
-        record[1],
-        int(seed, 16),
-    )
-
-
 # The empty DXF document that every cut file is filled into.
 #
 # ``python -m sbafab.cutting.dxf_write`` regenerates it with ezdxf. Keeping it as a file means that
@@ -302,6 +258,13 @@ def skeleton() -> Skeleton:
 
 
 SKELETON = Path(__file__).with_name("skeleton.dxf")
+
+
+@cache
+def skeleton() -> str:
+    """Return the packaged empty document without its extents, which differ between files."""
+    text = SKELETON.read_text(encoding="utf-8")
+    return text[: text.index("  9\n$EXTMIN\n")] + text[text.index("  9\n$ORTHOMODE\n") :]
 
 
 def skeleton_text() -> str:

@@ -7,7 +7,7 @@ other, and never in a hole. If the skeleton has no such room, the part gets no m
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -46,35 +46,34 @@ def index_marks(nest: Nest, sheet: int) -> tuple[IndexMark, ...]:
     """Return the marks of a sheet's parts, at most one for each."""
     import shapely
 
-    placed = nest.on_sheet(sheet)
+    placed, stock = nest.on_sheet(sheet), nest.stock
     if not placed:
         return ()
     outlines = [Region(nest.region(placement).outers).shapely(CHORD) for placement in placed]
     tree = shapely.STRtree(outlines)
-    clear = clearance(nest.stock.spacing) + CHORD
-    edge, stock = nest.stock.border, nest.stock
+    clear, edge = clearance(stock.spacing) + CHORD, stock.border
     inside = shapely.box(edge, edge, stock.width - edge, nest.length(sheet) - edge)
-    pins = [shapely.Point(x, y).buffer(d / 2 + clear) for x, y, d in stock.pins]
-    taken: list[shapely.Polygon] = []
+    taken = [shapely.Point(x, y).buffer(d / 2) for x, y, d in stock.pins]
     marks = []
     for number, placement in enumerate(placed):
-        text = _number(nest.parts[placement.part].pattern)
+        pattern = nest.parts[placement.part].pattern
+        # The number of a pattern, "5" of "P05".
+        text = pattern.lstrip("P").lstrip("0") or pattern
         size = width(text, HEIGHT), HEIGHT
         corners = np.array([*_corners(outlines[number], size, clear)])
         boxes = shapely.box(*corners.T, *(corners + size).T)
-        near = tree.query(boxes, predicate="dwithin", distance=clear)[0]
         is_free = shapely.contains_properly(inside, boxes)
-        is_free[near] = False
-        for box_number in _by_distance(boxes, is_free, tree, outlines, number):
-            box = boxes[box_number]
-            if any(box.intersects(pin) for pin in pins):
-                continue
-            if any(box.dwithin(other, clear) for other in taken):
-                continue
-            x, y = map(float, corners[box_number])
-            taken.append(box)
-            marks.append(IndexMark(text, (x, y), strokes(text, (x, y), HEIGHT)))
-            break
+        is_free[tree.query(boxes, predicate="dwithin", distance=clear)[0]] = False
+        away = np.round(shapely.distance(boxes, outlines[number]), GRID)
+        near = np.flatnonzero(is_free & (away <= FARTHEST))
+        for place in near[np.argsort(away[near], kind="stable")]:
+            box = boxes[place]
+            around = tree.query(box, predicate="dwithin", distance=away[place] + 0.1)
+            if {*around} == {number} and not any(box.dwithin(other, clear) for other in taken):
+                x, y = map(float, corners[place])
+                taken.append(box)
+                marks.append(IndexMark(text, (x, y), strokes(text, (x, y), HEIGHT)))
+                break
     return tuple(marks)
 
 
@@ -83,13 +82,8 @@ def clearance(spacing: float) -> float:
     return min(CLEARANCE, spacing / 2)
 
 
-def _number(pattern: str) -> str:
-    """Return the number of a pattern, "5" of "P05"."""
-    return pattern.lstrip("P").lstrip("0") or pattern
-
-
 def _corners(outline: shapely.MultiPolygon, size: Point, clear: float) -> Iterator[Point]:
-    """Yield lower left corners of boxes round a part, on two lines that keep off it."""
+    """Yield lower left corners of boxes round a part, on lines that keep off it."""
     import shapely
 
     for off in (size[1] / 2, size[0] / 2, (size[0] ** 2 + size[1] ** 2) ** 0.5 / 2):
@@ -98,28 +92,3 @@ def _corners(outline: shapely.MultiPolygon, size: Point, clear: float) -> Iterat
         for n in range(AROUND):
             p = exterior.interpolate(n / AROUND, normalized=True)
             yield round(p.x - size[0] / 2, GRID), round(p.y - size[1] / 2, GRID)
-
-
-def _by_distance(
-    boxes: np.ndarray,
-    is_free: np.ndarray,
-    tree: shapely.STRtree,
-    outlines: Sequence[shapely.MultiPolygon],
-    number: int,
-) -> list[int]:
-    """Return the free boxes that are nearest to their own part and to no other, nearest first."""
-    import shapely
-
-    free = np.flatnonzero(is_free)
-    if not len(free):
-        return []
-    away = shapely.distance(boxes[free], outlines[number])
-    order = sorted(zip(np.round(away, GRID), free, strict=True))
-    nearest = []
-    for distance, box in order:
-        if distance > FARTHEST:
-            break
-        around = tree.query(boxes[box], predicate="dwithin", distance=distance + 0.1)
-        if set(map(int, around)) <= {number}:
-            nearest.append(int(box))
-    return nearest

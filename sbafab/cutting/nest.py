@@ -1,4 +1,4 @@
-"""Records of nesting: parts, film sheets, the placements in a nest, and its errors.
+"""Records of nesting: parts, film sheets, and the placements in a nest.
 
 Lengths are mm, areas mm2. A sheet's lower left corner is its origin.
 """
@@ -11,10 +11,9 @@ from functools import cached_property
 from typing import Literal
 
 from sbafab.design.films import Sheet
-from sbafab.errors import DesignError, TooLargeError
 from sbafab.geometry.edges import Bounds, Point, unit
 from sbafab.geometry.region import Region
-from sbafab.laminate.films import FIRST, Material
+from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate
 
 Turn = Literal[0, 1, 2, 3]
@@ -112,19 +111,11 @@ def placed(region: Region, turn: Turn, shift: Point) -> Region:
     return region.mapped(lambda p: (p[0] * c - p[1] * s + dx, p[0] * s + p[1] * c + dy), 1.0, False)
 
 
-# The parts to cut for a laminate.
-
-
-def no_spares(needed: int) -> int:
-    """Return zero spares, whatever number is needed."""
-    return 0
-
-
 def parts_of(
     laminate: Laminate,
     paths: Mapping[str, Region],
     copies: int,
-    spares: Callable[[int], int] = no_spares,
+    spares: Callable[[int], int] = lambda needed: 0,
 ) -> tuple[NestPart, ...]:
     """Return every piece of every pattern, by pattern in stacking order.
 
@@ -138,66 +129,12 @@ def parts_of(
             continue
         needed = len(layers) * copies
         layers_cut = needed + spares(needed)
-        by_form: dict[Region, list[int]] = {}
-        pieces = paths[pattern].pieces
-        for number, piece in enumerate(pieces):
+        by_form: dict[Region, list[tuple[int, Region]]] = {}
+        for number, piece in enumerate(paths[pattern].pieces, start=1):
             low_x, low_y, _, _ = piece.bounds
-            by_form.setdefault(piece.moved(-low_x, -low_y), []).append(number)
-        for numbers in by_form.values():
-            parts.append(
-                NestPart(
-                    design=laminate.name,
-                    pattern=pattern,
-                    piece=numbers[0] + 1,
-                    material=layers[0].film.material,
-                    region=pieces[numbers[0]],
-                    count=len(numbers) * layers_cut,
-                )
-            )
+            by_form.setdefault(piece.moved(-low_x, -low_y), []).append((number, piece))
+        for alike in by_form.values():
+            (number, piece), count = alike[0], len(alike) * layers_cut
+            material = layers[0].film.material
+            parts.append(NestPart(laminate.name, pattern, number, material, piece, count))
     return tuple(parts)
-
-
-# Errors that name the field of the design file.
-
-
-def field(material: Material) -> str:
-    """Return the section of a design file that describes this material's sheets."""
-    name = material.lower()
-    return f"sheets.{name}" if material in FIRST else f"films.{name}.sheet"
-
-
-def no_usable_area(material: Material, stock: Stock) -> DesignError:
-    where = field(material)
-    return DesignError(
-        f"{where}.border of {stock.border:g} mm leaves no usable area on a sheet of "
-        f"{stock.width:g} x {stock.length:g} mm; it must be below "
-        f"{min(stock.width, stock.length) / 2:g} mm."
-    )
-
-
-def too_large(part: NestPart, stock: Stock) -> TooLargeError:
-    where = field(part.material)
-    low_x, low_y, high_x, high_y = part.region.bounds
-    min_x, min_y, max_x, max_y = stock.usable
-    return TooLargeError(
-        f"pattern {part.pattern} of {part.design} ({high_x - low_x:.1f} x {high_y - low_y:.1f} mm) "
-        f"does not fit the usable {max_x - min_x:.1f} x {max_y - min_y:.1f} mm of {where}; enlarge "
-        f"{where}.width or length, or lower its border of {stock.border:g} mm."
-    )
-
-
-def no_place(part: NestPart, stock: Stock) -> DesignError:
-    where = field(part.material)
-    return DesignError(
-        f"pattern {part.pattern} of {part.design} finds no place {stock.spacing:g} mm clear of the "
-        f"{len(stock.pins)} {where}.pins; lower {where}.spacing, move the pins, or enlarge the "
-        "sheet."
-    )
-
-
-def too_many(material: Material, parts: int, needed: str, stock: Stock) -> DesignError:
-    where = field(material)
-    return DesignError(
-        f"{parts} parts of {material} need {needed} of {stock.width:g} x {stock.length:g} mm, "
-        f"{where}.most allows {stock.most}; raise it, order fewer copies, or enlarge the sheets."
-    )

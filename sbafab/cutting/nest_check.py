@@ -16,9 +16,6 @@ from sbafab.geometry.spatial_index import close_pairs, widened
 SLACK = 1e-6
 """mm by which a distance may fall short of the spacing: rounding."""
 
-NEAR = 1e-4
-"""Two pairs share a bound of their gaps if their relative places differ by less than this, mm."""
-
 
 class Gap(NamedTuple):
     """A least distance in mm (0 for an overlap) and a place at which it occurs."""
@@ -54,40 +51,32 @@ def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: flo
 
     ``slack`` mm may be missing: the rounding of the numbers in a file.
     """
+    min_x, min_y, max_x, max_y = stock.usable
     for name, region in regions:
-        _check_border(name, region, stock, slack)
+        low_x, low_y, high_x, high_y = region.bounds
+        over = max(min_x - low_x, min_y - low_y, high_x - max_x, high_y - max_y)
+        if over > slack:
+            x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
+            raise OutputError(
+                f"{name} at x {x:.3f}, y {y:.3f} reaches {over:.4f} mm into the border of "
+                f"{stock.border:g} mm; nest again."
+            )
     # A part in another's hole would drop out with the waste: holes are cut first.
-    regions = [(name, Region(region.outers)) for name, region in regions]
-    pins = [
+    entries = [(name, Region(region.outers)) for name, region in regions]
+    entries += [
         (f"the pin at x {x:g}, y {y:g}", disc((x, y), diameter / 2))
         for x, y, diameter in stock.pins
     ]
-    entries = [*regions, *pins]
-    rounds = [_round(region) for _, region in entries]
-    for i, j in close_pairs([region.bounds for _, region in entries], stock.spacing):
-        if min(i, j) >= len(regions) or _circle_gap(rounds[i], rounds[j]) >= stock.spacing:
-            continue
-        pair = entries[i][1], entries[j][1]
-        gap = least_distance(*pair, stock.spacing)
-        if gap.value < stock.spacing - slack:
-            (x, y), (first, second) = gap.place, (entries[min(i, j)][0], entries[max(i, j)][0])
-            how = f"are {gap.value:.4f} mm apart" if gap.value > 0 else "overlap"
+    for pair in close_pairs([region.bounds for _, region in entries], stock.spacing):
+        (first, one), (second, other) = (entries[number] for number in sorted(pair))
+        gap = least_distance(one, other, stock.spacing)
+        if min(pair) < len(regions) and gap.value < stock.spacing - slack:
+            (x, y), value = gap.place, gap.value
+            how = f"are {value:.4f} mm apart" if value > 0 else "overlap"
             raise OutputError(
                 f"{first} and {second} {how} at x {x:.3f}, y {y:.3f}; the spacing is "
                 f"{stock.spacing:g} mm; nest again."
             )
-
-
-def _round(region: Region) -> tuple[Point, float]:
-    """Return centre and radius of a circle that encloses the region; exact for a disc."""
-    low_x, low_y, high_x, high_y = region.bounds
-    centre = (low_x + high_x) / 2, (low_y + high_y) / 2
-    return centre, max(edge.farthest_from(centre) for edge in region.edges)
-
-
-def _circle_gap(a: tuple[Point, float], b: tuple[Point, float]) -> float:
-    """Return the gap between two circles, mm: a lower bound for regions inside them."""
-    return math.dist(a[0], b[0]) - a[1] - b[1]
 
 
 def least_distance(a: Region, b: Region, beyond: float) -> Gap:
@@ -135,15 +124,3 @@ def _feet(a: Edge, b: Edge) -> Iterator[Point]:
             # Both sides of the circle: from inside it, the far one may be the near one.
             for p in line_circle(a.centre, axis, a.centre, a.radius):
                 yield a.nearest(p)
-
-
-def _check_border(name: str, region: Region, stock: Stock, slack: float) -> None:
-    min_x, min_y, max_x, max_y = stock.usable
-    low_x, low_y, high_x, high_y = region.bounds
-    over = max(min_x - low_x, min_y - low_y, high_x - max_x, high_y - max_y)
-    if over > slack:
-        x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
-        raise OutputError(
-            f"{name} at x {x:.3f}, y {y:.3f} reaches {over:.4f} mm into the border of "
-            f"{stock.border:g} mm; nest again."
-        )

@@ -152,18 +152,18 @@ def kerf_properties(kerf: Kerf | None) -> dict[str, str]:
 
 
 def kerf_of(properties: Mapping[str, str]) -> Kerf | None:
-    """The kerf that a file is compensated for, as it states; None for nominal edges.
+    """Return the kerf that a file is compensated for, as it states; None for nominal edges.
 
     Raises OutputError if it states neither.
     """
-    state, width = properties.get("KERF_STATE"), properties.get("KERF_WIDTH")
+    state, width = properties.get("KERF_STATE"), properties.get("KERF_WIDTH", "")
     if (state, width) == (UNCALIBRATED, "none"):
         return None
     try:
-        x, _, y = (width or "").partition(" x ")
-        kerf = (float(x), float(y or x))
+        x, _, y = width.partition(" x ")
+        kerf = float(x), float(y or x)
     except ValueError:
-        kerf = (math.nan, math.nan)
+        kerf = math.nan, math.nan
     if state != COMPENSATED or not is_kerf(*kerf):
         raise OutputError(
             f"its properties say KERF_STATE {state!r} and KERF_WIDTH {width!r}, which leaves open "

@@ -11,19 +11,15 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from sbafab.cutting.dxf_read import ReadBack, read_profile
+from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import seam_text
 from sbafab.cutting.properties import FOLDER, REFERENCE, SEAM, CutSettings
+from sbafab.cutting.verify import TOLERANCE, deviation
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Edge, Point, distance_to
+from sbafab.geometry.edges import Edge, Point
 from sbafab.geometry.offset import shifted
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Laminate
-
-TOLERANCE = 0.001
-"""mm within which a path read back is the one that was written."""
-SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Places along an edge at which it is compared."""
 
 WIDTH = "TOOL_WIDTH"
 CENTRED: Point = (0.0, 0.0)
@@ -67,7 +63,7 @@ def write_seam_files(laminate: Laminate, folder: Path, settings: CutSettings) ->
         text = seam_text(moved(seam.path, (-x, -y)), properties)
         path.write_text(text, encoding="utf-8", newline="\n")
         chains, written = read_seam(path)
-        off = deviation(moved(chains, (x, y)), seam.path)
+        off = path_difference(moved(chains, (x, y)), seam.path)
         if off is not None or written != properties:
             raise OutputError(f"{path.name}: {off or 'its properties differ'}; regenerate it.")
 
@@ -102,37 +98,23 @@ def read_seam(path: Path) -> tuple[tuple[tuple[Edge, ...], ...], dict[str, str]]
             f"{path.name}: it holds more than a path on {SEAM}; remove what is on "
             f"{strangers[0] if strangers else 'the layers of cuts'}, or regenerate it"
         )
-    chains = _chains(drawing)
+    chains = tuple(edges for layer, edges in drawing.strokes if layer == SEAM)
     if not chains:
         raise OutputError(f"{path.name}: it has no path on {SEAM}; regenerate it")
     return chains, drawing.properties
 
 
-def _chains(drawing: ReadBack) -> tuple[tuple[Edge, ...], ...]:
-    return tuple(edges for layer, edges in drawing.strokes if layer == SEAM)
-
-
-def deviation(chains: Chains, expected: Chains) -> str | None:
+def path_difference(chains: Chains, expected: Chains) -> str | None:
     """Return text on a path's deviation from the expected one; None within a micrometre."""
     if len(chains) != len(expected):
         return f"it has {len(chains)} paths, not {len(expected)}"
     worst: tuple[float, Point] = (0.0, (0.0, 0.0))
     for ours, theirs in zip(expected, chains, strict=True):
-        worst = max(worst, _farthest(ours, theirs), _farthest(theirs, ours))
-        ends = zip(_ends(ours), _ends(theirs), strict=True)
+        worst = max(worst, deviation(ours, theirs, TOLERANCE), deviation(theirs, ours, TOLERANCE))
+        ends = (ours[0].start, theirs[0].start), (ours[-1].end, theirs[-1].end)
         worst = max(worst, *((math.dist(a, b), a) for a, b in ends))
     off, (x, y) = worst
     return None if off <= TOLERANCE else f"its path is {off:.3f} mm off at x {x:.3f}, y {y:.3f}"
-
-
-def _farthest(chain: Sequence[Edge], target: Sequence[Edge]) -> tuple[float, Point]:
-    """The greatest distance of a chain from another, and where."""
-    places = [edge.at(share) for edge in chain for share in SHARES]
-    return max((min(distance_to(edge, p) for edge in target), p) for p in places)
-
-
-def _ends(chain: Sequence[Edge]) -> tuple[Point, Point]:
-    return chain[0].start, chain[-1].end
 
 
 def stated_width(properties: Mapping[str, str]) -> float | None:

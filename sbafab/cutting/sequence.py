@@ -18,8 +18,6 @@ SWEEPS = 6
 """Number of passes over a path to undo crossings."""
 LOOKED_AHEAD = 40
 """Contours along the path that one end of a crossing may lie from the other."""
-FEW = 20
-"""Contours up to which looking at every stretch costs less than fetching numpy."""
 SHORTER = 1e-6
 """mm by which a path has to become shorter to be turned round."""
 
@@ -80,12 +78,8 @@ def _undo_crossings(path: list[Contour], here: Point) -> bool:
     shorter = False
     stops = [here, *map(_start, path)]
     count = len(path)
-    worth = _worth_a_look(stops) if count > FEW else [True] * count
     steps = [math.dist(a, b) for a, b in pairwise(stops)] + [0.0]
-    changed = -1
     for i in range(count - 1):
-        if i > changed and not worth[i]:
-            continue
         for j in range(i + 1, min(count, i + LOOKED_AHEAD)):
             # Behind the last stop there is nothing to go on to.
             before = steps[i] + steps[j + 1]
@@ -100,26 +94,7 @@ def _undo_crossings(path: list[Contour], here: Point) -> bool:
                 if j + 1 < count:
                     steps[j + 1] = math.dist(stops[j + 1], stops[j + 2])
                 shorter = True
-                changed = max(changed, j + 1)
     return shorter
-
-
-def _worth_a_look(stops: Sequence[Point]) -> list[bool]:
-    """For each stop, True if reversing a stretch after it may shorten the current path.
-
-    All stretches are tested at once; a saving above half of ``SHORTER`` counts.
-    """
-    count = len(stops) - 1
-    xy = np.array(stops)
-    worth = np.zeros(count, dtype=bool)
-    steps = np.hypot(*(xy[1:] - xy[:-1]).T)
-    for ahead in range(1, min(LOOKED_AHEAD, count)):
-        # The stretch from stop i + 1 to stop i + ahead + 1; the last one has nothing behind it.
-        saved = steps[: count - ahead] - np.hypot(*(xy[ahead + 1 :] - xy[: count - ahead]).T)
-        saved[:-1] += steps[ahead + 1 :] - np.hypot(*(xy[ahead + 2 :] - xy[1 : count - ahead]).T)
-        worth[: count - ahead] |= saved > SHORTER / 2
-    flags: list[bool] = worth.tolist()
-    return flags
 
 
 def _spread(path: Sequence[Contour], heat_distance: float) -> list[Contour]:

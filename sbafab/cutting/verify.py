@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -139,7 +139,8 @@ def check_contours(region: Region, expected: Region, tolerance: float) -> None:
             if _same(contour, nearest, tolerance / 4):
                 continue
             off, (x, y) = max(
-                _deviation(contour, nearest, tolerance), _deviation(nearest, contour, tolerance)
+                deviation(contour.edges, nearest.edges, tolerance),
+                deviation(nearest.edges, contour.edges, tolerance),
             )
             if off > tolerance:
                 raise OutputError(
@@ -168,21 +169,18 @@ def _same_edge(a: Edge, b: Edge, room: float) -> bool:
     return a.ccw == b.ccw and is_round
 
 
-def _deviation(contour: Contour, second: Contour, tolerance: float) -> tuple[float, Point]:
-    """Return the largest distance of a contour from another, and where.
+def deviation(
+    edges: Sequence[Edge], others: Sequence[Edge], tolerance: float
+) -> tuple[float, Point]:
+    """Return the largest distance in mm of edges from others, and where.
 
-    It is measured from every vertex, and from places along every edge: thirds of a line, eighths
-    of an arc.
+    It is measured from places along every edge: thirds of a line, eighths of an arc.
     """
-    index = EdgeIndex(second.edges)
-    places = [
-        edge.at(i / count)
-        for edge in contour.edges
-        for count in (3 if isinstance(edge, Line) else 8,)
-        for i in range(count)
-    ]
-    worst = 0.0, places[0]
-    for p in places:
-        near = [*index.touching(widened((*p, *p), tolerance))] or second.edges
-        worst = max(worst, (min(distance_to(edge, p) for edge in near), p))
+    index = EdgeIndex(others)
+    worst = 0.0, edges[0].start
+    for edge in edges:
+        count = 3 if isinstance(edge, Line) else 8
+        for p in (edge.at(i / count) for i in range(count + 1)):
+            near = [*index.touching(widened((*p, *p), tolerance))] or others
+            worst = max(worst, (min(distance_to(other, p) for other in near), p))
     return worst

@@ -184,8 +184,9 @@ def write_text(path: Path, text: str) -> None:
 def _write_layers(folder: DesignFolder) -> None:
     """Write the layer files, the paths of seams and the base plate."""
     build, progress = folder.build, partial(folder.progress, "cut files")
-    files = write_layer_files(build.laminate, build.paths, folder.path, build.settings, progress)
-    folder.verified |= {file.path: file.sha256 for file in files}
+    folder.verified |= write_layer_files(
+        build.laminate, build.paths, folder.path, build.settings, progress
+    )
     write_plates(build, folder.path)
 
 

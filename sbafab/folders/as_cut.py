@@ -22,8 +22,8 @@ from sbafab.cutting.properties import (
 from sbafab.cutting.seam_files import (
     CENTRED,
     WIDTH,
-    deviation,
     moved,
+    path_difference,
     read_seam,
     seam_path,
     seam_properties,
@@ -300,7 +300,7 @@ def read_seams(
             message = f"seam {seam.name} ({file}): {difference}"
             problems.append(Problem(CLAIMS, message, layers))
         drawn = moved(chains, settings.seam_offsets.get(seam.tool, CENTRED))
-        what = deviation(drawn, seam.path)
+        what = path_difference(drawn, seam.path)
         as_drawn = seam if what is None else replace(seam, path=drawn)
         width = stated_width(properties)
         if width is not None and abs(width - seam.width) > TOLERANCE:

@@ -13,7 +13,7 @@ from ezdxf import path as dxf_path
 from sbafab.actuators import build, load_design
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.seam_files import (
-    deviation,
+    path_difference,
     read_seam,
     seam_path,
     stated_width,
@@ -68,7 +68,7 @@ def test_an_open_path_ends_where_it_ends_and_a_round_one_where_it_began(tmp_path
 def test_a_seam_is_read_back_as_its_path(tmp_path: Path) -> None:
     path = written(tmp_path, CHAIN, ROUND)
     chains, properties = read_seam(path)
-    assert deviation(chains, (CHAIN, ROUND)) is None
+    assert path_difference(chains, (CHAIN, ROUND)) is None
     assert stated_width(properties) == 2.0
     assert properties["ORDER"] == "1"
 
@@ -76,10 +76,10 @@ def test_a_seam_is_read_back_as_its_path(tmp_path: Path) -> None:
 def test_a_shorter_turned_or_second_path_is_another() -> None:
     line, short = Line((0.0, 0.0), (10.0, 0.0)), Line((0.0, 0.0), (9.0, 0.0))
     turned = Line((10.0, 0.0), (0.0, 0.0))
-    assert "1.000 mm off at x 10.000, y 0.000" in str(deviation(((short,),), ((line,),)))
-    assert "1.000 mm off" in str(deviation(((line,),), ((short,),)))
-    assert "10.000 mm off" in str(deviation(((turned,),), ((line,),)))
-    assert deviation(((line,), (short,)), ((line,),)) == "it has 2 paths, not 1"
+    assert "1.000 mm off at x 10.000, y 0.000" in str(path_difference(((short,),), ((line,),)))
+    assert "1.000 mm off" in str(path_difference(((line,),), ((short,),)))
+    assert "10.000 mm off" in str(path_difference(((turned,),), ((line,),)))
+    assert path_difference(((line,), (short,)), ((line,),)) == "it has 2 paths, not 1"
 
 
 def test_a_file_that_holds_more_or_no_path_is_refused(tmp_path: Path) -> None:
