@@ -4,21 +4,15 @@ quarter of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import csv
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.laminate.films import PAPER_BURST
-from sbafab.models.quantity import (
-    ANYWHERE,
-    OF_STACK,
-    Conditions,
-    ModelId,
-    Quantity,
-    chamber_count,
-    share_of_stroke,
-)
+from sbafab.models.quantity import OF_STACK, Conditions, ModelId, Quantity
 
 if TYPE_CHECKING:
     from sbafab.design.records import Form
@@ -40,15 +34,13 @@ class Measured(NamedTuple):
 HEIGHTS = (0.0, 0.25, 0.75)
 """Shares of the largest height at which forces were measured."""
 FORCE_KPA = 100.0
-FORCE_1DOF = (
-    Measured(1.48, 0.04, "N", "Sec. 4.3"),
-    Measured(1.01, 0.01, "N", "Sec. 4.3"),
-    Measured(0.64, 0.01, "N", "Sec. 4.3"),
+FORCE_1DOF = tuple(
+    Measured(value, error, "N", "Sec. 4.3")
+    for value, error in ((1.48, 0.04), (1.01, 0.01), (0.64, 0.01))
 )
-FORCE_3DOF = (
-    Measured(4.87, 0.02, "N", "Sec. 4.3"),
-    Measured(4.07, 0.07, "N", "Sec. 4.3"),
-    Measured(2.40, 0.03, "N", "Sec. 4.3"),
+FORCE_3DOF = tuple(
+    Measured(value, error, "N", "Sec. 4.3")
+    for value, error in ((4.87, 0.02), (4.07, 0.07), (2.40, 0.03))
 )
 FORCE_BENT = (
     (30, Measured(3.22, 0.12, "N", "Sec. 4.3")),
@@ -98,35 +90,34 @@ FULL_SHARE = FULL_HEIGHT.value / BALLOONS / 2.5
 """Stroke of a full balloon over its pocket's radius: 17.5 mm of 15 balloons of radius 2.5."""
 
 
-# Measured counterparts of figures that are off by more than a quarter of them.
-#
-# One table for all users of such figures: predictions, searches, sweeps, pictures, pages and the
-# studio. A row applies to every design whose figure comes from the row's model: other designs were
-# not measured, and a model that is off for the paper's actuators is not better for them.
+# Measured counterparts of figures that are off by more than a quarter of them, for predictions,
+# searches, sweeps, pictures, pages and the studio. A row applies to every design whose figure comes
+# from the row's model: other designs were not measured, and a model that is off for the paper's
+# actuators is not better for them.
 
 
 MISFIT = 0.25
 """Relative error up to which a figure may stand without its measured counterpart."""
-BALLOON, FILMS = (ModelId.ELASTIC_BALLOON,), (ModelId.FILMS,)
-CALIBRATED_MODELS = (*OF_STACK, *BALLOON, *FILMS)
+CALIBRATED_MODELS = (*OF_STACK, ModelId.ELASTIC_BALLOON, ModelId.FILMS)
 """Models that a calibration changes; its intervals say how far they may be off."""
-ONE_DOF, THREE_DOF = "1-DoF", "3-DoF"
-DerivedValue = Literal["time-with-air", "pocket-area", "cantilever-modulus"]
-"""Values that ``docs/validation.md`` computes from a prediction's figures."""
+CALIBRATION = "paper"
+"""The calibration of ``Counterpart.calibrated``."""
 
 
 @dataclass(frozen=True)
 class Counterpart:
-    """A measured value, and the model's value for the actuator on which it was measured.
+    """A measured value, and the model's value for the actuator on which it was measured: a row of
+    ``paper_counterparts.csv``.
 
     It stands beside figures of its ``quantities`` by its ``models`` (none: by any), at conditions
-    that meet ``at`` and that it ``fits``; ``state`` is the quantity or state that was ``measured``.
-    ``parallel``: it holds for actuators that bend (True), for the others (False), or for all
-    (None). ``template`` and ``recorded`` name the design and the figure from which ``gave`` was
-    taken, in the unit of ``measured``; ``where`` is the state in which the model gave it, if that
-    is not the one of the measurement. ``calibrated`` is the value with the calibration "paper" in
-    the unit of ``measured``, None if it is close or unchanged. A row may be far off with that
-    calibration only. A row ``of_papers`` stands beside figures of the paper's own 3-DoF only.
+    that meet ``at`` and are no less than ``at_least``; ``state`` is the quantity or state that was
+    ``measured``. ``parallel``: it holds for actuators that bend (True), for the others (False), or
+    for all (None). ``source`` names the template and the figure from which ``gave`` was taken, or
+    the value that ``docs/validation.md`` computes from its figures, in the unit of ``measured``;
+    ``where`` is the state in which the model gave it, if that is not the one of the measurement.
+    ``calibrated`` is the value with the calibration "paper" in the unit of ``measured``, None if it
+    is close or unchanged. A row may be far off with that calibration only. A row ``of_papers``
+    stands beside figures of the paper's own 3-DoF only.
     """
 
     quantities: tuple[Quantity, ...]
@@ -136,13 +127,12 @@ class Counterpart:
     actuator: str
     gave: float
     where: str
-    template: str
-    recorded: tuple[Quantity, Conditions] | DerivedValue
-    parallel: bool | None = None
-    calibrated: float | None = None
-    of_papers: bool = False
-    at: Conditions = ANYWHERE
-    fits: Callable[[Conditions], bool] | None = None
+    source: str
+    parallel: bool | None
+    calibrated: float | None
+    of_papers: bool
+    at: Conditions
+    at_least: Conditions
 
     def stands_beside(
         self, quantity: Quantity, at: Conditions, model: ModelId, is_parallel: bool
@@ -153,7 +143,9 @@ class Counterpart:
             and (not self.models or model in self.models)
             and self.parallel in (None, is_parallel)
             and at.meet(self.at)
-            and (self.fits is None or self.fits(at))
+            and all(
+                (getattr(at, name) or 0) >= least for name, least in self.at_least.as_dict().items()
+            )
         )
 
     @property
@@ -200,141 +192,31 @@ class CounterpartEntry(Document):
     """the same model for that actuator, in the unit"""
 
 
-def _forces() -> Iterator[Counterpart]:
-    """Yield straight forces at 100 kPa (Sec. 4.3) that a model misses by more than MISFIT."""
-    stack = OF_STACK[:1]
-    eq_4, eqs_1_to_3 = (ModelId.WORK_ON_EQ_4,), (ModelId.WORK_ON_EQS_1_TO_3,)
-    calibrated = {(ONE_DOF, stack): (None, 1.394, 0.9436)}
-    gave = {
-        (ONE_DOF, stack): (1.888, 1.709, 1.355),
-        (ONE_DOF, eq_4): (None, None, 0.8422),
-        (ONE_DOF, eqs_1_to_3): (0.9817, None, 0.8631),
-        (THREE_DOF, stack): (None, 5.129, 4.069),
-        (THREE_DOF, eqs_1_to_3): (2.945, 2.905, None),
-    }
-    measured_at = {ONE_DOF: FORCE_1DOF, THREE_DOF: FORCE_3DOF}
-    for (actuator, models), values in gave.items():
-        fitted = calibrated.get((actuator, models), (None, None, None))
-        rows = zip(HEIGHTS, measured_at[actuator], values, fitted, strict=True)
-        for share, measured, value, calibrated_value in rows:
-            if value is None:
-                continue
-            yield Counterpart(
-                (Quantity.BLOCKED_FORCE,),
-                models,
-                measured,
-                f"at 100 kPa, {share_of_stroke(share)},",
-                actuator,
-                value,
-                "",
-                "1dof-5mm" if actuator == ONE_DOF else "3dof-15mm",
-                (Quantity.BLOCKED_FORCE, Conditions(kpa=FORCE_KPA, share=share)),
-                actuator == THREE_DOF,
-                calibrated_value,
-                at=Conditions(share=share),
-            )
+@cache
+def counterparts() -> tuple[Counterpart, ...]:
+    """Return all figures of predictions that validation shows to be off by more than MISFIT."""
+    path = Path(__file__).with_name("paper_counterparts.csv")
+    with path.open(encoding="utf-8", newline="") as opened:
+        return tuple(_row(cells) for cells in csv.DictReader(opened))
 
 
-def _bent_forces() -> Iterator[Counterpart]:
-    """Yield bent forces at 100 kPa (Sec. 4.3); the paper does not name the chambers."""
-    gave = {30: (1.667, None), 60: (1.434, 2.829), 90: (1.194, 2.341)}
-    calibrated = {30: (1.345, None), 60: (1.054, 1.982), 90: (0.7642, 0.7656)}
-    for angle, measured in FORCE_BENT:
-        rows = zip((1, 2), gave[angle], calibrated[angle], strict=True)
-        for chambers, value, calibrated_value in rows:
-            if value is None:
-                continue
-            at = Conditions(chambers=chambers, angle=angle)
-            yield Counterpart(
-                (Quantity.BENT_FORCE,),
-                OF_STACK,
-                measured,
-                f"at 100 kPa, bent by {angle} deg,",
-                THREE_DOF,
-                value,
-                f"with {chamber_count(chambers)}",
-                "3dof-15mm",
-                (Quantity.BENT_FORCE, at._replace(kpa=FORCE_KPA)),
-                True,
-                calibrated_value,
-                at=at,
-            )
-
-
-def _has_several(at: Conditions) -> bool:
-    return at.chambers is not None and at.chambers > 1
-
-
-def _is_of_air(at: Conditions) -> bool:
-    """Return True for a flow in ml/min that only air has."""
-    return at.flow is not None and at.flow >= 1000
-
-
-def _further_counterparts() -> Iterator[Counterpart]:
-    """Yield heights, bends, energy, time and stiffness (Sec. 4.1, 4.4 to 4.6)."""
-    three, bend, full = "3dof-15mm", "of bend at most", "of full height"
-    yield Counterpart(
-        (Quantity.FOLDED_HEIGHT,), FILMS, FLAT_HEIGHT, "of deflated height",
-        THREE_DOF, 1.865, "", three, (Quantity.FOLDED_HEIGHT, ANYWHERE), of_papers=True,
-    )  # fmt: skip
-    yield Counterpart(
-        (Quantity.FREE_STROKE, Quantity.FREE_HEIGHT), BALLOON, FULL_HEIGHT, full,
-        THREE_DOF, 24.55, "at 10 kPa", three, (Quantity.FREE_HEIGHT, Conditions(kpa=FULL_KPA)),
-    )  # fmt: skip
-    yield Counterpart(
-        (Quantity.LARGEST_STROKE,), (ModelId.EQS_1_TO_3,), FULL_HEIGHT, full,
-        THREE_DOF, 39.82, "", three, (Quantity.LARGEST_STROKE, ANYWHERE),
-    )  # fmt: skip
-    yield Counterpart(
-        (Quantity.REFERENCE_BEND, Quantity.LARGEST_ASIDE), (ModelId.CONSTANT_CURVATURE,),
-        LARGEST_BEND, bend, THREE_DOF, 140.5, "", three,
-        (Quantity.REFERENCE_BEND, Conditions(chambers=1)), True, 148.7,
-    )  # fmt: skip
-    for chambers, kpa, value in ((1, FULL_KPA, 128.3), (2, FORCE_KPA, 105.5)):
-        yield Counterpart(
-            (Quantity.BEND, Quantity.ASIDE), OF_STACK, LARGEST_BEND, bend, THREE_DOF, value,
-            f"at {kpa:g} kPa in {chamber_count(chambers)}", three,
-            (Quantity.BEND, Conditions(kpa=kpa, chambers=chambers)), True,
-            at=Conditions(chambers=1) if chambers == 1 else ANYWHERE,
-            fits=None if chambers == 1 else _has_several,
-        )  # fmt: skip
-    large, air = "1-DoF of d = 10", "to 10 kPa with air"
-    for quantity, models, value, calibrated_value in (
-        (Quantity.FREE_WORK, BALLOON, 1.770, 1.588),
-        (Quantity.WORK_BOUND, (ModelId.P_V_EQ_4,), 5.820, None),
-    ):
-        yield Counterpart(
-            (quantity,), models, WORK, "at 10 kPa", large, value, "", "1dof-10mm",
-            (quantity, Conditions(kpa=FULL_KPA)), None, calibrated_value,
-        )  # fmt: skip
-    yield Counterpart(
-        (Quantity.POWER_DENSITY,), (ModelId.POWER,), AIR_TIME, air, THREE_DOF,
-        0.01439, "", three, "time-with-air",
-    )  # fmt: skip
-    yield Counterpart(
-        (Quantity.REFERENCE_TIME,), (), AIR_TIME,
-        air, THREE_DOF, 0.01439, "", three, "time-with-air", fits=_is_of_air,
-    )  # fmt: skip
-    yield Counterpart(
-        (Quantity.FORCE_BOUND,), (ModelId.FLAT_PLATES,),
-        FORCE_1DOF[0], "at 100 kPa, flat,", ONE_DOF, 1.963, "", "1dof-5mm",
-        "pocket-area", False,
-    )  # fmt: skip
-    for actuator, measured, value, calibrated_value, template, parallel in (
-        (ONE_DOF, MODULUS_1DOF, 6.431, 5.248, "1dof-5mm", False),
-        (THREE_DOF, MODULUS_3DOF, 13.06, 13.3, three, True),
-    ):
-        yield Counterpart(
-            (Quantity.HELD_STIFFNESS, Quantity.SHUT_STIFFNESS), OF_STACK, measured,
-            "of modulus in bending", actuator, value, "at 10 kPa, chambers shut", template,
-            "cantilever-modulus", parallel, calibrated_value,
-        )  # fmt: skip
-
-
-COUNTERPARTS = (*_forces(), *_bent_forces(), *_further_counterparts())
-"""All figures of predictions that validation shows to be off by more than MISFIT."""
-CALIBRATION = "paper"
-"""The calibration of ``Counterpart.calibrated``."""
+def _row(cells: dict[str, str]) -> Counterpart:
+    error = float(cells["error"] or 0)
+    return Counterpart(
+        tuple(map(Quantity.of, cells["quantities"].split())),
+        tuple(map(ModelId, cells["models"].split())),
+        Measured(float(cells["value"]), error, cells["unit"], cells["section"]),
+        cells["state"],
+        cells["actuator"],
+        float(cells["gave"]),
+        cells["where"],
+        cells["source"],
+        {"yes": True, "no": False}.get(cells["parallel"]),
+        float(cells["calibrated"]) if cells["calibrated"] else None,
+        cells["of_papers"] == "yes",
+        Conditions.read(cells["at"]),
+        Conditions.read(cells["at_least"]),
+    )
 
 
 def counterpart(
@@ -354,26 +236,19 @@ def counterpart(
     row = _counterpart(quantity, at, model, form.is_parallel)
     if row is None or (row.of_papers and not of_papers):
         return None
-    return _calibrated(row, calibration)
-
-
-def _counterpart(
-    quantity: Quantity, at: Conditions, model: ModelId, is_parallel: bool
-) -> Counterpart | None:
-    beside = (row for row in COUNTERPARTS if row.stands_beside(quantity, at, model, is_parallel))
-    return next(beside, None)
-
-
-def _calibrated(row: Counterpart, calibration: str) -> Counterpart | None:
-    """Return a row with the value of a calibration (its name, "" for none); None if it is not known
-    to be off.
-    """
     if not calibration:
         return row if abs(row.ratio - 1) > MISFIT else None
     if calibration == CALIBRATION and row.calibrated is not None:
         return replace(row, gave=row.calibrated)
     # A calibration changes these models, and its intervals give their possible error.
     return None if set(row.models) & set(CALIBRATED_MODELS) else row
+
+
+def _counterpart(
+    quantity: Quantity, at: Conditions, model: ModelId, is_parallel: bool
+) -> Counterpart | None:
+    beside = (row for row in counterparts() if row.stands_beside(quantity, at, model, is_parallel))
+    return next(beside, None)
 
 
 def counterparts_of_pose(chambers: int, calibration: str = "") -> dict[str, Counterpart]:

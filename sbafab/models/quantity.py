@@ -38,6 +38,14 @@ class Conditions(NamedTuple):
         given = self._asdict().items()
         return {name: value for name, value in given if value is not None and value != ""}
 
+    @classmethod
+    def read(cls, text: str) -> Conditions:
+        """Return the conditions of a text such as "kpa=10,share=0.25". Raises ValueError or
+        KeyError for another.
+        """
+        given = dict(part.split("=", 1) for part in text.split(",") if part)
+        return cls(**{name: _CONDITIONS[name](value) for name, value in given.items()})
+
     def meet(self, asked: Conditions) -> bool:
         """Return True if these are the conditions ``asked`` for, whatever that leaves open."""
         mine = self.as_dict()
@@ -335,9 +343,7 @@ class FigureKey(NamedTuple):
         """Return the key parsed from its text. Raises DesignError or ValueError for other text."""
         of, _, model = text.partition("|")
         quantity, _, at = of.partition("@")
-        given = dict(part.split("=", 1) for part in at.split(",") if part)
-        values = {name: _CONDITIONS[name](value) for name, value in given.items()}
-        return cls(Quantity.of(quantity), Conditions(**values), ModelId(model))
+        return cls(Quantity.of(quantity), Conditions.read(at), ModelId(model))
 
     @property
     def heading(self) -> str:
