@@ -75,8 +75,6 @@ SUCCESS = Measured(0.9, 0, "", "Sec. 6")
 WORK = Measured(45.3, 0, "mJ", "Sec. 4.1")
 """Pneumatic input work at 10 kPa, 6 balloons of d = 10."""
 BURST = Measured(*PAPER_BURST, "kPa", "Sec. 4")
-FOLDED = Measured(9.25, 0, "mm", "Sec. 2")
-RADIAL_FLAT = Measured(15.33, 0, "mm", "Sec. 2.1")
 RADIAL_FULL = Measured(28, 0, "mm", "Sec. 2.1")
 VALID = (
     ("air", 45.0, Measured(0.13, 0, "mm", "Sec. 4.2")),
