@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from sbafab.cli.formats import FORMATS, schema_of
-from sbafab.folders.artefacts import ARTEFACTS
+from sbafab.folders.artefacts import artefacts
 
 HEAD = """# File formats
 
@@ -84,7 +84,7 @@ def write(folder: Path) -> None:
         rows.append(f"| `{name}` | `{identity}` | {said} | {link} |")
     files = "".join(
         f"| `{file.path}` | {file.about} | {f'`{file.schema}`' if file.schema else ''} |\n"
-        for file in ARTEFACTS
+        for file in artefacts()
     )
     page = HEAD + "\n".join(rows) + "\n" + CUT + files + TAIL
     (folder / "formats.md").write_text(page, encoding="utf-8")

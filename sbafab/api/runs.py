@@ -21,7 +21,7 @@ from sbafab.importing.records import default_file, write_imported
 from sbafab.importing.sources import import_source
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
 from sbafab.process import Progress
-from sbafab.simulators.simulator import NAMES, Name, SimulationRequest
+from sbafab.simulators.simulator import NAMES, SimulationRequest
 
 
 def import_design(source: str | Path, out: str | Path | None = None) -> Design:
@@ -155,7 +155,7 @@ def nest(
 def simulate(
     source: Source,
     *changes: Change,
-    simulator: Name,
+    simulator: str,
     out: str | Path = RunRequest.out,
     export: bool = False,
     pressure: float | None = None,

@@ -29,7 +29,7 @@ from sbafab.folders.run import Run
 from sbafab.importing.records import default_file, write_imported
 from sbafab.importing.sources import import_source
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
-from sbafab.meshing.formats import CONFORMING_ENDINGS
+from sbafab.meshing.formats import conforming_endings
 from sbafab.pressing.cycles import batch_times, design_runs
 
 
@@ -101,7 +101,7 @@ def press(request: opt.Request) -> None:
 @opt.option(
     "--format formats...",
     "Formats of the volume, shell and cavity meshes.  [default: all]",
-    tuple(CONFORMING_ENDINGS),
+    conforming_endings(),
 )
 def mesh(
     request: opt.Request,
@@ -117,7 +117,7 @@ def mesh(
     if "" in fill_ul and len(fill_ul) > 1:
         raise click.UsageError("--fill takes one volume for all, or one for each chamber")
     fill = fill_ul.get("", fill_ul) if fill_ul else None
-    more |= {"formats": formats or CONFORMING_ENDINGS, "wrapped": not flat, "fill_ul": fill}
+    more |= {"formats": formats or conforming_endings(), "wrapped": not flat, "fill_ul": fill}
     _run(request, runs.mesh, load_design(*request.source), **more)
 
 

@@ -17,7 +17,7 @@ from sbafab.cli import show
 from sbafab.cli.exit import print_error
 from sbafab.folders.checks import checks
 from sbafab.folders.run import result_json
-from sbafab.simulators.simulator import CHOICES, NAMES, Name, Result, SimulationRequest
+from sbafab.simulators.simulator import CHOICES, NAMES, Result, SimulationRequest
 
 MOST_MINUTES = 10_000
 
@@ -66,7 +66,7 @@ MOST_MINUTES = 10_000
     "sofa, scene volume: volume added to a chamber.",
     opt.OfChamber(opt.VOLUME),
 )
-def simulate(request: opt.Request, simulator: Name, **settings: Any) -> None:
+def simulate(request: opt.Request, simulator: str, **settings: Any) -> None:
     """Inflate a design in an installed simulator.
 
     OUT/<name>/calculix/ receives stroke, air volume and wall stress over pressure as table and

@@ -1,7 +1,7 @@
 """The files of a design's folder: one table with a row for each file or folder.
 
-Adding an output file takes one row of ``ARTEFACTS`` and the function that renders it, which imports
-pictures and pages itself: a run of some parts loads none of them.
+Adding an output file takes one row of the table below and the function that renders it, which
+imports pictures and pages itself: a run of some parts loads none of them.
 """
 
 from __future__ import annotations
@@ -10,10 +10,11 @@ import json
 import shutil
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
+from sbafab import plugins
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.layer_files import write_layer_files
 from sbafab.cutting.nest import Nest
@@ -42,7 +43,6 @@ from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json
 from sbafab.process import Progress
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 from sbafab.simulators.simulator import (
-    Name,
     SimulateDocument,
     SimulationRequest,
     simulator,
@@ -62,7 +62,7 @@ PREDICT = "predict"
 PICTURES_OF_A_DESIGN = 3
 
 
-RunPart = Literal["cut", "press", "mesh", "preview", "predict"] | Name
+RunPart = str
 """Parts of a design's folder: by rules and geometry, by models, or for a simulator."""
 EVERYTHING: tuple[RunPart, ...] = ("cut", "press", "mesh", "preview")
 PICTURES: tuple[RunPart, ...] = ("preview",)
@@ -138,7 +138,7 @@ class Artefact:
     """
 
     path: str
-    part: RunPart | Literal[""]
+    part: RunPart
     about: str
     render: Callable[[DesignFolder], str | bytes | None] | None = None
     schema: str = ""
@@ -156,9 +156,9 @@ class Artefact:
         return is_wanted and (folder.has_pages or not self.is_page)
 
 
-def write_artefacts(folder: DesignFolder, artefacts: Iterable[Artefact] | None = None) -> None:
-    """Write the artefacts (by default all of ``ARTEFACTS``) that belong in the folder."""
-    for artefact in ARTEFACTS if artefacts is None else artefacts:
+def write_artefacts(folder: DesignFolder, rows: Iterable[Artefact] | None = None) -> None:
+    """Write the artefacts (by default all) that belong in the folder."""
+    for artefact in artefacts() if rows is None else rows:
         if artefact.render is None or not artefact.belongs_in(folder):
             continue
         contents = artefact.render(folder)
@@ -171,7 +171,7 @@ def write_artefacts(folder: DesignFolder, artefacts: Iterable[Artefact] | None =
 
 def tops_of(*parts: RunPart) -> tuple[str, ...]:
     """Return the files and folders that runs of these parts write, but for pictures."""
-    return tuple(dict.fromkeys(row.top for row in ARTEFACTS if row.part in parts))
+    return tuple(dict.fromkeys(row.top for row in artefacts() if row.part in parts))
 
 
 def write_text(path: Path, text: str) -> None:
@@ -326,7 +326,7 @@ def _write_plots(folder: DesignFolder) -> None:
         write_text(folder.path / PREDICT / f"{relation.name}.svg", plot)
 
 
-def _write_simulation(name: Name, folder: DesignFolder) -> None:
+def _write_simulation(name: str, folder: DesignFolder) -> None:
     """Copy a simulator's folder if it has run, else write what it reads."""
     simulated = folder.simulated
     if simulated is not None:
@@ -439,7 +439,7 @@ def _design(folder: DesignFolder) -> str:
     return design_toml(design)
 
 
-ARTEFACTS: tuple[Artefact, ...] = (
+_OWN: tuple[Artefact, ...] = (
     Artefact("layers", "cut", "a DXF a layer, and the base plate", _write_layers),
     Artefact("sheets", "cut", "film sheets with all parts, nested"),
     Artefact(
@@ -516,6 +516,15 @@ ARTEFACTS: tuple[Artefact, ...] = (
         _design,
     ),
 )
-"""All files of a design's folder but its index, in the order of writing."""
-PAGES = tuple(row.path for row in ARTEFACTS if row.is_page)
+"""Our files of a design's folder, in the order of writing, without its index."""
+
+
+@cache
+def artefacts() -> tuple[Artefact, ...]:
+    """Return all files of a design's folder but its index, those of other packages last."""
+    own = [row.path for row in _OWN]
+    return _OWN + plugins.added(plugins.ARTEFACTS, "output file", Artefact, own)
+
+
+PAGES = tuple(row.path for row in _OWN if row.is_page)
 """Pages; an assembly has one of each for all its designs."""

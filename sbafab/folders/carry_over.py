@@ -11,26 +11,18 @@ from typing import Any
 from sbafab.design.files import shown
 from sbafab.design.records import Design, dotted, resolved
 from sbafab.errors import OccupiedError, OutputError
-from sbafab.folders.artefacts import ARTEFACTS, tops_of
+from sbafab.folders.artefacts import artefacts, tops_of
 from sbafab.folders.build import Build
 from sbafab.folders.manifest import carried_over, file_hash, file_names, identity
 from sbafab.folders.swap import listed_files, read_manifest
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 
-CUT = tops_of("cut")
-PRESS = tops_of("press")
-MESH = tops_of("mesh")
-PREDICTION = tops_of("predict")
 MOST_KEYS = 3
 """Keys that a message names, at most."""
 RESULTS = "result.json"
 """Result of a simulator; a folder without it holds input only."""
-WORTH_KEEPING = {*CUT, *PRESS, *MESH, *PREDICTION, *SIMULATORS}
-"""Files and folders that a design which breaks a rule does not get."""
 WHOLE = {"layers", "sheets", "preview", "predict"}
 """Folders that a run which writes into them writes whole."""
-PARTS = {row.top for row in ARTEFACTS if row.part}
-"""Files and folders of the parts of runs; a listed file elsewhere is none of theirs."""
 
 
 def would_replace(
@@ -44,7 +36,8 @@ def would_replace(
     old = read_manifest(target)
     if old is None or (mine is not None and carried_over(old, mine)):
         return []
-    worth = WORTH_KEEPING - set(replaced)
+    # What a design that breaks a rule does not get.
+    worth = {*tops_of("cut", "press", "mesh", "predict", *SIMULATORS)} - set(replaced)
     return [path for path in listed_files(target) if worth & set(path.split("/"))]
 
 
@@ -122,7 +115,7 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
             )
     old_meshes = old.get("mesh_statistics")
     if "mesh_statistics" in index and old_meshes not in (None, index["mesh_statistics"]):
-        anew.update(MESH)
+        anew.update(tops_of("mesh"))
     anew |= WHOLE & {path.partition("/")[0] for path in written}
     for path, digest in (files if isinstance(files, dict) else {}).items():
         if path in written or path not in existing or not _may_stay(path, anew):
@@ -150,7 +143,8 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
 def _may_stay(path: str, anew: Collection[str]) -> bool:
     """Return True if an old run's file belongs to a part of a run that is not written again."""
     first = path.partition("/")[0]
-    return first in PARTS and first not in anew
+    is_part = any(row.part and row.top == first for row in artefacts())
+    return is_part and first not in anew
 
 
 def _differs(path: str, old_folder: Path, folder: Path) -> bool:

@@ -26,13 +26,14 @@ from sbafab.cutting.properties import curves_of
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.folders.artefacts import (
-    ARTEFACTS,
     EVERYTHING,
     PAGES,
     PICTURES,
     TRAVELLER,
     DesignFolder,
     RunPart,
+    artefacts,
+    tops_of,
     write_artefacts,
 )
 from sbafab.folders.as_cut import (
@@ -44,7 +45,6 @@ from sbafab.folders.as_cut import (
     read_seams,
 )
 from sbafab.folders.build import Build, make_build
-from sbafab.folders.carry_over import MESH, PREDICTION, PRESS
 from sbafab.folders.differences import (
     CLAIMS,
     DESIGNED,
@@ -93,8 +93,6 @@ CUT_ENDINGS = (
 """Suffixes of CAD and laser files; pictures and pages are not cut by mistake."""
 DESIGN_ERRORS = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
 """Errors of a doctored design."""
-BY_OTHER_COMMANDS = (*MESH, *PREDICTION, *SIMULATORS)
-"""Folders and files of other commands, which are not made again."""
 UNMEASURED = (ArithmeticError, ValueError, LookupError, StopIteration)
 """Errors that rules raise on shapes no design makes; programming errors are not included."""
 
@@ -381,7 +379,7 @@ def _remake(
 def _parts(files: Collection[str]) -> set[RunPart]:
     """Return the parts of a run that wrote these files."""
     parts: set[RunPart] = {"cut"}
-    if any(path in files for path in PRESS):
+    if any(path in files for path in tops_of("press")):
         parts.add("press")
     if any(path.startswith("preview/") for path in files):
         parts.add("preview")
@@ -397,7 +395,10 @@ def _foreign_problems(
 
     Files of other commands may be there, except those that could be cut.
     """
-    excluded: tuple[str, ...] = () if isinstance(index, JobManifest) else BY_OTHER_COMMANDS
+    # What other commands write is not made again.
+    excluded = tops_of("mesh", "predict", *SIMULATORS)
+    if isinstance(index, JobManifest):
+        excluded = ()
     # The pages of a job's design show the sheets of the job, and are compared there.
     excluded = (*excluded, *PAGES) if is_of_job else excluded
     return [
@@ -451,7 +452,7 @@ def _are_equal(found: Path, expected: Path) -> bool:
 
 def _is_compared(path: str, generator: str) -> bool:
     """Return True for a file of this version, and for one of any version that is cut or pressed."""
-    return generator == GENERATOR or path.lower().endswith((*PRESS, *CUT_ENDINGS))
+    return generator == GENERATOR or path.lower().endswith((*tops_of("press"), *CUT_ENDINGS))
 
 
 def _read_json(path: Path) -> Any:
@@ -516,7 +517,7 @@ def _prediction_problems(
         wanted: frozenset[RunPart] = frozenset(("predict",))
         again = DesignFolder(build, wanted, (), written, ignore_progress)
         again.prediction = predict(build.design, asked)
-        write_artefacts(again, [row for row in ARTEFACTS if row.part == "predict"])
+        write_artefacts(again, [row for row in artefacts() if row.part == "predict"])
     except (ValueError, LookupError, TypeError, OSError):
         message = "predict.json does not say what was asked for; regenerate the folder"
         return [Problem(DESIGNED, message)]

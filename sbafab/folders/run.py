@@ -35,7 +35,6 @@ from sbafab.pressing.schedule import Schedule
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Finding, Findings
 from sbafab.simulators.simulator import (
-    Name,
     Result,
     SimulateDocument,
     SimulationRequest,
@@ -272,7 +271,7 @@ def result_json(result: Result | None) -> dict[str, Any]:
 
 def simulate(
     design: Design,
-    name: Name,
+    name: str,
     wish: SimulationRequest,
     out: Path = Path("out"),
     progress: Progress | None = None,

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from sbafab import plugins
 from sbafab.design.laminate_file import SCHEMA
 from sbafab.errors import DesignError
 from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
@@ -27,14 +29,15 @@ def import_source(source: Path) -> tuple[str, Imported]:
     """Return the format of a file or folder, and its content. Raises DesignError."""
     if not source.exists():
         raise DesignError(f"{source} does not exist; give a file or folder to import")
-    for entry in FORMATS:
+    for entry in _formats():
         if entry.matches(source):
             return entry.name, entry.read(source)
     if source.suffix.lower() == ".json":
         json_of(source, read_text(source, MOST_OF_POLYGONS))
     what = "folder" if source.is_dir() else "file"
     raise DesignError(
-        f"{source} is a {what} of no format that is imported: " + "; ".join(f.name for f in FORMATS)
+        f"{source} is a {what} of no format that is imported: "
+        + "; ".join(f.name for f in _formats())
     )
 
 
@@ -57,7 +60,7 @@ def _is_popupcad(source: Path) -> bool:
     return source.suffix.lower() == SUFFIX and source.is_file()
 
 
-FORMATS = (
+_OWN = (
     SourceFormat(
         f"a folder of drawings with {LAYERS}", lambda s: (s / LAYERS).is_file(), import_table
     ),
@@ -71,3 +74,9 @@ FORMATS = (
     ),
     SourceFormat("a popupCAD design, with a table of its layers", _is_popupcad, refuse_alone),
 )
+
+
+@cache
+def _formats() -> tuple[SourceFormat, ...]:
+    """All formats, those of other packages last."""
+    return _OWN + plugins.added(plugins.IMPORTERS, "import format", SourceFormat)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sbafab import plugins
 from sbafab.meshing.conforming.mesh import FACES, VTK_TYPES, ElementKind, Mesh
 from sbafab.meshing.surface import Surface
 
@@ -361,7 +363,7 @@ class MeshFormat(NamedTuple):
     cavity: Callable[[Mesh, str, Path], None] | None = None
 
 
-MESH_FORMATS = (
+_OWN = (
     MeshFormat("vtu", elements=write_vtu, cavity=write_cavity_vtu),
     MeshFormat("vtk", elements=write_vtk),
     MeshFormat("msh", elements=write_msh),
@@ -372,9 +374,15 @@ MESH_FORMATS = (
     MeshFormat("3mf", solid=write_3mf),
     MeshFormat("glb", solid=write_glb),
 )
-"""Formats in the order in which files are written and listed."""
 
-CONFORMING_ENDINGS = tuple(
-    row.ending for row in MESH_FORMATS if row.elements or row.surface or row.cavity
-)
-"""File endings selectable by ``sbafab mesh --format``."""
+
+@cache
+def mesh_formats() -> tuple[MeshFormat, ...]:
+    """Return all formats in the order of files, those of other packages last."""
+    own = [row.ending for row in _OWN]
+    return _OWN + plugins.added(plugins.MESH_FORMATS, "mesh format", MeshFormat, own)
+
+
+def conforming_endings() -> tuple[str, ...]:
+    """Return the file endings selectable by ``sbafab mesh --format``."""
+    return tuple(row.ending for row in mesh_formats() if row.elements or row.surface or row.cavity)

@@ -9,7 +9,7 @@ from typing import Literal
 
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Chamber, Laminate
-from sbafab.meshing.formats import MESH_FORMATS, write_stl
+from sbafab.meshing.formats import mesh_formats, write_stl
 from sbafab.meshing.solid import SAGITTA, cavity, sealed, solid
 from sbafab.meshing.surface import Surface
 from sbafab.meshing.wrap import TubeWrap, tube_wrap, wrapped
@@ -53,7 +53,7 @@ def write_meshes(
     wrap = tube_wrap(laminate)
     written: list[MeshFile] = []
     left_out: list[tuple[str, str]] = []
-    solids = [(row.ending, row.solid) for row in MESH_FORMATS if row.solid]
+    solids = [(row.ending, row.solid) for row in mesh_formats() if row.solid]
     shapes: list[tuple[str, Chamber | None, list[tuple[str, Writer]]]] = [("solid", None, solids)]
     shapes += [(f"cavity_{c.name}", c, [("stl", write_stl)]) for c in laminate.chambers]
     suffixes = [""] if wrap is None else ["", "_wrapped"]

@@ -10,23 +10,32 @@ import subprocess
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from importlib import import_module
 from numbers import Real
 from pathlib import Path
-from typing import Literal, NamedTuple, Protocol, cast
+from types import ModuleType
+from typing import Annotated, Literal, NamedTuple, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from sbafab import plugins
 from sbafab.documents import Document, PlainNumber
 from sbafab.errors import DesignError, OutputError, VoidError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
+from sbafab.plugins import Plugins
 from sbafab.process import Progress
 from sbafab.simulators.coarse import enclosed, pocket_radii, why_not_round
 
-Name = Literal["calculix", "sofa", "mujoco"]
-NAMES: tuple[Name, ...] = ("calculix", "sofa", "mujoco")
+SIMULATORS = Plugins(
+    plugins.SIMULATORS,
+    "simulator",
+    ModuleType,
+    {name: f"sbafab.simulators.{name}.run" for name in ("calculix", "sofa", "mujoco")},
+)
+"""The modules of all simulators by name, each a ``Simulator``."""
+NAMES = tuple(SIMULATORS)
 LONGEST = 1e5
 """Longest simulated time, s."""
 DEFAULT_PRESSURE = 5.0
@@ -135,7 +144,7 @@ class Result:
     ``stopped`` is one sentence if it ended early; the results up to then are valid.
     """
 
-    simulator: Name
+    simulator: str
     states: tuple[State, ...]
     figures: Mapping[str, float] = field(default_factory=dict)
     stopped: str | None = None
@@ -216,7 +225,7 @@ class SimulateDocument(StateEntry, schema="sbafab/simulate@2"):
 
     units: Mapping[str, str]
     folder: str = ""
-    simulator: Name = "calculix"
+    simulator: Annotated[str, Field(json_schema_extra={"enum": [*NAMES]})] = "calculix"
     drift: PlainNumber = 0.0
     """sofa, mujoco: mm of the tip in the last 0.5 s"""
     overlap: PlainNumber = 0.0
@@ -248,14 +257,14 @@ class Simulator(Protocol):
         """Write the input, run it, and read the results back."""
 
 
-def simulator(name: Name) -> Simulator:
+def simulator(name: str) -> Simulator:
     """Return the simulator of that name; its imports are loaded only now. Raises DesignError."""
     if name not in NAMES:
         raise DesignError(f'simulator = "{name}" must be one of {", ".join(NAMES)}')
-    return cast(Simulator, import_module(f"sbafab.simulators.{name}.run"))
+    return cast(Simulator, SIMULATORS[name])
 
 
-def refuse_unused(name: Name, request: SimulationRequest) -> None:
+def refuse_unused(name: str, request: SimulationRequest) -> None:
     """Raises DesignError for an unknown simulator, and for a setting that it does not use."""
     used = simulator(name).USES
     for name_of_field in request.specific_fields:
@@ -266,7 +275,7 @@ def refuse_unused(name: Name, request: SimulationRequest) -> None:
             )
 
 
-def under_vacuum(name: Name, request: SimulationRequest) -> SimulationRequest:
+def under_vacuum(name: str, request: SimulationRequest) -> SimulationRequest:
     """Return the request for a design that works under a vacuum, by default one of ``VACUUM``.
 
     Raises DesignError for a pressure above 0, and for a simulator that takes no vacuum.
@@ -636,7 +645,7 @@ class ModelRun(NamedTuple):
     ``requested`` are the pressures or volumes of the chambers.
     """
 
-    simulator: Name
+    simulator: str
     model: Path
     command: Sequence[str]
     films: RecordedFilms

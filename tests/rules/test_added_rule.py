@@ -28,7 +28,9 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder on the path with the package of the page, as pip would lay it out."""
     files = blocks()
     groups = tomllib.loads(files["pyproject.toml"])["project"]["entry-points"]
-    return installed(tmp_path_factory.mktemp("site"), files["lab_sba.py"], groups, "lab_sba")
+    site = installed(tmp_path_factory.mktemp("site"), files["lab_sba.py"], groups, "lab_sba")
+    (site / "lab_files.py").write_text(files["lab_files.py"])
+    return site
 
 
 def test_the_rule_of_the_page_is_one_of_the_deck(site: Path, tmp_path: Path) -> None:
@@ -83,6 +85,31 @@ def test_the_family_of_the_page_makes_an_actuator(site: Path, tmp_path: Path) ->
     )
     (run,) = sbafab_runs(site, tmp_path, ("check", "soft.toml", *SMALL, "--json"))
     assert json.loads(run.stdout)["summary"]["holds"]
+
+
+def test_formats_files_and_simulators_of_the_page_work(site: Path, tmp_path: Path) -> None:
+    generate = ("generate", "1dof-5mm", *SMALL, "--set", "bore.diameter=1")
+    drawings = tmp_path / "lab-1"
+    drawings.mkdir()
+    runs = sbafab_runs(
+        site,
+        tmp_path,
+        generate,
+        ("check", "out/1dof-5mm"),
+        ("simulate", "1dof-5mm", "--with", "lab-solver", "--export", *generate[2:]),
+        ("mesh", "--help"),
+        ("import", "lab-1"),
+        ("simulate", "1dof-5mm", "--with", "lab-solved"),
+    )
+    assert [run.returncode for run in runs] == [0, 0, 0, 0, 2, 2], runs
+    folder = tmp_path / "out" / "1dof-5mm"
+    assert (folder / "label.txt").read_text() == "1dof-5mm\n"
+    assert "label.txt" in json.loads((folder / "manifest.json").read_text())["files"]
+    assert (folder / "lab-solver" / "model.txt").read_text() == "7 layers\n"
+    assert "xyz" in runs[3].stdout
+    # Ours reads such a folder; it is empty.
+    assert "layers.csv" in runs[4].stderr
+    assert "lab-solver" in runs[5].stderr
 
 
 RULE = """

@@ -23,7 +23,7 @@ from sbafab.meshing.conforming.element_mesh import (
 from sbafab.meshing.conforming.fill import Fill, filled, formed, pockets
 from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshSettings, Symmetry, flat, layup
 from sbafab.meshing.conforming.mesh import Mesh, aspects, jacobians, scaled_jacobians, volumes
-from sbafab.meshing.formats import CONFORMING_ENDINGS, MESH_FORMATS
+from sbafab.meshing.formats import conforming_endings, mesh_formats
 from sbafab.meshing.mesh_files import MeshFile, MeshKind
 from sbafab.meshing.surface import Surface
 
@@ -160,17 +160,18 @@ def write_conforming(
     meshes: ConformingMeshes,
     folder: Path,
     progress: Callable[[int, int], None] | None = None,
-    formats: Collection[str] = CONFORMING_ENDINGS,
+    formats: Collection[str] = (),
 ) -> list[MeshFile]:
     """Write ``mesh/volume.*``, ``mesh/shell.*``, and for open pockets ``mesh/skin.*`` and
     ``mesh/cavity_<chamber>_conforming.*``.
 
-    ``folder`` is the output folder, ``formats`` the requested file endings. Symmetry models have no
-    closed cavities: their cavity walls are face sets of the meshes. ``progress`` is called with the
-    number of files done and the total.
+    ``folder`` is the output folder, ``formats`` the requested file endings, by default all.
+    Symmetry models have no closed cavities: their cavity walls are face sets of the meshes.
+    ``progress`` is called with the number of files done and the total.
     """
     (folder / "mesh").mkdir(parents=True, exist_ok=True)
-    jobs = [job for job in _jobs(meshes) if Path(job[0].file).suffix[1:] in formats]
+    endings = formats or conforming_endings()
+    jobs = [job for job in _jobs(meshes) if Path(job[0].file).suffix[1:] in endings]
     written = []
     for file, write in jobs:
         write(folder / file.file)
@@ -186,7 +187,7 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
     kinds: tuple[tuple[MeshKind, Mesh], ...] = (("volume", meshes.volume), ("shell", meshes.shell))
     for kind, mesh in kinds:
         size = meshes.statistics[mesh.name]["volume_mm3"]
-        for row in MESH_FORMATS:
+        for row in mesh_formats():
             if row.elements:
                 file = f"mesh/{kind}.{row.ending}"
                 made = MeshFile(file, kind, None, fill, size, len(mesh.cells))
@@ -199,7 +200,7 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
     surfaces += [("cavity", chamber, mesh.cavity(chamber)[0]) for chamber in air]
     for kind, chamber, surface in surfaces:
         stem = kind if chamber is None else f"{kind}_{chamber}_conforming"
-        for row in MESH_FORMATS:
+        for row in mesh_formats():
             file = f"mesh/{stem}.{row.ending}"
             made = MeshFile(file, kind, chamber, fill, surface.volume, len(surface.faces))
             if row.cavity and chamber is not None:
