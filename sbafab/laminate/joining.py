@@ -71,54 +71,18 @@ def joinings(laminate: Laminate) -> tuple[Joining, ...]:
 
 def _joinings(laminate: Laminate) -> tuple[Joining, ...]:
     _refuse_strangers(laminate)
-    waiting = [*_presses(laminate), *_seams(laminate)]
-    ordered = _ordered(laminate, waiting, [], set())
+    search = _Search(laminate)
+    waiting = search.tasks()
+    ordered = search.order(waiting, [], set())
     if ordered is None:
-        raise DesignError(_first_conflict(laminate, waiting))
-    done: list[_Task] = []
+        raise DesignError(search.first_conflict(waiting))
     steps: list[Joining] = []
-    for task in ordered:
-        earlier = waiting[: waiting.index(task)]
-        before = [_conflict(laminate, other, waiting, done) for other in earlier]
-        steps += _steps(laminate, task, done, before, len(steps))
+    for place, task in enumerate(ordered):
+        done, earlier = ordered[:place], waiting[: waiting.index(task)]
+        before = [search.conflict(other, waiting, done) for other in earlier]
+        steps += search.steps(task, done, before, len(steps))
         waiting.remove(task)
-        done.append(task)
     return tuple(steps)
-
-
-def _ordered(
-    laminate: Laminate,
-    waiting: Sequence[_Task],
-    done: Sequence[_Task],
-    failed: set[frozenset[_Task]],
-) -> list[_Task] | None:
-    """Return the first order without a conflict, or None; ``failed`` are sets that are dead
-    ends.
-    """
-    if not waiting:
-        return []
-    key = frozenset(done)
-    if key in failed or len(failed) > MOST_TRIED:
-        return None
-    for task in waiting:
-        if _conflict(laminate, task, waiting, done) is None:
-            rest = [other for other in waiting if other is not task]
-            order = _ordered(laminate, rest, [*done, task], failed)
-            if order is not None:
-                return [task, *order]
-    failed.add(key)
-    return None
-
-
-def _first_conflict(laminate: Laminate, tasks: Sequence[_Task]) -> str:
-    """Return the conflict in the listed order."""
-    waiting, done = [*tasks], [*tasks[:0]]
-    while True:
-        conflicts = [_conflict(laminate, task, waiting, done) for task in waiting]
-        if None not in conflicts:
-            conflict = next(filter(None, conflicts))
-            return f"{conflict.words}; {conflict.remedy}"
-        done.append(waiting.pop(conflicts.index(None)))
 
 
 def _refuse_strangers(laminate: Laminate) -> None:
@@ -144,40 +108,6 @@ def _refuse_strangers(laminate: Laminate) -> None:
             )
 
 
-def _presses(laminate: Laminate) -> Iterator[_Task]:
-    """Yield runs of interfaces that bond in the press, bottom to top."""
-    for is_pressed, run in groupby(laminate.interfaces, key=lambda gap: gap.pressed):
-        first, *rest = (gap.index for gap in run)
-        if is_pressed:
-            yield _Task(first, rest[-1] if rest else first)
-
-
-def _seams(laminate: Laminate) -> Iterator[_Task]:
-    by_layers = {(gap.below.index, gap.above.index): gap.index for gap in laminate.interfaces}
-    for seam in sorted(laminate.seams, key=lambda seam: seam.order):
-        index = by_layers[seam.below, seam.above]
-        yield _Task(index, index, seam)
-
-
-def _bond(laminate: Laminate, task: _Task) -> FaceBond | None:
-    """The entry of ``bonds`` for a task's faces."""
-    gap = laminate.interfaces[task.first - 1]
-    return laminate.bond_of(gap.below, gap.above, task.process)
-
-
-def _in_hand(laminate: Laminate, task: _Task, done: Sequence[_Task]) -> tuple[int, int]:
-    """The first and last interface of the body that a task works on, with everything joined to
-    it.
-    """
-    first, last = task.first, task.last
-    joined = {index for past in done for index in range(past.first, past.last + 1)}
-    while first - 1 in joined:
-        first -= 1
-    while last + 1 in joined:
-        last += 1
-    return first, last
-
-
 class _Conflict(NamedTuple):
     """Why films cannot be joined yet: the fault of a task, its place, and a remedy."""
 
@@ -192,115 +122,242 @@ class _Conflict(NamedTuple):
         return f"{self.subject} {self.harm}{self.where}"
 
 
-def _conflict(
-    laminate: Laminate, task: _Task, waiting: Sequence[_Task], done: Sequence[_Task]
-) -> _Conflict | None:
-    """Return why a task is not possible yet, or None if it is."""
-    bond = _bond(laminate, task)
-    if bond is not None and bond.after is not None:
-        others = [_bond(laminate, other) for other in waiting if other is not task]
-        if any(other is not None and other.name == bond.after for other in others):
-            harm = (
-                f"comes after bond {bond.after} by face_bonds.{bond.name}.after, and that cannot "
-                "be made before"
-            )
-            subject = "the press" if task.seam is None else f"seam {task.seam.name}"
-            return _Conflict(subject, harm, "change the order of the two")
-    first, last = _in_hand(laminate, task, done)
-    return _harm(laminate, task, laminate.interfaces[first - 1 : last])
+class _Search:
+    """The search for an order of tasks in which none welds or melts what it should not."""
 
+    def __init__(self, laminate: Laminate) -> None:
+        self.laminate, self.gaps = laminate, laminate.interfaces
 
-def _harm(laminate: Laminate, task: _Task, gaps: Sequence[Interface]) -> _Conflict | None:
-    """Return what a task would do to the films of the interfaces, or None if it does no harm."""
-    if task.seam is None:
-        return _pressed_by_mistake(laminate, task, gaps)
-    return _welded_by_mistake(laminate, task.seam, task, gaps) or _is_covered(task.seam, task, gaps)
+    def tasks(self) -> list[_Task]:
+        """Runs of interfaces that bond in the press, bottom to top, then seams as listed."""
+        tasks = []
+        for is_pressed, run in groupby(self.gaps, key=lambda gap: gap.pressed):
+            indices = [gap.index for gap in run]
+            if is_pressed:
+                tasks.append(_Task(indices[0], indices[-1]))
+        by_layers = {(gap.below.index, gap.above.index): gap.index for gap in self.gaps}
+        for seam in sorted(self.laminate.seams, key=lambda seam: seam.order):
+            index = by_layers[seam.below, seam.above]
+            tasks.append(_Task(index, index, seam))
+        return tasks
+
+    def order(
+        self, waiting: Sequence[_Task], done: Sequence[_Task], failed: set[frozenset[_Task]]
+    ) -> list[_Task] | None:
+        """Return the first order without a conflict, or None; ``failed`` are sets that are dead
+        ends.
+        """
+        if not waiting:
+            return []
+        key = frozenset(done)
+        if key in failed or len(failed) > MOST_TRIED:
+            return None
+        for task in waiting:
+            if self.conflict(task, waiting, done) is None:
+                rest = [other for other in waiting if other is not task]
+                order = self.order(rest, [*done, task], failed)
+                if order is not None:
+                    return [task, *order]
+        failed.add(key)
+        return None
+
+    def first_conflict(self, tasks: Sequence[_Task]) -> str:
+        """Return the conflict in the listed order."""
+        waiting, done = [*tasks], [*tasks[:0]]
+        while True:
+            conflicts = [self.conflict(task, waiting, done) for task in waiting]
+            if None not in conflicts:
+                conflict = next(filter(None, conflicts))
+                return f"{conflict.words}; {conflict.remedy}"
+            done.append(waiting.pop(conflicts.index(None)))
+
+    def conflict(
+        self, task: _Task, waiting: Sequence[_Task], done: Sequence[_Task]
+    ) -> _Conflict | None:
+        """Return why a task is not possible yet, or None if it is."""
+        bond = self._bond(task)
+        if bond is not None and bond.after is not None:
+            others = [self._bond(other) for other in waiting if other is not task]
+            if any(other is not None and other.name == bond.after for other in others):
+                harm = (
+                    f"comes after bond {bond.after} by face_bonds.{bond.name}.after, and that "
+                    "cannot be made before"
+                )
+                subject = "the press" if task.seam is None else f"seam {task.seam.name}"
+                return _Conflict(subject, harm, "change the order of the two")
+        return self._harm(task, self._body(task, done))
+
+    def _bond(self, task: _Task) -> FaceBond | None:
+        """The entry of ``bonds`` for a task's faces."""
+        gap = self.gaps[task.first - 1]
+        return self.laminate.bond_of(gap.below, gap.above, task.process)
+
+    def _body(self, task: _Task, done: Sequence[_Task]) -> Sequence[Interface]:
+        """The interfaces of the body that a task works on, with everything joined to it."""
+        first, last = task.first, task.last
+        joined = {index for past in done for index in range(past.first, past.last + 1)}
+        while first - 1 in joined:
+            first -= 1
+        while last + 1 in joined:
+            last += 1
+        return self.gaps[first - 1 : last]
+
+    def _harm(self, task: _Task, gaps: Sequence[Interface]) -> _Conflict | None:
+        """Return what a task would do to the films of the interfaces, or None for no harm."""
+        if task.seam is None:
+            return self._pressed_by_mistake(task, gaps)
+        return self._welded_by_mistake(task.seam, task, gaps) or _covered(task.seam, task, gaps)
+
+    def _pressed_by_mistake(self, task: _Task, gaps: Sequence[Interface]) -> _Conflict | None:
+        # Faces that do not bond in the press are safe in it; its temperature is checked later.
+        for gap in gaps if not self.laminate.bonds else ():
+            if task.first <= gap.index <= task.last:
+                continue
+            weld = self._open(gap)
+            if weld.area > LEAST_WELD:
+                x, y = _somewhere(weld)
+                return _Conflict(
+                    f"the press of layers {gaps[0].below.index} to {gaps[-1].above.index}",
+                    f"would weld layers {gap.below.index} and {gap.above.index} all over, which "
+                    "are bonded by seams",
+                    "lay a mask between them, or say in [face_bonds] that these faces do not bond "
+                    "in the press",
+                    f" (x {x:.3f}, y {y:.3f})",
+                )
+        return None
+
+    def _open(self, gap: Interface) -> Region:
+        """Contact of films that are not meant to bond, without a mask between them.
+
+        Films may weld outside a chamber's seams: there they are a flap that holds no pressure.
+        """
+        bare = gap.unbonded - gap.mask if gap.masks else gap.unbonded
+        if gap.kind != "chamber":
+            return bare
+        places = [centre for chamber in self.laminate.chambers for centre in chamber.centres]
+        places += [port.at for port in self.laminate.ports]
+        pieces = sorted(bare.pieces, key=lambda piece: Region(piece.outers).area)
+        # A flap surrounds the pocket; the innermost piece around a place holds it.
+        inner = [
+            next((piece for piece in pieces if any(o.winding(place) for o in piece.outers)), None)
+            for place in places
+        ]
+        held = {id(piece): piece for piece in inner if piece is not None}.values()
+        return Region(tuple(c for piece in held for c in piece.contours)) if held else bare
+
+    def _welded_by_mistake(
+        self, seam: Seam, task: _Task, gaps: Sequence[Interface]
+    ) -> _Conflict | None:
+        for gap in gaps:
+            if gap.index == task.first or not self._bonds_by(gap, seam):
+                continue
+            weld = self._open(gap) & seam.region
+            if weld.area > LEAST_WELD:
+                x, y = _somewhere(weld)
+                return _Conflict(
+                    _named(seam),
+                    f"would weld layers {gap.below.index} and {gap.above.index} too, over "
+                    f"{weld.area:.3f} mm2 at x {x:.3f}, y {y:.3f}",
+                    "lay a mask between these, move the seam, or take films whose faces do not "
+                    "bond there",
+                )
+        return None
+
+    def _bonds_by(self, gap: Interface, seam: Seam) -> bool:
+        """Return True if the heat of a seam bonds the faces of another interface."""
+        if not self.laminate.bonds:
+            return True
+        other = self.laminate.bond_of(gap.below, gap.above, seam.tool)
+        below, above = self.laminate.layer(seam.below), self.laminate.layer(seam.above)
+        bond = self.laminate.bond_of(below, above, seam.tool)
+        if other is None or bond is None or None in (other.temperature_c, bond.temperature_c):
+            return other is not None
+        return (bond.temperature_c or 0.0) >= (other.temperature_c or 0.0)
+
+    # The steps of an order.
+
+    def steps(
+        self,
+        task: _Task,
+        done: Sequence[_Task],
+        before: Sequence[_Conflict | None],
+        count: int,
+    ) -> Iterator[Joining]:
+        """Yield a task's joining, after its folds. ``before``: why earlier ones in the list have to
+        wait.
+        """
+        gaps = self._body(task, done)
+        layers = tuple(range(gaps[0].below.index, gaps[-1].above.index + 1))
+        laid = {index for past in done for index in self._layers(past)}
+        folded = [fold for fold in self.laminate.folds if {fold.lower, fold.upper} <= laid]
+        for fold in sorted(self.laminate.folds, key=lambda fold: fold.lower):
+            halves = tuple(range(fold.lower, fold.upper + 1))
+            if fold in folded or not {*halves} <= {*layers}:
+                continue
+            count += 1
+            reason = f"layers {fold.lower} and {fold.upper} are halves of one film"
+            bodies = self._bodies(halves, done, folded)
+            yield Joining(count, "fold", halves, bodies, reason, fold=fold)
+            folded.append(fold)
+        bodies = self._bodies(layers, done, folded)
+        from_below = task.seam is not None and _cover(task.seam, task, gaps) is not None
+        reason = self._reason(task, before)
+        yield Joining(
+            count + 1, task.process, layers, bodies, reason, task.seam, from_below=from_below
+        )
+
+    def _layers(self, task: _Task) -> range:
+        below, above = self.gaps[task.first - 1].below, self.gaps[task.last - 1].above
+        return range(below.index, above.index + 1)
+
+    def _bodies(
+        self, layers: Sequence[int], done: Sequence[_Task], folded: Sequence[Fold]
+    ) -> tuple[tuple[int, ...], ...]:
+        """Return earlier joined bodies and single layers, lowest first."""
+        inside = {index for past in done for index in self._layers(past)[:-1]}
+        inside |= {index for fold in folded for index in range(fold.lower, fold.upper)}
+        bodies: list[list[int]] = [[]]
+        for index in layers:
+            bodies[-1].append(index)
+            if index not in inside:
+                bodies.append([])
+        return tuple(tuple(body) for body in bodies if body)
+
+    def _reason(self, task: _Task, before: Sequence[_Conflict | None]) -> str:
+        bond = self._bond(task)
+        layers = self._layers(task)
+        if task.seam is None:
+            words = f"films of layers {layers[0]} to {layers[-1]} bond in the press"
+        else:
+            words = f"{task.seam.tool} bonds layers {task.seam.below} and {task.seam.above}"
+        if bond is not None:
+            gap = self.gaps[task.first - 1]
+            words += f" ({gap.below.faces[0]} and {gap.above.faces[1]}, bond {bond.name}"
+            words += ")" if bond.temperature_c is None else f", {bond.temperature_c:g} C)"
+        # Why the task is not possible after all others.
+        is_alone = len(self.gaps) == task.last - task.first + 1
+        late = None if is_alone else self._harm(task, self.gaps)
+        if late is not None:
+            subject = late.subject if task.seam is None else "it"
+            return f"{words}; now, for once more films are joined {subject} {late.harm}"
+        waits = next(filter(None, before), None)
+        return words if waits is None else f"{words}; before others, for {waits.words}"
 
 
 def _named(seam: Seam) -> str:
     return f"seam {seam.name} of layers {seam.below} and {seam.above}"
 
 
-def _pressed_by_mistake(
-    laminate: Laminate, task: _Task, gaps: Sequence[Interface]
-) -> _Conflict | None:
-    # Faces that do not bond in the press are safe in it; its temperature is checked later.
-    for gap in gaps if not laminate.bonds else ():
-        weld = _open(laminate, gap) if not task.first <= gap.index <= task.last else Region()
-        if weld.area > LEAST_WELD:
-            x, y = _somewhere(weld)
-            return _Conflict(
-                f"the press of layers {gaps[0].below.index} to {gaps[-1].above.index}",
-                f"would weld layers {gap.below.index} and {gap.above.index} all over, which are "
-                "bonded by seams",
-                "lay a mask between them, or say in [face_bonds] that these faces do not bond in "
-                "the press",
-                f" (x {x:.3f}, y {y:.3f})",
-            )
-    return None
-
-
-def _open(laminate: Laminate, gap: Interface) -> Region:
-    """Contact of films that are not meant to bond, without a mask between them.
-
-    Films may weld outside a chamber's seams: there they are a flap that holds no pressure.
-    """
-    bare = gap.unbonded - gap.mask if gap.masks else gap.unbonded
-    if gap.kind != "chamber":
-        return bare
-    places = [centre for chamber in laminate.chambers for centre in chamber.centres]
-    places += [port.at for port in laminate.ports]
-    pieces = sorted(bare.pieces, key=lambda piece: Region(piece.outers).area)
-    # A flap surrounds the pocket; the innermost piece around a place holds it.
-    inner = [
-        next((piece for piece in pieces if any(o.winding(place) for o in piece.outers)), None)
-        for place in places
-    ]
-    held = {id(piece): piece for piece in inner if piece is not None}.values()
-    return Region(tuple(contour for piece in held for contour in piece.contours)) if held else bare
-
-
-def _welded_by_mistake(
-    laminate: Laminate, seam: Seam, task: _Task, gaps: Sequence[Interface]
-) -> _Conflict | None:
-    for gap in gaps:
-        if gap.index == task.first or not _bonds_by(laminate, gap, seam):
-            continue
-        weld = _open(laminate, gap) & seam.region
-        if weld.area > LEAST_WELD:
-            x, y = _somewhere(weld)
-            return _Conflict(
-                _named(seam),
-                f"would weld layers {gap.below.index} and {gap.above.index} too, over "
-                f"{weld.area:.3f} mm2 at x {x:.3f}, y {y:.3f}",
-                "lay a mask between these, move the seam, or take films whose faces do not bond "
-                "there",
-            )
-    return None
-
-
-def _bonds_by(laminate: Laminate, gap: Interface, seam: Seam) -> bool:
-    """Return True if the heat of a seam bonds the faces of another interface."""
-    if not laminate.bonds:
-        return True
-    other = laminate.bond_of(gap.below, gap.above, seam.tool)
-    below, above = laminate.layer(seam.below), laminate.layer(seam.above)
-    bond = laminate.bond_of(below, above, seam.tool)
-    if other is None or bond is None or None in (other.temperature_c, bond.temperature_c):
-        return other is not None
-    return (bond.temperature_c or 0.0) >= (other.temperature_c or 0.0)
-
-
-def _is_covered(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> _Conflict | None:
+def _covered(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> _Conflict | None:
     """Return the conflict of a seam covered by melting films both from above and from below."""
-    below = [gap.below for gap in gaps if gap.index < task.first]
-    covers = [_cover(seam, task, gaps), _melting(below, seam)]
-    if None in covers:
+    over = _cover(seam, task, gaps)
+    under = _melting([gap.below for gap in gaps if gap.index < task.first], seam)
+    if over is None or under is None:
         return None
-    over, under = (layer.index for layer in covers if layer is not None)
     return _Conflict(
         _named(seam),
-        f"would have to be made through layer {over} or layer {under}, which melt under the tool",
+        f"would have to be made through layer {over.index} or layer {under.index}, which melt "
+        "under the tool",
         "make it before these are joined to them, or open them there",
     )
 
@@ -312,92 +369,9 @@ def _cover(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> Layer | None:
 
 def _melting(films: Sequence[Layer], seam: Seam) -> Layer | None:
     """The first film over a seam that melts before the films under it are warm."""
-    return next(
-        (
-            film
-            for film in films
-            if not film.film.stays_solid and (film.profile & seam.region).area > LEAST_WELD
-        ),
-        None,
-    )
+    melting = (film for film in films if not film.film.stays_solid)
+    return next((f for f in melting if (f.profile & seam.region).area > LEAST_WELD), None)
 
 
 def _somewhere(region: Region) -> Point:
     return max(region.pieces, key=lambda piece: piece.area).edges[0].at(0.5)
-
-
-def _steps(
-    laminate: Laminate,
-    task: _Task,
-    done: Sequence[_Task],
-    before: Sequence[_Conflict | None],
-    count: int,
-) -> Iterator[Joining]:
-    """Yield a task's joining, after its folds. ``before``: why earlier ones in the list have to
-    wait.
-    """
-    first, last = _in_hand(laminate, task, done)
-    gaps = laminate.interfaces[first - 1 : last]
-    layers = tuple(range(gaps[0].below.index, gaps[-1].above.index + 1))
-    laid = {index for past in done for index in _layers(laminate, past)}
-    folded = [fold for fold in laminate.folds if {fold.lower, fold.upper} <= laid]
-    for fold in sorted(laminate.folds, key=lambda fold: fold.lower):
-        halves = range(fold.lower, fold.upper + 1)
-        if fold in folded or not {*halves} <= {*layers}:
-            continue
-        count += 1
-        bodies = tuple(_bodies(laminate, halves, done, folded))
-        reason = f"layers {fold.lower} and {fold.upper} are halves of one film"
-        yield Joining(count, "fold", tuple(halves), bodies, reason, fold=fold)
-        folded.append(fold)
-    bodies = tuple(_bodies(laminate, layers, done, folded))
-    reason = _reason(laminate, task, before)
-    from_below = task.seam is not None and _cover(task.seam, task, gaps) is not None
-    yield Joining(count + 1, task.process, layers, bodies, reason, task.seam, from_below=from_below)
-
-
-def _layers(laminate: Laminate, task: _Task) -> range:
-    gaps = laminate.interfaces
-    return range(gaps[task.first - 1].below.index, gaps[task.last - 1].above.index + 1)
-
-
-def _bodies(
-    laminate: Laminate, layers: Sequence[int], done: Sequence[_Task], folded: Sequence[Fold]
-) -> Iterator[tuple[int, ...]]:
-    """Yield earlier joined bodies and single layers, lowest first."""
-    inside = {index for past in done for index in _layers(laminate, past)[:-1]}
-    inside |= {index for fold in folded for index in range(fold.lower, fold.upper)}
-    body: list[int] = []
-    for index in layers:
-        body.append(index)
-        if index not in inside:
-            yield tuple(body)
-            body = []
-
-
-def _reason(laminate: Laminate, task: _Task, before: Sequence[_Conflict | None]) -> str:
-    bond = _bond(laminate, task)
-    gap = laminate.interfaces[task.first - 1]
-    faces = f"{gap.below.faces[0]} and {gap.above.faces[1]}"
-    if task.seam is None:
-        words = f"films of layers {gap.below.index} to "
-        words += f"{laminate.interfaces[task.last - 1].above.index} bond in the press"
-    else:
-        words = f"{task.seam.tool} bonds layers {task.seam.below} and {task.seam.above}"
-    if bond is not None:
-        words += f" ({faces}, bond {bond.name}"
-        words += ")" if bond.temperature_c is None else f", {bond.temperature_c:g} C)"
-    later = _later(laminate, task)
-    if later is not None:
-        return f"{words}; now, for once more films are joined {later}"
-    waits = next(filter(None, before), None)
-    return words if waits is None else f"{words}; before others, for {waits.words}"
-
-
-def _later(laminate: Laminate, task: _Task) -> str | None:
-    """Return why a task is not possible after all others, or None if it is."""
-    gaps = laminate.interfaces
-    conflict = _harm(laminate, task, gaps) if len(gaps) > task.last - task.first + 1 else None
-    if conflict is None:
-        return None
-    return f"{conflict.subject if task.seam is None else 'it'} {conflict.harm}"
