@@ -20,7 +20,7 @@ from sbafab.actuators.shapes import (
     Vertex,
     marks_of,
 )
-from sbafab.actuators.stacking import CutFilm, channel_pin, layers
+from sbafab.actuators.stacking import CutFilm, channel_pin, layers, of_every_family
 from sbafab.design.files import hint, shown
 from sbafab.design.outline import read_drawing
 from sbafab.design.polylines import polyline
@@ -357,7 +357,8 @@ def build(design: DrawnDesign) -> Laminate:
 
     Raises DesignError with the key at fault, or with the reason why its films cannot be joined.
     """
-    _refuse(_faults(design))
+    for fault in _faults(design):
+        raise DesignError(fault)
     shapes = ShapeRegions(design.shapes.by_name, design.drawings)
     balloons = design.stack.balloons
     numbers = balloon_numbers(design.layer_roles, design.chamber_gaps)
@@ -365,10 +366,7 @@ def build(design: DrawnDesign) -> Laminate:
         CutFilm(row.role, shapes.of(row.shape, f"layer {number}"), balloon, row.pieces)
         for number, (row, balloon) in enumerate(zip(design.layers, numbers, strict=True), start=1)
     ]
-    chambers = tuple(
-        Chamber(chamber.name, chamber.centres, chamber.balloons or ())
-        for chamber in design.chambers
-    )
+    chambers = tuple(Chamber(c.name, c.centres, c.balloons or ()) for c in design.chambers)
     bores = tuple(
         Bore(chamber.name, centre, design.bore.diameter)
         for chamber in chambers
@@ -378,8 +376,7 @@ def build(design: DrawnDesign) -> Laminate:
     stack = _turned(layers(cuts, design), design)
     tube = design.inlet.tube_outer_diameter
     laminate = Laminate(
-        name=design.name,
-        family=design.family,
+        **of_every_family(design),
         layers=stack,
         chambers=chambers,
         bores=bores,
@@ -388,10 +385,7 @@ def build(design: DrawnDesign) -> Laminate:
         pins=_pins(design, () if _nets(design) else bores),
         lumen=design.lumen,
         balloons=balloons,
-        registration=design.registration.method,
         notes=design.notes or (),
-        pins_in_full_bonds=design.registration.full_bond_pins == "in",
-        middle_first=design.registration.is_middle_first,
         tube=None if design.tube is None else design.tube.outer_diameter,
         outline=Region() if design.body is None else shapes.of(design.body, "body"),
         seams=tuple(
@@ -407,9 +401,9 @@ def build(design: DrawnDesign) -> Laminate:
             for row in design.ports or ()
         ),
         nets=tuple(Net(name, members) for name, members in _nets(design).items()),
-        bonds=design.stated_bonds,
     )
-    _refuse(_faults_of_folds(laminate, design))
+    for fault in _faults_of_folds(laminate, design):
+        raise DesignError(fault)
     joinings(laminate)
     return laminate
 
@@ -420,8 +414,6 @@ def _nets(design: DrawnDesign) -> Mapping[str, tuple[str, ...]]:
 
 def _faults(design: DrawnDesign) -> Iterator[str]:
     """Yield what makes parts no laminate; each fault rests on those before it."""
-    if not design.layers:
-        yield 'layers is missing; add a list of {role = "...", shape = "..."}'
     yield from _faults_of_names(design)
     if design.registration.method == "ears" and design.pins is None:
         yield (
@@ -558,13 +550,6 @@ def _turned(stack: tuple[Layer, ...], design: DrawnDesign) -> tuple[Layer, ...]:
         pattern = patterns.setdefault(shape, f"P{len(patterns) + 1:02d}")
         placed.append(replace(layer, turned=turned[layer.index], pattern=pattern))
     return tuple(placed)
-
-
-def _refuse(faults: Iterator[str]) -> None:
-    """Raise DesignError for the first of the faults."""
-    fault = next(faults, None)
-    if fault is not None:
-        raise DesignError(fault)
 
 
 def _faults_of_folds(laminate: Laminate, design: DrawnDesign) -> Iterator[str]:

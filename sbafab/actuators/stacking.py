@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -238,8 +238,7 @@ def stacked(
     pins += [ear.pin for ear in stack.ears]
     pins += [pin for tail in stack.tails for pin in tail.pins]
     return Laminate(
-        name=design.name,
-        family=design.family,
+        **of_every_family(design),
         layers=layers([*carrier, *balloon_cuts(stack, design)], design),
         chambers=tuple(chambers),
         bores=bores,
@@ -247,12 +246,20 @@ def stacked(
         pins=tuple(pins),
         lumen=stack.lumen,
         balloons=balloons,
-        registration=design.registration.method,
-        pins_in_full_bonds=design.registration.full_bond_pins == "in",
-        middle_first=design.registration.is_middle_first,
         notes=(NOTE,) if stack.ears else (),
-        bonds=design.stated_bonds,
     )
+
+
+def of_every_family(design: Design) -> dict[str, Any]:
+    """Return what a laminate has from sections that all families share."""
+    return {
+        "name": design.name,
+        "family": design.family,
+        "registration": design.registration.method,
+        "pins_in_full_bonds": design.registration.full_bond_pins == "in",
+        "middle_first": design.registration.is_middle_first,
+        "bonds": design.stated_bonds,
+    }
 
 
 # Pockets of discs or of a drawn outline, tapered or not, and their inlet strips and tabs.

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from sbafab.design.films import is_kerf
-from sbafab.design.recipes import Operation, Recipe
+from sbafab.design.films import Operation, Recipe, is_kerf
 from sbafab.errors import OutputError
 from sbafab.geometry.offset import Kerf, widths
 from sbafab.laminate.films import PTFE_WARNING, Material

@@ -16,8 +16,7 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from sbafab.design.films import FACE_PATTERN
-from sbafab.design.recipes import DATE_PATTERN
+from sbafab.design.films import DATE_PATTERN, FACE_PATTERN
 from sbafab.design.sections import NAME_PATTERN, PART_PATTERN, rule_names
 from sbafab.errors import DesignError
 

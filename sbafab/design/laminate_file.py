@@ -138,48 +138,39 @@ def laminate_json(laminate: Laminate) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-class _Places:
-    """Unique values in a list, and their indices in it."""
-
-    def __init__(self) -> None:
-        self.values: list[Any] = []
-        self._places: dict[str, int] = {}
-
-    def of(self, value: Any) -> int:
-        """The index of a value, identified by its text in the file."""
-        text = json.dumps(value)
-        if text not in self._places:
-            self._places[text] = len(self.values)
-            self.values.append(value)
-        return self._places[text]
-
-
 def _document(laminate: Laminate) -> dict[str, Any]:
-    films, shapes = _Places(), _Places()
+    # Values that are equal in the file are listed once, by their text.
+    films: dict[str, Any] = {}
+    shapes: dict[str, Any] = {}
     # Many layers share one profile, which is converted to rows once.
     rows: dict[int, int] = {}
 
+    def place(values: dict[str, Any], value: Any) -> int:
+        text = json.dumps(value)
+        values.setdefault(text, value)
+        return [*values].index(text)
+
     def shape(region: Region) -> int:
         if id(region) not in rows:
-            rows[id(region)] = shapes.of(_shape_rows(region))
+            rows[id(region)] = place(shapes, _shape_rows(region))
         return rows[id(region)]
 
     layers = [
         {name: getattr(layer, name, None) for name in LayerRow.model_fields}
-        | {"film": films.of(asdict(layer.film)), "shape": shape(layer.profile)}
+        | {"film": place(films, asdict(layer.film)), "shape": shape(layer.profile)}
         for layer in laminate.layers
     ]
     outline = shape(laminate.outline)
     converted = {
         "schema_id": SCHEMA,
-        "films": films.values,
+        "films": [*films.values()],
         "layers": layers,
         "seams": [
             {**asdict(seam), "path": [[*map(_edge_row, chain)] for chain in seam.path]}
             for seam in laminate.seams
         ],
         "outline": outline,
-        "shapes": shapes.values,
+        "shapes": [*shapes.values()],
     }
     return {
         info.alias or name: converted[name]

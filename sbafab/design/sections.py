@@ -19,8 +19,7 @@ from pydantic import (
 )
 
 from sbafab import catalogue, plugins
-from sbafab.design.films import UNCALIBRATED, KerfWidth, Sheet
-from sbafab.design.recipes import MachineName, Recipe
+from sbafab.design.films import UNCALIBRATED, KerfWidth, MachineName, Recipe, Sheet
 from sbafab.design.toml_table import Section, writable
 from sbafab.design.units import CELSIUS, SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.laminate.base_plate import PlateMachine

@@ -12,9 +12,8 @@ from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.nest import TURNS, NestPart, Stock, parts_of
 from sbafab.cutting.nesting import refuse_unfit
 from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings, LeadIns, Recipes
-from sbafab.design.films import Sheet, material
+from sbafab.design.films import Sheet, material, recipes_for
 from sbafab.design.identity import design_sha256
-from sbafab.design.recipes import recipes_for
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.offset import widths

@@ -610,20 +610,10 @@ def refuse_alone(path: Path) -> NoReturn:
         for number, operation in enumerate(design.operations, 1)
         if operation.kind not in OPERATIONS
     ]
-    last = next((n for n in range(len(design.operations), 0, -1) if _is_read(design, n - 1)), None)
-    of = "" if last is None else f" for operation {last}, the last that rests on what is read"
     more = "" if len(unread) <= MOST_NAMED else f" and {len(unread) - MOST_NAMED} more"
     strange = f"; operations that are not read: {', '.join(unread[:MOST_NAMED])}{more}"
     raise DesignError(
         f"{path} holds {len(design.layers)} layers and not what they are for; write {LAYERS} "
-        f'beside it, with a row "{path.name},ROLE,{last or "OPERATION"}/NUMBER" a layer under '
-        f'"file,role,layer"{of}, and import the folder{strange if unread else ""}'
+        f'beside it, with a row "{path.name},ROLE,OPERATION/NUMBER" a layer under '
+        f'"file,role,layer", and import the folder{strange if unread else ""}'
     )
-
-
-def _is_read(design: CadDesign, index: int) -> bool:
-    try:
-        needed = design.needed(index)
-    except DesignError:
-        return False
-    return all(design.operations[number].kind in OPERATIONS for number in needed)

@@ -358,7 +358,7 @@ def test_a_design_alone_says_what_is_missing_and_what_is_not_read(
     path = saved(tmp_path, design([drawn(1, 1), widened(2, 1, 1.0), joint], SKETCHES))
     said = importing(path).output
     assert "hinge.cad holds 3 layers and not what they are for; write layers.csv" in said
-    assert '"hinge.cad,ROLE,2/NUMBER"' in said
+    assert '"hinge.cad,ROLE,OPERATION/NUMBER"' in said
     assert "operations that are not read: 3 (JointOperation3)" in said
 
 

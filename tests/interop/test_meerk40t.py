@@ -20,7 +20,7 @@ from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.laser_programs import LaserSheet, laser_text
 from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, ENGRAVE, LeadIns
 from sbafab.cutting.sequence import cutting_sequence
-from sbafab.design.recipes import Recipe
+from sbafab.design.films import Recipe
 from tests.interop.made import LENGTH, WIDTH, Sheet
 
 pytestmark = pytest.mark.long
