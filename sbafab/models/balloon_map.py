@@ -13,7 +13,6 @@ Lengths mm, pressures kPa, volumes ul, forces mN, energies uJ.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
@@ -70,8 +69,6 @@ LEAST_CHECK = 0.005
 """Share of the map's height by which limits are scaled below it."""
 MARGIN = 5e-5
 """Share by which the limits are met, far above floating-point rounding of sums."""
-ACTIVE_SET_ROUNDS = 12
-"""Rounds in which violated limits join the active set."""
 MOST_STRETCH = 0.15
 """Share by which films may stretch; a single modulus is unlikely to hold beyond it."""
 
@@ -469,44 +466,81 @@ def _free_rows(frame: BalloonMap, free: _Free, area: float) -> tuple[Array, tupl
 
 @dataclass(frozen=True, eq=False)
 class MapLimits:
-    """Functions of a spline's coefficients that must be above 0, with MARGIN as target: the
-    matrices by pressure and by height (Bernstein coefficients, coefficients) of each kind, and a
-    constant for each row by pressure, added to the result.
+    """Functions of a spline's coefficients ``units * x`` that must be above 0, with MARGIN as
+    target: the matrices by pressure and by height (Bernstein coefficients, coefficients) of each of
+    the ``kinds``, and a constant for each row by pressure, added to the result.
+
+    Limits are ``rows @ x >= least``, divided by the lengths ``size`` of their gradients. A row is
+    the product of one row by pressure and one by height, of six coefficients each; all products
+    with ``rows``, (values, coefficients), are computed from these.
     """
 
     kinds: tuple[tuple[Array, Array, Array], ...]
+    units: Array
+    size: Array
 
-    def values(self, coefficients: Array) -> list[Array]:
-        """Return the values of each kind: (by pressure, by height)."""
-        grid = coefficients.reshape(PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE)
-        return [across @ grid @ along.T + room[:, None] for across, along, room in self.kinds]
+    @classmethod
+    def scaled(
+        cls, kinds: tuple[tuple[Array, Array, Array], ...], units: Array, metric: Array
+    ) -> MapLimits:
+        """Return the limits on x, whose gradients g have lengths sqrt(g @ metric @ g)."""
+        count = PRESSURE_SPANS + DEGREE
+        whole = units[:, None] * metric * units
+        pairs = whole.reshape((count, count) * 2).swapaxes(1, 2).reshape(count**2, count**2)
+        size = [np.sqrt(_squares(a) @ pairs @ _squares(b).T).ravel() for a, b, _ in kinds]
+        return cls(kinds, units, np.concatenate(size))
 
     @cached_property
-    def outer_products(self) -> list[tuple[Array, Array]]:
-        """Products of pairs of near coefficients, of each kind's rows: (rows, pairs), twice."""
-        return [
-            (across[:, PAIRS[0]] * across[:, PAIRS[1]], along[:, PAIRS[0]] * along[:, PAIRS[1]])
-            for across, along, _ in self.kinds
-        ]
+    def least(self) -> Array:
+        """The least values of the rows."""
+        rooms = [np.repeat(room, len(along)) for _, along, room in self.kinds]
+        return np.asarray((MARGIN - np.concatenate(rooms)) / self.size)
 
-    def lengths(self, metric: Array) -> list[Array]:
-        """Return the lengths of the values' gradients g: sqrt(g @ metric @ g)."""
-        count = PRESSURE_SPANS + DEGREE
-        pairs = metric.reshape((count, count) * 2).swapaxes(1, 2).reshape(count**2, count**2)
-        return [
-            np.sqrt(_squares(across) @ pairs @ _squares(along).T) for across, along, _ in self.kinds
-        ]
+    @cached_property
+    def _outer_products(self) -> list[tuple[Array, Array]]:
+        """Products of pairs of near coefficients, of each kind's rows: (rows, pairs), twice."""
+        first, second = PAIRS
+        return [(a[:, first] * a[:, second], b[:, first] * b[:, second]) for a, b, _ in self.kinds]
+
+    def times(self, x: Array) -> Array:
+        """Return ``rows @ x``."""
+        grid = (self.units * x).reshape(PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE)
+        values = [(across @ grid @ along.T).ravel() for across, along, _ in self.kinds]
+        return np.asarray(np.concatenate(values) / self.size)
+
+    def transposed(self, factors: Array) -> Array:
+        """Return ``factors @ rows``."""
+        parts = zip(self.kinds, self._grids(factors / self.size), strict=True)
+        total = sum(across.T @ grid @ along for (across, along, _), grid in parts)
+        return np.asarray(np.ravel(total) * self.units)
+
+    def normal_matrix(self, weights: Array) -> Array:
+        """Return ``rows.T @ diag(weights) @ rows``."""
+        pairs = np.zeros((len(PAIRS[0]) + 1,) * 2)
+        grids = self._grids(weights / self.size**2)
+        for (across, along), grid in zip(self._outer_products, grids, strict=True):
+            pairs[:-1, :-1] += across.T @ (grid @ along)
+        return np.asarray(self.units[:, None] * pairs.ravel()[PAIR_OF] * self.units)
+
+    def _grids(self, values: Array) -> list[Array]:
+        """Return each kind's values: (by pressure, by height)."""
+        shapes = [(len(across), len(along)) for across, along, _ in self.kinds]
+        ends = np.cumsum([rows * columns for rows, columns in shapes])
+        parts = np.split(values, ends[:-1])
+        return [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
 
 
 def _squares(rows: Array) -> Array:
     return (rows[:, :, None] * rows[:, None]).reshape(len(rows), -1)
 
 
-def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> MapLimits:
-    """Return the limits on W. Volumes rise with pressure, are above 0 without pressure, and at the
-    end of each piece at most the largest volume ``held`` at the next of ``pressures`` at any
-    height, as shares of area times height. Forces fall with height, as shares of pressure times
-    area.
+def _limits(
+    frame: BalloonMap, area: float, pressures: Array, held: Array
+) -> tuple[tuple[Array, Array, Array], ...]:
+    """Return the kinds of ``MapLimits`` on W. Volumes rise with pressure, are above 0 without
+    pressure, and at the end of each piece at most the largest volume ``held`` at the next of
+    ``pressures`` at any height, as shares of area times height. Forces fall with height, as shares
+    of pressure times area.
 
     The limits apply to Bernstein coefficients, so that they also hold between places.
     """
@@ -539,13 +573,11 @@ def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> Ma
     next_one = np.minimum(np.searchsorted(pressures, at * (1 - 1e-9)), len(pressures) - 1)
     most = (1 + HELD_MARGIN) * np.maximum.accumulate(held)[next_one] / (area * top)
     plain = _joined(_parts(y, 0, HEIGHT_SPANS + DEGREE))
-    return MapLimits(
-        (
-            (every, along, np.zeros(len(every))),
-            (_joined(falls), _joined(bent), np.zeros(len(falls) * DEGREE + 1)),
-            (none, along, np.zeros(1)),
-            (content, plain, most),
-        )
+    return (
+        (every, along, np.zeros(len(every))),
+        (_joined(falls), _joined(bent), np.zeros(len(falls) * DEGREE + 1)),
+        (none, along, np.zeros(1)),
+        (content, plain, most),
     )
 
 
@@ -581,30 +613,19 @@ def _times_line(parts: Array, line: Array) -> Array:
     return np.asarray(BERNSTEIN @ (line_values[..., None] * values))
 
 
-def _admissible(matrix: Array, right_side: Array, limits: MapLimits) -> Array | None:
-    """Return the least-squares coefficients within the limits; None if none exist.
-
-    An active-set method: violated limits are added until all are met.
-    """
+def _admissible(
+    matrix: Array, right_side: Array, kinds: tuple[tuple[Array, Array, Array], ...]
+) -> Array | None:
+    """Return the least-squares coefficients within the limits; None if none exist."""
     # With columns scaled to equal length the normal equations are well-conditioned (2e6; 1e17
     # without scaling), and need no orthogonal factorisation.
     units = 1 / np.sqrt((matrix * matrix).sum(0))
     columns = matrix * units
     normal = columns.T @ columns
     free = np.linalg.solve(normal, columns.T @ right_side)
-    lengths = limits.lengths(units[:, None] * np.linalg.inv(normal) * units)
-    best, chosen = free, [np.zeros(kind.shape, bool) for kind in lengths]
-    for _ in range(ACTIVE_SET_ROUNDS):
-        values = limits.values(units * best)
-        if min(kind.min() for kind in values) >= MARGIN / 2:
-            return np.asarray(units * best)
-        chosen = [old | (kind < 2 * MARGIN) for old, kind in zip(chosen, values, strict=True)]
-        size = np.concatenate([kind[these] for kind, these in zip(lengths, chosen, strict=True)])
-        closest = nearest_admissible(free, normal, ChosenLimits(limits, chosen, units, size))
-        if closest is None:
-            return None
-        best = closest
-    return None
+    limits = MapLimits.scaled(kinds, units, np.linalg.inv(normal))
+    best = nearest_admissible(free, normal, limits)
+    return None if best is None else np.asarray(units * best)
 
 
 def _rows(x: Array, order: int, count: int) -> Array:
@@ -631,62 +652,7 @@ STEP_SHARE = 0.99
 """Maximum step as a share of the distance to the next limit."""
 
 
-class ChosenLimits(NamedTuple):
-    """Limits ``rows @ x >= least`` on x, where ``units * x`` are the coefficients of a spline: the
-    values ``chosen`` of each kind, divided by the lengths ``size`` of their gradients.
-
-    A row is the product of one row by pressure and one by height, of six coefficients each. All
-    products with ``rows``, (values, coefficients), are computed from these.
-    """
-
-    limits: MapLimits
-    chosen: list[NDArray[np.bool_]]
-    units: Array
-    size: Array
-
-    @property
-    def least(self) -> Array:
-        rooms = [
-            np.broadcast_to(room[:, None], these.shape)[these]
-            for (*_, room), these in zip(self.limits.kinds, self.chosen, strict=True)
-        ]
-        return np.asarray((MARGIN - np.concatenate(rooms)) / self.size)
-
-    def times(self, x: Array) -> Array:
-        """Return ``rows @ x``."""
-        grid = (self.units * x).reshape(PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE)
-        values = [
-            (across @ grid @ along.T)[these]
-            for (across, along, _), these in zip(self.limits.kinds, self.chosen, strict=True)
-        ]
-        return np.asarray(np.concatenate(values) / self.size)
-
-    def transposed(self, factors: Array) -> Array:
-        """Return ``factors @ rows``."""
-        total = np.zeros((PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE))
-        grids = self._on_grids(factors / self.size)
-        for (across, along, _), grid in zip(self.limits.kinds, grids, strict=True):
-            total += across.T @ grid @ along
-        return np.asarray(total.ravel() * self.units)
-
-    def normal_matrix(self, weights: Array) -> Array:
-        """Return ``rows.T @ diag(weights) @ rows``."""
-        pairs = np.zeros((len(PAIRS[0]) + 1,) * 2)
-        grids = self._on_grids(weights / self.size**2)
-        for (across, along), grid in zip(self.limits.outer_products, grids, strict=True):
-            pairs[:-1, :-1] += across.T @ (grid @ along)
-        return np.asarray(self.units[:, None] * pairs.ravel()[PAIR_OF] * self.units)
-
-    def _on_grids(self, values: Array) -> Iterator[Array]:
-        """Yield each kind's values at their places by pressure and height, with 0 elsewhere."""
-        ends = np.cumsum([these.sum() for these in self.chosen])
-        for part, these in zip(np.split(values, ends[:-1]), self.chosen, strict=True):
-            grid = np.zeros(these.shape)
-            grid[these] = part
-            yield grid
-
-
-def nearest_admissible(point: Array, metric: Array, limits: ChosenLimits) -> Array | None:
+def nearest_admissible(point: Array, metric: Array, limits: MapLimits) -> Array | None:
     """Return the x within the limits that is nearest to ``point`` (n,), by the squared distance
     d @ ``metric`` @ d; None if no such x is found.
 
