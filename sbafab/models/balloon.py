@@ -141,18 +141,6 @@ class Balloon:
         numbers += [2 * node + 1 for node in nodes[self.neck_edge : self.edge]]
         return np.array(sorted(numbers))
 
-    @cached_property
-    def free(self) -> Array:
-        """1 for each coordinate that is a degree of freedom, else 0: (coordinates, 1)."""
-        mask = np.zeros((2 * len(self.nodes), 1))
-        mask[self.freedoms] = 1.0
-        return mask
-
-    @cached_property
-    def packing(self) -> least_energy.Packing:
-        """Index map from a band of coordinates to one of degrees of freedom."""
-        return least_energy.packing(self.freedoms, 2 * len(self.nodes), 6)
-
     @property
     def level(self) -> int:
         """Number of the height that all heights of the neck are tied to."""
@@ -213,10 +201,12 @@ class BalloonLoad(NamedTuple):
         return BalloonLoad(pressure, half, cap, self.tied, self.ripple.rows(these))
 
 
+@one_blas_thread
 def inflate(
     balloon: Balloon, pressure: ArrayLike, height: ArrayLike | None = None, tied: bool = False
 ) -> Shapes:
-    """Return the equilibrium shapes at pressures (kPa), free or between plates at heights (mm).
+    """Return the equilibrium shapes at pressures (kPa), free or between plates at heights (mm);
+    of two films ``r`` and ``z`` are those of the one that stretches more easily.
 
     The air in the bore of a free balloon pulls on it, as in a stack. With ``tied`` the plates hold
     its necks, and pull if they stand higher than it would rise; the force is then below 0. Raises
@@ -232,25 +222,44 @@ def inflate(
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
     cap = np.broadcast_to(smooth, (len(p), elements))
     load = BalloonLoad(p, high / 2, cap, tied, no_ripples(balloon, len(p)))
-    if balloon.mate is not None:
-        return inflate_two_films((replace(balloon, mate=None), balloon.mate), load)
+    mate = balloon.mate
+    films = (balloon,) if mate is None else (replace(balloon, mate=None), mate)
+    motion = _motion(films, is_free=bool(np.isinf(high).any()))
+    loads = [load] * len(films)
+    begin = [coordinates(*initial_shape(film, load)) for film in films]
+    y = motion.inverse @ np.concatenate(begin)
     # Elements may collapse before equilibrium; that raises an error in the end.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        x = _equilibrium(balloon, load, coordinates(*initial_shape(balloon, load)))
+        y = _equilibrium(FilmEnergy(films, loads, motion), y)
         if balloon.wrinkles and not balloon.inextensible:
-            zone = compressed_length(balloon, *node_positions(x))
+            shapes = motion.shapes(y)
+            zones = [
+                compressed_length(film, *shape) for film, shape in zip(films, shapes, strict=True)
+            ]
             for _ in range(WRINKLE_ROUNDS):
-                (ripple,) = ripples_at((balloon,), (node_positions(x),))
-                load = load._replace(
-                    cap=wrinkle_stress(balloon, *node_positions(x), zone), ripple=ripple
-                )
-                x = _equilibrium(balloon, load, x)
-    r, z = (np.ascontiguousarray(part) for part in node_positions(x))
-    state = total_energy(balloon, load, x)
-    half_volume = air_volume(balloon.film, balloon.edge, Elements.of(r, z)).energy
-    return Shapes(
-        p, 2 * z[:, 0], 2 * half_volume, state.force, 2 * (state.energy + p * half_volume), r, z
-    )
+                shapes = motion.shapes(y)
+                ripples = ripples_at(films, shapes)
+                loads = [
+                    load._replace(cap=wrinkle_stress(film, *shape, zone), ripple=ripple)
+                    for film, shape, zone, ripple in zip(films, shapes, zones, ripples, strict=True)
+                ]
+                y = _equilibrium(FilmEnergy(films, loads, motion), y)
+    return _shapes(films, loads, motion, y)
+
+
+def _shapes(films: Films, loads: Sequence[BalloonLoad], motion: FilmMotion, y: Array) -> Shapes:
+    """Return the shapes at freedoms (freedoms, rows); one film stands for two."""
+    height = volume = force = np.zeros(y.shape[1])
+    energy, both = motion.twist @ y**2 / 2, 2 / len(films)
+    for film, load, basis in zip(films, loads, motion.bases, strict=True):
+        state, (r, z) = total_energy(film, load, basis @ y), node_positions(basis @ y)
+        half = air_volume(film.film, film.edge, Elements.of(r, z)).energy
+        energy = energy + both * (state.energy + load.pressure * half)
+        height, volume = height + both * z[:, 0], volume + both * half
+        force = force + both / 2 * state.force
+    softer = int(films[-1].membrane_stiffness < films[0].membrane_stiffness)
+    r, z = (np.ascontiguousarray(part) for part in motion.shapes(y)[softer])
+    return Shapes(loads[0].pressure, height, volume, force, energy, r, z)
 
 
 def initial_shape(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
@@ -334,44 +343,91 @@ def total_energy(balloon: Balloon, load: BalloonLoad, x: Array) -> TotalEnergy:
     return TotalEnergy(energy, by_place, band, eased.curves, pressed.sum(-1))
 
 
-def neck_tied(balloon: Balloon, state: TotalEnergy) -> TotalEnergy:
-    """Tie the heights of the neck to the one at ``level``, in place, and return the energy."""
-    for height in range(1, balloon.level, 2):
-        state.gradient[balloon.level] += state.gradient[height]
-        least_energy.tie(state.matrix, height, balloon.level)
-    return state
+Films = tuple["Balloon", ...]
+"""One film, mirrored by an equal one, or two films bonded at one rim."""
 
 
-class BalloonEnergy:
-    """A balloon's energy under a load, as a ``least_energy.Potential``."""
+class FilmMotion(NamedTuple):
+    """Motion of films by a unit of each degree of freedom: ``bases`` (films, coordinates,
+    freedoms), whose pseudoinverse is ``inverse``; the index map from their tangent stiffness to its
+    band; and the stiffness ``twist`` of each freedom by the rim's twist.
 
-    def __init__(self, balloon: Balloon, load: BalloonLoad) -> None:
-        self.balloon, self.load = balloon, load
-        self.scale, self.close = tolerances(balloon, load)
+    Heights of the neck are one freedom, so that it stays level. Two films share the rim, which
+    moves until their pulls balance and tilts as they twist it, like a ring whose section turns.
+    """
+
+    bases: Array
+    inverse: Array
+    packing: least_energy.Packing
+    twist: Array
+
+    def shapes(self, y: Array) -> list[tuple[Array, Array]]:
+        """Return radii and heights of each film's nodes at freedoms (freedoms, rows)."""
+        return [node_positions(basis @ y) for basis in self.bases]
+
+
+@lru_cache(maxsize=64)
+def _motion(films: Films, is_free: bool) -> FilmMotion:
+    """Return the motion of films by their own freedoms, coordinate by coordinate, then the rim's:
+    its radii and, of two films, its tilt and its height. A free balloon's rim stays in its plane:
+    its overall height is fixed.
+    """
+    balloon, several = films[0], len(films)
+    inner, rim = (
+        balloon.freedoms[balloon.freedoms < 2 * balloon.edge],
+        np.arange(balloon.edge, len(balloon.nodes)),
+    )
+    shared = several * len(inner)
+    count = shared + len(rim) + (several - 1) * (2 - is_free)
+    bases = np.zeros((several, 2 * len(balloon.nodes), count))
+    for number, basis in enumerate(bases):
+        own, side = several * np.arange(len(inner)) + number, 1.0 - 2 * number
+        basis[inner, own] = 1.0
+        basis[1 : balloon.level : 2, own[np.searchsorted(inner, balloon.level)]] = 1.0
+        basis[2 * rim, shared + np.arange(len(rim))] = 1.0
+        if several > 1:
+            basis[2 * rim + 1, shared + len(rim)] = side * (balloon.nodes[rim] - balloon.pocket)
+            basis[2 * rim + 1, shared + len(rim) + 1 :] = side
+    # A ring of both films bonded turns round its middle line: hoops are bent.
+    twist = np.zeros(count)
+    if several > 1:
+        widening = math.log((balloon.pocket + balloon.ring) / balloon.pocket)
+        twist[shared + len(rim)] = math.tau * bonded_bending_stiffness(films) * widening
+    inverse = np.asarray(np.linalg.pinv(bases.reshape(-1, count)), dtype=float)
+    return FilmMotion(bases, inverse, least_energy.packing(bases, 6, 2 * rim), twist)
+
+
+class FilmEnergy:
+    """The energy of one film, or of two, under their loads, by freedoms (freedoms, rows), as a
+    ``least_energy.Potential``.
+    """
+
+    def __init__(self, films: Films, loads: Sequence[BalloonLoad], motion: FilmMotion) -> None:
+        self.films, self.loads, self.motion = films, loads, motion
+        self.scale, self.close = tolerances(films[0], loads[0])
 
     def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
-        state = neck_tied(self.balloon, total_energy(self.balloon, self.load.rows(rows), x))
-        band = least_energy.packed(state.matrix, self.balloon.packing)
-        # The rim's radii are the last freedoms, next to each other.
-        ends = len(state.rim)
-        for k in range(ends):
-            number = np.arange(ends - k)
-            band[len(band) - ends + number, k] += state.rim[number, number + k]
-        return Descent(state.energy, state.gradient * self.balloon.free, band)
+        twist = self.motion.twist[:, None]
+        energy, slopes, entries = (twist * x**2 / 2).sum(0), twist * x, []
+        for film, load, basis in zip(self.films, self.loads, self.motion.bases, strict=True):
+            state = total_energy(film, load.rows(rows), basis @ x)
+            energy, slopes = energy + state.energy, slopes + basis.T @ state.gradient
+            entries += [part.reshape(-1, x.shape[1]) for part in (state.matrix, state.rim)]
+        band = self.motion.packing.band(np.concatenate(entries))
+        band[:, 0] += twist
+        return Descent(energy, slopes, band)
 
     def newton_step(self, state: Descent, damping: Array) -> Array:
-        band = state.matrix.copy()
-        band[:, 0] += damping * np.abs(band[:, 0])
-        freedoms = self.balloon.freedoms
-        step, right_side = np.zeros_like(state.gradient), -state.gradient[freedoms]
+        band, size = state.matrix.copy(), np.abs(state.matrix[:, 0])
+        # A share of the order of rounding is for slack films, which may be unsupported.
+        band[:, 0] += damping * size + 1e-15 * size.max(0)
         few = len(damping) <= FEW
-        solution = least_energy.solve_positive(band, right_side) if few else None
-        step[freedoms] = least_energy.solve(band, right_side) if solution is None else solution
-        step[1 : self.balloon.level : 2] = step[self.balloon.level]
-        return step
+        step = least_energy.solve_positive(band, -state.gradient) if few else None
+        return least_energy.solve(band, -state.gradient) if step is None else step
 
     def change(self, x: Array, ahead: Array) -> Array:
-        return relative_change(x, ahead)
+        parts = [relative_change(basis @ x, basis @ ahead) for basis in self.motion.bases]
+        return np.asarray(np.max(parts, axis=0))
 
 
 def tolerances(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
@@ -386,13 +442,14 @@ def relative_change(x: Array, ahead: Array) -> Array:
     return np.asarray((by / length).max(0))
 
 
-def _equilibrium(balloon: Balloon, load: BalloonLoad, x: Array) -> Array:
-    """Return the equilibrium downhill of coordinates. Raises DesignError if it finds none."""
+def _equilibrium(problem: FilmEnergy, y: Array) -> Array:
+    """Return the freedoms (freedoms, rows) of least energy downhill. Raises DesignError."""
     try:
-        return equilibrium(BalloonEnergy(balloon, load), x)
-    except NoEquilibrium:
+        return equilibrium(problem, y)
+    except (NoEquilibrium, np.linalg.LinAlgError):
         raise DesignError(
-            f"no equilibrium found for a balloon of radius {balloon.pocket:g} mm; try another load"
+            f"no equilibrium found for a balloon of radius {problem.films[0].pocket:g} mm; try "
+            "another load"
         ) from None
 
 
@@ -589,192 +646,3 @@ def _rim_hoop(flat: FlatFilm, edge: int, r: Array) -> Array:
 def _ripple_drive(hoop: Array, ripple: Ripple) -> Array:
     """Return the excess of the hoop's compression over the ripples' cost, at least 0."""
     return np.asarray(np.maximum(-(ripple.cost + (hoop * ripple.pull).sum(-1)), 0.0))
-
-
-# A balloon of two different films, each with its thickness and modulus, bonded at one rim.
-#
-# Both films are solved at once. They share the rim, which moves until their pulls balance and tilts
-# as they twist it, like a ring whose section turns.
-
-
-COUPLED = 5
-"""Number of following coordinates to which a coordinate is coupled."""
-TwoFilms = tuple["Balloon", "Balloon"]
-Loads = tuple["BalloonLoad", "BalloonLoad"]
-
-
-@one_blas_thread
-def inflate_two_films(films: TwoFilms, load: BalloonLoad) -> Shapes:
-    """Return the shapes under a load; ``r`` and ``z`` belong to the film that stretches more
-    easily.
-
-    Raises DesignError if Newton's method finds no equilibrium.
-    """
-    loads = (load, load)
-    basis = _basis(films[0], is_free=bool(np.isinf(load.half).any()))
-    begin = [coordinates(*initial_shape(film, load)) for film in films]
-    y = np.asarray(np.linalg.pinv(basis) @ np.concatenate(begin), dtype=float)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        y = _two_film_equilibrium(films, loads, basis, y)
-        if films[0].wrinkles:
-            zones = [
-                compressed_length(film, *node_positions(part))
-                for film, part in zip(films, np.split(basis @ y, 2), strict=True)
-            ]
-            for _ in range(WRINKLE_ROUNDS):
-                shapes = [node_positions(part) for part in np.split(basis @ y, 2)]
-                ripples = ripples_at(films, shapes)
-                loads = tuple(
-                    load._replace(cap=wrinkle_stress(film, *shape, zone), ripple=ripple)
-                    for film, shape, zone, ripple in zip(films, shapes, zones, ripples, strict=True)
-                )  # type: ignore[assignment]
-                y = _two_film_equilibrium(films, loads, basis, y)
-    x = basis @ y
-    energy = (_rim_twist(films) @ x) ** 2 / 2
-    volume, force = np.zeros_like(energy), np.zeros_like(energy)
-    shapes = []
-    for film, load_of, part in zip(films, loads, np.split(x, 2), strict=True):
-        r, z = (np.ascontiguousarray(each) for each in node_positions(part))
-        state = total_energy(film, load_of, part)
-        half_volume = air_volume(film.film, film.edge, Elements.of(r, z)).energy
-        energy, volume = energy + state.energy + load.pressure * half_volume, volume + half_volume
-        force = force + state.force / 2
-        shapes.append((r, z))
-    height = shapes[0][1][:, 0] + shapes[1][1][:, 0]
-    softer = shapes[int(films[1].membrane_stiffness < films[0].membrane_stiffness)]
-    return Shapes(load.pressure, height, volume, force, energy, *softer)
-
-
-def _rim_twist(films: TwoFilms) -> Array:
-    """Return the row whose product with the coordinates is the square root of twice the rim's twist
-    energy.
-
-    A ring of both films bonded turns round its middle line: hoops are bent.
-    """
-    film = films[0]
-    stiff = (
-        math.tau
-        * bonded_bending_stiffness(films)
-        * math.log((film.pocket + film.ring) / film.pocket)
-    )
-    row = np.zeros(4 * len(film.nodes))
-    row[[2 * len(film.nodes) - 1, 2 * film.edge + 1]] = 1.0, -1.0
-    return np.asarray(row * math.sqrt(stiff) / film.ring)
-
-
-def _basis(balloon: Balloon, is_free: bool) -> Array:
-    """Return the motion of a unit of each degree of freedom: (coordinates of both films, freedoms).
-
-    Each film's own freedoms come first, then the shared ones: the rim's radii, its tilt, and its
-    height. A free balloon's rim stays in its plane: its overall height is fixed.
-    """
-    count, inner = len(balloon.nodes), _inner_freedoms(balloon)
-    basis = np.zeros((4 * count, 2 * len(inner) + count - balloon.edge + 1 + (not is_free)))
-    for film, start in ((0, 0), (2 * count, len(inner))):
-        basis[film + inner, start + np.arange(len(inner))] = 1.0
-        basis[
-            film + 1 : film + balloon.level : 2, start + np.searchsorted(inner, balloon.level)
-        ] = 1.0
-    rim, shared = np.arange(balloon.edge, count), 2 * len(inner)
-    for film, side in ((0, 1.0), (2 * count, -1.0)):
-        basis[film + 2 * rim, shared + np.arange(len(rim))] = 1.0
-        basis[film + 2 * rim + 1, shared + len(rim)] = side * (balloon.nodes[rim] - balloon.pocket)
-        basis[film + 2 * rim + 1, shared + len(rim) + 1 :] = side
-    return basis
-
-
-def _inner_freedoms(film: Balloon) -> NDArray[np.int_]:
-    """Return the coordinates that belong to only one film, inside the pocket's edge."""
-    return film.freedoms[film.freedoms < 2 * film.edge]
-
-
-def _two_film_equilibrium(films: TwoFilms, loads: Loads, basis: Array, y: Array) -> Array:
-    """Return the freedoms (freedoms, rows) of least energy downhill of these."""
-    try:
-        return equilibrium(_TwoFilmEnergy(films, loads, basis), y)
-    except (NoEquilibrium, np.linalg.LinAlgError):
-        raise DesignError(
-            f"no equilibrium found for a balloon of radius {films[0].pocket:g} mm with two unlike "
-            "films; try another load"
-        ) from None
-
-
-class _TangentBlocks(NamedTuple):
-    """Blocks of the tangent stiffness, rows last.
-
-    ``inner`` are bands of each film's inner freedoms (freedoms, 6, 2 rows), the first film's rows
-    before the second's; ``between`` couples the last of them with the shared ones (``COUPLED``,
-    shared, 2 rows), other couplings are 0; ``shared`` (rows, shared, shared).
-    """
-
-    inner: Array
-    between: Array
-    shared: Array
-
-
-class _TwoFilmEnergy:
-    """The energy of both films under their loads, by freedoms, as a ``least_energy.Potential``."""
-
-    def __init__(self, films: TwoFilms, loads: Loads, basis: Array) -> None:
-        self.films, self.loads, self.basis = films, loads, basis
-        self.wrings = _rim_twist(films) @ basis
-        self.scale, self.close = tolerances(films[0], loads[0])
-        inner = _inner_freedoms(films[0])
-        self.packing = least_energy.packing(inner, len(basis) // 2, COUPLED + 1)
-        self.alone = len(inner)
-
-    def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
-        first = 2 * self.alone
-        by = self.wrings[first:]
-        wrung = self.wrings @ x
-        energy, slopes = wrung**2 / 2, wrung * self.wrings[:, None]
-        shared = np.tile(np.multiply.outer(by, by), (x.shape[1], 1, 1))
-        bases, parts = np.split(self.basis, 2), np.split(self.basis @ x, 2)
-        inner, between = [], []
-        for film, load, part, basis in zip(self.films, self.loads, parts, bases, strict=True):
-            state = total_energy(film, load.rows(rows), part)
-            energy = energy + state.energy
-            slopes += basis.T @ state.gradient
-            neck_tied(film, state)
-            inner.append(least_energy.packed(state.matrix, self.packing))
-            # The rim, and the nodes near enough to be coupled with it.
-            edge = 2 * film.edge
-            end, moved = least_energy.dense(state.matrix[edge - COUPLED :]), basis[edge:, first:]
-            rim = np.arange(COUPLED, end.shape[1], 2)
-            end[:, rim[:, None], rim] += np.moveaxis(state.rim, -1, 0)
-            between.append(np.moveaxis(end[:, :COUPLED, COUPLED:] @ moved, 0, -1))
-            shared += moved.T @ end[:, COUPLED:, COUPLED:] @ moved
-        matrix = _TangentBlocks(np.concatenate(inner, -1), np.concatenate(between, -1), shared)
-        return Descent(energy, slopes, matrix)
-
-    def newton_step(self, state: Descent, damping: Array) -> Array:
-        """Return Newton's step by the Schur complement of the shared freedoms."""
-        matrix, first = state.matrix, 2 * self.alone
-        several, rows = matrix.shared.shape[1], len(damping)
-        band, shared = matrix.inner.copy(), matrix.shared.copy()
-        band[:, 0] += _regularisation(band[:, 0], np.tile(damping, 2))
-        number = np.arange(several)
-        shared[:, number, number] += _regularisation(shared[:, number, number].T, damping).T
-        right_side = np.zeros((self.alone, several + 1, 2 * rows))
-        right_side[-COUPLED:, :-1] = matrix.between
-        right_side[:, -1] = -np.concatenate(np.split(state.gradient[:first], 2), -1)
-        alone = least_energy.solve(band, right_side)
-        passed = np.einsum("iar,ibr->rab", matrix.between, alone[-COUPLED:])
-        passed = passed[:rows] + passed[rows:]
-        remainder = -state.gradient[first:].T - passed[..., -1]
-        shared_step = np.linalg.solve(shared - passed[..., :-1], remainder[..., None])[..., 0].T
-        inner_step = alone[:, -1] - (alone[:, :-1] * np.tile(shared_step, 2)).sum(1)
-        return np.concatenate([inner_step[:, :rows], inner_step[:, rows:], shared_step])
-
-    def change(self, x: Array, ahead: Array) -> Array:
-        parts = zip(np.split(self.basis @ x, 2), np.split(self.basis @ ahead, 2), strict=True)
-        return np.asarray(np.max([relative_change(*part) for part in parts], axis=0))
-
-
-def _regularisation(diagonal: Array, damping: Array) -> Array:
-    """Return the addition to a diagonal (n, rows): damping, and a share of the order of rounding.
-
-    The share is for slack films without pressure, which may be unsupported.
-    """
-    size = np.abs(diagonal)
-    return np.asarray(damping * size + 1e-15 * size.max(0))

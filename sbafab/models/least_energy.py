@@ -189,42 +189,49 @@ def solve_positive(band: Array, right_side: Array) -> Array | None:
     return np.asarray(solution.reshape(rows, -1)[:, :size].T)
 
 
-def tie(band: Array, from_: int, to: int) -> None:
-    """Add the row and column of one unknown to another's, to which it is equal."""
-    size, width = band.shape[:2]
-    for i in range(max(0, from_ - width + 1), min(size, from_ + width)):
-        value = band[min(i, from_), abs(i - from_)]
-        if i == to:
-            value = 2 * value
-        at = to if i == from_ else i
-        band[min(at, to), abs(at - to)] += value
-
-
 class Packing(NamedTuple):
-    """Entries [i, k] of a band that belong to free unknowns, and their places in their band."""
+    """Index map to a band (size, width) of unknowns: the sums from ``starts`` of the ``source``
+    entries times their ``weight`` go ``into`` its elements.
+    """
 
-    row: NDArray[np.int_]
-    off: NDArray[np.int_]
-    to_row: NDArray[np.int_]
-    to_off: NDArray[np.int_]
-    size: int
+    source: NDArray[np.int_]
+    weight: Array
+    starts: NDArray[np.int_]
+    into: NDArray[np.int_]
+    shape: tuple[int, int]
+
+    def band(self, entries: Array) -> Array:
+        """Return the band (size, width, rows) from entries (n, rows)."""
+        sums = np.add.reduceat(entries[self.source] * self.weight[:, None], self.starts)
+        whole = np.zeros((self.shape[0] * self.shape[1], entries.shape[1]))
+        whole[self.into] = sums
+        return whole.reshape(*self.shape, -1)
 
 
-def packing(freedoms: NDArray[np.int_], size: int, width: int) -> Packing:
-    """Return the map from a band (size, width) to the band of the ``freedoms`` alone."""
-    number = np.full(size + width, -1)
-    number[freedoms] = np.arange(len(freedoms))
-    row, off = (part.ravel() for part in np.meshgrid(freedoms, np.arange(width), indexing="ij"))
-    is_free = number[row + off] >= 0
-    row, off = row[is_free], off[is_free]
-    return Packing(row, off, number[row], number[row + off] - number[row], len(freedoms))
+def packing(bases: Array, width: int, block: NDArray[np.int_]) -> Packing:
+    """Return the map from bands of parts to the band of their unknowns, by the motion of each
+    part's coordinates by a unit of each unknown, ``bases`` (parts, coordinates, unknowns).
 
-
-def packed(band: Array, to: Packing) -> Array:
-    """Return the band (freedoms, width, rows) of the free unknowns, from one (n, width, rows)."""
-    narrow = np.zeros((to.size, *band.shape[1:]))
-    narrow[to.to_row, to.to_off] = band[to.row, to.off]
-    return narrow
+    Entries are, part after part, those of its band (coordinates, ``width``), and of the matrix of
+    the coordinates in ``block``, which couples them further.
+    """
+    size, count = bases.shape[1:]
+    band = np.add.outer(np.arange(size), np.arange(width))
+    first = np.concatenate([np.repeat(np.arange(size), width), np.repeat(block, len(block))])
+    second = np.concatenate([band.ravel(), np.tile(block, len(block))])
+    found = []
+    for part, basis in enumerate(bases):
+        for entry in np.flatnonzero((second < size) & (first <= second)).tolist():
+            i, j = first[entry], second[entry]
+            for a in np.flatnonzero(basis[i]).tolist():
+                for b in np.flatnonzero(basis[j]).tolist():
+                    weight = basis[i, a] * basis[j, b] * (2 if i != j and a == b else 1)
+                    if i != j or a <= b:
+                        found.append((min(a, b), abs(a - b), part * len(first) + entry, weight))
+    row, off, source, weight = (np.array(each) for each in zip(*sorted(found), strict=True))
+    wide = int(off.max()) + 1
+    into, starts = np.unique(row * wide + off, return_index=True)
+    return Packing(source, weight, starts, into, (count, wide))
 
 
 def dense(band: Array) -> Array:

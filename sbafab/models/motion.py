@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
-from sbafab.models.derivatives import derivatives, hessian
+from sbafab.models.derivatives import derivatives, tangent
 from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import ATMOSPHERE_KPA, Line
 from sbafab.models.stack_balance import (
@@ -26,11 +26,12 @@ from sbafab.models.stack_balance import (
     BatchPoses,
     Equilibria,
     Pose,
+    bounded_solutions,
     is_positive_definite,
     put,
     step_limit,
 )
-from sbafab.models.stack_loads import Load, loaded_energy
+from sbafab.models.stack_loads import Load
 from sbafab.process import one_blas_thread
 
 if TYPE_CHECKING:
@@ -180,23 +181,17 @@ class SupplyStep(NamedTuple):
         return is_solved
 
     def _linearised(self, at: Array, p: Array) -> Linear:
-        stack, load, count = self.stack, self.load, len(p)
-        springs = stack.springs(p, True, by_level=load is not None, orders=3)
-        if load is None:
-            _, gradient, matrix = springs.energy(at)
-        else:
-            now = loaded_energy(springs, stack.pitch, load, at)
-            gradient = now.gradient[:, None]
-            matrix = hessian(now, now.rest(), at, stack.pitch)[:, None]
+        stack, count = self.stack, len(p)
+        springs = stack.springs(p, True, by_level=self.load is not None, orders=3)
+        now = tangent(stack, springs, self.load, at)
         volumes, filling, swelling = springs.volumes(at)
-        pulls = np.concatenate([filling, -gradient.reshape(*at.shape[:2], 1, 3)], axis=2)
-        right = pulls.swapaxes(2, 3).reshape(*matrix.shape[:3], -1)
-        moves = np.linalg.solve(matrix, right).reshape(count, -1, right.shape[-1])
-        counts = stack.row_counts[load is None]
+        pulls = np.concatenate([filling, -now.gradient.reshape(*at.shape[:2], 1, 3)], axis=2)
+        moves = now.solved(pulls.swapaxes(2, 3).reshape(count, now.gradient.shape[1], -1))
+        counts = stack.row_counts[self.load is None]
         by_row = (counts[:, None, None] * filling).transpose(0, 2, 1, 3)
         filled = by_row.reshape(count, p.shape[1], -1) @ moves
         rates = filled[..., :-1] + (counts @ swelling)[..., None] * np.eye(p.shape[1])
-        return Linear(matrix, moves, counts @ volumes, filled[..., -1], rates)
+        return Linear(now.matrix, moves, counts @ volumes, filled[..., -1], rates)
 
     def _alone(self, pose: Pose, supply: Supply) -> Pose:
         """Return the pose of one state after a step, from equilibrium to equilibrium.
@@ -331,27 +326,10 @@ def _pressure_step(
             total = (place - y) * first_rate
             ahead = now.volumes + now.settling + (now.rates @ total[..., None])[..., 0]
         wrong, own = supply.excess(ahead, at)
-        total = total + _free_step(now.rates, own * (rate / first_rate), -wrong, at <= supply.least)
+        whole = now.rates + (own * (rate / first_rate))[..., None] * np.eye(p.shape[1])
+        least = np.where(at <= supply.least, 0.0, -np.inf)
+        total = total + bounded_solutions(whole, -wrong, least, np.full_like(least, np.inf))
     return total / first_rate, total
-
-
-def _free_step(matrix: Array, more: Array, right: Array, at_end: NDArray[np.bool_]) -> Array:
-    """Return the solutions (n, size) of matrices with ``more`` on their diagonals; entries
-    ``at_end`` (n, size) may not fall.
-    """
-    unit = np.eye(matrix.shape[-1])
-    whole = matrix + more[..., None] * unit
-    step = np.linalg.solve(whole, right[..., None])[..., 0]
-    held = np.zeros_like(at_end)
-    for _ in range(len(unit) if at_end.any() else 0):
-        falls = at_end & ~held & ((step < 0) | (right <= 0))
-        if not falls.any():
-            break
-        held |= falls
-        free = ~held
-        reduced = np.where(free[:, None] & free[..., None], whole, unit)
-        step = np.linalg.solve(reduced, np.where(free, right, 0.0)[..., None])[..., 0]
-    return np.asarray(step)
 
 
 @dataclass

@@ -29,6 +29,7 @@ from sbafab.models.stack_balance import (
     Balance,
     Equilibria,
     Pose,
+    bounded_solutions,
     is_positive_definite,
     put,
     step_limit,
@@ -485,31 +486,10 @@ class Run(NamedTuple):
 def bounded_steps(rates: Array, missing: Array, damping: Array, room: tuple[Array, Array]) -> Array:
     """Return the steps (n, chambers) with least |rates @ step - missing|^2 + damping |step|^2, of
     rates (n, 3, chambers), that stay within ``room``, its least and largest values (n, chambers).
-
-    Components outside the room are clamped until the rest stays within: an active set that only
-    grows, sufficient for one of many steps.
     """
-    chambers = rates.shape[-1]
     turned = rates.swapaxes(1, 2)
-    matrix = turned @ rates + damping[:, None, None] * np.eye(chambers)
-    gradient = (turned @ missing[..., None])[..., 0]
-    tried = np.linalg.solve(matrix, gradient[..., None])[..., 0]
-    step = np.clip(tried, *room)
-    is_free = step == tried
-    live = ~is_free.all(1)
-    for _ in range(chambers):
-        if not live.any():
-            break
-        held = np.where(is_free, 0.0, step)
-        right = np.where(is_free, gradient - (matrix @ held[..., None])[..., 0], step)
-        reduced = np.where(is_free[:, None] & is_free[..., None], matrix, np.eye(chambers))
-        tried = np.linalg.solve(reduced, right[..., None])[..., 0]
-        within = np.clip(tried, *room)
-        still = is_free & (within == tried)
-        step = np.where(live[:, None], within, step)
-        live &= (still != is_free).any(1) & still.any(1)
-        is_free = still
-    return np.asarray(step)
+    matrix = turned @ rates + damping[:, None, None] * np.eye(rates.shape[-1])
+    return bounded_solutions(matrix, (turned @ missing[..., None])[..., 0], *room)
 
 
 # Starts.

@@ -407,3 +407,29 @@ def is_positive_definite(matrix: Array) -> NDArray[np.bool_]:
             return np.zeros((), dtype=bool)
         return np.array([is_positive_definite(each) for each in matrix])
     return np.ones(matrix.shape[:-2], dtype=bool)
+
+
+def bounded_solutions(matrix: Array, right: Array, least: Array, most: Array) -> Array:
+    """Return the minima (n, size) of x @ matrix @ x / 2 - right @ x from ``least`` to ``most``.
+
+    Components beyond are clamped until the rest stays within: an active set that only grows,
+    sufficient for one of many steps.
+    """
+    size = matrix.shape[-1]
+    tried = np.linalg.solve(matrix, right[..., None])[..., 0]
+    x = np.clip(tried, least, most)
+    is_free = x == tried
+    live = ~is_free.all(1)
+    for _ in range(size):
+        if not live.any():
+            break
+        held = np.where(is_free, 0.0, x)
+        reduced = np.where(is_free, right - (matrix @ held[..., None])[..., 0], x)
+        both = is_free[:, None] & is_free[..., None]
+        tried = np.linalg.solve(np.where(both, matrix, np.eye(size)), reduced[..., None])[..., 0]
+        within = np.clip(tried, least, most)
+        still = is_free & (within == tried)
+        x = np.where(live[:, None], within, x)
+        live &= (still != is_free).any(1) & still.any(1)
+        is_free = still
+    return np.asarray(x)
