@@ -14,6 +14,7 @@ import binascii
 import contextlib
 import hmac
 import json
+import os
 import secrets
 import shutil
 import socket
@@ -23,7 +24,7 @@ from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
@@ -36,9 +37,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from sbafab import api
 from sbafab.errors import DesignError, OutputError, SbafabError, Stopped
-from sbafab.process import processors
-from sbafab.studio import forms, places, record_form
-from sbafab.studio.places import RunFolder, zipped
+from sbafab.studio import forms, places
 from sbafab.studio.workers import BusyError, WaitingJob, WorkerPool
 
 ADDRESS = "127.0.0.1"
@@ -130,13 +129,6 @@ def design_in(link: str) -> str:
         ) from None
 
 
-def packed(text: str) -> str:
-    """Return the text as it follows ``design=`` in a link."""
-    squeezer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
-    raw = squeezer.compress(text.encode("utf-8")) + squeezer.flush()
-    return base64.urlsafe_b64encode(raw).decode("ascii").rstrip("=")
-
-
 # The studio's routes.
 
 
@@ -149,35 +141,23 @@ MOST_MADE = 6
 """Number of run folders kept; the oldest is deleted first."""
 
 
-class OpenedDesign(NamedTuple):
-    """The design that the page opens: a file of the folder, the text in a link, or a template."""
-
-    opened: str | None = None
-    text: str | None = None
-    template: str | None = None
-
-
-NO_DESIGN = OpenedDesign()
-
-
 @dataclass
 class Studio:
     """State that the routes share: folder, initial design, workers and folders of runs."""
 
     folder: Path
     token: str
-    opened: OpenedDesign = NO_DESIGN
+    opened: Mapping[str, str] = field(default_factory=dict)
+    """The design that the page opens: a file ``opened``, the ``text`` in a link, a ``template``."""
     address: str = ADDRESS
     """Address to listen on; at another than this a phone gets only the record page."""
-    live: WorkerPool = field(default_factory=lambda: WorkerPool(LIVE_SECONDS, _processes()))
-    mover: WorkerPool = field(
-        default_factory=lambda: WorkerPool(LIVE_SECONDS, _processes(), warm=False)
-    )
+    live: WorkerPool = field(default_factory=lambda: WorkerPool(LIVE_SECONDS))
+    mover: WorkerPool = field(default_factory=lambda: WorkerPool(LIVE_SECONDS, warm=False))
     # A cancelled run ends at its next step, where it cleans up.
     maker: WorkerPool = field(
-        default_factory=lambda: WorkerPool(MAKE_SECONDS, _processes(), False, MAKE_SECONDS)
+        default_factory=lambda: WorkerPool(MAKE_SECONDS, warm=False, patience=MAKE_SECONDS)
     )
-    made: dict[str, RunFolder] = field(default_factory=dict)
+    made: dict[str, Path] = field(default_factory=dict)
     scratch: Path = field(default_factory=lambda: Path(tempfile.mkdtemp(prefix="sbafab-studio-")))
 
     @contextlib.asynccontextmanager
@@ -190,11 +170,6 @@ class Studio:
             for pool in (self.live, self.mover, self.maker):
                 pool.stop()
             shutil.rmtree(self.scratch, ignore_errors=True)
-
-
-def _processes() -> int:
-    """Processes of a pool; at least two, so that a slow design in one tab never blocks another."""
-    return max(2, processors())
 
 
 def app(studio: Studio) -> Starlette:
@@ -216,8 +191,8 @@ def app(studio: Studio) -> Starlette:
             # The record page, the only routes for a phone.
             Route("/record", record_page),
             Route("/api/record", record_choices),
-            Route("/api/record", partial(recorded, record_form.stored), methods=["POST"]),
-            Route("/api/record/sheet", partial(recorded, record_form.sheet), methods=["POST"]),
+            Route("/api/record", partial(recorded, _stored), methods=["POST"]),
+            Route("/api/record/sheet", partial(recorded, _sheet), methods=["POST"]),
             Mount("/", StaticFiles(directory=STATIC, html=True)),
         ],
         middleware=[Middleware(Guard, token=studio.token, address=studio.address)],
@@ -245,7 +220,8 @@ async def _busy(_: Request, __: Exception) -> Response:
 
 async def start(request: Request) -> Response:
     studio = _studio(request)
-    return JSONResponse(forms.started(studio.folder) | studio.opened._asdict())
+    design = {**dict.fromkeys(("opened", "text", "template")), **studio.opened}
+    return JSONResponse(forms.started(studio.folder) | design)
 
 
 async def template(request: Request) -> Response:
@@ -302,49 +278,34 @@ async def generate(request: Request) -> Response:
         async for line in waiting.lines():
             answer = json.loads(line)
             if answer["kind"] == "made":
-                _remember(studio, key, RunFolder(out / answer["name"], answer["name"]))
+                _remember(studio, key, out / answer["name"])
                 answer["key"] = key
             yield json.dumps(answer).encode() + b"\n"
 
     return _Lines(lines(), waiting)
 
 
-def _remember(studio: Studio, key: str, run: RunFolder) -> None:
-    studio.made[key] = run
+def _remember(studio: Studio, key: str, folder: Path) -> None:
+    studio.made[key] = folder
     while len(studio.made) > MOST_MADE:
         oldest = next(iter(studio.made))
-        folder = studio.made.pop(oldest).folder
-        if folder.is_relative_to(studio.scratch):
-            shutil.rmtree(folder.parent, ignore_errors=True)
-
-
-async def record_page(_: Request) -> Response:
-    return FileResponse(STATIC / "record.html")
-
-
-async def record_choices(request: Request) -> Response:
-    return JSONResponse(record_form.choices(_studio(request).folder))
-
-
-async def recorded(
-    answer: Callable[[Path, Mapping[str, Any]], dict[str, Any]], request: Request
-) -> Response:
-    table = await _request_table(request)
-    return JSONResponse(await asyncio.to_thread(answer, _studio(request).folder, table))
+        old = studio.made.pop(oldest)
+        if old.is_relative_to(studio.scratch):
+            shutil.rmtree(old.parent, ignore_errors=True)
 
 
 async def made_file(request: Request) -> Response:
-    run = _studio(request).made.get(request.path_params["key"])
-    path = run.file(request.path_params["path"]) if run else None
+    folder = _studio(request).made.get(request.path_params["key"])
+    path = places.file_in(folder, request.path_params["path"]) if folder else None
     return FileResponse(path) if path else Response(status_code=404)
 
 
 async def made_zip(request: Request) -> Response:
-    run = _studio(request).made.get(request.path_params["key"])
-    if run is None:
+    folder = _studio(request).made.get(request.path_params["key"])
+    if folder is None:
         return Response(status_code=404)
-    content = await asyncio.to_thread(zipped, run)
-    headers = {"content-disposition": f'attachment; filename="{run.name}.zip"'}
+    content = await asyncio.to_thread(places.zipped, folder)
+    headers = {"content-disposition": f'attachment; filename="{folder.name}.zip"'}
     return Response(content, media_type="application/zip", headers=headers)
 
 
@@ -370,6 +331,95 @@ async def _request_table(request: Request) -> dict[str, Any]:
     return forms.table(await request.body())
 
 
+# The record page: entries of a device's history from a form on a phone.
+
+
+async def record_page(_: Request) -> Response:
+    return FileResponse(STATIC / "record.html")
+
+
+async def record_choices(request: Request) -> Response:
+    """The designs that may be recorded, and the lab's file."""
+    folder = _studio(request).folder
+    lab = str(_lab_file(folder))
+    designs = {"files": places.listed(folder), "templates": api.templates()}
+    return JSONResponse({**designs, "lab": lab})
+
+
+async def recorded(
+    answer: Callable[[Path, Mapping[str, Any]], dict[str, Any]], request: Request
+) -> Response:
+    table = await _request_table(request)
+    return JSONResponse(await asyncio.to_thread(answer, _studio(request).folder, table))
+
+
+def _lab_file(folder: Path) -> Path:
+    """Return the lab's file: SBAFAB_LAB, or lab.sqlite in the chosen folder."""
+    return folder / os.environ.get("SBAFAB_LAB", "lab.sqlite")
+
+
+def _sheet(folder: Path, request: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of the record page of the named design."""
+    tables = api.record_sheet(_recorded_design(folder, request))
+    return {
+        "tables": [
+            {
+                "title": table.title,
+                "fields": [field._asdict() for field in table.fields],
+                "rows": [
+                    {"values": dict(row), "nominal": nominal}
+                    for row, nominal in zip(table.rows, table.nominal, strict=True)
+                ],
+            }
+            for table in tables
+        ]
+    }
+
+
+def _stored(folder: Path, request: Mapping[str, Any]) -> dict[str, Any]:
+    """Store the filled entries, all or none, and return their numbers and warnings."""
+    lines = request.get("entries")
+    if not isinstance(lines, list) or not lines or not all(isinstance(x, dict) for x in lines):
+        raise DesignError("no line is filled in; fill in a reading, a lot, a decision or a note")
+    entries = api.record_history(
+        _recorded_design(folder, request),
+        entries=[_entry(line) for line in lines],
+        lab=_lab_file(folder),
+        again=request.get("again") is True,
+    )
+    warnings = [
+        f"{entry.item} lot {entry.lot} expired on {entry.expires}"
+        for entry in entries
+        if entry.is_expired
+    ]
+    return {
+        "entries": [f"e{entry.id}" for entry in entries],
+        "warnings": list(dict.fromkeys(warnings)),
+    }
+
+
+def _recorded_design(folder: Path, request: Mapping[str, Any]) -> str | Path:
+    """Return the template or the file of the folder that a request names. Raises DesignError."""
+    name = str(request.get("design", ""))
+    if name in api.templates():
+        return name
+    path = places.design_file(folder, name)
+    places.named_files(places.read(path)[0], folder)
+    return path
+
+
+def _entry(line: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an entry with its photograph as bytes: a page cannot name files of this machine."""
+    values = {str(name): value for name, value in line.items() if name != "photograph"}
+    packed = line.get("photograph")
+    if packed:
+        try:
+            values["photograph"] = base64.b64decode(str(packed), validate=True)
+        except (binascii.Error, ValueError):
+            raise DesignError("the photograph did not arrive whole; send it again") from None
+    return values
+
+
 # Start of the studio: design, port and link.
 
 
@@ -377,28 +427,28 @@ PORT = 8417
 """Tried first, so that a saved link finds the studio again."""
 
 
-def opened(source: str | None) -> tuple[Path, OpenedDesign]:
+def opened(source: str | None) -> tuple[Path, dict[str, str]]:
     """Return the folder and the design that the studio opens.
 
     ``source`` is a file, a folder, a template's name, a link that holds a design, or None for the
     current folder. Raises DesignError.
     """
     if source is None:
-        return Path.cwd(), NO_DESIGN
+        return Path.cwd(), {}
     if source.startswith(("http://", "https://")):
-        return Path.cwd(), OpenedDesign(text=design_in(source))
+        return Path.cwd(), {"text": design_in(source)}
     if source in api.templates():
-        return Path.cwd(), OpenedDesign(template=source)
+        return Path.cwd(), {"template": source}
     path = Path(source)
     if path.is_dir():
-        return path.resolve(), NO_DESIGN
+        return path.resolve(), {}
     if not path.is_file():
         raise DesignError(
             f"{source} is not a design file, folder, template or link; the templates are "
             f"{', '.join(api.templates())}"
         )
     folder = path.resolve().parent
-    return folder, OpenedDesign(places.design_file(folder, path.name).name)
+    return folder, {"opened": places.design_file(folder, path.name).name}
 
 
 def listening(port: int | None, address: str = ADDRESS) -> socket.socket:

@@ -10,7 +10,6 @@ import base64
 import hashlib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from sbafab import api
@@ -19,7 +18,7 @@ from sbafab.folders.checks import FindingEntry
 if TYPE_CHECKING:
     from sbafab.assemblies.build import Assembled, PlacedPart
     from sbafab.geometry.region import Region
-    from sbafab.laminate.laminate import Laminate, Layer
+    from sbafab.laminate.laminate import Laminate
     from sbafab.meshing.surface import Surface
     from sbafab.reports.nets_svg import NetMap
     from sbafab.rules.finding import Finding
@@ -29,18 +28,21 @@ CancelCheck = Callable[[], None]
 """Called between steps of work; raises if the answer is not needed any longer."""
 
 
+def of(record: object, *names: str) -> dict[str, Any]:
+    """Return these attributes of a record by name."""
+    return {name: getattr(record, name) for name in names}
+
+
 @dataclass
 class AnswerShapes:
     """The shapes of one answer; shapes that the page ``has`` are only named."""
 
     has: Collection[str]
     new: dict[str, list[list[float]]] = field(default_factory=dict)
-    used: set[str] = field(default_factory=set)
 
     def key(self, region: Region) -> str:
         """The name of a region, which is sent along if the page lacks it."""
         key = region.key[:24]
-        self.used.add(key)
         if key not in self.has and key not in self.new:
             self.new[key] = [flat(contour.vertices) for contour in region.contours]
         return key
@@ -57,52 +59,33 @@ def flat(vertices: Iterable[tuple[float, float, float]]) -> list[float]:
 def laminate_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:
     """Layers, patterns and their positions; plan, section and solid are drawn from it."""
     shapes = AnswerShapes(has)
-    layers = [_layer(layer) for layer in laminate.layers]
     patterns = {
-        name: _pattern(laminate, group, shapes) for name, group in laminate.patterns.items()
+        name: {
+            "shape": shapes.key(group[0].profile),
+            "layers": [layer.index for layer in group],
+            "area": round(group[0].profile.area, 4),
+            "bounds": group[0].profile.bounds,
+            "marks": [asdict(mark) for mark in api.dimensions(laminate, group[0])],
+        }
+        for name, group in laminate.patterns.items()
     }
+    layers = [
+        {
+            **of(layer, "index", "role", "balloon", "pattern", "z"),
+            **of(layer.film, "material", "shade", "thickness"),
+            "mask": layer.is_mask,
+        }
+        for layer in laminate.layers
+    ]
+    lists = ("chambers", "bores", "inlets", "pins")
+    names = ("name", "family", "thickness", "balloons", "lumen", "bounds", "registration", "notes")
     return {
         "kind": "laminate",
-        "name": laminate.name,
-        "family": laminate.family,
-        "thickness": laminate.thickness,
-        "balloons": laminate.balloons,
-        "lumen": laminate.lumen,
-        "bounds": list(laminate.bounds),
-        "registration": laminate.registration,
-        "notes": list(laminate.notes),
+        **of(laminate, *names),
+        **{name: [asdict(row) for row in getattr(laminate, name)] for name in lists},
         "layers": layers,
         "patterns": patterns,
-        "chambers": [asdict(chamber) for chamber in laminate.chambers],
-        "bores": [asdict(bore) for bore in laminate.bores],
-        "inlets": [asdict(inlet) for inlet in laminate.inlets],
-        "pins": [asdict(pin) for pin in laminate.pins],
         "shapes": shapes.new,
-    }
-
-
-def _layer(layer: Layer) -> dict[str, Any]:
-    return {
-        "index": layer.index,
-        "role": layer.role,
-        "balloon": layer.balloon,
-        "pattern": layer.pattern,
-        "material": layer.film.material,
-        "mask": layer.is_mask,
-        "shade": layer.film.shade,
-        "thickness": layer.film.thickness,
-        "z": layer.z,
-    }
-
-
-def _pattern(laminate: Laminate, layers: tuple[Layer, ...], shapes: AnswerShapes) -> dict[str, Any]:
-    first = layers[0]
-    return {
-        "shape": shapes.key(first.profile),
-        "layers": [layer.index for layer in layers],
-        "area": round(first.profile.area, 4),
-        "bounds": list(first.profile.bounds),
-        "marks": [asdict(mark) for mark in api.dimensions(laminate, first)],
     }
 
 
@@ -116,42 +99,27 @@ def shapes_model(drawn: Mapping[str, Region | None], has: Collection[str]) -> di
 def nets_model(laminate: Laminate, nets: NetMap, has: Collection[str]) -> dict[str, Any]:
     """Voids with their nets by gap, the gaps of films, ports, and faults with their places."""
     shapes = AnswerShapes(has)
+    gaps = [
+        {"interface": gap.index, "layers": gap.layer_indices, "contact": shapes.key(gap.contact)}
+        for gap in laminate.interfaces
+    ]
+    areas = [
+        {**of(area, "nets", "interface", "colour"), "shape": shapes.key(area.region)}
+        for area in nets.areas
+    ]
+    ports = [
+        {"name": port.name, "layers": (port.below, port.above), "at": port.at}
+        for port in laminate.ports
+    ]
+    names = ("kind", "nets", "interface", "layers", "at", "message")
     return {
         "kind": "nets",
         "declared": bool(laminate.nets),
-        "colours": dict(nets.colours),
-        "gaps": [
-            {
-                "interface": gap.index,
-                "layers": list(gap.layer_indices),
-                "contact": shapes.key(gap.contact),
-            }
-            for gap in laminate.interfaces
-        ],
-        "areas": [
-            {
-                "nets": list(area.nets),
-                "interface": area.interface,
-                "colour": area.colour,
-                "shape": shapes.key(area.region),
-            }
-            for area in nets.areas
-        ],
-        "ports": [
-            {"name": port.name, "layers": [port.below, port.above], "at": list(port.at)}
-            for port in laminate.ports
-        ],
-        "faults": [
-            {
-                "kind": fault.kind,
-                "nets": list(fault.nets),
-                "interface": fault.interface,
-                "layers": list(fault.layers),
-                "at": list(fault.at),
-                "message": fault.message,
-            }
-            for fault in nets.faults
-        ],
+        "colours": nets.colours,
+        "gaps": gaps,
+        "areas": areas,
+        "ports": ports,
+        "faults": [of(fault, *names) for fault in nets.faults],
         "shapes": shapes.new,
     }
 
@@ -160,7 +128,7 @@ def finding_model(finding: Finding) -> dict[str, Any]:
     """A finding as in ``checks.json``, its design, whose name the message omits, and its parts."""
     entry = FindingEntry.of(replace(finding, design=""))
     design = {"design": finding.design} if finding.design else {}
-    return {**entry, **design, "by_user": finding.by_user, "parts": list(finding.parts)}
+    return {**entry, **design, **of(finding, "by_user", "parts")}
 
 
 # Assemblies: the surface of each part once, and its place.
@@ -180,30 +148,14 @@ def parts_model(assembled: Assembled, has: Collection[str]) -> dict[str, Any]:
     for placed in assembled.parts:
         key = _key(placed)
         if key not in has and key not in surfaces:
-            make = partial(_solid, placed)
-            surfaces[key] = remembered(_SURFACES, key, make, MOST_SURFACES)
-        parts.append({**_part(placed), "surface": key})
+            surfaces[key] = packed(api.solid(placed))
+        design = None
+        if placed.made is not None:
+            values = api.resolved(placed.made.design)
+            design = {**of(placed.made.design, "name", "family"), "values": values}
+        part = {**of(placed.part, "kind", "on", "at"), **of(placed.pose, "rows", "shift")}
+        parts.append({**part, "name": placed.name, "design": design, "surface": key})
     return {"kind": "parts", "parts": parts, "surfaces": surfaces}
-
-
-def _part(placed: PlacedPart) -> dict[str, Any]:
-    part, actuator = placed.part, placed.made
-    design = None
-    if actuator is not None:
-        design = {
-            "name": actuator.design.name,
-            "family": actuator.design.family,
-            "values": api.resolved(actuator.design),
-        }
-    return {
-        "name": placed.name,
-        "kind": part.kind,
-        "on": part.on,
-        "at": part.at,
-        "design": design,
-        "rows": [list(row) for row in placed.pose.rows],
-        "shift": list(placed.pose.shift),
-    }
 
 
 def _key(placed: PlacedPart) -> str:
@@ -219,10 +171,6 @@ def _key(placed: PlacedPart) -> str:
     return hashlib.sha256(repr(decisive).encode()).hexdigest()[:24]
 
 
-def _solid(placed: PlacedPart) -> dict[str, str]:
-    return packed(api.solid(placed))
-
-
 def remembered(kept: dict[str, Kept], key: str, make: Callable[[], Kept], most: int) -> Kept:
     """Return the value of a key, made if it is missing; the oldest of over ``most`` is dropped."""
     if key not in kept:
@@ -234,13 +182,5 @@ def remembered(kept: dict[str, Kept], key: str, make: Callable[[], Kept], most: 
 
 def packed(surface: Surface) -> dict[str, str]:
     """Points and faces of a surface as the page unpacks them."""
-    return {"points": _words(surface.points, "<f4"), "faces": _words(surface.faces, "<u4")}
-
-
-def _words(numbers: Any, kind: str) -> str:
-    return base64.b64encode(numbers.astype(kind).tobytes()).decode("ascii")
-
-
-_SURFACES: dict[str, dict[str, str]] = {}
-MOST_SURFACES = 24
-"""Surfaces that a worker keeps, so that a page that lost one is answered at once."""
+    arrays = {"points": surface.points.astype("<f4"), "faces": surface.faces.astype("<u4")}
+    return {name: base64.b64encode(rows.tobytes()).decode() for name, rows in arrays.items()}

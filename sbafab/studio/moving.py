@@ -11,7 +11,7 @@ import numpy as np
 
 from sbafab import api
 from sbafab.errors import DesignError
-from sbafab.studio.model import flat, packed, remembered
+from sbafab.studio.model import flat, of, packed, remembered
 
 if TYPE_CHECKING:
     from sbafab.assemblies.build import Assembled, PlacedPart
@@ -37,23 +37,14 @@ def stack_of(design: Design) -> Stack:
 
 def stack_model(name: str, stack: Stack) -> dict[str, Any]:
     """Return radii, axes, pitch, and the highest pressure."""
+    radii = ("neck", "pocket", "ring", "thickness")
     return {
         "kind": "stack",
         "name": name,
         "axes": numbers(stack.axes),
-        "pitch": stack.pitch,
-        "flat_height": stack.flat_height,
-        "outline": stack.outline,
+        **of(stack, "pitch", "flat_height", "outline"),
         "levels": [int(level) for level in stack.levels],
-        "balloons": [
-            {
-                "neck": balloon_map.balloon.neck,
-                "pocket": balloon_map.balloon.pocket,
-                "ring": balloon_map.balloon.ring,
-                "thickness": balloon_map.balloon.thickness,
-            }
-            for balloon_map in stack.maps
-        ],
+        "balloons": [of(balloon_map.balloon, *radii) for balloon_map in stack.maps],
         "most_pressure": min(balloon_map.most_pressure for balloon_map in stack.maps),
         "measured": stack.counterparts,
     }
@@ -224,11 +215,8 @@ def whole_prediction(
     prediction = api.predict_assembly(assembled, pressure_kpa=pressure, load_g=load, pause=pause)
     figures = [
         {
+            **of(figure, "name", "value", "unit", "model"),
             "group": figure.part,
-            "name": figure.name,
-            "value": figure.value,
-            "unit": figure.unit,
-            "model": figure.model,
             "trust": f"The paper: {figure.paper}" if figure.paper else "",
             "design_with": True,
             "measured": {"sentence": figure.measured} if figure.measured else None,

@@ -11,7 +11,6 @@ import tempfile
 import tomllib
 import zipfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -181,30 +180,22 @@ DAY_ONE = (1980, 1, 1, 0, 0, 0)
 """The date of every file in a zip: equal runs give equal zips."""
 
 
-@dataclass(frozen=True)
-class RunFolder:
-    """The folder of a run and its name."""
-
-    folder: Path
-    name: str
-
-    def file(self, path: str) -> Path | None:
-        """A file of the run; None for any other path."""
-        try:
-            resolved = (self.folder / path).resolve()
-            inside = resolved.is_relative_to(self.folder.resolve())
-            return resolved if inside and resolved.is_file() else None
-        except (OSError, ValueError):  # a name too long for any file, or with a NUL
-            return None
+def file_in(folder: Path, path: str) -> Path | None:
+    """Return a file of a run's folder; None for any other path."""
+    try:
+        resolved = (folder / path).resolve()
+        inside = resolved.is_relative_to(folder.resolve())
+        return resolved if inside and resolved.is_file() else None
+    except (OSError, ValueError):  # a name too long for any file, or with a NUL
+        return None
 
 
-def zipped(run: RunFolder) -> bytes:
-    """The run's folder as a zip, its files byte for byte, in order of their names."""
+def zipped(folder: Path) -> bytes:
+    """Return a run's folder as a zip, its files byte for byte, in order of their names."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path in sorted(path for path in run.folder.rglob("*") if path.is_file()):
-            name = f"{run.name}/{path.relative_to(run.folder).as_posix()}"
-            entry = zipfile.ZipInfo(name, DAY_ONE)
+        for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+            entry = zipfile.ZipInfo(f"{folder.name}/{path.relative_to(folder).as_posix()}", DAY_ONE)
             entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
             archive.writestr(entry, path.read_bytes())
     return content.getvalue()

@@ -20,6 +20,7 @@ from typing import Any
 
 from sbafab import api
 from sbafab.errors import SbafabError
+from sbafab.process import processors
 
 END = b""
 """The last message of a job."""
@@ -62,15 +63,17 @@ class WaitingJob:
 class WorkerPool:
     """Processes and the jobs that wait for them. All methods belong to the event loop.
 
-    ``seconds`` is the time limit of a job, ``processes`` the most that run at once, and
+    ``seconds`` is the time limit of a job, ``processes`` the most that run at once (0: by
+    the machine), and
     ``patience`` the seconds for a cancelled job to end.
     """
 
     def __init__(
-        self, seconds: float, processes: int, warm: bool = True, patience: float = PATIENCE
+        self, seconds: float, processes: int = 0, warm: bool = True, patience: float = PATIENCE
     ) -> None:
-        self.seconds, self.processes, self.patience = seconds, processes, patience
-        self.warm = warm
+        self.seconds, self.warm, self.patience = seconds, warm, patience
+        # At least two, so that a slow design in one tab never blocks another.
+        self.processes = processes or max(2, processors())
         self.waiting: dict[Key, WaitingJob] = {}
         self.workers: list[Worker] = []
         self.homes: dict[Key, Worker] = {}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import base64
+import zlib
 from typing import Any
 
 import httpx
@@ -28,3 +30,10 @@ class Client:
                 return await client.request(method, path, **options)
 
         return asyncio.run(asked())
+
+
+def packed(text: str) -> str:
+    """The text as it follows ``design=`` in a link, as the page packs it."""
+    squeezer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
+    raw = squeezer.compress(text.encode("utf-8")) + squeezer.flush()
+    return base64.urlsafe_b64encode(raw).decode("ascii").rstrip("=")

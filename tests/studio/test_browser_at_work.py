@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from sbafab import api
-from sbafab.studio.app import packed
+from tests.studio.asking import packed
 from tests.studio.browsing import (
     DESIGN,
     FILE,

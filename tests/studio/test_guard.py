@@ -11,7 +11,7 @@ import pytest
 from sbafab import api
 from sbafab.actuators import FAMILIES
 from sbafab.studio.app import Studio, app
-from sbafab.studio.places import RunFolder, zipped
+from sbafab.studio.places import zipped
 from tests.studio.asking import Client
 
 TOKEN = "right-token"
@@ -157,7 +157,7 @@ def test_what_was_made_needs_its_key_and_keeps_inside(client: Client, studio: St
     folder.mkdir(parents=True)
     (folder / "a.txt").write_text("a", encoding="utf-8")
     (studio.scratch / "run" / "b.txt").write_text("b", encoding="utf-8")
-    studio.made["key"] = RunFolder(folder, "own")
+    studio.made["key"] = folder
     assert client.get("/made/key/a.txt").text == "a"
     assert "sandbox" in client.get("/made/key/a.txt").headers["content-security-policy"]
     assert client.get("/made/other/a.txt").status_code == 404

@@ -16,9 +16,10 @@ from sbafab.design.sections import rule_names
 from sbafab.errors import DesignError
 from sbafab.models import map_range
 from sbafab.studio import jobs
-from sbafab.studio.app import design_in, packed
+from sbafab.studio.app import design_in
 from sbafab.studio.editing import edited
 from sbafab.studio.jobs import JOBS, SupersededError, refusal
+from tests.studio.asking import packed
 from tests.studio.worked import EnoughError, answers, given_up_at, job
 
 SMALL = api.template("1dof-5mm").replace("balloons = 6", "balloons = 2") + (
