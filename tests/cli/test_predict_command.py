@@ -74,18 +74,6 @@ def test_json_is_what_is_written(run: Run) -> None:
     assert printed["asked"]["pressures_kpa"] == [50]
 
 
-def test_twice_the_same_bytes_and_a_later_run_keeps_them(run: Run) -> None:
-    for out in "ab":
-        run(f"predict 1dof-5mm -o {out}")
-    a, b = (
-        {p.relative_to(out).as_posix(): p.read_bytes() for p in Path(out).rglob("*") if p.is_file()}
-        for out in "ab"
-    )
-    assert a == b
-    kept = generate(RunRequest(sbafab.load("1dof-5mm"), Path("a"), ("press",)))
-    assert {"predict.json", "predict/force.svg", "press.json"} <= set(kept.manifest["files"])
-
-
 def test_a_prediction_goes_beside_another_designs_folder_and_says_so(run: Run) -> None:
     wide = sbafab.load("1dof-5mm", "stack.balloons=1", "chamber.diameter=6")
     folder = generate(RunRequest(wide, Path("out"), ("cut",))).folder

@@ -5,10 +5,7 @@ from __future__ import annotations
 import click
 import pytest
 
-from sbafab.cli.options import FLOW, PRESSURE, VOLUME, MeasuredQuantity, OfChamber, by_chamber
-
-OPTION = click.Option(["--volume"], multiple=True)
-CONTEXT = click.Context(click.Command("any"))
+from sbafab.cli.options import FLOW, PRESSURE, VOLUME, MeasuredQuantity
 
 
 @pytest.mark.parametrize(
@@ -33,14 +30,3 @@ def test_units(quantity: MeasuredQuantity, written: str, value: float) -> None:
 def test_anything_else_is_refused_with_the_units(written: str) -> None:
     with pytest.raises(click.BadParameter, match="the units are kPa, Pa, MPa, mbar, bar, psi"):
         PRESSURE.convert(written, None, None)
-
-
-def test_chambers() -> None:
-    assert OfChamber(VOLUME).convert("chamber1 = 5 ul", None, None) == ("chamber1", 5)
-    assert OfChamber(VOLUME, all_chambers=True).convert("5ul", None, None) == ("", 5)
-    for written in ("5ul", "=5ul"):
-        with pytest.raises(click.BadParameter, match="chamber1=5"):
-            OfChamber(VOLUME).convert(written, None, None)
-    assert by_chamber(CONTEXT, OPTION, (("a", 1.0), ("b", 2.0))) == {"a": 1.0, "b": 2.0}
-    with pytest.raises(click.BadParameter, match="given once"):
-        by_chamber(CONTEXT, OPTION, (("a", 1.0), ("a", 2.0)))

@@ -38,12 +38,6 @@ def facing(folder: Path) -> list[Finding]:
     return [finding for finding in check_folder(folder) if finding.rule == "facing-films"]
 
 
-def test_what_is_written_passes_as_built(waisted: Doctor) -> None:
-    area, overhang = facing(waisted.folder)
-    assert (area.verdict, area.measured) == ("pass", 0.0)
-    assert (overhang.verdict, overhang.measured) == ("pass", pytest.approx(0.5, abs=1e-5))
-
-
 def test_the_mask_as_it_was_fails_as_built(waisted: Doctor) -> None:
     kept = waisted.path(8).read_text()
 

@@ -25,10 +25,3 @@ def test_a_tab_that_its_fillet_takes_whole_is_found_as_built(tmp_path: Path) -> 
     )
     assert not run.failed
     assert [finding.rule for finding in check_folder(run.folder) if finding.verdict == "fail"] == []
-
-
-def test_tabs_that_a_fillet_takes_whole_are_told_apart(tmp_path: Path) -> None:
-    short = ["stack.balloons=2", "inlet.tab_length=1.0", "fillet.radius=2.5"]
-    run = generate(RunRequest(load_design("3dof-15mm", short), tmp_path, ["cut"]))
-    assert not run.failed
-    assert [finding.rule for finding in check_folder(run.folder) if finding.verdict == "fail"] == []

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from sbafab import api
-from tests.studio.browsing import DESIGN, Watched, chromium, picture, share_changed
+from tests.studio.browsing import Watched, chromium, picture, share_changed
 
 pytestmark = [
     pytest.mark.long,
@@ -36,12 +36,6 @@ def colour(name: str) -> list[int]:
     code = re.search(rf"{name}: #(\w{{6}})", (STATIC / "studio.css").read_text(encoding="utf-8"))
     assert code is not None
     return list(bytes.fromhex(code[1]))
-
-
-def linear(value: int) -> float:
-    """Return the light of a colour's share, by the definition of sRGB."""
-    share = value / 255
-    return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4
 
 
 def test_a_prism_holds_the_area_of_its_film(seen: Watched) -> None:
@@ -67,47 +61,6 @@ def shown(seen: Watched) -> Image.Image:
     seen.page.wait_for_timeout(700)
     shot = seen.page.locator("#view-solid canvas").screenshot()
     return Image.open(io.BytesIO(shot)).convert("RGB")
-
-
-def seen_at(seen: Watched, points: np.ndarray) -> np.ndarray:
-    """Return where a pinhole of 28 degrees sees points (n, 3): dots of the picture (n, 2)."""
-    eye, target, width, height = seen.say(
-        "(({camera, canvas}) => [camera.eye, camera.target, canvas.clientWidth, "
-        "canvas.clientHeight])(studio.solid.stage)"
-    )
-    back = np.subtract(eye, target) / np.linalg.norm(np.subtract(eye, target))
-    right = np.cross((0, 0, 1), back)
-    right /= np.linalg.norm(right)
-    away = points - eye
-    plane = np.stack((away @ right, away @ -np.cross(back, right)), axis=1)
-    return np.array((width, height)) / 2 + plane / (away @ -back)[:, None] * (
-        height / 2 / math.tan(math.radians(14))
-    )
-
-
-def test_the_top_film_is_where_a_pinhole_sees_it_and_lit_by_lambert_s_law(seen: Watched) -> None:
-    """Its way is along z, so that sky and ground are half each; the suns are those of the stage."""
-    seen.page.get_by_role("button", name="Top", exact=True).click()
-    image = shown(seen)
-    laminate = api.build(api.loads(DESIGN))
-    turn = np.linspace(0, 2 * np.pi, 12, endpoint=False)
-    ring = 2.2 * np.stack((np.cos(turn), np.sin(turn)), axis=1)
-    plan = np.concatenate(
-        [ring + centre for chamber in laminate.chambers for centre in chamber.centres]
-    )
-    assert all(laminate.layers[-1].profile.contains((x, y)) for x, y in plan)
-    height = seen.say("studio.solid.stage.box.max[2]")
-    ground = [2.1 * linear(value) for value in (0x9A, 0xA4, 0xB0)]
-    suns = 1.7 * 1.6 / math.hypot(0.6, 0.9, 1.6) + 0.5 * 0.2 / math.hypot(1, 1, 0.2)
-    tints = [linear(value) for value in colour("--tpe")]
-    expected = [
-        tint * ((2.1 + below) / 2 + suns) / math.pi
-        for tint, below in zip(tints, ground, strict=True)
-    ]
-    for x, y in seen_at(seen, np.column_stack((plan, np.full(len(plan), height)))):
-        dot = image.getpixel((round(x), round(y)))
-        assert isinstance(dot, tuple)
-        assert [linear(value) for value in dot] == pytest.approx(expected, abs=0.006)
 
 
 def test_what_is_picked_is_what_is_seen(seen: Watched) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from sbafab.studio.app import design_in
 from sbafab.studio.editing import edited
 from sbafab.studio.jobs import JOBS, SupersededError, refusal
 from tests.studio.asking import packed
-from tests.studio.worked import EnoughError, answers, given_up_at, job
+from tests.studio.worked import answers, job
 
 SMALL = api.template("1dof-5mm").replace("balloons = 6", "balloons = 2") + (
     "[rules]\nyield_builds = 100\n"
@@ -40,14 +39,6 @@ def test_the_answers_come_in_the_order_a_person_waits_for_them(tmp_path: Path) -
     assert [(f["rule"], f["measured"], f["message"]) for f in found] == [
         (f.rule, f.measured, f.message) for f in theirs
     ]
-
-
-def test_a_shape_that_the_page_has_is_not_sent_again(tmp_path: Path) -> None:
-    first = seen(job(tmp_path, SMALL))
-    assert first["shapes"]
-    again = seen({**job(tmp_path, SMALL), "has": list(first["shapes"])})
-    assert again["shapes"] == {}
-    assert again["patterns"] == first["patterns"]
 
 
 def test_named_shapes_are_sent_with_their_arcs_even_where_one_fails(tmp_path: Path) -> None:
@@ -93,49 +84,8 @@ def seen(asked: dict[str, Any]) -> dict[str, Any]:
     return next(a for a in JOBS["live"](asked, lambda: None) if a["kind"] == "laminate")
 
 
-def test_the_prediction_is_that_of_the_command(tmp_path: Path) -> None:
-    told = {answer["kind"]: answer for answer in answers(job(tmp_path, SMALL))}
-    theirs = api.predict(api.loads(SMALL), quick=True).as_dict()
-    assert told["prediction"]["figures"] == theirs["figures"]
-    # What an assembly does takes seconds; it is asked for when the hand rests.
-    aperture = JOBS["live"](job(tmp_path, api.template("aperture")), lambda: None)
-    told = {answer["kind"]: answer for answer in islice(aperture, 4)}
-    assert told["prediction"]["quick"]
-    assert told["prediction"]["figures"] == []
-
-
-@pytest.mark.long
-def test_what_to_design_with_stays_when_the_elastic_stack_s_figures_come(tmp_path: Path) -> None:
-    text = edited(api.template("3dof-15mm"), [("stack.balloons", "2")])
-    shown = JOBS["live"](job(tmp_path, text), lambda: None)
-    quick = next(answer for answer in shown if answer["kind"] == "prediction")
-    (full,) = answers({**job(tmp_path, text), "do": "elastic"})
-    own = {key(figure): figure["design_with"] for figure in full["figures"]}
-    assert {
-        key(figure): figure["design_with"] for figure in quick["figures"]
-    }.items() <= own.items()
-    # The upper bound is hidden from the start.
-    assert not own["bending", "maximum lateral tip displacement", "constant curvature"]
-
-
 def key(figure: dict[str, Any]) -> tuple[str, str, str]:
     return figure["group"], figure["name"], figure["model"].partition(" (")[0]
-
-
-def test_shapes_are_the_laminate_s_own(tmp_path: Path) -> None:
-    model = next(a for a in answers(job(tmp_path, SMALL)) if a["kind"] == "laminate")
-    laminate = api.build(api.loads(SMALL))
-    for name, layers in laminate.patterns.items():
-        flat = model["shapes"][model["patterns"][name]["shape"]]
-        corners = [
-            number
-            for contour in layers[0].profile.contours
-            for v in contour.vertices
-            for number in v
-        ]
-        assert [number for contour in flat for number in contour] == pytest.approx(
-            corners, abs=1e-6
-        )
 
 
 @pytest.mark.parametrize(
@@ -215,11 +165,6 @@ def test_a_change_that_comes_during_the_yield_ends_it(tmp_path: Path) -> None:
     assert seen[-2:] == [before, "superseded"]
 
 
-def test_work_that_nobody_waits_for_ends(tmp_path: Path) -> None:
-    with pytest.raises(EnoughError):
-        answers(job(tmp_path, SMALL), given_up_at(3))
-
-
 def test_edits_keep_comments_and_order() -> None:
     text = api.template("3dof-15mm")
     new = edited(
@@ -243,11 +188,6 @@ def test_edits_keep_comments_and_order() -> None:
 def test_an_edit_that_is_no_toml_gets_one_sentence(text: str, value: str) -> None:
     with pytest.raises(DesignError):
         edited(text, [("a", value)])
-
-
-def test_a_table_is_not_written_into_a_value() -> None:
-    with pytest.raises(DesignError, match="a value, not a table"):
-        edited("bond = 3", [("bond.width", "1")])
 
 
 def test_a_link_holds_a_design() -> None:

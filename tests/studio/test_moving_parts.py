@@ -11,9 +11,8 @@ import pytest
 
 from sbafab import api
 from sbafab.errors import DesignError
-from sbafab.studio.jobs import JOBS
 from tests.studio.test_parts import BASE
-from tests.studio.worked import EnoughError, answers, given_up_at, job
+from tests.studio.worked import answers, job
 
 
 def asked(folder: Path, text: str, do: str, pose: dict[str, Any]) -> dict[str, Any]:
@@ -48,11 +47,6 @@ def test_a_grip_in_its_lumen_touches_the_wall_and_free_is_as_wide_as_the_paper_s
     assert api.grip(brace, "arm") is None
     with pytest.raises(DesignError, match="there are tube, grip, arm"):
         api.grip(brace, "hand")
-
-
-def test_a_prediction_of_the_whole_ends_where_nobody_waits_for_it(tmp_path: Path) -> None:
-    with pytest.raises(EnoughError):
-        list(JOBS["elastic"](job(tmp_path, api.template("brace")), given_up_at(2)))
 
 
 @pytest.mark.parametrize("pose", [{"pressure_kpa": 0}, {"load_g": -1}, {"load_g": "much"}])
