@@ -237,7 +237,7 @@ def test_phone_width(chrome: Any, link: str, scheme: str) -> None:
     for name in ("Draw", "Nets"):
         page.get_by_role("tab", name=name).click()
         assert watched.say("document.documentElement.scrollWidth") <= 390
-    assert page.locator("#view-nets .void").count() > 0
+    page.locator("#view-nets .void").first.wait_for(state="attached")
     assert watched.complaints == []
     watched.close()
 
