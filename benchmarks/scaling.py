@@ -31,11 +31,11 @@ def rules_and_cut_files(balloons: int, turn: int) -> float:
         files = write_layer_files(laminate, paths, folder, settings)
         taken = time.process_time() - began
         copies = len(files) - len(laminate.patterns)
-        return taken - copies * _copy_time(folder / files[0].path)
+        return taken - copies * _copy_time(folder / min(files))
 
 
 def _copy_time(path: Path, times: int = 20) -> float:
-    """Seconds to copy a cut file and to hash the copy."""
+    """Seconds to write a cut file once more and to hash it."""
     began = time.process_time()
     for _ in range(times):
         copy = shutil.copyfile(path, path.with_suffix(".copy"))

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from sbafab.actuators import build, load_design
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.nest import NestPart, parts_of
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.offset import fillet
 from sbafab.geometry.region import Region, disc, stadium, strip, union
@@ -78,19 +75,3 @@ def laminate(plate: Region) -> Laminate:
         for index, (role, film, profile, pattern) in enumerate(rows, 1)
     )
     return Laminate("two-plates", "lobed", layers, (), (), (), (), 2.0, 1, "channel-pin")
-
-
-@pytest.fixture
-def lobed_plates() -> list[NestPart]:
-    """40 walls without tabs and 39 separators of the 15 mm actuator, taken as one material."""
-    laminate = build(load_design("3dof-15mm"))
-    paths = {pattern: layers[0].profile for pattern, layers in laminate.patterns.items()}
-    by_role = {
-        laminate.patterns[part.pattern][0].role: part
-        for part in parts_of(laminate, paths, 1)
-        if part.count > 10
-    }
-    return [
-        replace(by_role["wall"], count=40),
-        replace(by_role["separator-mask"], count=39, material="TPE"),
-    ]

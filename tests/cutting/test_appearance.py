@@ -56,29 +56,6 @@ def test_a_true_colour_may_be_the_layers() -> None:
     assert read_profile(saved(lambda d, e: coloured(e, (255, 0, 0)))).region.outers
 
 
-@pytest.mark.parametrize(
-    ("edit", "said"),
-    [
-        (lambda d, e: d.layers.get("CUT_OUTER").off(), "CUT_OUTER is off"),
-        (lambda d, e: d.layers.get("CUT_OUTER").freeze(), "CUT_OUTER is frozen"),
-        (lambda d, e: d.layers.get("CUT_OUTER").dxf.set("plot", 0), "CUT_OUTER is not plotted"),
-        (lambda d, e: d.layers.get("REFERENCE").off(), "REFERENCE is off"),
-        (lambda d, e: d.layers.get("CUT_OUTER").dxf.set("color", 5), "the colour 5, not 1"),
-        (lambda d, e: d.layers.get("CUT_OUTER").dxf.set("linetype", "DASHED"), "linetype DASHED"),
-        (lambda d, e: d.layers.remove("CUT_OUTER"), "not in the layer table"),
-        (lambda d, e: e.dxf.set("invisible", 1), "is invisible"),
-        (lambda d, e: e.dxf.set("linetype", "HIDDEN"), "linetype HIDDEN"),
-        (lambda d, e: e.dxf.set("color", 5), "the colour 5"),
-        (lambda d, e: coloured(e, (0, 0, 255)), "the colour #0000ff"),
-        (lambda d, e: e.dxf.set("thickness", 2.0), "2 mm high"),
-        (lambda d, e: setattr(e, "transparency", 0.5), "is transparent"),
-    ],
-)
-def test_what_is_skipped_or_broken_is_refused(edit: Edit, said: str) -> None:
-    with pytest.raises(OutputError, match=said):
-        read_profile(saved(edit))
-
-
 def test_an_entity_marked_as_one_of_paper_space_is_refused() -> None:
     text = saved(lambda d, e: None).replace(
         "CUT_OUTER\n100\nAcDbC", "CUT_OUTER\n 67\n1\n100\nAcDbC"

@@ -43,17 +43,6 @@ def test_squares_fill_the_grid_they_fit_in_exactly(spacing: float, a_row: int) -
     assert nested([part(square, a_row**2 + 1)], stock).sheets == 2
 
 
-def test_discs_lie_closer_than_in_squares() -> None:
-    """Rows of discs in a triangular array are sqrt(3)/2 of a pitch apart."""
-    pitch, rows, a_row = 11.0, 9, 5
-    # The grid may cost every row two of its cells of 0.1 mm.
-    length = 10 + (rows - 1) * (pitch * math.sqrt(3) / 2 + 0.2)
-    width = 10 + (a_row - 0.5) * pitch + 0.5
-    stock = Stock(width=width + 10, length=length + 10, border=5)
-    assert length < 10 + (rows - 1) * pitch
-    assert nested([part(disc((0.0, 0.0), 5.0), rows * a_row)], stock).sheets == 1
-
-
 def test_no_part_goes_into_a_hole_which_is_cut_before_it() -> None:
     frame = rectangle((0.0, 0.0), (40.0, 40.0)) - rectangle((5.0, 5.0), (35.0, 35.0))
     stock = Stock(width=60, length=60)
@@ -65,12 +54,6 @@ def test_only_turns_that_the_stock_allows_are_used() -> None:
     upright = Stock(width=60, length=200, turns=(0, 2))
     result = nested([part(rectangle((0.0, 0.0), (39.0, 5.0)), 12)], upright)
     assert {place.turn % 2 for place in result.placements} == {0}
-
-
-def test_a_part_is_turned_where_only_that_fits() -> None:
-    stock = Stock(width=40, length=80, border=5)
-    result = nested([part(rectangle((0.0, 0.0), (69.97, 29.98)), 1)], stock)
-    assert [place.turn % 2 for place in result.placements] == [1]
 
 
 def test_a_part_as_large_as_the_usable_area_is_nested() -> None:
@@ -127,12 +110,3 @@ def test_shapely_agrees_that_random_parts_are_apart(
         )
         assert least >= spacing - 5e-4
         assert box(4, 4, 41, 46).buffer(1e-5).contains(unary_union(shapes))
-
-
-def test_forty_lobed_plates_and_39_separators_lie_on_one_sheet(
-    lobed_plates: list[NestPart],
-) -> None:
-    """On the 132.4 mm square that a border of 10 mm leaves of the press's heated area."""
-    result = nested(lobed_plates, Stock())
-    assert len(result.placements) == 79
-    assert result.sheets == 1

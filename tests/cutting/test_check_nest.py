@@ -12,7 +12,6 @@ from shapely.geometry import Polygon
 from sbafab.cutting.nest import Nest, NestPart, Placement, Stock
 from sbafab.cutting.nest_check import check_nest, check_placed, least_distance
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Line
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 
 SQUARE = rectangle((0.0, 0.0), (10.0, 10.0))
@@ -27,10 +26,6 @@ def nest_of(*shifts: tuple[float, float, int], count: int | None = None) -> Nest
         parts=(NestPart("demo", "P01", 1, "TPE", SQUARE, placements),),
         placements=tuple(Placement(0, sheet, 0, (x, y)) for x, y, sheet in shifts),
     )
-
-
-def test_a_sound_nest_passes() -> None:
-    check_nest(nest_of((5, 5, 0), (16, 5, 0), (5, 16, 0), (5, 5, 1)))
 
 
 @pytest.mark.parametrize(
@@ -89,15 +84,7 @@ def test_least_distances_by_closed_forms(a: Region, b: Region, expected: float) 
     assert least_distance(b, a, 10.0).value == pytest.approx(expected, abs=1e-9)
 
 
-def test_nothing_is_told_beyond_the_reach() -> None:
-    assert least_distance(disc((0, 0), 2), disc((9, 0), 2), 4.9).value == math.inf
-    assert least_distance(disc((0, 0), 2), disc((9, 0), 2), 5.1).value == pytest.approx(5.0)
-
-
 spots = st.tuples(st.floats(-4, 4), st.floats(-4, 4))
-
-
-lines = st.builds(Line, spots, spots).filter(lambda line: line.length > 0.1)
 
 
 sizes = st.floats(0.5, 3)

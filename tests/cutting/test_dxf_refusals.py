@@ -144,22 +144,6 @@ def test_truncated_file_is_refused(
         read_profile(write(plate_text[: int(share * len(plate_text))]))
 
 
-def test_missing_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match=r"gone\.dxf: cannot be read"):
-        read_profile(tmp_path / "gone.dxf")
-
-
-@pytest.mark.parametrize("layer", ["ENGRAVE", "CUT_SHEET", "REFERENCE"])
-def test_what_is_not_of_the_part_is_counted_apart(layer: str, plate_text: str) -> None:
-    text = drawn(
-        plate_text,
-        lambda model: model.add_lwpolyline(SQUARE, close=True, dxfattribs={"layer": layer}),
-    )
-    found = read_profile(text)
-    assert found.region == read_profile(plate_text).region
-    assert found.other == ("LINE", "LINE", "LWPOLYLINE")
-
-
 @pytest.mark.parametrize(("flags", "fitted"), [(1, False), (1 | 2, True), (1 | 4, True)])
 def test_an_old_polyline_is_read_as_it_stands_and_refused_with_a_curve_fitted(
     flags: int, fitted: bool, plate_text: str

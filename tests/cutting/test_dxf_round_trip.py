@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import Surroundings, dxf_text, number
+from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.properties import DxfProfile
 from sbafab.cutting.sequence import cutting_sequence
@@ -54,10 +54,6 @@ def test_holes_come_first_and_the_datum_last(plate: Region) -> None:
     assert found.units == "mm"
 
 
-def test_datum_can_be_left_out(plate: Region) -> None:
-    assert read_profile(dxf_text(cutting_sequence(plate), {}, sheet=Surroundings())).other == ()
-
-
 def test_a_large_bulge_from_elsewhere_is_read_exactly(plate_text: str) -> None:
     """Three quarters of a circle of radius 1 and the chord: area 3/4 pi + 1/2."""
     bulge = math.tan(math.radians(270) / 4)
@@ -78,17 +74,3 @@ def test_extents_bound_the_drawing(plate: Region, plate_text: str) -> None:
     assert high is not None
     found = [float(value) for value in (*low.groups(), *high.groups())]
     assert found == pytest.approx(plate.bounds, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(-0.0, "0.0"), (-1e-12, "0.0"), (2.5, "2.5"), (1e-7, "0.0000001"), (1 / 3, "0.333333333")],
-)
-def test_numbers_have_no_exponent_and_no_negative_zero(value: float, text: str) -> None:
-    assert number(value) == text
-
-
-def test_outlines_go_on_from_the_last_hole() -> None:
-    ring = disc((10.0, 0.0), 2.0) - disc((10.0, 0.0), 1.0)
-    order = [contour.circle for contour in cutting_sequence(ring | disc((3.0, 0.0), 1.0))]
-    assert [circle[0][0] for circle in order if circle] == pytest.approx([10.0, 10.0, 3.0])

@@ -65,11 +65,3 @@ def test_a_marked_folder_passes_and_its_marks_keep_off_the_parts(marked: Run) ->
     outlines, strokes = shapes(marked.folder / "sheets" / "TPE_1.dxf")
     assert strokes
     assert min(a.distance(b) for a in outlines for b in strokes) >= 0.5 - 1e-3
-
-
-def test_a_sheet_has_no_marks_unless_asked_for(tmp_path: Path) -> None:
-    plain = written(tmp_path)
-    for film in ("TPE", "PTFE"):
-        outlines, strokes = shapes(plain.folder / "sheets" / f"{film}_1.dxf")
-        assert outlines
-        assert not strokes

@@ -46,10 +46,6 @@ def test_a_kerf_put_on_and_taken_off_leaves_the_part(parts: list[Region], kerf: 
     check_contours(shrink(path, kerf / 2), region, 0.0001)
 
 
-def test_no_kerf_changes_nothing(plate: Region) -> None:
-    assert compensate(plate, 0.0) is plate
-
-
 def dumbbell() -> Region:
     """A hole of two rounds joined by a slot 0.2 wide."""
     slot = rectangle((-2.0, -0.1), (2.0, 0.1))

@@ -152,12 +152,6 @@ def test_parts_round_lattices_and_pins_are_apart(
     judged(result)
 
 
-def test_only_turns_that_the_stock_allows_are_used() -> None:
-    triangle = polygon([(0.0, 0.0), (7.0, 0.0), (2.0, 11.0)])
-    for laid in lattices_of(triangle, 1.0, (0.0, 0.0, 50.0, 80.0), (0, 2)):
-        assert {turn for turn, _ in laid.places} <= {0, 2}
-
-
 def test_five_folded_pouches_lie_on_one_sheet() -> None:
     """As sparrow packs them; two lattices hold four, as bottom-left alone does."""
     design = load_design("folded", ("order.copies=4",))

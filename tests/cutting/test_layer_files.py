@@ -5,14 +5,13 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-import ezdxf
 import pytest
 
 from sbafab.cutting import layer_files
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.layer_files import write_layer_files
-from sbafab.cutting.properties import Curves, CutSettings, DxfProfile
+from sbafab.cutting.properties import CutSettings
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.process import Counted
@@ -68,18 +67,6 @@ def test_kerf_is_stated_and_done_for_each_material(laminate: Laminate, tmp_path:
     assert nominal.properties["KERF_STATE"] == "uncalibrated: nominal edges"
     assert nominal.properties["KERF_WIDTH"] == "none"
     assert nominal.region.key == laminate.layer(2).profile.key
-
-
-@pytest.mark.parametrize(
-    ("profile", "kinds"), [("arcs", {"LINE", "ARC", "CIRCLE"}), ("chords", {"LWPOLYLINE"})]
-)
-def test_other_ways_of_writing_curves(
-    profile: DxfProfile, kinds: set[str], laminate: Laminate, tmp_path: Path
-) -> None:
-    settings = CutSettings("two-plates", "", curves=Curves(profile, 0.01))
-    base = min(written(laminate, tmp_path, settings))
-    model = ezdxf.readfile(tmp_path / base).modelspace()
-    assert {entity.dxftype() for entity in model.query('*[layer!="REFERENCE"]')} == kinds
 
 
 def test_kerf_too_wide_names_the_layer(laminate: Laminate, tmp_path: Path) -> None:

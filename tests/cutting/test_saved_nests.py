@@ -45,11 +45,6 @@ def test_other_parts_are_nested_anew(saved: Any, parts: tuple[NestPart, ...]) ->
     assert from_dict(saved, parts, STOCKS) is None
 
 
-def test_another_stock_is_nested_anew(saved: Any) -> None:
-    stocks = {**STOCKS, "PTFE": STOCKS["PTFE"].model_copy(update={"spacing": 0.8})}
-    assert from_dict(saved, PARTS, stocks) is None
-
-
 @pytest.mark.parametrize("data", [None, [], "x", 3, {}, {"key": 1}])
 def test_what_is_no_saved_nest_is_ignored(data: object) -> None:
     assert from_dict(data, PARTS, STOCKS) is None
@@ -70,11 +65,4 @@ def test_what_is_no_saved_nest_is_ignored(data: object) -> None:
 )
 def test_a_spoilt_row_is_ignored(saved: Any, row: object) -> None:
     saved["nests"]["TPE"][0] = row
-    assert from_dict(saved, PARTS, STOCKS) is None
-
-
-def test_a_missing_row_or_material_is_noticed(saved: Any) -> None:
-    del saved["nests"]["TPE"][0]
-    assert from_dict(saved, PARTS, STOCKS) is None
-    del saved["nests"]["TPE"]
     assert from_dict(saved, PARTS, STOCKS) is None

@@ -162,17 +162,6 @@ def test_an_imported_folder_keeps_offset_and_path(
     assert text == (beside / SEAM_FILE).read_text(encoding="utf-8")
 
 
-def test_no_offset_changes_no_byte(folders: tuple[Path, Path], tmp_path: Path) -> None:
-    plain, _ = folders
-    none = {"seam_tools": {"hot_tip": {"offset": [0, 0]}, "laser": {"offset": [5, 5]}}}
-    folder = made(welded(**none), tmp_path)
-    hashes = [
-        json.loads((top / "manifest.json").read_text())["design_sha256"] for top in (plain, folder)
-    ]
-    text = (folder / SEAM_FILE).read_text(encoding="utf-8").replace(hashes[1], hashes[0])
-    assert text == (plain / SEAM_FILE).read_text(encoding="utf-8")
-
-
 @pytest.mark.parametrize(
     ("tools", "sentence"),
     [

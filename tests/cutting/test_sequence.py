@@ -27,21 +27,6 @@ def test_holes_are_cut_before_any_outline() -> None:
     assert [contour.is_hole for contour in order] == [True] * 3 + [False] * 3
 
 
-def test_a_row_is_travelled_from_one_end_to_the_other() -> None:
-    row = grid(1, 20, 5.0, 1.0)
-    # Every disc starts 1 mm right of its centre: from the origin to the first, then 19 steps of 5.
-    assert travel(cutting_sequence(row)) == 1.0 + 19 * 5.0
-
-
-def test_a_grid_is_travelled_near_its_shortest_way() -> None:
-    field = grid(8, 8, 10.0, 2.0)
-    # 64 stops 10 mm apart take at least 63 steps, and 2 mm to the first.
-    shortest = 2.0 + 63 * 10.0
-    ours = travel(cutting_sequence(field))
-    assert shortest <= ours <= 1.15 * shortest
-    assert travel(field.contours) > 3 * ours
-
-
 def test_scattered_cuts_are_travelled_near_their_shortest_way() -> None:
     draw = random.Random(4)
     places = [(draw.uniform(2, 98), draw.uniform(2, 98)) for _ in range(120)]
@@ -69,9 +54,3 @@ def test_neighbours_do_not_follow_each_other_while_others_are_left() -> None:
     assert hot(cutting_sequence(field)) > 20
     assert hot(cutting_sequence(field, heat_distance=near)) <= 3
     assert travel(cutting_sequence(field, heat_distance=near)) < travel(field.contours)
-
-
-def test_every_contour_is_cut_once() -> None:
-    field = grid(5, 7, 8.0, 3.0)
-    for heat in (0.0, 3.0):
-        assert sorted(map(id, cutting_sequence(field, heat))) == sorted(map(id, field.contours))

@@ -10,7 +10,7 @@ import shapely
 
 from sbafab.cutting import sheets as module
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.nest import Nest, NestPart, Placement, Stock
+from sbafab.cutting.nest import Nest, NestPart, Stock
 from sbafab.cutting.nesting import nest
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import SheetFile, write_sheets
@@ -42,16 +42,6 @@ def test_the_file_holds_the_parts_with_holes_before_outlines(tmp_path: Path) -> 
     assert sheet.counts == (("demo", "P01", 7),)
     assert found.properties["PARTS"] == "7 x demo P01"
     assert found.properties["PATTERN"] == "sheet 1 of 1"
-
-
-def test_the_frame_is_the_sheet_and_starts_at_the_origin(tmp_path: Path) -> None:
-    (sheet,) = write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER, PLAIN)
-    frame = [
-        edges
-        for layer, edges in read_profile(tmp_path / sheet.path).strokes
-        if layer == "REFERENCE"
-    ]
-    assert [edge.end for edge in frame[0]] == [(60, 0), (60, 80), (0, 80), (0, 0)]
 
 
 def test_the_label_is_engraved_in_the_border_alone(tmp_path: Path) -> None:
@@ -122,14 +112,6 @@ def test_a_roll_is_cut_off_one_border_past_its_parts(tmp_path: Path) -> None:
     assert found.layers.index("CUT_SHEET") > max(
         i for i, layer in enumerate(found.layers) if layer == "CUT_OUTER"
     )
-
-
-def test_parts_that_overlap_are_not_let_through(tmp_path: Path) -> None:
-    part = NestPart("demo", "P01", 1, "TPE", RING, 2)
-    places = (Placement(0, 0, 0, (11.0, 11.0)), Placement(0, 0, 0, (12.0, 11.0)))
-    bad = Nest("TPE", STOCK, (part,), places)
-    with pytest.raises(OutputError, match="touch or cross"):
-        write_sheets([bad], tmp_path, SETTINGS, LASER, PLAIN)
 
 
 def test_engraving_that_runs_through_a_part_is_found(

@@ -10,9 +10,11 @@ import pytest
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.properties import DxfProfile
+from sbafab.cutting.seam_files import path_difference
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import OutputError
+from sbafab.geometry.edges import Line
 from sbafab.geometry.region import Region, disc, rectangle
 
 Write = Callable[[str], Path]
@@ -59,22 +61,10 @@ def test_missing_and_added_holes_are_found(write: Write) -> None:
         check(ring() - disc((-2.0, 0.0), 0.5), ring(), write)
 
 
-def test_missing_piece_is_found(write: Write, profiles: dict[str, Region]) -> None:
-    with pytest.raises(OutputError, match="has 1 outlines, not 3"):
-        check(disc((0.0, 0.0), 2.5), profiles["discs"], write)
-
-
 def test_outline_before_its_hole_is_found(write: Write) -> None:
     backwards = cutting_sequence(ring())[::-1]
     with pytest.raises(OutputError, match="CUT_OUTER is cut before CUT_INNER"):
         verify_file(write(dxf_text(backwards, {})), ring(), {})
-
-
-@pytest.mark.parametrize("expected", [{}, {"A": "c"}, {"A": "b", "C": "d"}])
-def test_other_properties_are_found(expected: dict[str, str], write: Write) -> None:
-    path = write(dxf_text(cutting_sequence(ring()), {"A": "b"}))
-    with pytest.raises(OutputError, match=r"custom property [AC] is"):
-        verify_file(path, ring(), expected)
 
 
 def test_a_notch_that_misses_every_sample_is_found_either_way(write: Write) -> None:
@@ -84,3 +74,12 @@ def test_a_notch_that_misses_every_sample_is_found_either_way(write: Write) -> N
     for found, expected in ((slit, sheet), (sheet, slit)):
         with pytest.raises(OutputError, match=r"1\.000000 mm off at x 20\.[05]"):
             check(found, expected, write)
+
+
+def test_a_shorter_turned_or_second_path_of_a_seam_is_another() -> None:
+    line, short = Line((0.0, 0.0), (10.0, 0.0)), Line((0.0, 0.0), (9.0, 0.0))
+    turned = Line((10.0, 0.0), (0.0, 0.0))
+    assert path_difference(((line,),), ((line,),)) is None
+    assert "1.000 mm off at x 10.000, y 0.000" in str(path_difference(((short,),), ((line,),)))
+    assert "10.000 mm off" in str(path_difference(((turned,),), ((line,),)))
+    assert path_difference(((line,), (short,)), ((line,),)) == "it has 2 paths, not 1"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import re
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,7 +15,7 @@ from sbafab.errors import DesignError
 from sbafab.lab.builds import RecordedDesign, promised
 from sbafab.lab.recording import matching
 from sbafab.lab.records import Record
-from sbafab.lab.report import Report, report, success_svg
+from sbafab.lab.report import Report, report
 from sbafab.lab.store import Lab
 from tests.lab.conftest import SHA, build, result
 
@@ -109,19 +108,6 @@ def test_intervals_hold_the_truth_about_95_times_in_100(lot: Lot) -> None:
     assert all(0.9 <= count / 150 <= 0.985 for count in held.values()), held
 
 
-def test_the_chart_draws_the_share_so_far_and_of_the_last() -> None:
-    records, recorded = invented(LOTS[0], 0, 3)
-    svg = success_svg(records, {recorded.sha256: recorded})
-    counts = [
-        len(re.findall(r"[ML]\d", curve)) for curve in re.findall(r'id="curve1.\d">(.*?)</g>', svg)
-    ]
-    assert counts == [60, 60, 60, 41]
-    assert "Success of 60 actuators" in svg
-    assert "last 20" not in success_svg(records[:19], {recorded.sha256: recorded})
-    with pytest.raises(DesignError, match="no leak test is recorded yet"):
-        success_svg([], {})
-
-
 OTHER_ORDER = """
 order.copies=8 order.spares=5 order.made_for="Ada" sheets.tpe.width=300 sheets.ptfe.roll=true
 laser.cut_speed=40 rules.bond_width=0.7 registration.hand_placement=0.12
@@ -173,16 +159,6 @@ def test_batches_of_one_and_of_eight_are_one_design(tmp_path: Path) -> None:
     assert len(builds) == 2
     for sha256 in builds:
         assert len(matching(sha256, "", records, builds)) == 3
-
-
-def test_a_lot_of_another_design_may_use_the_same_serials(tmp_path: Path) -> None:
-    lab = tmp_path / "lab.sqlite"
-    sbafab.record("1dof-5mm", SMALL, lab=lab, serial="A1", leak="pass")
-    wider = {**SMALL, "bond": {"width": 0.8}}
-    sbafab.record("1dof-5mm", wider, lab=lab, serial="A1", leak="fail")
-    found = sbafab.report(lab)
-    assert found.items == 2
-    assert [s.name[:9] for s in found.success if s.by == "design"] == ["1dof-5mm "] * 2
 
 
 def test_a_mended_actuator_counts_by_its_first_attempt(lab: Lab) -> None:

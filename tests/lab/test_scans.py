@@ -105,11 +105,6 @@ def test_a_clean_sheet_gives_no_alarm(seed: int, folder: Path, lobed: Path, tmp_
     assert not inspection.failed
 
 
-def test_dust_is_no_opening(folder: Path, tmp_path: Path) -> None:
-    inspection = inspected(folder, tmp_path, Camera(dpi=400, specks=300, seed=4))
-    assert not inspection.failed
-
-
 PINS = ((32.0, 14.0, 3.0), (32.0, 34.0, 3.0), (54.0, 24.0, 2.0))
 """Centre and diameter in mm, among the parts."""
 

@@ -1,4 +1,4 @@
-"""Machine files of other laser programs: colours, order and shapes, read by other readers."""
+"""Files of laser programs: settings, colours, order and shapes, read by other readers."""
 
 from __future__ import annotations
 
@@ -14,9 +14,15 @@ import pytest
 import shapely
 import svgelements
 
-from sbafab.cutting.beam_paths import beam_runs, drawn
+from sbafab.cutting.beam_paths import beam_runs, contour_runs, drawn
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.laser_programs import PROGRAMS, LaserSheet, laser_text, verify_laser_file
+from sbafab.cutting.laser_programs import (
+    PROGRAMS,
+    LaserSheet,
+    laser_text,
+    read_laser_file,
+    verify_laser_file,
+)
 from sbafab.cutting.properties import PLAIN, LeadIns
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
@@ -38,7 +44,7 @@ AREA = math.pi * (10**2 - 4**2) + math.pi * 8**2 + 20 * 16
 
 def sheet_of(lead_ins: LeadIns) -> LaserSheet:
     cuts = beam_runs(cutting_sequence(PARTS), lead_ins, AROUND)
-    return LaserSheet(list(drawn(cuts, AROUND)), SIZE, "arm & co <1>")
+    return LaserSheet(list(drawn(cuts, AROUND)), SIZE, "arm & co <1>", notes='arm "2" & co')
 
 
 def written(folder: Path, program: str, lead_ins: LeadIns = PLAIN) -> Path:
@@ -112,6 +118,41 @@ def shape_is(shape: object) -> bool:
     return isinstance(shape, svgelements.Shape) and shape.stroke.hex == "#ff0000"
 
 
+def test_curves_leave_their_arcs_by_less_than_their_formula_says(tmp_path: Path) -> None:
+    """A cubic of 45 degrees is at most 4.3e-6 of the radius outside, and nowhere inside."""
+    region = disc((0.0, 0.0), 400.0)
+    half = region - region.moved(0.0, 300.0)
+    runs = list(drawn(contour_runs(cutting_sequence(half)), Surroundings()))
+    sheet = LaserSheet(runs, SIZE, "half")
+    path = tmp_path / "large.lbrn2"
+    path.write_text(laser_text("lightburn", sheet))
+    [run] = read_laser_file(path, "lightburn").runs
+    places = [curve.at(k / 32) for curve in run.curves for k in range(33)]
+    offs = [min(abs(math.hypot(x, y - c) - 400) for c in (0.0, 300.0)) for x, y in places]
+    assert 1e-4 < max(offs) < 4.3e-6 * 400
+    path.write_text(path.read_text().replace("B1 2", "L1 2"))
+    with pytest.raises(OutputError, match="differs from what was written"):
+        verify_laser_file(path, "lightburn", sheet)
+
+
+def test_no_power_and_no_order_is_left_to_lightburn(tmp_path: Path) -> None:
+    root = ElementTree.parse(written(tmp_path, "lightburn")).getroot()
+    for setting in root.iter("CutSetting"):
+        told = {child.tag: child.get("Value") for child in setting}
+        assert {told[name] for name in ("minPower", "maxPower", "minPower2", "maxPower2")} == {"0"}
+        assert "speed" not in told
+        assert setting.get("type") == "Cut"
+        assert told["doOutput"] == ("0" if told["name"] == "REFERENCE: not cut" else "1")
+    prefs = {child.tag: child.get("Value") for child in root.iterfind("UIPrefs/*")}
+    assert (prefs.pop("Optimize_ByGroup"), prefs.pop("Optimize_ByPriority")) == ("-1", "1")
+    assert set(prefs.values()) == {"0"}
+    notes = root.find("Notes")
+    assert notes is not None
+    assert notes.get("Notes") == 'arm "2" & co'
+    ids = [shape.get("VertID") for shape in root.iter("Shape") if shape.get("Type") == "Path"]
+    assert len(set(ids)) == len(ids), "LightBurn takes shapes of one VertID for one"
+
+
 def once(old: str, new: str) -> Callable[[str], str]:
     def change(text: str) -> str:
         changed, count = re.subn(old, new, text, count=1, flags=re.DOTALL)
@@ -143,6 +184,32 @@ FAULTS: list[tuple[str, Callable[[str], str], str]] = [
     ("epilog", once("A8 8 0 0 0", "A8 8 0 0 1"), "differs from what was written"),
     ("epilog", once(r"<circle .*?/>\n", ""), "it has 4 lines, not 5"),
     ("epilog", lambda text: text[: len(text) // 2], "cannot be read"),
+    ("lightburn", once(r"V(-?\d+\.\d\d)\d*", r"V\g<1>9999"), "differs from"),
+    ("lightburn", once(r'Rx="4" Ry="4"', 'Rx="4.002" Ry="4.002"'), "is not the circle"),
+    ("lightburn", once(r'Rx="4"', 'Rx="4.1"'), "type Ellipse"),
+    ("lightburn", once('MirrorX="False"', 'MirrorX="True"'), "mirrored"),
+    ("lightburn", once(r'doOutput Value="0"', 'doOutput Value="1"'), "doOutput of layer REFERENCE"),
+    (
+        "lightburn",
+        once(r'type="Cut"(><index Value="2")', r'type="Scan"\1'),
+        "type of layer CUT_OUTER",
+    ),
+    ("lightburn", once('<kerf Value="0"/>', '<kerf Value="0.1"/>'), "kerf of layer ENGRAVE is 0.1"),
+    ("lightburn", once('priority Value="1"', 'priority Value="9"'), "priority of layer CUT_INNER"),
+    ("lightburn", once(r'<maxPower Value="0"', '<maxPower Value="9"'), "maxPower of layer"),
+    ("lightburn", once(r'CutIndex="1"', 'CutIndex="2"'), "one of CUT_OUTER, not of CUT_INNER"),
+    ("lightburn", once(r'<Shape Type="Ellipse".*?</Shape>\n', ""), "it has 5 lines, not 6"),
+    (
+        "lightburn",
+        once(r'<CutSetting type="Cut"><index Value="7".*?</CutSetting>', ""),
+        "are others",
+    ),
+    ("lightburn", once(r"([LB]\d+ 0)(</PrimList>)", r"\2"), "differs from what was written"),
+    ("lightburn", once(r'Type="Path"', 'Type="Bitmap"'), "type Bitmap that no sheet has"),
+    ("lightburn", once("<XForm>1 0 0 1", "<XForm>0 1 -1 0"), "turns or stretches a shape"),
+    ("lightburn", once(r"<VertList>V", "<VertList>W"), "says 'W"),
+    ("lightburn", lambda text: text[: len(text) // 2], "cannot be read"),
+    ("lightburn", lambda text: "<svg/>", "no LightBurn project"),
 ]
 
 
