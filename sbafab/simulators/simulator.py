@@ -91,12 +91,6 @@ class SimulationRequest:
         if not 0 < self.minutes < math.inf:
             raise DesignError(f"minutes = {self.minutes:g} must be a finite number above 0")
 
-    @property
-    def specific_fields(self) -> list[str]:
-        """Names of the fields in use that not every simulator reads."""
-        names = ("h", "symmetry", "procedure", "scene", "seconds", "volumes")
-        return [name for name in names if getattr(self, name) not in (None, {})]
-
 
 @dataclass(frozen=True)
 class State:
@@ -151,32 +145,27 @@ class Result:
 
     @property
     def last(self) -> State:
-        """The final state; the properties below refer to it."""
+        """The final state; the properties below are its own."""
         return self.states[-1]
 
     @property
     def pressures(self) -> Mapping[str, float]:
-        """Pressures in kPa above the outside air, by chamber."""
         return self.last.pressures
 
     @property
     def height(self) -> float | None:
-        """Height in mm of the middle of the tip above the underside of the base."""
         return self.last.height
 
     @property
     def tip(self) -> Vector | None:
-        """Displacement in mm of the middle of the tip from the flat state."""
         return self.last.tip
 
     @property
     def tilt(self) -> float | None:
-        """Tilt of the tip in degrees."""
         return self.last.tilt
 
     @property
     def volumes(self) -> Mapping[str, float]:
-        """Volumes of air in ul, by chamber."""
         return self.last.volumes
 
     @property
@@ -184,11 +173,8 @@ class Result:
         """Label, value and unit of each printed line."""
         last = self.last
         rows = [(name, value, "kPa") for name, value in last.pressures.items()]
-        if last.tip is not None and last.height is not None:
-            rows += [
-                (f"tip {axis}", place, "mm") for axis, place in zip("xyz", last.tip, strict=True)
-            ]
-            rows += [("height", last.height, "mm")]
+        rows += [(f"tip {axis}", at, "mm") for axis, at in zip("xyz", last.tip or (), strict=False)]
+        rows += [] if last.height is None else [("height", last.height, "mm")]
         rows += [] if last.tilt is None else [("tilt", last.tilt, "degrees")]
         rows += [(f"air {name}", value, "ul") for name, value in last.volumes.items()]
         labels = ((FIGURES[name], value) for name, value in self.figures.items())
@@ -197,8 +183,7 @@ class Result:
     def as_dict(self) -> dict[str, object]:
         """For a JSON file: the last state, the figures, all states."""
         head = {"simulator": self.simulator, **asdict(self.last), **self.figures}
-        states = [asdict(state) for state in self.states]
-        return {**head, "states": states, "stopped": self.stopped}
+        return {**head, "states": list(map(asdict, self.states)), "stopped": self.stopped}
 
 
 class StateEntry(Document):
@@ -266,13 +251,11 @@ def simulator(name: str) -> Simulator:
 
 def refuse_unused(name: str, request: SimulationRequest) -> None:
     """Raises DesignError for an unknown simulator, and for a setting that it does not use."""
-    used = simulator(name).USES
-    for name_of_field in request.specific_fields:
-        if name_of_field not in used:
-            users = [other for other in NAMES if name_of_field in simulator(other).USES]
-            raise DesignError(
-                f"{name_of_field} is for {' and '.join(users)}; leave it out with {name}"
-            )
+    uses = {other: simulator(other).USES for other in dict.fromkeys((name, *NAMES))}
+    for setting in sorted({each for used in uses.values() for each in used}):
+        if getattr(request, setting) not in (None, {}) and setting not in uses[name]:
+            users = [other for other in NAMES if setting in uses[other]]
+            raise DesignError(f"{setting} is for {' and '.join(users)}; leave it out with {name}")
 
 
 def under_vacuum(name: str, request: SimulationRequest) -> SimulationRequest:
@@ -363,45 +346,29 @@ MOST_OVERLAP = 0.2
 SOFA's scenes reaches a tenth, and then bends some 10 degrees too far."""
 
 
-@dataclass(frozen=True)
-class PhysicalLimits:
-    """Physical limits of a laminate.
+def impossible(
+    laminate: Laminate, state: State, requested: Collection[float] = (), passed: float = 0.0
+) -> str | None:
+    """Return why a state of a laminate is impossible, or None.
 
-    ``highest`` is the maximum rise of its tip in mm, None round a tube; then a flag, True if equal
-    chambers must keep the tip level, and the least air of a chamber in ul.
+    A balloon's height cannot exceed the length of its two films, and a laminate on a tube has no
+    common tip. Equal pressures or volumes, if ``requested`` of all chambers, lift a plate evenly if
+    the mesh has no inlets. ``passed`` is the ``overlap`` in ul.
     """
-
-    highest: float | None
-    must_stand: bool
-    least_air: float
+    return next(_wrong(laminate, state, requested, passed), None)
 
 
-def limits(laminate: Laminate, requested: Collection[float]) -> PhysicalLimits:
-    """Return the limits of a laminate with these pressures or volumes in its chambers.
-
-    A balloon's height cannot exceed the length of its two films; equal chambers lift a plate evenly
-    if the mesh has no inlets. A laminate on a tube has no common tip.
-    """
-    radii = pocket_radii(laminate)
-    thick = min((layer.film.thickness for layer in laminate.tpe_layers), default=0.0)
+def _wrong(
+    laminate: Laminate, state: State, requested: Collection[float], passed: float
+) -> Iterator[str]:
+    tip, tilt, radii = state.tip, state.tilt, pocket_radii(laminate)
     chambers = max(len(laminate.chambers), 1)
-    least_air = -NO_AIR * thick * math.pi * sum(radius**2 for radius in radii) / chambers
-    highest = None if laminate.tube is not None else 2 * STRETCH * sum(radii) / chambers
-    must_stand = highest is not None and len(set(requested)) == 1 and min(requested) >= 0
-    return PhysicalLimits(highest, must_stand and why_not_round(laminate) is None, least_air)
-
-
-def impossible(state: State, can_be: PhysicalLimits, passed: float = 0.0) -> str | None:
-    """Return why a state is impossible, or None; ``passed`` is the ``overlap`` in ul."""
-    return next(_wrong(state, can_be, passed), None)
-
-
-def _wrong(state: State, can_be: PhysicalLimits, passed: float) -> Iterator[str]:
-    tip, tilt = state.tip, state.tilt
     if not all(map(math.isfinite, (*state.volumes.values(), *(tip or ()), tilt or 0.0))):
         yield "a place or a volume is not finite"
+    thick = min((layer.film.thickness for layer in laminate.tpe_layers), default=0.0)
+    least_air = -NO_AIR * thick * math.pi * sum(radius**2 for radius in radii) / chambers
     for name, air in state.volumes.items():
-        if air < can_be.least_air:
+        if air < least_air:
             yield (
                 f"{name} holds {air:.3g} ul of air, less than none: its films have passed through "
                 "each other"
@@ -409,19 +376,19 @@ def _wrong(state: State, can_be: PhysicalLimits, passed: float) -> Iterator[str]
     air = sum(state.volumes.values())
     if passed > MOST_OVERLAP * max(air, 0.0):
         yield f"films have passed through each other in {passed:.3g} ul, with {air:.3g} ul of air"
-    if tip is None or can_be.highest is None:
+    if tip is None or laminate.tube is not None:
         return
     if max(map(abs, tip)) < NOWHERE and any(state.pressures.values()):
         yield "the tip lies at 0, 0, 0"
-    if tip[2] > can_be.highest:
-        yield (
-            f"the tip is {tip[2]:.3f} mm high, and the films reach {can_be.highest:.3g} mm at most"
-        )
-    alike = "all chambers are told the same, and the tip"
-    if can_be.must_stand and tip[2] < LEAST_RISE:
-        yield f"{alike} has not risen (z {tip[2]:.3f} mm)"
-    if can_be.must_stand and tilt is not None and tilt > MOST_LEAN:
-        yield f"{alike} leans by {tilt:.1f} degrees (more than {MOST_LEAN:g})"
+    highest = 2 * STRETCH * sum(radii) / chambers
+    if tip[2] > highest:
+        yield f"the tip is {tip[2]:.3f} mm high, and the films reach {highest:.3g} mm at most"
+    if len(set(requested)) == 1 and min(requested) >= 0 and why_not_round(laminate) is None:
+        alike = "all chambers are told the same, and the tip"
+        if tip[2] < LEAST_RISE:
+            yield f"{alike} has not risen (z {tip[2]:.3f} mm)"
+        if tilt is not None and tilt > MOST_LEAN:
+            yield f"{alike} leans by {tilt:.1f} degrees (more than {MOST_LEAN:g})"
 
 
 def overlap(
@@ -481,11 +448,8 @@ class Stop(NamedTuple):
     words: str
 
 
-class Ended(NamedTuple):
-    """End of a program: its exit code, and the reason if it was stopped, else None."""
-
-    code: int
-    stopped: Stop | None
+Ended = tuple[int, Stop | None]
+"""End of a program: its exit code, and the reason if it was stopped, else None."""
 
 
 def program_path(name: str, install: str) -> str:
@@ -541,7 +505,7 @@ def run_program(
             stopped = Stop("interrupt", "it was interrupted")
         finally:
             _end(process)
-    return Ended(process.returncode, stopped)
+    return process.returncode, stopped
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
@@ -576,7 +540,8 @@ class RecordedFilms:
     ``rest`` and ``start`` (n, 3) are the nodes in mm when flat and at the start; ``triangles``
     (k, 3) all films, ``cavities`` closed surfaces by chamber, normals out of the air; both are
     empty if films bear nothing. The mean of the ``middle`` nodes is the tip, the plane of the
-    ``tip`` nodes its tilt. ``pressures`` are kPa by chamber at the end, empty with volumes.
+    ``tip`` nodes its tilt. ``pressures`` are kPa by chamber at the end, empty with volumes;
+    ``requested`` are the pressures or volumes of all chambers.
     """
 
     laminate: Laminate
@@ -587,6 +552,7 @@ class RecordedFilms:
     tip: NDArray[np.int64]
     middle: NDArray[np.int64]
     pressures: Mapping[str, float]
+    requested: Collection[float]
 
     def state(self, time: float, nodes: NDArray[np.float64]) -> State:
         """The state at a time in s, with the nodes (n, 3) in mm."""
@@ -637,82 +603,69 @@ def read_nodes(path: Path) -> list[tuple[float, NDArray[np.float64]]]:
     return records
 
 
-class ModelRun(NamedTuple):
-    """A model to run for ``seconds`` of simulated time: its file and its films.
-
-    ``command`` runs it in its folder and records its nodes in ``NODES_FILE`` every ``PERIOD``.
-    ``read_log`` returns the first trouble in the text of its log, if any, and the steps per s.
-    ``requested`` are the pressures or volumes of the chambers.
-    """
-
-    simulator: str
-    model: Path
-    command: Sequence[str]
-    films: RecordedFilms
-    seconds: float
-    read_log: Callable[[str], tuple[str | None, float | None]]
-    requested: Collection[float]
+ReadLog = Callable[[str], tuple[str | None, float | None]]
+"""The first trouble in the text of a log, if any, and the steps per s."""
 
 
-def run_model(run: ModelRun, minutes: float, progress: Progress) -> Result:
-    """Run a model for at most so many minutes, read its nodes and judge them.
+def run_model(
+    simulator: str,
+    model: Path,
+    command: Sequence[str],
+    films: RecordedFilms,
+    read_log: ReadLog,
+    times: tuple[float, float],
+    progress: Progress,
+) -> Result:
+    """Run a model and judge its nodes; ``times`` are simulated seconds, and at most real minutes.
 
-    Its log stays beside it. Raises VoidError if it ends by itself, is killed, logs an error or has
+    ``command`` runs it in its folder and records its nodes in ``NODES_FILE`` every ``PERIOD``. Its
+    log stays beside it. Raises VoidError if it ends by itself, is killed, logs an error or has
     an impossible result; the message says how far the tip was known.
     """
-    folder, name = run.model.parent, run.model.name
-    program = Path(run.command[0]).name if run.simulator == "sofa" else run.simulator
+    folder, name, (seconds, minutes) = model.parent, model.name, times
+    program = Path(command[0]).name if simulator == "sofa" else simulator
     record, log = folder / NODES_FILE, folder / f"{program}.log"
     record.unlink(missing_ok=True)
-    periods = round(run.seconds / PERIOD)
+    periods = round(seconds / PERIOD)
 
     def look() -> None:
         done = record.read_bytes().count(b"T=") if record.is_file() else 0
         if done:
             progress(program, min(done - 1, periods), periods)
 
-    ended = run_program(run.command, log, 60 * minutes, look)
-    trouble, rate = run.read_log(log.read_text(encoding="utf-8", errors="replace"))
+    code, stopped = run_program(command, log, 60 * minutes, look)
+    trouble, rate = read_log(log.read_text(encoding="utf-8", errors="replace"))
     records = read_nodes(record)
-    why = _why_void(program, ended, trouble, [time for time, _ in records], run.seconds)
-    is_cut_short = ended.stopped is not None and bool(records) and trouble is None
-    if why is not None and not is_cut_short:
+    why = stopped.words if stopped else _why_void(program, code, trouble)
+    if not why and not records:
+        why = f"it wrote no place of a node into {NODES_FILE}"
+    if not why and records[-1][0] < seconds - 1.5 * PERIOD:
+        why = f"its record ends before {seconds:g} s or is not finite from there on"
+    is_cut_short = stopped is not None and bool(records) and trouble is None
+    if why and not is_cut_short:
         known = f"the tip is known to {records[-1][0]:g} s" if records else "nothing is known of it"
         raise VoidError(f"{name} did not run to its end: {why}; {known} (see {log})")
-    states = tuple(run.films.state(*each) for each in records)
-    figures = run.films.figures(states, records[-1][1])
-    wrong = impossible(
-        states[-1], limits(run.films.laminate, run.requested), figures.get("overlap", 0.0)
-    )
+    states = tuple(films.state(*each) for each in records)
+    figures = films.figures(states, records[-1][1])
+    last, passed = states[-1], figures.get("overlap", 0.0)
+    wrong = impossible(films.laminate, last, films.requested, passed)
     if wrong is not None:
-        raise VoidError(f"{name} ran to {states[-1].time:g} s, but its result cannot be: {wrong}")
+        raise VoidError(f"{name} ran to {last.time:g} s, but its result cannot be: {wrong}")
     record.unlink()
-    if ended.stopped is not None:
-        reached = f"{name} ran to {states[-1].time:g} of {run.seconds:g} s"
-        stopped = f"{reached}: {ended.stopped.words}; what it reached is kept"
-        return Result(run.simulator, states, figures, stopped)
+    if stopped is not None:
+        reached = f"{name} ran to {last.time:g} of {seconds:g} s: {stopped.words}"
+        return Result(simulator, states, figures, f"{reached}; what it reached is kept")
     progress(program, periods, periods)
-    return Result(run.simulator, states, figures | ({} if rate is None else {"rate": rate}))
+    return Result(simulator, states, figures | ({} if rate is None else {"rate": rate}))
 
 
-def _why_void(
-    program: str, ended: Ended, trouble: str | None, times: Sequence[float], seconds: float
-) -> str | None:
-    """Return the reason why a run did not come to its end, or None."""
-    code = ended.code
-    if ended.stopped is not None:
-        return ended.stopped.words
+def _why_void(program: str, code: int, trouble: str | None) -> str:
+    """Return the reason why a program that was not stopped has failed; empty if it has not."""
     if code < 0:
         return f"{program} was killed by signal {-code} ({signal.Signals(-code).name})"
     if trouble is not None:
         return f'its log says "{trouble[:200]}"'
-    if code > 0:
-        return f"{program} ended with exit code {code}"
-    if not times:
-        return f"it wrote no place of a node into {NODES_FILE}"
-    if times[-1] < seconds - 1.5 * PERIOD:
-        return f"its record ends before {seconds:g} s or is not finite from there on"
-    return None
+    return f"{program} ended with exit code {code}" if code > 0 else ""
 
 
 def tilt_of(points: NDArray[np.float64]) -> float:

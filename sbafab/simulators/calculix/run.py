@@ -41,7 +41,6 @@ from sbafab.simulators.simulator import (
     State,
     Stop,
     impossible,
-    limits,
     program_path,
     run_program,
 )
@@ -583,12 +582,11 @@ def _first_wrong(
     states: Sequence[LoadedState],
 ) -> tuple[int, str] | None:
     """Return the index of the first impossible frame, and the reason; decks have no contact."""
-    can_be = limits(laminate, settings.pressures.values())
     drawn_in = [name for name, pressure in settings.pressures.items() if pressure < 0]
     for number, (frame, state) in enumerate(zip(frames, states[1:], strict=True)):
         if any(films_meet(mesh, name, frame) for name in drawn_in):
             return number, "the films meet, and the deck has no contact and no loose sheets"
-        reason = impossible(state, replace(can_be, must_stand=False))
+        reason = impossible(laminate, state)
         if reason is not None:
             return number, reason
     return None

@@ -24,7 +24,6 @@ from sbafab.simulators.simulator import (
     DEFAULT_PRESSURE,
     NODES_FILE,
     RAMP,
-    ModelRun,
     RecordedFilms,
     Result,
     SimulationRequest,
@@ -132,9 +131,16 @@ def write_model(
     }
     write_files(texts, folder)
     films = np.concatenate([triangles for _, triangles, _ in mesh.groups])
-    walls = mesh.cavities
     return RecordedFilms(
-        laminate, mesh.rest, mesh.position, films, walls, mesh.tip, mesh.poles, pressures
+        laminate,
+        mesh.rest,
+        mesh.position,
+        films,
+        mesh.cavities,
+        mesh.tip,
+        mesh.poles,
+        pressures,
+        pressures.values(),
     )
 
 
@@ -188,9 +194,8 @@ def inflate(
     """Inflate the model that was written into a folder."""
     seconds = SECONDS if request.seconds is None else request.seconds
     command = [sys.executable, PYTHON, f"--seconds={seconds!r}", f"--record={NODES_FILE}"]
-    pressures = films.pressures.values()
-    run = ModelRun("mujoco", folder / MODEL, command, films, seconds, read_log, pressures)
-    result = run_model(run, request.minutes, progress)
+    model, times = folder / MODEL, (seconds, request.minutes)
+    result = run_model("mujoco", model, command, films, read_log, times, progress)
     for log in ("mujoco.log", "MUJOCO_LOG.TXT"):
         (folder / log).unlink(missing_ok=True)
     return result

@@ -12,7 +12,6 @@ from sbafab.simulators.coarse import why_not_round
 from sbafab.simulators.simulator import (
     DEFAULT_PRESSURE,
     PERIOD,
-    ModelRun,
     Result,
     SimulationRequest,
     chamber_pressures,
@@ -66,18 +65,15 @@ def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: 
     # Nodes are written at the beginning of a step: one more step writes the last.
     steps = round(seconds / scene.dt) + 1
     plugins = NEEDED.findall(text)
-    requested = scene.values["volumes" if scene.name == "volume" else "pressures"]
-    assert isinstance(requested, dict)
-    run = ModelRun(
+    result = run_model(
         "sofa",
         folder / scene.file,
         [program, "-g", "batch", "-n", str(steps), recorded.name],
         scene.films,
-        seconds,
         lambda log: read_log(log, plugins),
-        requested.values(),
+        (seconds, request.minutes),
+        progress,
     )
-    result = run_model(run, request.minutes, progress)
     recorded.unlink()
     return result
 

@@ -487,6 +487,8 @@ def scenes_of(
         shell = values["shell"]
         assert isinstance(shell, Shell)
         bears = name != "beam"
+        told = values.get("volumes", pressures)
+        assert isinstance(told, dict)
         films = RecordedFilms(
             laminate,
             shell.rest,
@@ -496,6 +498,7 @@ def scenes_of(
             shell.tip,
             shell.tip,
             pressures if name != "volume" else {},
+            told.values(),
         )
         scenes[name] = Scene(name, file, dt, films, {**values, "pressures": pressures})
 
