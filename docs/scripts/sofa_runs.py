@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import sbafab
@@ -21,7 +22,7 @@ from docs.scripts.axisymmetric import MeridianSection, axisymmetric_strokes
 from docs.scripts.measured import Record, keep
 from docs.scripts.tables import Table
 from sbafab.process import ignore_progress
-from sbafab.simulators.coarse import CoarseActuator
+from sbafab.simulators.coarse import Shell, round_stack
 from sbafab.simulators.simulator import Result, SimulationRequest
 from sbafab.simulators.sofa import scenes as scene_files
 from sbafab.simulators.sofa.run import run
@@ -126,9 +127,9 @@ def finer() -> Iterator[list[str]]:
     """Scene A with rings of more and fewer corners at 5 kPa."""
     yield row("corners of a ring", "nodes", "height, mm", "steps/s")
     for sectors in (8, 12, 16):
-        with _changed(lambda made, n=sectors: replace(made, sectors=n)):
+        with _made(lambda stack, *_, n=sectors: ROUND(stack, n)):
             done, rate = ran([5.0] * 3)
-        nodes = len(scene_files.round_actuator(sbafab.build(NAME), sectors).mesh.rest)
+        nodes = len(ROUND(round_stack(sbafab.build(NAME)), sectors).rest)
         yield row(sectors, nodes, f"{done.last.tip[2]:.2f}", f"{rate:.0f}")
 
 
@@ -145,44 +146,43 @@ def three() -> Iterator[list[str]]:
 def bending() -> Iterator[list[str]]:
     """What the bend depends on, at 5 kPa in one chamber and in two."""
     yield row("", "5 kPa in one chamber", "in two")
-    cases: dict[str, Callable[[CoarseActuator], CoarseActuator]] = {
-        "as drawn": lambda made: made,
-        "pockets 0.3 mm smaller in radius": lambda made: _stack(made, pockets=(2.2,) * 15),
-        "neck discs of radius 1.6 for 1.25": lambda made: _stack(made, neck=1.6),
-        "films that bend ten times as hard": lambda made: _Stiff.of(made, 10.0),
-        "a tenth as hard": lambda made: _Stiff.of(made, 0.1),
+    cases: dict[str, Callable[..., Shell]] = {
+        "as drawn": ROUND,
+        "pockets 0.3 mm smaller in radius": _of(pockets=(2.2,) * 15),
+        "neck discs of radius 1.6 for 1.25": _of(neck=1.6),
+        "films that bend ten times as hard": _stiff(10.0),
+        "a tenth as hard": _stiff(0.1),
     }
-    for name, change in cases.items():
+    for name, make in cases.items():
         cells = []
         for pressures in ([5.0, 0.0, 0.0], [5.0, 5.0, 0.0]):
-            with _changed(change):
+            with _made(make):
                 done, _ = ran(pressures)
             cells.append(f"{done.last.tilt:.1f}")
         yield row(name, *cells)
 
 
-class _Stiff(CoarseActuator):
-    """An actuator whose films bend harder, and stretch as before."""
-
-    factor = 1.0
-
-    @classmethod
-    def of(cls, made: CoarseActuator, factor: float) -> CoarseActuator:
-        harder = cls(made.stack, made.sectors, made.start, made.is_fair)
-        object.__setattr__(harder, "factor", factor)
-        return harder
-
-    def bending(self, films: int) -> float:
-        return self.factor * super().bending(films)
+ROUND = scene_files.round_shell
 
 
-def _stack(made: CoarseActuator, **other: object) -> CoarseActuator:
-    return replace(made, stack=replace(made.stack, **other))  # type: ignore[arg-type]
+def _stiff(factor: float) -> Callable[..., Shell]:
+    """Films that bend harder, and stretch as before."""
+
+    def make(*given: Any) -> Shell:
+        shell = ROUND(*given)
+        groups = (g._replace(stiffness=factor * g.stiffness) for g in shell.bending)
+        return replace(shell, bending=tuple(groups))
+
+    return make
 
 
-def _changed(change: Callable[[CoarseActuator], CoarseActuator]) -> mock._patch[object]:
-    make = scene_files.round_actuator
-    return mock.patch.object(scene_files, "round_actuator", lambda *given: change(make(*given)))
+def _of(**other: Any) -> Callable[..., Shell]:
+    """The shell of another stack."""
+    return lambda stack, *given: ROUND(replace(stack, **other), *given)
+
+
+def _made(make: Callable[..., Shell]) -> mock._patch[object]:
+    return mock.patch.object(scene_files, "round_shell", make)
 
 
 def row(*cells: object) -> list[str]:

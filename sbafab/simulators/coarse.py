@@ -1,16 +1,18 @@
-"""The coarse shell of a stack of round pockets: mid-surfaces that share nodes where bonded.
+"""The shell that simulators take, and the coarse one of a stack of round pockets: mid-surfaces that
+share nodes where bonded.
 
-Each pocket has rings of nodes at bore, neck, edge and between neck and edge; the web between the
-pockets and the neck rings are one layer of double thickness. Inlet tabs and strips are omitted.
+Each round pocket has rings of nodes at bore, neck, edge and between neck and edge; the web between
+the pockets and the neck rings are one layer of double thickness. Inlet tabs and strips are omitted.
 Lengths mm, volumes ul.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,69 @@ from sbafab.laminate.laminate import Interface, Laminate
 
 Triangles = NDArray[np.int64]
 """Node numbers (k, 3), counter-clockwise seen from outside."""
+Ring = NDArray[np.int64]
+
+
+class FilmGroup(NamedTuple):
+    """Triangles of one stiffness: E t in mN/mm of a membrane, or bending stiffness in mN mm."""
+
+    name: str
+    triangles: Triangles
+    stiffness: float
+    poisson: float
+
+
+@dataclass(frozen=True, eq=False)
+class Shell:
+    """Nodes (n, 3) at ``rest`` (flat) and at the start (``position``), and the films on them.
+
+    ``membranes`` partition all triangles; in a group of ``bending`` an edge has at most two.
+    ``cavities`` are closed surfaces by chamber, normals out of the air. ``fixed`` nodes do not
+    move; the plane of the ``tip`` nodes, counter-clockwise from above, gives its tilt. ``mass`` is
+    the true mass in kg, ``size`` the largest pocket radius over 2.5 mm, ``about`` a sentence on the
+    mesh. ``roots`` and ``poles`` are the centres of the lowest and of the highest film over each
+    axis of round pockets.
+    """
+
+    rest: NDArray[np.float64]
+    position: NDArray[np.float64]
+    membranes: tuple[FilmGroup, ...]
+    bending: tuple[FilmGroup, ...]
+    cavities: Mapping[str, Triangles]
+    fixed: Ring
+    tip: Ring
+    roots: Ring
+    poles: Ring
+    mass: float = 0.0
+    size: float = 1.0
+    about: str = ""
+
+    @property
+    def triangles(self) -> Triangles:
+        """All films."""
+        return np.concatenate([group.triangles for group in self.membranes])
+
+    @property
+    def height(self) -> float:
+        """Height at the start in mm."""
+        return float(self.position[:, 2].max())
+
+    def volume(self, chamber: str) -> float:
+        """Volume of the chamber's cavity at the start."""
+        return enclosed(self.position, self.cavities[chamber])
+
+
+def enclosed(points: NDArray[np.float64], triangles: Triangles) -> float:
+    """Volume inside a closed surface whose normals point outward."""
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+
+
+def areas(points: NDArray[np.float64], triangles: Triangles) -> NDArray[np.float64]:
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    sizes: NDArray[np.float64] = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return sizes
+
 
 # Round pockets on their axes, taken from a laminate's profiles.
 
@@ -62,6 +127,33 @@ class RoundStack:
     @property
     def lobes(self) -> int:
         return len(self.axes)
+
+    @property
+    def balloons(self) -> int:
+        return len(self.pockets)
+
+    @property
+    def size(self) -> float:
+        """Mean pocket radius relative to the measured pocket of 5 mm."""
+        return sum(self.pockets) / self.balloons / 2.5
+
+    @property
+    def young(self) -> float:
+        """Young's modulus of the film in kPa."""
+        return 1000 * elastic_of(self.film)[0]
+
+    @property
+    def poisson(self) -> float:
+        return elastic_of(self.film)[1]
+
+    @property
+    def membrane(self) -> float:
+        """E t of one film in kPa mm = mN/mm."""
+        return self.young * self.film.thickness
+
+    def bending(self, films: int) -> float:
+        """Bending stiffness of ``films`` bonded films, in mN mm."""
+        return self.young * (films * self.film.thickness) ** 3 / (12 * (1 - self.poisson**2))
 
     def with_fair_rings(self, sectors: int) -> RoundStack:
         """Return the stack whose rings of ``sectors`` corners have the area of these circles.
@@ -398,84 +490,44 @@ SECTORS = 8
 """Nodes per ring; a multiple of four."""
 RING_STEP = 0.25
 """Distance of the rings between neck and edge, in pocket radii."""
+FILMS = {"bend_lower": 1, "bend_upper": 1, "bend_web": 2, "bend_neck": 2}
+"""Groups of the coarse shell's triangles, and the number of films bonded in each."""
 
-Ring = NDArray[np.int64]
+
+def node_masses(shell: Shell, film: Film) -> NDArray[np.float64]:
+    """True mass (n,) in kg of each node of a coarse shell: a third of each triangle's."""
+    masses = np.zeros(len(shell.rest))
+    dense = density_of(film, "a simulation")
+    for group in shell.bending:
+        weight = FILMS[group.name] * film.thickness * dense * 1e-9
+        of_each = areas(shell.rest, group.triangles) / 3 * weight
+        np.add.at(masses, group.triangles, of_each[:, None])
+    return masses
 
 
-@dataclass(frozen=True, eq=False)
-class CoarseMesh:
-    """Nodes (n, 3) flat (``rest``) and inflated (``position``), and the triangles of every group.
+def coarse_shell(
+    stack: RoundStack, sectors: int = SECTORS, start: Start = fullest, is_fair: bool = False
+) -> Shell:
+    """The shell of a stack, inflated to the ``start`` shape of each pocket and neck radius.
 
-    ``lower`` and ``upper`` are the free films, ``web`` and ``necks`` are bonded pairs. In each
-    group an edge has at most two triangles. ``cavities`` holds one closed surface per chamber,
-    normals out of the air. ``fixed`` are the nodes on the ground. ``tip`` are nodes whose mean is
-    the tip and whose plane gives its tilt, counter-clockwise from above; ``roots`` and ``poles``
-    are the centres of the lowest and of the highest film over each chamber axis.
+    ``sectors`` is the number of nodes per ring. A ring has the area of its circle if ``is_fair``,
+    otherwise it is inscribed in the circle.
     """
-
-    rest: NDArray[np.float64]
-    position: NDArray[np.float64]
-    lower: Triangles
-    upper: Triangles
-    web: Triangles
-    necks: Triangles
-    cavities: dict[str, Triangles]
-    fixed: Ring
-    tip: Ring
-    roots: Ring
-    poles: Ring
-
-    @property
-    def groups(self) -> list[tuple[str, Triangles, int]]:
-        """The groups that have triangles: name, triangles, number of films bonded in each."""
-        films = {"lower": 1, "upper": 1, "web": 2, "necks": 2}
-        groups = [(name, getattr(self, name), count) for name, count in films.items()]
-        return [group for group in groups if len(group[1])]
-
-    @property
-    def single(self) -> Triangles:
-        """Triangles of a single film."""
-        return np.concatenate([self.lower, self.upper])
-
-    @property
-    def double(self) -> Triangles:
-        """Triangles of two bonded films."""
-        return np.concatenate([self.web, self.necks])
-
-    @property
-    def height(self) -> float:
-        """Height at the inflated start."""
-        return float(self.position[:, 2].max())
-
-    def volume(self, chamber: str) -> float:
-        """Volume of the chamber's cavity at the start."""
-        return enclosed(self.position, self.cavities[chamber])
-
-    def masses(self, film: Film) -> NDArray[np.float64]:
-        """True mass (n,) in kg of each node: a third of each triangle's."""
-        masses = np.zeros(len(self.rest))
-        dense = density_of(film, "a simulation")
-        for _, triangles, films in self.groups:
-            of_each = areas(self.rest, triangles) / 3 * films * film.thickness * dense * 1e-9
-            np.add.at(masses, triangles, of_each[:, None])
-        return masses
-
-
-def enclosed(points: NDArray[np.float64], triangles: Triangles) -> float:
-    """Volume inside a closed surface whose normals point outward."""
-    a, b, c = points[triangles].transpose(1, 0, 2)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
-
-
-def areas(points: NDArray[np.float64], triangles: Triangles) -> NDArray[np.float64]:
-    a, b, c = points[triangles].transpose(1, 0, 2)
-    sizes: NDArray[np.float64] = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    return sizes
-
-
-def coarse_mesh(stack: RoundStack, start: Start = fullest, sectors: int = SECTORS) -> CoarseMesh:
-    """The mesh of a stack, inflated to the ``start`` shape of each pocket and neck radius."""
-    return _Builder(stack, [start(pocket, stack.neck) for pocket in stack.pockets], sectors).mesh()
+    meshed = stack.with_fair_rings(sectors) if is_fair else stack
+    meridians = [start(pocket, meshed.neck) for pocket in meshed.pockets]
+    shell = _Builder(meshed, meridians, sectors).shell()
+    balloon_ul = shell.volume(stack.chambers[0]) / stack.balloons
+    return replace(
+        shell,
+        mass=float(node_masses(shell, stack.film).sum()),
+        size=max(stack.pockets) / 2.5,
+        about=(
+            f"{len(shell.rest)} nodes, {len(shell.triangles)} triangles; rings of {sectors} "
+            "corners have the area of\nthe circles. It starts "
+            f"{shell.height:.4g} mm high ({balloon_ul:.3g} ul a balloon). Inlet tabs and strips "
+            "are left out."
+        ),
+    )
 
 
 class _Builder:
@@ -490,16 +542,16 @@ class _Builder:
         self.position: list[NDArray[np.float64]] = []
         self.count = 0
         self.films: dict[str, list[Triangles]] = {
-            name: [np.empty((0, 3), dtype=np.int64)] for name in ("lower", "upper", "web", "necks")
+            name: [np.empty((0, 3), dtype=np.int64)] for name in FILMS
         }
         self.cavities: list[list[Triangles]] = [[] for _ in stack.axes]
 
-    def mesh(self) -> CoarseMesh:
+    def shell(self) -> Shell:
         lobes, last = range(self.stack.lobes), len(self.meridians) - 1
         z = 0.0
         base = discs = [self._disc(k, z, closed=True) for k in lobes]
         for k, disc_rings in enumerate(base):
-            self._wall(k, "lower", reverse(_cap(disc_rings)))
+            self._wall(k, "bend_lower", reverse(_cap(disc_rings)))
         for balloon, meridian in enumerate(self.meridians):
             middle, above = z + meridian.height, z + 2 * meridian.height
             tops = [self._disc(k, above, closed=balloon == last) for k in lobes]
@@ -508,20 +560,35 @@ class _Builder:
                 edge = self._ring(k, self.stack.pockets[balloon], meridian.edge, middle)
                 edges.append(edge)
                 film = self._film(k, balloon, middle, -1, discs[k][-1], edge)
-                self._wall(k, "lower", reverse(film))
-                self._wall(k, "upper", self._film(k, balloon, middle, 1, tops[k][-1], edge))
+                self._wall(k, "bend_lower", reverse(film))
+                self._wall(k, "bend_upper", self._film(k, balloon, middle, 1, tops[k][-1], edge))
                 if balloon < last:
-                    self.films["necks"].append(annulus(*tops[k]))
-            self.films["web"].append(self._web(balloon, middle, edges))
+                    self.films["bend_neck"].append(annulus(*tops[k]))
+            self.films["bend_web"].append(self._web(balloon, middle, edges))
             discs, z = tops, above
         for k, disc_rings in enumerate(discs):
-            self._wall(k, "upper", _cap(disc_rings))
-        cavities = zip(self.stack.chambers, map(np.concatenate, self.cavities), strict=True)
-        return CoarseMesh(
+            self._wall(k, "bend_upper", _cap(disc_rings))
+        return self._finished(base, discs)
+
+    def _finished(self, base: list[list[Ring]], discs: list[list[Ring]]) -> Shell:
+        stack, nu = self.stack, self.stack.poisson
+        films = {name: np.concatenate(parts) for name, parts in self.films.items()}
+        lower, upper, web, neck = films.values()
+        single, double = np.concatenate([lower, upper]), np.concatenate([web, neck])
+        cavities = map(np.concatenate, self.cavities)
+        return Shell(
             np.concatenate(self.rest).round(6),
             np.concatenate(self.position).round(6),
-            **{name: np.concatenate(parts) for name, parts in self.films.items()},
-            cavities=dict(cavities),
+            (
+                FilmGroup("membrane1", single, stack.membrane, nu),
+                FilmGroup("membrane2", double, 2 * stack.membrane, nu),
+            ),
+            tuple(
+                FilmGroup(name, triangles, stack.bending(FILMS[name]), nu)
+                for name, triangles in films.items()
+                if len(triangles)
+            ),
+            dict(zip(stack.chambers, cavities, strict=True)),
             fixed=np.concatenate([ring for rings in base for ring in rings]),
             tip=self._tip(discs),
             roots=np.array([rings[0][0] for rings in base]),
@@ -623,55 +690,3 @@ def annulus(inner: Ring, outer: Ring) -> Triangles:
 def reverse(triangles: Triangles) -> Triangles:
     """Return the triangles seen from the other side, beginning with the same edge."""
     return triangles[:, [1, 0, 2]]
-
-
-@dataclass(frozen=True)
-class CoarseActuator:
-    """A stack of round balloons, and how it is meshed.
-
-    ``sectors`` is the number of nodes per ring; ``start`` the start shape of each balloon. A ring
-    has the area of its circle if ``is_fair``, otherwise it is inscribed in the circle.
-    """
-
-    stack: RoundStack
-    sectors: int = SECTORS
-    start: Start = field(default=fullest)
-    is_fair: bool = False
-
-    @cached_property
-    def mesh(self) -> CoarseMesh:
-        """The coarse shell, inflated."""
-        stack = self.stack.with_fair_rings(self.sectors) if self.is_fair else self.stack
-        return coarse_mesh(stack, self.start, self.sectors)
-
-    @property
-    def young(self) -> float:
-        """Young's modulus of the film in kPa."""
-        return 1000 * elastic_of(self.stack.film)[0]
-
-    @property
-    def poisson(self) -> float:
-        return elastic_of(self.stack.film)[1]
-
-    @property
-    def membrane(self) -> float:
-        """E t of one film in kPa mm = mN/mm."""
-        return self.young * self.stack.film.thickness
-
-    def bending(self, films: int) -> float:
-        """Bending stiffness of ``films`` bonded films, in mN mm."""
-        return self.young * (films * self.stack.film.thickness) ** 3 / (12 * (1 - self.poisson**2))
-
-    @cached_property
-    def mass(self) -> float:
-        """True mass of the films in kg, without tabs."""
-        return float(self.mesh.masses(self.stack.film).sum())
-
-    @property
-    def balloons(self) -> int:
-        return len(self.stack.pockets)
-
-    @property
-    def size(self) -> float:
-        """Mean pocket radius relative to the measured pocket of 5 mm."""
-        return sum(self.stack.pockets) / self.balloons / 2.5

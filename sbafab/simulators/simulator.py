@@ -26,7 +26,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.plugins import Plugins
 from sbafab.process import Progress
-from sbafab.simulators.coarse import enclosed, pocket_radii, why_not_round
+from sbafab.simulators.coarse import Shell, enclosed, pocket_radii, why_not_round
 
 SIMULATORS = Plugins(
     plugins.SIMULATORS,
@@ -535,35 +535,30 @@ RAMP = 1.0
 
 @dataclass(frozen=True, eq=False)
 class RecordedFilms:
-    """Nodes and films of a model of a laminate, from which its motion is read.
+    """The shell of a laminate whose nodes are recorded, from which its motion is read.
 
-    ``rest`` and ``start`` (n, 3) are the nodes in mm when flat and at the start; ``triangles``
-    (k, 3) all films, ``cavities`` closed surfaces by chamber, normals out of the air; both are
-    empty if films bear nothing. The mean of the ``middle`` nodes is the tip, the plane of the
-    ``tip`` nodes its tilt. ``pressures`` are kPa by chamber at the end, empty with volumes;
-    ``requested`` are the pressures or volumes of all chambers.
+    It has no triangles and cavities if films bear nothing. The mean of the ``middle`` nodes is the
+    tip. ``pressures`` are kPa by chamber at the end, empty with volumes; ``requested`` are the
+    pressures or volumes of all chambers.
     """
 
     laminate: Laminate
-    rest: NDArray[np.float64]
-    start: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-    cavities: Mapping[str, NDArray[np.int64]]
-    tip: NDArray[np.int64]
+    shell: Shell
     middle: NDArray[np.int64]
     pressures: Mapping[str, float]
     requested: Collection[float]
 
     def state(self, time: float, nodes: NDArray[np.float64]) -> State:
         """The state at a time in s, with the nodes (n, 3) in mm."""
-        on = min(1.0, time / RAMP)
+        on, shell = min(1.0, time / RAMP), self.shell
         pressures = {name: on * value for name, value in self.pressures.items()}
-        volumes = {name: enclosed(nodes, walls) for name, walls in self.cavities.items()}
+        volumes = {name: enclosed(nodes, walls) for name, walls in shell.cavities.items()}
         if self.laminate.tube is not None:
             return State(time, pressures, None, None, None, volumes)
-        x, y, z = (nodes[self.middle].mean(axis=0) - self.rest[self.middle].mean(axis=0)).tolist()
+        moved = nodes[self.middle].mean(axis=0) - shell.rest[self.middle].mean(axis=0)
+        x, y, z = moved.tolist()
         height = sum(layer.film.thickness for layer in self.laminate.tpe_layers) + z
-        return State(time, pressures, height, (x, y, z), tilt_of(nodes[self.tip]), volumes)
+        return State(time, pressures, height, (x, y, z), tilt_of(nodes[shell.tip]), volumes)
 
     def figures(self, states: Sequence[State], nodes: NDArray[np.float64]) -> dict[str, float]:
         """Figures of a run by name of ``FIGURES``, from its states and its last nodes."""
@@ -572,9 +567,11 @@ class RecordedFilms:
             figures["drift"] = drift(states)
         else:
             # Distance of the balloons' crowns from their tube's axis.
-            figures["diameter"] = float(2 * np.linalg.norm(nodes[self.tip, :2], axis=1).mean())
-        if len(self.triangles):
-            figures["overlap"] = overlap(nodes, self.rest, self.start, self.triangles)
+            radii = np.linalg.norm(nodes[self.shell.tip, :2], axis=1)
+            figures["diameter"] = float(2 * radii.mean())
+        if self.shell.membranes:
+            flat, start = self.shell.rest, self.shell.position
+            figures["overlap"] = overlap(nodes, flat, start, self.shell.triangles)
         return figures
 
 

@@ -20,7 +20,7 @@ from sbafab.folders.run import Run, RunRequest, generate
 from sbafab.pressing.schedule import schedule
 from sbafab.rules.deck import has_failed
 from sbafab.simulators.calculix.deck import deck_settings
-from sbafab.simulators.coarse import CoarseActuator, round_stack, why_not_round
+from sbafab.simulators.coarse import coarse_shell, round_stack, why_not_round
 from sbafab.simulators.mujoco.run import model_text
 from sbafab.simulators.sofa.scenes import why_no_scene
 
@@ -152,15 +152,15 @@ def test_calculix_takes_each_film_and_the_coarse_shell_one_that_is_known(
         build(design.with_(*(f"layup.{role}={name}" for role in ("base", "wall", "cap"))))
         for name in ("tpu50", "tpe", "pet")
     )
-    coarse = {film: CoarseActuator(round_stack(film)) for film in (tpu, tpe)}
-    model = model_text(coarse[tpu], {"chamber1": 5.0})
+    stack = round_stack(tpu)
+    shells = [coarse_shell(stack), coarse_shell(round_stack(tpe))]
+    model = model_text(stack, shells[0], {"chamber1": 5.0})
     assert 'young="200000"' in model
     assert 'poisson="0.3"' in model
     # Two bonded films of 0.05 mm, and the mass of TPU at 1200 kg/m3 instead of TPE's.
     assert 'thickness="0.01"' in model
-    assert coarse[tpu].bending(1) == pytest.approx(20e3 * 0.05**3 / 12 / (1 - 0.09))
-    ratio = coarse[tpu].mass / coarse[tpe].mass
-    assert ratio == pytest.approx(0.05 * 1200 / (0.038 * 1122))
+    assert stack.bending(1) == pytest.approx(20e3 * 0.05**3 / 12 / (1 - 0.09))
+    assert shells[0].mass / shells[1].mass == pytest.approx(0.05 * 1200 / (0.038 * 1122))
     assert "add films.pet.modulus, in MPa" in (why_not_round(pet) or "")
     assert why_no_scene(tpu) is None
     with pytest.raises(DesignError, match=r"add films.pet.modulus, in MPa"):

@@ -12,7 +12,7 @@ from sbafab.models.figures import Prediction, PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.models.stack import stack
 from sbafab.simulators.calculix.deck import deck_settings
-from sbafab.simulators.coarse import CoarseActuator, round_stack
+from sbafab.simulators.coarse import coarse_shell, round_stack
 
 TPU = ("films.tpe.product=TPU 85A", "films.tpe.thickness=0.05")
 KNOWN = (*TPU, "films.tpe.modulus=20", "films.tpe.poisson=0.45")
@@ -101,7 +101,7 @@ def test_masses_and_weights_need_a_density() -> None:
     with pytest.raises(DesignError, match=r"CalculiX needs the density of TPE"):
         deck_settings(build(design))
     with pytest.raises(DesignError, match=r"a simulation needs the density of TPE"):
-        assert CoarseActuator(round_stack(build(design))).mass
+        assert coarse_shell(round_stack(build(design))).mass
     heavy = build(load_design("1dof-5mm", (*KNOWN, "films.tpe.density=2244")))
     paper = build(load_design("1dof-5mm", ("films.tpe.thickness=0.05",)))
     tpe = sum(layer.profile.area * 0.05 * 1122e-6 for layer in paper.tpe_layers)

@@ -12,12 +12,11 @@ import trimesh
 
 import sbafab
 from sbafab.simulators.coarse import (
-    CoarseActuator,
-    CoarseMesh,
     Meridian,
+    Shell,
     Triangles,
     areas,
-    coarse_mesh,
+    coarse_shell,
     fullest,
     holding,
     round_stack,
@@ -37,8 +36,8 @@ DESIGNS = [
 
 
 @cache
-def mesh_of(*design: str) -> CoarseMesh:
-    return coarse_mesh(round_stack(sbafab.build(*design)))
+def mesh_of(*design: str) -> Shell:
+    return coarse_shell(round_stack(sbafab.build(*design)))
 
 
 def edges(triangles: Triangles) -> Counter[tuple[int, int]]:
@@ -48,7 +47,7 @@ def edges(triangles: Triangles) -> Counter[tuple[int, int]]:
 def test_the_paper_s_actuator_has_the_size_that_was_run() -> None:
     mesh = mesh_of(LOBED)
     assert mesh.rest.shape == mesh.position.shape == (2304, 3)
-    assert len(mesh.single) + len(mesh.double) == 4596
+    assert len(mesh.triangles) == 4596
     assert len(mesh.fixed) == 3 * 17
     assert not mesh.position[mesh.fixed, 2].any()
     assert not mesh.rest[:, 2].any()
@@ -63,13 +62,13 @@ def test_groups_are_manifold_without_slivers_and_cavities_are_closed(
     design: tuple[str, ...],
 ) -> None:
     mesh, laminate = mesh_of(*design), sbafab.build(*design)
-    triangles = np.concatenate([mesh.single, mesh.double])
-    for _, group, _ in mesh.groups:
-        assert set(edges(group).values()) == {1}
+    triangles = mesh.triangles
+    for group in mesh.bending:
+        assert set(edges(group.triangles).values()) == {1}
     assert set(triangles.ravel().tolist()) == set(range(len(mesh.rest)))
     for points in (mesh.rest, mesh.position):
         assert areas(points, triangles).min() > 0.05
-        a, b, c = points[mesh.double].transpose(1, 0, 2)
+        a, b, c = points[mesh.membranes[1].triangles].transpose(1, 0, 2)
         assert np.cross(b - a, c - a)[:, 2].min() > 0.05
     tip = mesh.position[mesh.tip]
     assert np.cross(tip[1] - tip[0], tip[2] - tip[1])[2] > 0.5
@@ -104,21 +103,24 @@ def test_a_mirrored_mesh_is_the_same_and_begins_its_triangles_alike(
     begin with others, a chamber on the axis of x bends the actuator out of its plane.
     """
     design = (LOBED, f"chamber.count={count}", "stack.balloons=2")
-    mesh = coarse_mesh(round_stack(sbafab.build(*design)), sectors=sectors)
+    mesh = coarse_shell(round_stack(sbafab.build(*design)), sectors=sectors)
     places = (mesh.position.round(4) + 0.0).tolist()
     nodes = {(x, y, z): i for i, (x, y, z) in enumerate(places)}
     mirror = [nodes[x, -y + 0.0, z] for x, y, z in places]
-    for _, group, _ in mesh.groups:
-        begun = {(frozenset((a, b)), c) for a, b, c in group.tolist()}
-        mirrored = {(frozenset((mirror[a], mirror[b])), mirror[c]) for a, b, c in group.tolist()}
+    for group in mesh.bending:
+        rows = group.triangles.tolist()
+        begun = {(frozenset((a, b)), c) for a, b, c in rows}
+        mirrored = {(frozenset((mirror[a], mirror[b])), mirror[c]) for a, b, c in rows}
         assert begun == mirrored
 
 
 def test_fair_rings_have_the_area_of_circles() -> None:
     stack = round_stack(sbafab.build("1dof-5mm", "stack.balloons=1"))
     for sectors in (8, 12):
-        mesh = CoarseActuator(stack, sectors, is_fair=True).mesh
-        assert areas(mesh.rest, mesh.lower).sum() == pytest.approx(math.pi * 2.5**2, rel=1e-6)
+        mesh = coarse_shell(stack, sectors, is_fair=True)
+        assert areas(mesh.rest, mesh.bending[0].triangles).sum() == pytest.approx(
+            math.pi * 2.5**2, rel=1e-6
+        )
 
 
 def test_the_parabola_without_a_neck_is_the_paper_s() -> None:

@@ -17,8 +17,9 @@ import pytest
 import sbafab
 from sbafab.errors import OutputError
 from sbafab.process import ignore_progress
+from sbafab.simulators.coarse import round_stack
 from sbafab.simulators.mujoco import run as of_mujoco
-from sbafab.simulators.mujoco.run import coarse_actuator, export, inflate, run, why_not
+from sbafab.simulators.mujoco.run import export, inflate, run, shell_of, why_not
 from sbafab.simulators.simulator import Result, SimulationRequest
 from tests.quick import few
 
@@ -57,7 +58,7 @@ def test_mujoco_reads_the_mesh_as_it_was_meant(tmp_path: Path, design: tuple[str
 
     The model's lengths are cm.
     """
-    mesh = coarse_actuator(sbafab.build(*design), {"chamber1": 5.0}, 8).mesh
+    mesh = shell_of(round_stack(sbafab.build(*design)), {"chamber1": 5.0}, 8)
     model = mujoco.MjModel.from_xml_path(str(written(tmp_path, *design)))
     state = mujoco.MjData(model)
     mujoco.mj_kinematics(model, state)
@@ -73,7 +74,7 @@ def test_mujoco_reads_the_mesh_as_it_was_meant(tmp_path: Path, design: tuple[str
     corners = model.flex_elem.reshape(-1, 3)
     first = np.repeat(model.flex_vertadr, model.flex_elemnum)
     read = {tuple(map(int, bodies[t + start])) for t, start in zip(corners, first, strict=True)}
-    assert read == {tuple(t) for _, group, _ in mesh.groups for t in group.tolist()}
+    assert read == {tuple(t) for group in mesh.bending for t in group.triangles.tolist()}
     assert model.opt.gravity.tolist() == [0, 0, 0]
 
 

@@ -178,13 +178,13 @@ def test_a_record_cut_short_keeps_what_is_whole(tmp_path: Path) -> None:
 def test_air_is_that_of_the_recorded_films() -> None:
     """At the start a balloon is the paper's parabola; rings of 12 have the area of its circles."""
     films = scenes_of(laminate(), {"chamber1": 5.0})["shell"].films
-    state = films.state(0.5, films.start)
+    state = films.state(0.5, films.shell.position)
     balloon = nearly_flat(2.5, 1.25)
     assert state.volumes["chamber1"] == pytest.approx(balloon.volume, rel=0.05)
     assert state.pressures == {"chamber1": 2.5}
-    assert films.figures([state], films.start)["overlap"] == 0
+    assert films.figures([state], films.shell.position)["overlap"] == 0
     # Upside down, all the air is where films have passed through each other.
-    lowered = films.start * [1, 1, -1]
+    lowered = films.shell.position * [1, 1, -1]
     passed = films.figures([state], lowered)["overlap"]
     assert passed == pytest.approx(balloon.volume, rel=0.1)
 

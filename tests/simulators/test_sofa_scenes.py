@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import sbafab
+from sbafab.simulators.coarse import round_stack
 from sbafab.simulators.simulator import SimulationRequest
 from sbafab.simulators.sofa.run import export
 from sbafab.simulators.sofa.scenes import (
     beam_of,
     conforming_shell,
-    round_actuator,
     scenes_of,
 )
 
@@ -194,7 +194,7 @@ def test_the_beam_stretches_and_bends_as_fitted(folder: Path) -> None:
     radius, young = float(field["radius"]), float(field["youngModulus"])
     assert young * math.pi * radius**2 == pytest.approx(3 * 7 * 7.2)
     assert young * math.pi * radius**4 / 4 == pytest.approx(1.5 * 7 * 4.25**2 * 7.2)
-    beam = beam_of(round_actuator(sbafab.build("3dof-15mm")))
+    beam = beam_of(round_stack(sbafab.build("3dof-15mm")))
     assert beam.height + 5 * beam.area / beam.spring == pytest.approx(17.49, abs=0.1)
     frames = numbers(
         next(parsed(folder / "actuator_beam.scn").iter("MechanicalObject")).attrib["position"]

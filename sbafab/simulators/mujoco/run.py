@@ -8,7 +8,6 @@ import json
 import re
 import sys
 from collections.abc import Mapping
-from dataclasses import replace
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,7 +17,17 @@ import numpy as np
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.process import Progress
-from sbafab.simulators.coarse import CoarseActuator, nearly_flat, round_stack, why_not_round
+from sbafab.simulators.coarse import (
+    FILMS,
+    RoundStack,
+    Shell,
+    coarse_shell,
+    fullest,
+    nearly_flat,
+    node_masses,
+    round_stack,
+    why_not_round,
+)
 from sbafab.simulators.model_files import model_file, write_files
 from sbafab.simulators.simulator import (
     DEFAULT_PRESSURE,
@@ -45,21 +54,19 @@ film; with mm the solver needs forty times the iterations."""
 START = "inflated"
 SECTORS = 16
 """Nodes per ring. Eight, as in SOFA's scenes, take a quarter of the time and rise 13 % less."""
-COLOURS = {
-    "lower": "0.35 0.60 0.85 1",
-    "upper": "0.55 0.75 0.95 1",
-    "web": "0.20 0.35 0.60 1",
-    "necks": "0.90 0.60 0.25 1",
+FLEXES = {
+    "bend_lower": ("lower", "0.35 0.60 0.85 1"),
+    "bend_upper": ("upper", "0.55 0.75 0.95 1"),
+    "bend_web": ("web", "0.20 0.35 0.60 1"),
+    "bend_neck": ("necks", "0.90 0.60 0.25 1"),
 }
+"""Names and colours of the flexes, by the group of the shell's triangles."""
 
 
-def coarse_actuator(
-    laminate: Laminate, pressures: Mapping[str, float], sectors: int = SECTORS
-) -> CoarseActuator:
-    """The coarse actuator of a laminate. Raises DesignError if its pockets are not round."""
-    made = CoarseActuator(round_stack(laminate), sectors)
+def shell_of(stack: RoundStack, pressures: Mapping[str, float], sectors: int = SECTORS) -> Shell:
+    """The coarse shell of a stack of round pockets."""
     # Films that fall far onto each other need many iterations.
-    return replace(made, start=nearly_flat) if has_contact(pressures) else made
+    return coarse_shell(stack, sectors, nearly_flat if has_contact(pressures) else fullest)
 
 
 def has_contact(pressures: Mapping[str, float]) -> bool:
@@ -67,33 +74,37 @@ def has_contact(pressures: Mapping[str, float]) -> bool:
     return len(set(pressures.values())) > 1
 
 
-def model_text(actuator: CoarseActuator, pressures: Mapping[str, float]) -> str:
+def model_text(
+    stack: RoundStack, shell: Shell, pressures: Mapping[str, float], sectors: int = SECTORS
+) -> str:
     """The model as a file: node i is body ``n<i>``, which is flat unless the keyframe is loaded.
 
     Fixed are the nodes of the base, or the centre of a lone balloon, so that it bulges both ways,
     as in the CalculiX deck.
     """
-    mesh, film = actuator.mesh, actuator.stack.film
-    still = mesh.roots if actuator.balloons == 1 else mesh.fixed
-    free = np.setdiff1d(np.arange(len(mesh.rest)), still)
+    still = shell.roots if stack.balloons == 1 else shell.fixed
+    free = np.setdiff1d(np.arange(len(shell.rest)), still)
     flexes = []
-    for name, triangles, films in mesh.groups:
+    for group in shell.bending:
         # Flexes share bodies where films are bonded. In one an edge has at most two triangles.
-        nodes, elements = np.unique(triangles, return_inverse=True)
-        flex = {"name": name, "colour": COLOURS[name], "nodes": nodes.tolist()}
-        flexes.append({**flex, "elements": elements, "thickness": films * film.thickness})
+        nodes, elements = np.unique(group.triangles, return_inverse=True)
+        name, colour = FLEXES[group.name]
+        flex = {"name": name, "colour": colour, "nodes": nodes.tolist(), "elements": elements}
+        flexes.append({**flex, "thickness": FILMS[group.name] * stack.film.thickness})
     return model_file(
         TEMPLATES / f"{MODEL}.j2",
-        actuator.stack.name,
-        actuator=actuator,
+        stack.name,
+        stack=stack,
+        sectors=sectors,
+        mass=shell.mass,
         contact=has_contact(pressures),
-        places=(mesh.rest / LENGTH).round(9),
-        moved=((mesh.position - mesh.rest)[free] / LENGTH).round(9),
+        places=(shell.rest / LENGTH).round(9),
+        moved=((shell.position - shell.rest)[free] / LENGTH).round(9),
         still=set(still.tolist()),
-        masses=mesh.masses(film).tolist(),
+        masses=node_masses(shell, stack.film).tolist(),
         flexes=flexes,
-        triangles=len(mesh.single) + len(mesh.double),
-        height=mesh.height,
+        triangles=len(shell.triangles),
+        height=shell.height,
         length=LENGTH,
         dt=DT,
         solver_steps=SOLVER_STEPS,
@@ -109,39 +120,28 @@ def write_model(
     ``pressures`` in kPa by chamber; ``sectors`` is the number of nodes per ring. Raises
     DesignError if the pockets are not round.
     """
-    coarse = coarse_actuator(laminate, pressures, sectors)
-    mesh = coarse.mesh
+    stack = round_stack(laminate)
+    shell = shell_of(stack, pressures, sectors)
     data = {
         "schema": "sbafab/mujoco@1",
-        "name": coarse.stack.name,
+        "name": stack.name,
         "units": {"length": "mm", "mass": "kg", "time": "s", "pressure": "kPa", "volume": "ul"},
         "length": LENGTH,
         "start": START,
         "pressures": dict(pressures),
-        "films": 2 * coarse.balloons * coarse.stack.film.thickness,
-        "cavities": {name: walls.tolist() for name, walls in mesh.cavities.items()},
-        "tip": mesh.tip.tolist(),
-        "roots": mesh.roots.tolist(),
-        "poles": mesh.poles.tolist(),
+        "films": 2 * stack.balloons * stack.film.thickness,
+        "cavities": {name: walls.tolist() for name, walls in shell.cavities.items()},
+        "tip": shell.tip.tolist(),
+        "roots": shell.roots.tolist(),
+        "poles": shell.poles.tolist(),
     }
     texts = {
-        MODEL: model_text(coarse, pressures),
+        MODEL: model_text(stack, shell, pressures, sectors),
         DATA: json.dumps(data, separators=(",", ":")) + "\n",
         PYTHON: (TEMPLATES / f"{PYTHON}.txt").read_text("utf-8"),
     }
     write_files(texts, folder)
-    films = np.concatenate([triangles for _, triangles, _ in mesh.groups])
-    return RecordedFilms(
-        laminate,
-        mesh.rest,
-        mesh.position,
-        films,
-        mesh.cavities,
-        mesh.tip,
-        mesh.poles,
-        pressures,
-        pressures.values(),
-    )
+    return RecordedFilms(laminate, shell, shell.poles, pressures, pressures.values())
 
 
 # The run.

@@ -21,10 +21,13 @@ from sbafab.meshing.conforming.element_mesh import shell_mesh, thin
 from sbafab.meshing.conforming.layup import Layup, MeshSettings, flat, layup, narrowest_ring
 from sbafab.meshing.conforming.mesh import Mesh, volumes
 from sbafab.simulators.coarse import (
-    CoarseActuator,
+    FilmGroup,
     Meridian,
+    RoundStack,
+    Shell,
     Start,
     Triangles,
+    coarse_shell,
     elastic_of,
     holding,
     nearly_flat,
@@ -36,8 +39,7 @@ from sbafab.simulators.coarse import (
 from sbafab.simulators.model_files import model_file, write_files
 from sbafab.simulators.simulator import NODES_FILE, PERIOD, RAMP, RecordedFilms, refuse_unknown
 
-# The films of an actuator: nodes, triangles by stiffness, cavities. Stacks of round pockets use the
-# coarse mesh; drawn pockets, several films and tubes the conforming one.
+# Stacks of round pockets use the coarse shell, others the conforming mesh.
 
 
 SECTORS = 12
@@ -46,92 +48,14 @@ COARSE_SECTORS = 8
 """Nodes per ring in the other scenes."""
 
 
-class FilmGroup(NamedTuple):
-    """Triangles of one stiffness: E t in mN/mm of a membrane, or bending stiffness in mN mm."""
-
-    name: str
-    triangles: Triangles
-    stiffness: float
-    poisson: float
-
-
-@dataclass(frozen=True, eq=False)
-class Shell:
-    """Nodes (n, 3) at ``rest`` (flat) and at the start (``position``), and the films on them.
-
-    ``membranes`` partition all triangles; in a group of ``bending`` an edge has at most two.
-    ``cavities`` are closed surfaces, normals out of the air. ``fixed`` nodes do not move, ``tip``
-    nodes are recorded. ``mass`` is the true mass in kg, ``size`` the largest pocket radius over
-    2.5 mm, ``about`` a sentence on the mesh.
-    """
-
-    rest: NDArray[np.float64]
-    position: NDArray[np.float64]
-    membranes: tuple[FilmGroup, ...]
-    bending: tuple[FilmGroup, ...]
-    cavities: Mapping[str, Triangles]
-    fixed: NDArray[np.int64]
-    tip: NDArray[np.int64]
-    mass: float
-    size: float
-    about: str
-
-    @property
-    def triangles(self) -> Triangles:
-        """All films."""
-        return np.concatenate([group.triangles for group in self.membranes])
-
-    @property
-    def height(self) -> float:
-        """Height at the start in mm."""
-        return float(self.position[:, 2].max())
-
-
 def half_full(pocket: float, neck: float) -> Meridian:
     """7.5 ul in a pocket of 5 mm: 80 ul more brings 15 balloons near their volume at 5 kPa."""
     return holding(neck, pocket - neck, 7.5 * (pocket / 2.5) ** 3)
 
 
-def round_actuator(
-    laminate: Laminate, sectors: int = SECTORS, start: Start = nearly_flat
-) -> CoarseActuator:
-    """The coarse actuator of a stack of round pockets; its rings have the area of the circles.
-
-    Raises DesignError if the pockets are not round.
-    """
-    return CoarseActuator(round_stack(laminate), sectors, start, is_fair=True)
-
-
-def round_shell(coarse: CoarseActuator) -> Shell:
-    """The shell of a stack of round pockets."""
-    mesh, nu = coarse.mesh, coarse.poisson
-    membranes = (
-        FilmGroup("membrane1", mesh.single, coarse.membrane, nu),
-        FilmGroup("membrane2", mesh.double, 2 * coarse.membrane, nu),
-    )
-    names = {"lower": "bend_lower", "upper": "bend_upper", "web": "bend_web", "necks": "bend_neck"}
-    bending = tuple(
-        FilmGroup(names[name], triangles, coarse.bending(films), nu)
-        for name, triangles, films in mesh.groups
-    )
-    balloon_ul = mesh.volume(coarse.stack.chambers[0]) / coarse.balloons
-    return Shell(
-        rest=mesh.rest,
-        position=mesh.position,
-        membranes=membranes,
-        bending=bending,
-        cavities=mesh.cavities,
-        fixed=mesh.fixed,
-        tip=mesh.tip,
-        mass=coarse.mass,
-        size=max(coarse.stack.pockets) / 2.5,
-        about=(
-            f"{len(mesh.rest)} nodes, {len(mesh.single) + len(mesh.double)} triangles; rings of "
-            f"{coarse.sectors} corners have the area of\nthe circles. It starts "
-            f"{mesh.height:.4g} mm high ({balloon_ul:.3g} ul a balloon). Inlet tabs and strips are "
-            "left out."
-        ),
-    )
+def round_shell(stack: RoundStack, sectors: int = SECTORS, start: Start = nearly_flat) -> Shell:
+    """The shell of a stack of round pockets; its rings have the area of the circles."""
+    return coarse_shell(stack, sectors, start, is_fair=True)
 
 
 # The shell of any laminate, from its conforming mesh: drawn pockets, several films, tubes.
@@ -188,6 +112,8 @@ def conforming_shell(laminate: Laminate) -> Shell:
             f"{len(rest)} nodes, {len(corners)} triangles, inlets and their strips among them.\n"
             f"It starts {start}."
         ),
+        roots=base[:0],
+        poles=base[:0],
     )
 
 
@@ -347,11 +273,11 @@ def _shell_values(shell: Shell, highest: float) -> dict[str, object]:
 
 
 def _volume_values(
-    actuator: CoarseActuator, shell: Shell, volumes: Mapping[str, float] | None
+    stack: RoundStack, shell: Shell, volumes: Mapping[str, float] | None
 ) -> dict[str, object]:
     """Each chamber has a given volume in ul above the start; those not named have 0."""
-    usual = float(f"{VOLUME * actuator.balloons / 15 * actuator.size**3:.3g}")
-    names = actuator.stack.chambers
+    usual = float(f"{VOLUME * stack.balloons / 15 * stack.size**3:.3g}")
+    names = stack.chambers
     refuse_unknown(names, volumes or {}, "volume")
     for name, value in (volumes or {}).items():
         if not (math.isfinite(value) and value >= 0):
@@ -392,28 +318,29 @@ class Beam(NamedTuple):
     young: float
 
 
-def beam_of(actuator: CoarseActuator) -> Beam:
+def beam_of(stack: RoundStack) -> Beam:
     """EA = N k H0 and EI = N k R^2 H0 / 2 of a round bar: its radius is R times root 2."""
-    height = 7.2 * actuator.balloons / 15 * actuator.size
-    spring = 7.0 * 15 / actuator.balloons
-    radius = actuator.stack.radius * math.sqrt(2)
-    young = actuator.stack.lobes * spring * height / (math.pi * radius**2)
-    return Beam(height, 14.4 * actuator.size**2, spring, radius, young)
+    height = 7.2 * stack.balloons / 15 * stack.size
+    spring = 7.0 * 15 / stack.balloons
+    radius = stack.radius * math.sqrt(2)
+    young = stack.lobes * spring * height / (math.pi * radius**2)
+    return Beam(height, 14.4 * stack.size**2, spring, radius, young)
 
 
-def _frame_values(actuator: CoarseActuator, shell: Shell) -> dict[str, object]:
-    count = min(FRAMES, actuator.balloons + 1)
+def _frame_values(stack: RoundStack, shell: Shell) -> dict[str, object]:
+    count = min(FRAMES, stack.balloons + 1)
     weights = [pair_of_frames(z, shell.height, count) for z in shell.position[:, 2].tolist()]
-    values = {"shell": shell, "frames": count, "weights": weights, "poisson": actuator.poisson}
-    return {**values, "membrane": actuator.membrane, "share": SOFTENING}
+    values = {"shell": shell, "frames": count, "weights": weights, "poisson": stack.poisson}
+    return {**values, "membrane": stack.membrane, "share": SOFTENING}
 
 
-def _beam_values(actuator: CoarseActuator, beam: Beam, shell: Shell) -> dict[str, object]:
-    values = _frame_values(actuator, shell)
-    named = zip(actuator.stack.chambers, actuator.stack.axes, strict=True)
-    count = min(FRAMES, actuator.balloons + 1)
-    prisms = {name: prism(axis, beam.area, shell.height, count) for name, axis in named}
-    return {**values, "beam": beam, "prisms": prisms}
+def _beam_values(stack: RoundStack, beam: Beam, shell: Shell) -> dict[str, object]:
+    count = min(FRAMES, stack.balloons + 1)
+    prisms = {
+        name: prism(axis, beam.area, shell.height, count)
+        for name, axis in zip(stack.chambers, stack.axes, strict=True)
+    }
+    return {**_frame_values(stack, shell), "beam": beam, "prisms": prisms}
 
 
 def pair_of_frames(
@@ -484,38 +411,28 @@ def scenes_of(
     scenes: dict[str, Scene] = {}
 
     def add(name: SceneName, file: str, dt: float, values: Mapping[str, object]) -> None:
-        shell = values["shell"]
+        shell, told = values["shell"], values.get("volumes", pressures)
         assert isinstance(shell, Shell)
-        bears = name != "beam"
-        told = values.get("volumes", pressures)
         assert isinstance(told, dict)
-        films = RecordedFilms(
-            laminate,
-            shell.rest,
-            shell.position,
-            shell.triangles if bears else np.empty((0, 3), dtype=np.int64),
-            shell.cavities if bears else {},
-            shell.tip,
-            shell.tip,
-            pressures if name != "volume" else {},
-            told.values(),
-        )
+        # The films of a beam bear nothing.
+        bearing = replace(shell, membranes=(), cavities={}) if name == "beam" else shell
+        kpa = pressures if name != "volume" else {}
+        films = RecordedFilms(laminate, bearing, shell.tip, kpa, told.values())
         scenes[name] = Scene(name, file, dt, films, {**values, "pressures": pressures})
 
-    is_round = why_not_round(laminate) is None
-    shell = round_shell(round_actuator(laminate)) if is_round else conforming_shell(laminate)
+    stack = None if why_not_round(laminate) else round_stack(laminate)
+    shell = conforming_shell(laminate) if stack is None else round_shell(stack)
     add("shell", "actuator.scn", DT, _shell_values(shell, max(pressures.values())))
-    if is_round:
-        frames = round_actuator(laminate, COARSE_SECTORS, FRAMES_START)
-        values = _frame_values(frames, round_shell(frames))
-        add("frames", "actuator_frames.scn", FRAMES_DT, values)
-        half = round_actuator(laminate, COARSE_SECTORS, half_full)
-        values = _volume_values(half, round_shell(half), volumes)
-        add("volume", "actuator_volume.scn", DT, values)
-        if frames.stack.lobes >= LEAST_LOBES:
-            beam = beam_of(frames)
-            upright = round_shell(replace(frames, start=standing(beam.height / frames.balloons)))
-            add("beam", "actuator_beam.scn", DT, _beam_values(frames, beam, upright))
+    if stack is not None:
+        frames = round_shell(stack, COARSE_SECTORS, FRAMES_START)
+        add("frames", "actuator_frames.scn", FRAMES_DT, _frame_values(stack, frames))
+        half = round_shell(stack, COARSE_SECTORS, half_full)
+        add("volume", "actuator_volume.scn", DT, _volume_values(stack, half, volumes))
+        if stack.lobes >= LEAST_LOBES:
+            beam = beam_of(stack)
+            upright = standing(beam.height / stack.balloons)
+            values = _beam_values(stack, beam, round_shell(stack, COARSE_SECTORS, upright))
+            add("beam", "actuator_beam.scn", DT, values)
     return scenes
 
 
