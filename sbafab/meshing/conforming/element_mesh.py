@@ -28,8 +28,8 @@ from sbafab.meshing.conforming.mesh import (
 from sbafab.meshing.solid import loops_of
 from sbafab.meshing.surface import Surface, unpaired_edges
 
-Ints = NDArray[np.int64]
-Sets = dict[str, Ints]
+NumberArray = NDArray[np.int64]
+Sets = dict[str, NumberArray]
 
 # The sweep: nodes and prisms of every film.
 
@@ -49,7 +49,7 @@ class Sweep:
         self.lower, self.middle, self.upper, self.joints = np.full((4, *nodes), -1)
         self.cell_of, self.joint_of = np.full((2, *cells), -1)
         self._points = [np.empty((0, 3))]
-        self._cells: list[Ints] = []
+        self._cells: list[NumberArray] = []
         self._counts = [0, 0]
 
     @property
@@ -58,17 +58,17 @@ class Sweep:
         return np.concatenate(self._points)
 
     @property
-    def cells(self) -> Ints:
+    def cells(self) -> NumberArray:
         """Prisms (m, 18): six nodes of a triangle below, halfway up and above; or triangles."""
         return np.concatenate(self._cells)
 
-    def place(self, numbers: Ints, nodes: Ints, at: NDArray[np.float64]) -> None:
+    def place(self, numbers: NumberArray, nodes: NumberArray, at: NDArray[np.float64]) -> None:
         """Add points over nodes of the plane."""
         numbers[nodes] = self._counts[0] + np.arange(len(nodes))
         self._points.append(at[nodes])
         self._counts[0] += len(nodes)
 
-    def fill(self, numbers: Ints, chosen: NDArray[np.bool_], *levels: Ints) -> None:
+    def fill(self, numbers: NumberArray, chosen: NDArray[np.bool_], *levels: NumberArray) -> None:
         """Add a cell over each chosen triangle."""
         (over,) = np.nonzero(chosen)
         numbers[over] = self._counts[1] + np.arange(len(over))
@@ -84,7 +84,7 @@ def sweep(stack: Layup, forms: Sequence[FormedFilm]) -> Sweep:
     """
     swept, is_tet = Sweep(stack), stack.settings.element == "tet"
 
-    def half_up(nodes: Ints) -> Ints:
+    def half_up(nodes: NumberArray) -> NumberArray:
         return nodes if is_tet else nodes[nodes < stack.plane.corners]
 
     for k, (ply, form) in enumerate(zip(stack.plies, forms, strict=True)):
@@ -124,10 +124,10 @@ def swept_shell(stack: Layup, forms: Sequence[FormedFilm]) -> Sweep:
 
 
 BOTTOM, TOP, SIDES = 0, 1, 2
-"""Ints of a wedge's faces; the sides follow the triangle's edges."""
+"""NumberArray of a wedge's faces; the sides follow the triangle's edges."""
 
 
-def neighbours(triangles: Ints) -> Ints:
+def neighbours(triangles: NumberArray) -> NumberArray:
     """The triangle (m, 3) beyond each side of each triangle, -1 without a neighbour."""
     middles = triangles[:, 3:].ravel()
     order = np.argsort(middles, kind="stable")
@@ -139,17 +139,17 @@ def neighbours(triangles: Ints) -> Ints:
 
 
 def bordering(
-    inside: NDArray[np.bool_], beside: NDArray[np.bool_], beyond: Ints
-) -> tuple[Ints, Ints]:
+    inside: NDArray[np.bool_], beside: NDArray[np.bool_], beyond: NumberArray
+) -> tuple[NumberArray, NumberArray]:
     """Triangles of ``inside`` and their sides that lie against a triangle of ``beside``."""
     # The last entry, False, stands for the outside of the plane.
     cells, sides = np.nonzero(inside[:, None] & np.append(beside, False)[beyond])
     return cells, sides
 
 
-def wetted(stack: Layup, swept: Sweep, void: MeshedVoid, beyond: Ints) -> Ints:
+def wetted(stack: Layup, swept: Sweep, void: MeshedVoid, beyond: NumberArray) -> NumberArray:
     """Cells and their faces (k, 2) that the air of a void touches."""
-    parts: list[tuple[Ints, Ints | int]] = []
+    parts: list[tuple[NumberArray, NumberArray | int]] = []
     for k, cells in sorted(void.under.items()):
         parts.append((swept.cell_of[k - 1][cells & stack.plies[k - 1].cells], TOP))
         parts.append((swept.cell_of[k][cells & stack.plies[k].cells], BOTTOM))
@@ -162,14 +162,14 @@ def wetted(stack: Layup, swept: Sweep, void: MeshedVoid, beyond: Ints) -> Ints:
     return np.concatenate([np.column_stack(np.broadcast_arrays(*part)) for part in parts])
 
 
-def _sides(stack: Layup, triangles: Ints, sides: Ints) -> Ints:
+def _sides(stack: Layup, triangles: NumberArray, sides: NumberArray) -> NumberArray:
     """Nodes (k, 3) of sides of triangles: start, end, middle."""
     nodes = stack.plane.triangles[triangles]
     places = np.column_stack([sides, (sides + 1) % 3, 3 + sides])
     return np.take_along_axis(nodes, places, axis=1)
 
 
-def mouths(stack: Layup, swept: Sweep, void: MeshedVoid, beyond: Ints) -> list[Ints]:
+def mouths(stack: Layup, swept: Sweep, void: MeshedVoid, beyond: NumberArray) -> list[NumberArray]:
     """Triangles (k, 3) of mesh nodes over each place where a void ends without a bond."""
     points = stack.plane.points
     patches = []
@@ -184,7 +184,7 @@ def mouths(stack: Layup, swept: Sweep, void: MeshedVoid, beyond: Ints) -> list[I
     return patches
 
 
-def _mouth_patch(stack: Layup, swept: Sweep, ply: int, edges: Ints) -> Ints:
+def _mouth_patch(stack: Layup, swept: Sweep, ply: int, edges: NumberArray) -> NumberArray:
     """Triangles (k, 3) between the two films at a void's mouth, out of the void."""
     low, high, half = swept.upper[ply - 1], swept.lower[ply], swept.joints[ply]
     triangles = []
@@ -201,7 +201,7 @@ def _mouth_patch(stack: Layup, swept: Sweep, ply: int, edges: Ints) -> Ints:
     return np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
-def lids(stack: Layup, swept: Sweep, void: MeshedVoid, beyond: Ints) -> list[Ints]:
+def lids(stack: Layup, swept: Sweep, void: MeshedVoid, beyond: NumberArray) -> list[NumberArray]:
     """Return triangles (k, 3) of mesh nodes over holes by which a void leaves it through a film.
 
     Such a hole leads to another chamber of its net, or to a tube; its rim is the lid's. Raises
@@ -231,8 +231,8 @@ def _air(
     swept: Sweep,
     voids: Mapping[str, MeshedVoid],
     kind: ElementKind,
-    cells: Ints,
-    faces_of: Callable[[Ints], Ints],
+    cells: NumberArray,
+    faces_of: Callable[[NumberArray], NumberArray],
 ) -> tuple[Sets, Sets, Sets]:
     """Node sets, face sets and cavities of a mesh; ``faces_of`` turns faces of prisms into its."""
     named, face_sets, cavities = node_sets(stack, swept), {}, {}
@@ -256,7 +256,7 @@ def _air(
 SQUARE_PARTS = ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6), (4, 6, 7))
 
 
-def flat_triangles(kind: ElementKind, cells: Ints, faces: Ints) -> Ints:
+def flat_triangles(kind: ElementKind, cells: NumberArray, faces: NumberArray) -> NumberArray:
     """The faces (k, 2: cell and face number) as flat triangles through all of their nodes."""
     parts_of_faces = [np.empty((0, 3), dtype=np.int64)]
     for number, local in enumerate(FACES[kind]):
@@ -266,7 +266,9 @@ def flat_triangles(kind: ElementKind, cells: Ints, faces: Ints) -> Ints:
     return np.concatenate(parts_of_faces)
 
 
-def faces_of_tetrahedra(prisms: Ints, tetrahedra: Ints, faces: Ints) -> Ints:
+def faces_of_tetrahedra(
+    prisms: NumberArray, tetrahedra: NumberArray, faces: NumberArray
+) -> NumberArray:
     """Prism faces (k, 2) as the faces of the three tetrahedra of each prism that lie in them."""
     wedge_corners = [[0, 1, 2], [12, 13, 14], [0, 1, 13, 12], [1, 2, 14, 13], [2, 0, 12, 14]]
     found = []
@@ -282,7 +284,7 @@ def faces_of_tetrahedra(prisms: Ints, tetrahedra: Ints, faces: Ints) -> Ints:
     return rows[np.lexsort((rows[:, 1], rows[:, 0]))]
 
 
-def skin(mesh: Mesh) -> Ints:
+def skin(mesh: Mesh) -> NumberArray:
     """The faces (k, 2: cell and face number) that belong to one cell only."""
     size, count = len(mesh.points), len(mesh.cells)
     keys = []
@@ -413,10 +415,10 @@ def shell_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     return mesh
 
 
-def _one_sided(faces: Ints) -> Ints:
+def _one_sided(faces: NumberArray) -> NumberArray:
     """The faces of cells that the air touches on one side only."""
     _, first, times = np.unique(faces[:, 0], return_index=True, return_counts=True)
-    one_sided: Ints = faces[np.sort(first[times == 1])]
+    one_sided: NumberArray = faces[np.sort(first[times == 1])]
     return one_sided
 
 
@@ -435,7 +437,7 @@ def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     else:
         cells = prisms[:, [0, 1, 2, 12, 13, 14, 3, 4, 5, 15, 16, 17, 6, 7, 8]]
 
-    def faces_of(faces: Ints) -> Ints:
+    def faces_of(faces: NumberArray) -> NumberArray:
         return faces_of_tetrahedra(prisms, cells, faces) if is_tet else faces
 
     kind: ElementKind = "tetra10" if is_tet else "wedge15"
@@ -470,7 +472,7 @@ def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     return mesh
 
 
-def _corners_under(stack: Layup, swept: Sweep) -> Ints:
+def _corners_under(stack: Layup, swept: Sweep) -> NumberArray:
     """The plane's corner nodes (prisms, 3) under each prism."""
     under = np.empty((len(swept.cells), 3), dtype=np.int64)
     for numbers in (*swept.cell_of, *swept.joint_of):
