@@ -231,27 +231,17 @@ class Relation:
         """One flat row per point of each curve, and per measurement: ``x`` and ``y`` in the units
         of ``x_label`` and ``y_label``, ``error`` of y only for measurements.
         """
-        rows = [
-            {
-                "curve": line.label,
-                "x": float(x),
-                "y": float(y),
-                "error": None,
-                "model": line.title,
-            }
-            for line in self.lines
-            for x, y in zip(line.x, line.y, strict=True)
+        curves = [
+            *(
+                (line.label, line.title, line.x, line.y, [None] * len(line.x))
+                for line in self.lines
+            ),
+            *((each.label, MEASURED, each.x, each.y, each.error) for each in self.points),
         ]
-        return rows + [
-            {
-                "curve": points.label,
-                "x": float(x),
-                "y": float(y),
-                "error": float(error),
-                "model": MEASURED,
-            }
-            for points in self.points
-            for x, y, error in zip(points.x, points.y, points.error, strict=True)
+        return [
+            {"curve": label, "x": float(x), "y": float(y), "error": error, "model": model}
+            for label, model, xs, ys, errors in curves
+            for x, y, error in zip(xs, ys, errors, strict=True)
         ]
 
     def frame(self) -> DataFrame:
@@ -300,11 +290,9 @@ class Factors:
     """Name of the calibration that the others come from, unless it is the user's own values."""
 
     def __post_init__(self) -> None:
-        for name, value, most in (
-            ("press factor", self.press_factor, 1.0),
-            ("contact factor", self.contact_factor, 10.0),
-            ("modulus ratio", self.modulus_ratio, 1000.0),
-        ):
+        limits = {"press_factor": 1.0, "contact_factor": 10.0, "modulus_ratio": 1000.0}
+        for field_name, most in limits.items():
+            value, name = getattr(self, field_name), field_name.replace("_", " ")
             if not 0 < value <= most:
                 raise DesignError(f"{name} = {value:g} must be above 0 and at most {most:g}")
         if not 0 <= self.pocket_loss <= 100:
@@ -393,8 +381,16 @@ class Prediction:
 
     @property
     def verdict(self) -> tuple[VerdictLine, ...]:
-        """Lines with the main figures, their validity, and the omitted figures."""
-        return verdict(self)
+        """Lines with the main figures, their validity, and the omitted figures with reasons."""
+        lines = [
+            VerdictLine(quantity, _shown(figure), _note(figure))
+            for quantity, figure in _main_figures(self.figures)
+        ]
+        why: dict[str, list[str]] = {}
+        for omission in self.left_out:
+            why.setdefault(omission.reason, []).append(omission.name)
+        lines += [VerdictLine(LEFT_OUT, ", ".join(names), reason) for reason, names in why.items()]
+        return tuple(lines)
 
     @property
     def rows(self) -> list[dict[str, Any]]:
@@ -410,22 +406,13 @@ class Prediction:
         return f"Prediction({len(self.figures)} figures, {len(self.relations)} curves{omitted})"
 
     def _repr_html_(self) -> str:
-        head = ("", "", "unit", "model", "validity")
-        first = sorted(self.figures, key=lambda figure: figure.other)
-        rows = [
-            (
-                f"{f.name} (other model)" if f.other else f.name,
-                f.value,
-                f.unit,
-                f.model.title,
-                f"{f.model.trust} {f.aside}".strip(),
-            )
-            for f in first
-        ]
-        omitted = [
-            (omitted.name, None, "", "not predicted", omitted.reason) for omitted in self.left_out
-        ]
-        return table_html(head, [*rows, *omitted])
+        rows: list[tuple[str, float | None, str, str, str]] = []
+        for f in sorted(self.figures, key=lambda figure: figure.other):
+            name = f"{f.name} (other model)" if f.other else f.name
+            validity = f"{f.model.trust} {f.aside}".strip()
+            rows.append((name, f.value, f.unit, f.model.title, validity))
+        rows += [(item.name, None, "", "not predicted", item.reason) for item in self.left_out]
+        return table_html(("", "", "unit", "model", "validity"), rows)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of ``predict.json``, its schema apart."""
@@ -479,33 +466,22 @@ class VerdictLine:
     note: str
 
 
-def verdict(prediction: Prediction) -> tuple[VerdictLine, ...]:
-    """Return the lines of a prediction: strokes, a bend, a force, then omissions and reasons."""
-    lines = [
-        VerdictLine(quantity, _shown(figure), _note(figure))
-        for quantity, figure in _main_figures(prediction)
-    ]
-    why: dict[str, list[str]] = {}
-    for omission in prediction.left_out:
-        why.setdefault(omission.reason, []).append(omission.name)
-    lines += [VerdictLine(LEFT_OUT, ", ".join(names), reason) for reason, names in why.items()]
-    return tuple(lines)
-
-
-def _main_figures(prediction: Prediction) -> Iterator[tuple[str, Figure]]:
-    """Yield the main figures with their quantities, each by the model to design with."""
-    to_design_with = [figure for figure in prediction.figures if not figure.other]
-    is_calibrated = any(figure.interval is not None for figure in to_design_with)
+def _main_figures(figures: Sequence[Figure]) -> Iterator[tuple[str, Figure]]:
+    """Yield strokes, a bend, forces and burst with their quantities, each by the model to design
+    with.
+    """
+    chosen_ones = [figure for figure in figures if not figure.other]
+    is_calibrated = any(figure.interval is not None for figure in chosen_ones)
     for quantity in CALIBRATED_STROKES if is_calibrated else STROKES:
-        yield from (("stroke", item) for item in _of(to_design_with, quantity)[:1])
-    yield from (("bend", item) for item in _of(to_design_with, *BENDS)[:1])
-    flat = [item for item in _of(to_design_with, *BLOCKED) if not item.at.share]
+        yield from (("stroke", item) for item in _of(chosen_ones, quantity)[:1])
+    yield from (("bend", item) for item in _of(chosen_ones, *BENDS)[:1])
+    flat = [item for item in _of(chosen_ones, *BLOCKED) if not item.at.share]
     yield from (("force", item) for item in _strongest(flat))
     for quantities in PULLS:
         # If the film does not withstand the highest pressure, use the highest it withstands.
-        for item in _strongest(_of(to_design_with, *quantities)):
+        for item in _strongest(_of(chosen_ones, *quantities)):
             yield "moment" if item.quantity is Quantity.MOMENT else "force", item
-    yield from (("burst", item) for item in _of(to_design_with, Quantity.BURST)[:1])
+    yield from (("burst", item) for item in _of(chosen_ones, Quantity.BURST)[:1])
 
 
 def _of(figures: Sequence[Figure], *quantities: Quantity) -> list[Figure]:
@@ -525,9 +501,10 @@ def _strongest(figures: list[Figure]) -> list[Figure]:
 
 def _shown(figure: Figure) -> str:
     """Return value, 90 % interval, name and model of a figure in one line."""
-    if figure.interval is None:
-        return f"{figure.value:.4g} {figure.unit}, {figure.name} ({figure.model.name})"
-    return f"{figure.value:.3g} {figure.unit} ({figure.range}), {figure.name} ({figure.model.name})"
+    value = f"{figure.value:.4g} {figure.unit}"
+    if figure.interval is not None:
+        value = f"{figure.value:.3g} {figure.unit} ({figure.range})"
+    return f"{value}, {figure.name} ({figure.model.name})"
 
 
 def _note(figure: Figure) -> str:
@@ -562,7 +539,7 @@ def eq_4_ratios() -> tuple[float, float]:
 # Choice of the figure to design with where several models give one quantity.
 
 
-SUPERSEDED = (
+SUPERSEDED: tuple[tuple[str, tuple[ModelId, ...], tuple[ModelId, ...]], ...] = (
     # An upper bound: it says 140 degrees where the paper measured 81 and the stack says 69 to 83.
     ("bending", (ModelId.CONSTANT_CURVATURE,), OF_STACK),
     # The modulus was measured at an unknown pressure; the stack's is a tenth of it.
@@ -585,34 +562,28 @@ def chosen(
     Eqs. 1-3, 0.47 to 0.86 times the elastic stack).
     """
     candidates = tuple(figures)
-    forces_to_come = bool(to_come) and is_calibrated
-    return tuple(
-        replace(
-            figure,
-            other=figure.other
-            or (forces_to_come and figure.quantity in BLOCKED)
-            or _is_superseded(figure, candidates, to_come),
+    given = {(figure.group, figure.model.id) for figure in candidates}
+    preferred: dict[tuple[Quantity, Conditions], Figure] = {}
+    for figure in candidates:
+        best = preferred.setdefault((figure.quantity, figure.at), figure)
+        if best.interval is None and figure.interval is not None:
+            preferred[figure.quantity, figure.at] = figure
+
+    def is_other(figure: Figure) -> bool:
+        if preferred[figure.quantity, figure.at] is not figure:
+            return True
+        if figure.quantity is Quantity.WORK_BOUND:
+            return (Quantity.FREE_WORK, figure.at) in preferred
+        if to_come and is_calibrated and figure.quantity in BLOCKED:
+            return True
+        return any(
+            figure.group == group
+            and figure.model.id in behind
+            and any(model in to_come or (group, model) in given for model in first)
+            for group, behind, first in SUPERSEDED
         )
-        for figure in candidates
-    )
 
-
-def _is_superseded(
-    subject: Figure, figures: Sequence[Figure], to_come: tuple[ModelId, ...]
-) -> bool:
-    same = [f for f in figures if f.quantity is subject.quantity and f.at == subject.at]
-    preferred = next((figure for figure in same if figure.interval is not None), same[0])
-    if preferred is not subject:
-        return True
-    if subject.quantity is Quantity.WORK_BOUND:
-        return any(figure.is_of(Quantity.FREE_WORK, subject.at) for figure in figures)
-    given = {figure.model.id for figure in figures if figure.group == subject.group}
-    return any(
-        subject.group == group
-        and subject.model.id in behind
-        and not given.union(to_come).isdisjoint(first)
-        for group, behind, first in SUPERSEDED
-    )
+    return tuple(replace(each, other=each.other or is_other(each)) for each in candidates)
 
 
 # The documents.

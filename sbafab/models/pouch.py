@@ -55,12 +55,16 @@ def half_angle(share: ArrayLike) -> NDArray[np.float64]:
     return inverse(contraction, shares, math.pi / 2)
 
 
+def section(angle: ArrayLike) -> NDArray[np.float64]:
+    """Return the area between two arcs of this half angle over half the square of their length."""
+    t = np.asarray(angle, dtype=float)
+    safe = np.maximum(t, SHALLOW)
+    return np.where(t > SHALLOW, (safe - np.sin(safe) * np.cos(safe)) / safe**2, 2 * t / 3)
+
+
 def volume(share: ArrayLike, length: float, width: float) -> NDArray[np.float64]:
     """Return the volume in ul at a contraction."""
-    t = half_angle(share)
-    safe = np.maximum(t, SHALLOW)
-    section = np.where(t > SHALLOW, (safe - np.sin(safe) * np.cos(safe)) / safe**2, 2 * t / 3)
-    return np.asarray(width * length**2 / 2 * section)
+    return np.asarray(width * length**2 / 2 * section(half_angle(share)))
 
 
 def pull(pressure: float, share: ArrayLike, length: float, width: float) -> NDArray[np.float64]:
@@ -80,15 +84,6 @@ def tension(pressure: float, angle: ArrayLike, length: float) -> NDArray[np.floa
 def bent(angle: ArrayLike) -> NDArray[np.float64]:
     """Return the bend in rad at which the free film's half angle is ``angle``."""
     return np.asarray(2 * np.arccos(1 - contraction(angle)))
-
-
-def hinge_section(bend: ArrayLike, length: float) -> NDArray[np.float64]:
-    """Return the section's area in mm2: the triangle over the joint and the arc over that."""
-    b = np.asarray(bend, dtype=float)
-    t = _angle_at(b)
-    safe = np.maximum(t, SHALLOW)
-    arc = np.where(t > SHALLOW, (safe - np.sin(safe) * np.cos(safe)) / safe**2, 2 * t / 3)
-    return np.asarray(length**2 / 8 * np.sin(b) + length**2 / 4 * arc)
 
 
 def moment(pressure: float, bend: ArrayLike, length: float, width: float) -> NDArray[np.float64]:

@@ -58,7 +58,7 @@ ANYWHERE = Conditions()
 
 class Quantity(Enum):
     """Quantities of figures: ``key`` for programs, ``group`` in the output, ``unit``, and the
-    ``words`` of their names, in which ``c`` stands for the text of the conditions.
+    ``words`` of their names, with places for texts of the conditions.
     """
 
     key: str
@@ -80,10 +80,10 @@ class Quantity(Enum):
     FOLDED_HEIGHT = "folded_height", "size", "mm", "folded height"
     FOLDED_DIAMETER = "folded_diameter", "size", "mm", "folded diameter"
     MASS = "mass", "size", "g", "mass"
-    BEAM_DIAMETER = "beam_diameter", "size", "mm", "inflated diameter of a beam{c.of}"
+    BEAM_DIAMETER = "beam_diameter", "size", "mm", "inflated diameter of a beam{of}"
 
     LARGEST_TUBE = "largest_tube", "inlet", "mm", "largest tube that the inlet opens to"
-    TUBE_ROOM = "tube_room", "inlet", "mm", "room round the tube of {c.tube} mm"
+    TUBE_ROOM = "tube_room", "inlet", "mm", "room round the tube of {tube} mm"
 
     BURST = "burst", "strength", "kPa", "burst pressure"
 
@@ -97,78 +97,78 @@ class Quantity(Enum):
     BALLOON_DIAMETER = (
         "balloon_diameter", "stroke", "mm", "balloon's diameter at the largest volume",
     )  # fmt: skip
-    VOLUME_STROKE = "volume_stroke", "stroke", "mm", "stroke at {c.volume} ul a balloon"
-    FREE_STROKE = "free_stroke", "stroke", "mm", "free stroke at {c.kpa} kPa"
-    FREE_HEIGHT = "free_height", "stroke", "mm", "free height at {c.kpa} kPa"
-    BALLOON_VOLUME = "balloon_volume", "stroke", "ul", "volume a balloon at {c.kpa} kPa"
-    CONTRACTION = "contraction", "stroke", "mm", "free contraction{c.of}"
-    CONTRACTION_SHARE = "contraction_share", "stroke", "%", "free contraction{c.of}, share"
+    VOLUME_STROKE = "volume_stroke", "stroke", "mm", "stroke at {volume} ul a balloon"
+    FREE_STROKE = "free_stroke", "stroke", "mm", "free stroke at {kpa} kPa"
+    FREE_HEIGHT = "free_height", "stroke", "mm", "free height at {kpa} kPa"
+    BALLOON_VOLUME = "balloon_volume", "stroke", "ul", "volume a balloon at {kpa} kPa"
+    CONTRACTION = "contraction", "stroke", "mm", "free contraction{of}"
+    CONTRACTION_SHARE = "contraction_share", "stroke", "%", "free contraction{of}, share"
 
     BLOCKED_FORCE = (
-        "blocked_force", "force", "N", "blocked force{c.of}{c.each} at {c.kpa} kPa, {c.stroke}",
+        "blocked_force", "force", "N", "blocked force{of}{each} at {kpa} kPa, {stroke}",
     )  # fmt: skip
     FORCE_BOUND = (
-        "force_bound", "force", "N", "blocked force{c.of}{c.each} at {c.kpa} kPa, flat, at most",
+        "force_bound", "force", "N", "blocked force{of}{each} at {kpa} kPa, flat, at most",
     )  # fmt: skip
     BENT_FORCE = (
-        "bent_force", "force", "N", "force at {c.kpa} kPa in {c.chambers}, bent by {c.angle} deg",
+        "bent_force", "force", "N", "force at {kpa} kPa in {chambers}, bent by {angle} deg",
     )  # fmt: skip
-    PULL = "pull", "force", "N", "pull{c.of} at {c.kpa} kPa, {c.percent} % shorter"
-    MOMENT = "moment", "force", "N mm", "moment{c.of} at {c.kpa} kPa, {c.bent}"
+    PULL = "pull", "force", "N", "pull{of} at {kpa} kPa, {percent} % shorter"
+    MOMENT = "moment", "force", "N mm", "moment{of} at {kpa} kPa, {bent}"
     WRINKLING_LOAD = (
-        "wrinkling_load", "force", "N", "load that wrinkles a beam{c.of} at {c.kpa} kPa",
+        "wrinkling_load", "force", "N", "load that wrinkles a beam{of} at {kpa} kPa",
     )  # fmt: skip
     COLLAPSE_LOAD = (
-        "collapse_load", "force", "N", "load that collapses a beam{c.of} at {c.kpa} kPa",
+        "collapse_load", "force", "N", "load that collapses a beam{of} at {kpa} kPa",
     )  # fmt: skip
-    SLIP_LOAD = "slip_load", "force", "N", "load that slips{c.of} at {c.kpa} kPa"
+    SLIP_LOAD = "slip_load", "force", "N", "load that slips{of} at {kpa} kPa"
 
     TOTAL_VOLUME = (
         "total_volume", "actuation", "ul", "volume of all chambers at the reference stroke",
     )  # fmt: skip
     REFERENCE_TIME = (
-        "reference_time", "actuation", "s", "time to the reference stroke at {c.flow} ml/min",
+        "reference_time", "actuation", "s", "time to the reference stroke at {flow} ml/min",
     )  # fmt: skip
     VOLUME_TIME = (
-        "volume_time", "actuation", "s", "time to {c.volume} ul a balloon at {c.flow} ml/min",
+        "volume_time", "actuation", "s", "time to {volume} ul a balloon at {flow} ml/min",
     )  # fmt: skip
-    WORK_BOUND = "work_bound", "actuation", "mJ", "pneumatic input work at {c.kpa} kPa"
-    FREE_WORK = "free_work", "actuation", "mJ", "pneumatic input work at {c.kpa} kPa, free"
+    WORK_BOUND = "work_bound", "actuation", "mJ", "pneumatic input work at {kpa} kPa"
+    FREE_WORK = "free_work", "actuation", "mJ", "pneumatic input work at {kpa} kPa, free"
     LOST_WORK = "lost_work", "actuation", "%", "input work lost in a cycle"
     POWER_DENSITY = (
         "power_density", "actuation", "W/kg",
-        "power density, blocked force flat at {c.kpa} kPa and {c.litres} l/min of air",
+        "power density, blocked force flat at {kpa} kPa and {litres} l/min of air",
     )  # fmt: skip
     WATER_TIME = (
         "water_time", "actuation", "s",
-        "time to {c.kpa} kPa at the pump, water at {c.flow} ml/min in all",
+        "time to {kpa} kPa at the pump, water at {flow} ml/min in all",
     )  # fmt: skip
     WATER_HEIGHT = (
-        "water_height", "actuation", "mm", "height when the water's pump shows {c.kpa} kPa",
+        "water_height", "actuation", "mm", "height when the water's pump shows {kpa} kPa",
     )  # fmt: skip
     CONTRACTION_VOLUME = (
-        "contraction_volume", "actuation", "ul", "volume at free contraction{c.of}",
+        "contraction_volume", "actuation", "ul", "volume at free contraction{of}",
     )  # fmt: skip
 
     REFERENCE_BEND = (
         "reference_bend", "bending", "deg",
-        "bend with {c.chambers} at the reference stroke, the others flat",
+        "bend with {chambers} at the reference stroke, the others flat",
     )  # fmt: skip
     LARGEST_ASIDE = "largest_aside", "bending", "mm", "maximum lateral tip displacement"
-    BEND = "bend", "bending", "deg", "bend at {c.kpa} kPa in {c.chambers}, the others empty"
+    BEND = "bend", "bending", "deg", "bend at {kpa} kPa in {chambers}, the others empty"
     RIM_ROOM = (
         "rim_room", "bending", "mm",
-        "room between rims on the inner side, {c.kpa} kPa in {c.chambers}, the others empty",
+        "room between rims on the inner side, {kpa} kPa in {chambers}, the others empty",
     )  # fmt: skip
     CHAMBER_CLEARANCE = (
         "chamber_clearance", "bending", "mm",
-        "clearance between chambers, {c.kpa} kPa in {c.chambers}, the others empty",
+        "clearance between chambers, {kpa} kPa in {chambers}, the others empty",
     )  # fmt: skip
     ASIDE = (
         "aside", "bending", "mm",
-        "lateral tip displacement at {c.kpa} kPa in {c.chambers}, the others empty",
+        "lateral tip displacement at {kpa} kPa in {chambers}, the others empty",
     )  # fmt: skip
-    FREE_BEND = "free_bend", "bending", "deg", "free bend{c.of}{c.hinges}"
+    FREE_BEND = "free_bend", "bending", "deg", "free bend{of}{hinges}"
 
     SECOND_MOMENT = "second_moment", "stiffness", "mm4", "second moment of area of the plate"
     REFERENCE_STIFFNESS = (
@@ -176,19 +176,19 @@ class Quantity(Enum):
     )  # fmt: skip
     HELD_STIFFNESS = (
         "held_stiffness", "stiffness", "N/mm",
-        "lateral tip stiffness at {c.kpa} kPa, pressure held",
+        "lateral tip stiffness at {kpa} kPa, pressure held",
     )  # fmt: skip
     SHUT_STIFFNESS = (
         "shut_stiffness", "stiffness", "N/mm",
-        "lateral tip stiffness at {c.kpa} kPa, chambers shut",
+        "lateral tip stiffness at {kpa} kPa, chambers shut",
     )  # fmt: skip
-    JAMMING_RATIO = "jamming_ratio", "stiffness", "", "jammed over loose stiffness{c.of}"
-    LOOSE_STIFFNESS = "loose_stiffness", "stiffness", "N mm2", "bending stiffness{c.of}, loose"
-    JAMMED_STIFFNESS = "jammed_stiffness", "stiffness", "N mm2", "bending stiffness{c.of}, jammed"
+    JAMMING_RATIO = "jamming_ratio", "stiffness", "", "jammed over loose stiffness{of}"
+    LOOSE_STIFFNESS = "loose_stiffness", "stiffness", "N mm2", "bending stiffness{of}, loose"
+    JAMMED_STIFFNESS = "jammed_stiffness", "stiffness", "N mm2", "bending stiffness{of}, jammed"
 
     def named(self, at: Conditions) -> str:
         """Return the figure's display name."""
-        return self.words.format(c=_Words(at))
+        return self.words.format_map(_texts(at))
 
     @classmethod
     def of(cls, key: str) -> Quantity:
@@ -201,46 +201,20 @@ class Quantity(Enum):
         return keys[key]
 
 
-class _Words:
-    """Conditions as text, for the names of figures."""
-
-    def __init__(self, at: Conditions) -> None:
-        self._at = at
-
-    def __getattr__(self, name: str) -> str:
-        return f"{getattr(self._at, name):g}"
-
-    @property
-    def of(self) -> str:
-        return f" of {self._at.of}" if self._at.of else ""
-
-    @property
-    def each(self) -> str:
-        return {"sba": " of one SBA", "pouch": " a pouch"}.get(self._at.each, "")
-
-    @property
-    def chambers(self) -> str:
-        return chamber_count(self._at.chambers or 0)
-
-    @property
-    def hinges(self) -> str:
-        return f", {self._at.hinges} hinges" if self._at.hinges else ""
-
-    @property
-    def percent(self) -> str:
-        return f"{100 * (self._at.share or 0.0):g}"
-
-    @property
-    def stroke(self) -> str:
-        return share_of_stroke(self._at.share or 0.0)
-
-    @property
-    def bent(self) -> str:
-        return "half bent" if self._at.share else "straight"
-
-    @property
-    def litres(self) -> str:
-        return f"{(self._at.flow or 0.0) / 1000:g}"
+def _texts(at: Conditions) -> dict[str, str]:
+    """Return conditions as texts for the names of figures."""
+    numbers = {name: f"{value:g}" for name, value in at.as_dict().items() if name not in _NAMES}
+    share = at.share or 0.0
+    return numbers | {
+        "of": f" of {at.of}" if at.of else "",
+        "each": {"sba": " of one SBA", "pouch": " a pouch"}.get(at.each, ""),
+        "chambers": chamber_count(at.chambers or 0),
+        "hinges": f", {at.hinges} hinges" if at.hinges else "",
+        "percent": f"{100 * share:g}",
+        "stroke": share_of_stroke(share),
+        "bent": "half bent" if share else "straight",
+        "litres": f"{(at.flow or 0.0) / 1000:g}",
+    }
 
 
 def share_of_stroke(share: float) -> str:
@@ -352,10 +326,11 @@ class FigureKey(NamedTuple):
         return f"{self.quantity.named(self.at)}{model} [{self.quantity.unit}]"
 
 
+_NAMES = ("of", "each")
 _CONDITIONS: dict[str, Any] = {
     **dict.fromkeys(("kpa", "share", "angle", "volume", "flow", "tube"), float),
     **dict.fromkeys(("chambers", "hinges"), int),
-    **dict.fromkeys(("of", "each"), str),
+    **dict.fromkeys(_NAMES, str),
 }
 BY_SEVERAL = (
     Quantity.BLOCKED_FORCE,

@@ -59,12 +59,18 @@ def test_a_pouch_shortens_by_36_percent_at_most() -> None:
         pouch.half_angle(0.4)
 
 
+def hinge_section(bend: float, length: float) -> float:
+    """The triangle over the joint and the arc over that."""
+    angle = pouch.half_angle(1 - math.cos(bend / 2))
+    return length**2 / 8 * math.sin(bend) + length**2 / 4 * float(pouch.section(angle))
+
+
 @pytest.mark.parametrize("degrees", [5.0, 40.0, 80.0, 94.0])
 def test_moment_of_a_hinge_is_virtual_work(degrees: float) -> None:
     """Statics of the plates against the work of the air: two ways that share no line."""
     bend, length, width, kpa = math.radians(degrees), 12.0, 20.0, 10.0
-    higher, lower = (pouch.hinge_section(bend + s, length) for s in (STEP, -STEP))
-    work = kpa / 1000 * width * float(higher - lower) / (2 * STEP)
+    higher, lower = (hinge_section(bend + s, length) for s in (STEP, -STEP))
+    work = kpa / 1000 * width * (higher - lower) / (2 * STEP)
     assert float(pouch.moment(kpa, bend, length, width)) == pytest.approx(work, rel=1e-4, abs=1e-6)
 
 
@@ -77,7 +83,7 @@ def test_a_straight_hinge_has_half_plus_root_third_of_a_plates_moment() -> None:
 
 def test_a_hinge_rests_where_its_section_is_largest() -> None:
     bends = np.linspace(0.5, 1.76, 1261)
-    largest = bends[np.argmax(pouch.hinge_section(bends, 10.0))]
+    largest = bends[np.argmax([hinge_section(float(bend), 10.0) for bend in bends])]
     assert pouch.free_bend() == pytest.approx(largest, abs=2e-3)
     # More than the 80 deg of real pouches, whose films and joints resist.
     assert 80 < math.degrees(pouch.free_bend()) < 100

@@ -16,7 +16,6 @@ import pytest
 from click.testing import CliRunner
 
 import sbafab
-from docs.scripts.gallery import figures_of
 from sbafab.cli import app
 from sbafab.models import paper
 from sbafab.models.calibrated import load_calibration
@@ -297,25 +296,6 @@ def test_find_prints_and_writes_them(tmp_path: Path) -> None:
     assert set(told["measured"]) == {"stroke@10kPa", "bend@10kPa", "force@4mm@50kPa", "height"}
 
 
-def test_find_leaves_out_what_is_near_once_calibrated(tmp_path: Path) -> None:
-    asked = ["find", "3dof-15mm", "--min", "bend@10kPa=50", "--max", "height=3"]
-    asked += ["--set", "stack.balloons=15", "--free", "chamber.diameter=5:5:1"]
-    ended = CliRunner().invoke(app, [*asked, "--to", str(tmp_path / "tip.toml")])
-    assert ended.exit_code == 0, ended.output
-    assert "the paper measured" not in ended.output
-    assert "the paper measured" not in (tmp_path / "tip.toml").read_text(encoding="utf-8")
-
-
-def test_the_gallery_s_cards_show_them() -> None:
-    design = sbafab.load("3dof-15mm", UNCALIBRATED)
-    card = list(figures_of(sbafab.predict(design), design))
-    for begins, measured in (("flat 1.8", "0.95 mm"), ("bend at 10 kPa", "81 +- 6 deg")):
-        (line,) = [one for one in card if one.startswith(begins)]
-        assert f"(the paper measured {measured}" in line
-    # The upper bound, 141 degrees, is no longer a key figure.
-    assert not any("140" in one.partition("(")[0] or "141" in one for one in card)
-
-
 def test_the_studio_s_answers_hold_them(calibrated: dict[str, Prediction], tmp_path: Path) -> None:
     (answer,) = elastic(job(tmp_path, sbafab.template("3dof-15mm")), lambda: None)
     told = {figure["name"] for figure in answer["figures"] if figure["measured"]}
@@ -324,21 +304,6 @@ def test_the_studio_s_answers_hold_them(calibrated: dict[str, Prediction], tmp_p
     moving = stack_model("3dof-15mm", sbafab.stack("3dof-15mm", UNCALIBRATED))["measured"]
     assert "17.5 mm" in moving["height"]
     assert "81 +- 6 deg" in moving["bend"]
-    folder = Path(sbafab.__file__).parent / "studio" / "static"
-    for script, words in (
-        ("findings.js", "figure.measured.sentence"),
-        ("compare.js", "figure.measured.sentence"),
-        ("motion.js", "measured(stack)"),
-        ("parts_motion.js", "measured(mover)"),
-    ):
-        assert words in (folder / script).read_text(encoding="utf-8")
-
-
-@pytest.mark.long
-def test_assemblies_leave_out_what_is_near_once_calibrated() -> None:
-    found = sbafab.predict_assembly("standing")
-    told = {figure.name for figure in found.figures if figure.measured}
-    assert told == {"sag of the tip, 1.2 g across it"}
 
 
 @pytest.mark.long

@@ -9,7 +9,6 @@ import pytest
 from sbafab.models.calibrated import ModelCalibration, load_calibration
 from sbafab.models.figures import Factors
 from sbafab.models.intervals import Uncertainty
-from sbafab.models.priors import UNKNOWNS
 from sbafab.validation.comparison import curve_intervals, uncertainty_for, widened
 from sbafab.validation.evidence import MeasuredCurve, Setup, StatedError
 from sbafab.validation.model_values import ModelValues
@@ -97,15 +96,6 @@ def test_a_time_counts_its_delay(paper: ModelCalibration) -> None:
     assert math.log(narrower[1] / time) == pytest.approx(half)
 
 
-def test_a_share_is_a_term_alone(paper: ModelCalibration) -> None:
-    share, ends = Uncertainty(paper, {}).interval_of(
-        "loss", lambda f: f.loss_share, term="loss_share"
-    )
-    assert share == pytest.approx(paper.values["loss_share"])
-    spread = math.sqrt(paper.covariance[5][5] + paper.discrepancy["loss"] ** 2)
-    assert math.log(ends[1] / share) == pytest.approx(DEVIATIONS * spread)
-
-
 def test_a_value_that_vanishes_with_other_factors_may_be_nothing(paper: ModelCalibration) -> None:
     def force(factors: Factors) -> float:
         return 1.0 if factors.modulus_ratio == paper.values["modulus_ratio"] else 1e-4
@@ -128,12 +118,3 @@ def test_a_quantity_that_no_unknown_changes_has_none(paper: ModelCalibration) ->
     assert curve_intervals(mass, uncertainty_for(mass, paper)) is None
     undescribed = curve("force_n").model_copy(update={"design": ""})
     assert curve_intervals(undescribed, uncertainty_for(undescribed, paper)) is None
-
-
-def test_another_film_is_as_uncertain_as_the_prior(paper: ModelCalibration) -> None:
-    film = {"product": "TPU 50", "thickness": 0.05, "modulus": 20.0, "poisson": 0.4}
-    changes = {f"films.tpe.{key}": value for key, value in film.items()}
-    of = curve("height_mm").model_copy(update={"changes": changes})
-    calibration = uncertainty_for(of, paper).calibration
-    assert calibration.values["modulus_ratio"] == 1.0
-    assert calibration.covariance[0][0] == pytest.approx(UNKNOWNS[0].spread ** 2)

@@ -91,26 +91,6 @@ def test_sizes_of_the_paper_follow_from_its_films() -> None:
     assert values(paper.curve("radial-inflated"))[""] == pytest.approx([inflated], rel=1e-4)
 
 
-def test_a_press_factor_counts() -> None:
-    flat = load_evidence("paper").curve("flat-height")
-    # Of the films; the masks between them keep their thickness.
-    half = 29 * 0.025 + 30 * 0.038 / 2
-    assert values(flat, Factors(press_factor=0.5))[""] == pytest.approx([half])
-
-
-def test_a_flat_force_is_nearly_pressure_times_pocket() -> None:
-    held = curve(
-        "force_n",
-        "pressure_kpa",
-        (50.0, 100.0),
-        setup=Setup(tip="held", stroke_mm=0.0),
-    )
-    pocket = math.pi * 2.5**2
-    for pressure, force in zip(held.x, values(held)[""], strict=True):
-        assert force is not None
-        assert 0.9 * pressure * pocket / 1000 < force <= pressure * pocket / 1000
-
-
 def test_shares_of_the_height_have_five_readings_and_strokes_have_none(three: Stack) -> None:
     shares = load_evidence("paper").curve("force-3dof")
     series = values(shares)
@@ -251,13 +231,6 @@ def test_a_source_that_ships_says_what_could_not_be_had(
     assert "230 kPa" in out
     assert "Not had: Only the abstract" in out
     assert "0 of 1 values" in out
-
-
-def test_no_such_source_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = run(["reproduce", "papr"], capsys)
-    assert (code, out) == (2, "")
-    assert "did you mean paper?" in err
-    assert err.count("\n") == 1
 
 
 # A lab's records.
