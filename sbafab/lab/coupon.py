@@ -312,25 +312,22 @@ def _left_by_rounding(scatter: float, resolution: float) -> float:
 
 @cache
 def student_t(degrees: int) -> float:
-    """The t that 95 % of Student's distribution stay within, by its series for whole degrees."""
+    """Return the t that 95 % of Student's distribution lie within, by its series for whole degrees
+    of freedom.
+    """
     degrees = min(degrees, MOST_DEGREES)
-    low, high = 1.0, 20.0
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if _within(middle, degrees) < 0.95 else (low, middle)
+    low, high, odd = 1.0, 20.0, degrees % 2
+    while high - low > 1e-12:
+        t = (low + high) / 2
+        angle = math.atan(t / math.sqrt(degrees))
+        term = math.sin(angle) * (math.cos(angle) if odd else 1.0)
+        within = 0.0
+        for k in range(1 + odd, degrees, 2):
+            within += term
+            term *= math.cos(angle) ** 2 * k / (k + 1)
+        within = 2 / math.pi * (angle + within) if odd else within
+        low, high = (t, high) if within < 0.95 else (low, t)
     return (low + high) / 2
-
-
-def _within(t: float, degrees: int) -> float:
-    """The share of Student's distribution between -t and t."""
-    angle = math.atan(t / math.sqrt(degrees))
-    cosine, odd = math.cos(angle), degrees % 2
-    term = math.sin(angle) * (cosine if odd else 1.0)
-    total = 0.0
-    for k in range(1 + odd, degrees, 2):
-        total += term
-        term *= cosine**2 * k / (k + 1)
-    return 2 / math.pi * (angle + total) if odd else total
 
 
 # The calibration piece: four frames of film whose sizes tell how wide the beam cuts.
@@ -359,28 +356,30 @@ class CouponFrame(NamedTuple):
 
     name: str
     corner: Point
-    outer: tuple[float, float]
-    window: tuple[float, float]
+    outer: Point
+    window: Point
 
     @property
     def region(self) -> Region:
-        return self._box(self.outer) - self._box(self.window)
+        (x, y), (width, height), (inner_width, inner_height) = self[1:]
+        # The window in the middle.
+        u, v = x + (width - inner_width) / 2, y + (height - inner_height) / 2
+        window = rectangle((u, v), (u + inner_width, v + inner_height))
+        return rectangle((x, y), (x + width, y + height)) - window
 
-    def _box(self, size: tuple[float, float]) -> Region:
-        x, y = self.corner[0] + self.outer[0] / 2, self.corner[1] + self.outer[1] / 2
-        return rectangle((x - size[0] / 2, y - size[1] / 2), (x + size[0] / 2, y + size[1] / 2))
 
-
-FRAMES = (
-    CouponFrame("A", (4.0, 34.0), (24.0, 20.0), (14.0, 10.0)),
-    CouponFrame("B", (32.0, 34.0), (24.0, 20.0), (14.0, 10.0)),
-    CouponFrame("C", (8.0, 12.0), (16.0, 12.0), (8.0, 6.0)),
-    CouponFrame("D", (36.0, 12.0), (16.0, 12.0), (8.0, 6.0)),
+FRAMES = tuple(
+    CouponFrame(name, corner, outer, window)
+    for (outer, window), names in (
+        (((24.0, 20.0), (14.0, 10.0)), {"A": (4.0, 34.0), "B": (32.0, 34.0)}),
+        (((16.0, 12.0), (8.0, 6.0)), {"C": (8.0, 12.0), "D": (36.0, 12.0)}),
+    )
+    for name, corner in names.items()
 )
 
 
 def coupon() -> Region:
-    """The frames, nominal, on a square of film with its lower left corner at the origin."""
+    """Return the frames, nominal, on a square of film with its lower left corner at the origin."""
     return union(frame.region for frame in FRAMES)
 
 

@@ -58,14 +58,14 @@ def read_cut_sheet(source: Path, name: str | None) -> DrawnSheet:
     Raises DesignError if the folder has no such file, OutputError if a file is corrupt.
     """
     if source.suffix.lower() == ".dxf":
-        return _sheet(source.stem, source, (), SPACING, ())
+        return _sheet(source.stem, source)
     claims = read_index(source)
     sheets = {Path(sheet.file).stem: sheet for sheet in claims.sheets}
     layers = dict(_layers(source, claims))
     name = _chosen(name, [*sheets, *layers])
     shapes = tuple(_shapes(layers))
     if name not in sheets:
-        return _sheet(name, layers[name][1], shapes, SPACING, ())
+        return _sheet(name, layers[name][1], shapes)
     sheet = sheets[name]
     path = path_in_folder(source, sheet.file)
     pins = tuple((pin.x, pin.y, pin.diameter) for pin in sheet.pins)
@@ -109,9 +109,9 @@ def _shapes(layers: dict[str, tuple[str, Path]]) -> Iterator[SheetShape]:
 def _sheet(
     name: str,
     path: Path,
-    shapes: tuple[SheetShape, ...],
-    spacing: float,
-    pins: tuple[tuple[float, float, float], ...],
+    shapes: tuple[SheetShape, ...] = (),
+    spacing: float = SPACING,
+    pins: tuple[tuple[float, float, float], ...] = (),
 ) -> DrawnSheet:
     drawing = read_profile(path)
     if not drawing.region.contours:
@@ -119,22 +119,14 @@ def _sheet(
     named: list[SheetShape] = []
     unnamed: list[SheetShape] = []
     for piece in drawing.region.pieces:
-        matches = [shape for shape in shapes if _is_congruent(piece, shape.region)]
-        if not matches:
-            matches = [SheetShape(f"part {len(unnamed) + 1}", piece)]
-            unnamed += matches
-        label = ", ".join(dict.fromkeys(shape.name for shape in matches))
-        named.append(SheetShape(label, piece))
-    properties = drawing.properties
-    return DrawnSheet(
-        name=name,
-        places=tuple(named),
-        shapes=(*shapes, *unnamed),
-        pins=pins,
-        spacing=spacing,
-        kerf=properties.get("KERF_WIDTH", "none"),
-        film=properties.get("MATERIAL", ""),
-    )
+        names = [shape.name for shape in shapes if _is_congruent(piece, shape.region)]
+        if not names:
+            names = [f"part {len(unnamed) + 1}"]
+            unnamed.append(SheetShape(names[0], piece))
+        named.append(SheetShape(", ".join(dict.fromkeys(names)), piece))
+    kerf, film = (drawing.properties.get(key, "") for key in ("KERF_WIDTH", "MATERIAL"))
+    every = (*shapes, *unnamed)
+    return DrawnSheet(name, tuple(named), every, pins, spacing, kerf or "none", film)
 
 
 def _is_congruent(piece: Region, shape: Region) -> bool:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
-from collections.abc import Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from sbafab.errors import DesignError
 from sbafab.lab.report import Built, items
@@ -19,27 +18,18 @@ from sbafab.validation.evidence import (
     load_evidence,
 )
 
-
-class _Recorded(NamedTuple):
-    quantity: str
-    setup: Setup = Setup()
-    unknown: tuple[str, ...] = ()
-    x_name: str = ""
-
-
-RECORDED = {
-    "stroke_mm": _Recorded("stroke_mm", Setup(tip="free"), ("The pressure is not recorded.",)),
-    "force_n": _Recorded(
-        "force_n",
-        Setup(pressure_kpa=100.0, tip="held"),
-        ("How the sensor holds the tip is not recorded.",),
-        "height_share",
-    ),
-    "height_mm": _Recorded("flat_height_mm", Setup(tip="free")),
-    "mass_g": _Recorded("mass_g"),
-    "burst_kpa": _Recorded("burst_kpa"),
+FREE, HELD = Setup(tip="free"), Setup(pressure_kpa=100.0, tip="held")
+PRESSURE, SENSOR = "The pressure is not recorded.", "How the sensor holds the tip is not recorded."
+RECORDED: dict[str, tuple[str, Setup, tuple[str, ...], str]] = {
+    "stroke_mm": ("stroke_mm", FREE, (PRESSURE,), ""),
+    "force_n": ("force_n", HELD, (SENSOR,), "height_share"),
+    "height_mm": ("flat_height_mm", FREE, (), ""),
+    "mass_g": ("mass_g", Setup(), (), ""),
+    "burst_kpa": ("burst_kpa", Setup(), (), ""),
 }
-"""Recorded quantities used as evidence, named as in ``sbafab record``; x is 0 if it is named."""
+"""Recorded quantities used as evidence, named as in ``sbafab record``: quantity, set-up, what is
+unknown, and the axis along which x is 0.
+"""
 
 
 def from_lab_records(lab: Lab) -> Evidence:
@@ -52,57 +42,47 @@ def from_lab_records(lab: Lab) -> Evidence:
     by_design: dict[str, list[Built]] = defaultdict(list)
     for built in items(records, builds):
         by_design[built.design].append(built)
-    curves = tuple(curve for actuators in by_design.values() for curve in _curves(actuators))
+    counts: Counter[str] = Counter()
+    curves = []
+    for actuators in by_design.values():
+        for curve in _curves(actuators):
+            # Designs of one name share ids.
+            counts[curve.id] += 1
+            number = counts[curve.id]
+            name = curve.id if number == 1 else f"{curve.id}-{number}"
+            curves.append(curve.model_copy(update={"id": name}))
     if not curves:
         raise DesignError(
             f"{lab.path} has no record with any of {', '.join(RECORDED)}; record one, such as "
             "--stroke 16.8"
         )
     citation = f"build records in {lab.path.name}"
-    return Evidence(id=_id(lab.path.stem), citation=citation, curves=_renamed(curves))
+    return Evidence(id=_id(lab.path.stem), citation=citation, curves=tuple(curves))
 
 
-def _curves(actuators: Sequence[Built]) -> list[MeasuredCurve]:
-    build = actuators[0].build
-    curves = []
-    for name, kind in RECORDED.items():
+def _curves(actuators: Sequence[Built]) -> Iterator[MeasuredCurve]:
+    design, build = actuators[0].design, actuators[0].build
+    for name, (quantity, setup, unknown, x_name) in RECORDED.items():
         values = tuple(a.numbers[name] for a in actuators if name in a.numbers)
-        if not values:
-            continue
-        curves.append(
-            MeasuredCurve(
-                id=_id(f"{actuators[0].design}-{name}"),
-                quantity=kind.quantity,
+        if values:
+            yield MeasuredCurve(
+                id=_id(f"{design}-{name}"),
+                quantity=quantity,
                 place=f"{len(values)} actuators",
                 y=values,
-                x_name=kind.x_name,
-                x=(0.0,) * len(values) if kind.x_name else (),
+                x_name=x_name,
+                x=(0.0,) * len(values) if x_name else (),
                 toml=build.toml if build.design else "",
-                setup=kind.setup,
+                setup=setup,
                 error=StatedError(source="not recorded"),
-                group=_id(actuators[0].design),
-                unknown=kind.unknown,
+                group=_id(design),
+                unknown=unknown,
             )
-        )
-    return curves
 
 
 def _id(text: str) -> str:
     """Return a text as an id of evidence."""
     return re.sub(r"[^A-Za-z0-9._-]+", "-", text).lstrip("-._")[:64] or "lab"
-
-
-def _renamed(curves: Sequence[MeasuredCurve]) -> tuple[MeasuredCurve, ...]:
-    """Return the curves, with a number appended to ids that designs of one name share."""
-    counts: dict[str, int] = defaultdict(int)
-    renamed = []
-    for curve in curves:
-        counts[curve.id] += 1
-        number = counts[curve.id]
-        renamed.append(
-            curve if number == 1 else curve.model_copy(update={"id": f"{curve.id}-{number}"})
-        )
-    return tuple(renamed)
 
 
 RECORDS = (".sqlite", ".db")

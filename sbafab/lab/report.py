@@ -7,7 +7,7 @@ retested actuator counts by its first attempt.
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
@@ -131,13 +131,8 @@ class ReportDocument(Document, schema="sbafab/report@1"):
 def report(records: Sequence[Record], builds: Mapping[str, RecordedDesign]) -> Report:
     """Evaluate the records; every design recorded must be among ``builds``."""
     actuators = items(records, builds)
-    tested = [item for item in actuators if item.first("leak")]
-    return Report(
-        len(records),
-        len(actuators),
-        tuple(_success(tested)),
-        tuple(_comparisons(actuators, builds)),
-    )
+    success = tuple(_success([item for item in actuators if item.first("leak")]))
+    return Report(len(records), len(actuators), success, tuple(_comparisons(actuators, builds)))
 
 
 def items(records: Iterable[Record], builds: Mapping[str, RecordedDesign]) -> list[Built]:
@@ -145,26 +140,19 @@ def items(records: Iterable[Record], builds: Mapping[str, RecordedDesign]) -> li
     groups: dict[tuple[str, str], list[Record]] = defaultdict(list)
     for record in standing(records):
         groups[builds[record.design_sha256].actuator, record.serial].append(record)
-    names = _names(builds)
+    named: dict[str, dict[str, None]] = defaultdict(dict)
+    for build in builds.values():
+        named[build.actuator][build.name] = None
+    names = {actuator: ", ".join(designs) for actuator, designs in named.items()}
+    counts = Counter(names.values())
     actuators = []
     for (actuator, _), group in groups.items():
         ordered = sorted(group, key=lambda record: record.attempt)
-        build = builds[ordered[0].design_sha256]
-        actuators.append(Built(names[actuator], build, tuple(ordered)))
+        # Designs of the same name get the hash's first digits.
+        name = names[actuator]
+        name = name if counts[name] == 1 else f"{name} {actuator[:8]}"
+        actuators.append(Built(name, builds[ordered[0].design_sha256], tuple(ordered)))
     return actuators
-
-
-def _names(builds: Mapping[str, RecordedDesign]) -> dict[str, str]:
-    """Names of built designs, by hash; designs of the same name get the hash's first digits."""
-    names: dict[str, dict[str, None]] = defaultdict(dict)
-    for build in builds.values():
-        names[build.actuator][build.name] = None
-    joined = {actuator: ", ".join(designs) for actuator, designs in names.items()}
-    shared = [*joined.values()]
-    return {
-        actuator: name if shared.count(name) == 1 else f"{name} {actuator[:8]}"
-        for actuator, name in joined.items()
-    }
 
 
 def _groups(
@@ -203,29 +191,20 @@ def _comparisons(
             if not values:
                 continue
             predicted, model = newest[group[0].build.actuator].predicted.get(quantity, (None, ""))
-            mean, interval = fmean(values), interval_of(values)
-            low, high = interval or (None, None)
+            mean, count, half = fmean(values), len(values), math.inf
+            if count > 1:
+                # Student's 95 % interval of the mean.
+                half = student_t(count - 1) * stdev(values) / math.sqrt(count)
+            verdict: Agreement = "one measurement" if count == 1 else "differs"
+            if predicted is None:
+                verdict = "not predicted"
+            elif count > 1 and abs(predicted - mean) <= half:
+                verdict = "agrees"
+            low, high = (None, None) if count == 1 else (mean - half, mean + half)
+            ratio = mean / predicted if predicted else None
             yield Comparison(
-                *(design, quantity, unit, len(values), mean, low, high, predicted, model),
-                ratio=mean / predicted if predicted else None,
-                verdict=_agreement(predicted, interval),
+                design, quantity, unit, count, mean, low, high, predicted, model, ratio, verdict
             )
-
-
-def _agreement(predicted: float | None, interval: tuple[float, float] | None) -> Agreement:
-    if predicted is None:
-        return "not predicted"
-    if interval is None:
-        return "one measurement"
-    return "agrees" if interval[0] <= predicted <= interval[1] else "differs"
-
-
-def interval_of(values: Sequence[float]) -> tuple[float, float] | None:
-    """Return Student's 95 % interval of the mean; None for fewer than two values."""
-    if len(values) < 2:
-        return None
-    half = student_t(len(values) - 1) * stdev(values) / math.sqrt(len(values))
-    return fmean(values) - half, fmean(values) + half
 
 
 RECENT = 20

@@ -11,7 +11,6 @@ import os
 import re
 import sqlite3
 import threading
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from datetime import UTC, datetime
@@ -56,6 +55,20 @@ class Contents(NamedTuple):
         """Return the records or the entries."""
         return [row for row in (*self.entries, *self.records) if isinstance(row, kind)]
 
+    def of_device(self, sha256: str, serial: str) -> list[LabRow]:
+        """Return the standing rows of a device: of this design, and of others of one actuator."""
+        rows: list[LabRow] = [*standing(self.records), *standing(self.entries)]
+        builds = self.builds
+        return [
+            row
+            for row in rows
+            if row.serial == serial
+            and (
+                row.design_sha256 == sha256
+                or builds[row.design_sha256].actuator == builds[sha256].actuator
+            )
+        ]
+
 
 class Lab:
     """The records in the file ``path``, which the first record creates.
@@ -98,14 +111,24 @@ class Lab:
             if build is not None:
                 values = (build.sha256, build.generator, _BUILD.dump_json(build).decode())
                 file.execute("INSERT OR IGNORE INTO design VALUES (?, ?, ?)", values)
-            devices = _Devices(file, self._contents(file), self.clock())
-            serials = dict.fromkeys(row.serial for row in rows)
-            attempts = {serial: devices.attempt(sha256, serial, is_again) for serial in serials}
-            head = {"design_sha256": sha256}
-            return [
-                devices.put(row.model_copy(update={**head, "attempt": attempts[row.serial]}))
-                for row in rows
-            ]
+            contents = self._contents(file)
+            devices = {row.serial: contents.of_device(sha256, row.serial) for row in rows}
+            for serial, device in devices.items() if is_again else ():
+                if not device:
+                    raise DesignError(
+                        f"serial {serial} has no record yet, so no attempt came before this one; "
+                        "leave out --again, or see: sbafab record --find"
+                    )
+            attempts = {
+                serial: max((row.attempt for row in device), default=1) + is_again
+                for serial, device in devices.items()
+            }
+            added = []
+            for row in rows:
+                head = {"design_sha256": sha256, "attempt": attempts[row.serial]}
+                added.append(self._put(file, devices[row.serial], row.model_copy(update=head)))
+                devices[row.serial].append(added[-1])
+            return added
 
     def correct(self, kind: type[Row], number: int, change: Mapping[str, Any]) -> Row:
         """Store a correction of row ``number``: a copy with the values of ``change``, by column,
@@ -130,19 +153,36 @@ class Lab:
             row = with_photograph(self.path, row_of(kind, {**old.stated, **change}))
             more = {name: getattr(old, name) for name in ("design_sha256", "attempt")}
             row = row.model_copy(update={**more, "corrects": number})
-            return _Devices(file, contents, self.clock()).put(row)
+            return self._put(file, contents.of_device(row.design_sha256, row.serial), row)
+
+    def _put(self, file: sqlite3.Connection, device: Sequence[LabRow], row: Row) -> Row:
+        """Add a row. Raises DesignError if it contradicts or repeats another one of its device."""
+        for stored in () if row.withdrawn else device:
+            is_other = stored.attempt == row.attempt and stored.id != row.corrects
+            if type(stored) is type(row) and is_other and (problem := row.conflict(stored)):
+                raise DesignError(problem)
+        row = row.model_copy(update={"recorded": self.clock().strftime("%Y-%m-%dT%H:%M:%SZ")})
+        content = row.model_dump_json(exclude={"id", "corrects"}, exclude_defaults=True)
+        statement = f"INSERT INTO {row.NOUN} (corrects, content) VALUES (?, ?)"
+        number = file.execute(statement, (row.corrects, content)).lastrowid
+        return row.model_copy(update={"id": number})
 
     def _contents(self, file: sqlite3.Connection) -> Contents:
+        def rows(kind: type[Row]) -> list[Row]:
+            query = f"SELECT id, corrects, content FROM {kind.NOUN} ORDER BY id"
+            return [
+                kind.model_validate_json(content).model_copy(update={"id": i, "corrects": corrects})
+                for i, corrects, content in file.execute(query)
+            ]
+
         designs = file.execute("SELECT content FROM design ORDER BY rowid")
         builds = [_BUILD.validate_json(content) for (content,) in designs]
         contents = Contents(
-            list(_rows(file, Record)),
-            list(_rows(file, HistoryEntry)),
-            {build.sha256: build for build in builds},
+            rows(Record), rows(HistoryEntry), {build.sha256: build for build in builds}
         )
-        for row in (*contents.records, *contents.entries):
-            if row.design_sha256 not in contents.builds:
-                raise OutputError(f"{self.path} {_REASONS['CORRUPT']}")
+        stored: list[LabRow] = [*contents.records, *contents.entries]
+        if {row.design_sha256 for row in stored} - contents.builds.keys():
+            raise OutputError(f"{self.path} {_REASONS['CORRUPT']}")
         return contents
 
     @contextmanager
@@ -222,57 +262,6 @@ def _reason(error: sqlite3.Error) -> str:
 
 
 _BUILD = TypeAdapter(RecordedDesign)
-
-
-def _rows(file: sqlite3.Connection, kind: type[Row]) -> Iterator[Row]:
-    query = f"SELECT id, corrects, content FROM {kind.NOUN} ORDER BY id"
-    for number, corrects, content in file.execute(query):
-        row = kind.model_validate_json(content)
-        yield row.model_copy(update={"id": number, "corrects": corrects})
-
-
-class _Devices:
-    """The valid rows of an open file, by serial."""
-
-    def __init__(self, file: sqlite3.Connection, contents: Contents, now: datetime) -> None:
-        self.file, self.builds = file, contents.builds
-        self.recorded = now.strftime("%Y-%m-%dT%H:%M:%SZ")
-        self.rows: dict[str, list[LabRow]] = defaultdict(list)
-        for row in (*standing(contents.records), *standing(contents.entries)):
-            self.rows[row.serial].append(row)
-
-    def of(self, sha256: str, serial: str) -> list[LabRow]:
-        """Return the rows of a device: of this design, and of others of the same actuator."""
-        return [
-            row
-            for row in self.rows[serial]
-            if row.design_sha256 == sha256
-            or self.builds[row.design_sha256].actuator == self.builds[sha256].actuator
-        ]
-
-    def attempt(self, sha256: str, serial: str, is_again: bool) -> int:
-        """Return the attempt that a new row of a device belongs to. Raises DesignError."""
-        attempts = [row.attempt for row in self.of(sha256, serial)]
-        if is_again and not attempts:
-            raise DesignError(
-                f"serial {serial} has no record yet, so no attempt came before this one; leave "
-                "out --again, or see: sbafab record --find"
-            )
-        return max(attempts, default=1) + is_again
-
-    def put(self, row: Row) -> Row:
-        """Add a row. Raises DesignError if it contradicts or repeats another one."""
-        for stored in () if row.withdrawn else self.of(row.design_sha256, row.serial):
-            is_other = stored.attempt == row.attempt and stored.id != row.corrects
-            if type(stored) is type(row) and is_other and (problem := row.conflict(stored)):
-                raise DesignError(problem)
-        row = row.model_copy(update={"recorded": self.recorded})
-        content = row.model_dump_json(exclude={"id", "corrects"}, exclude_defaults=True)
-        statement = f"INSERT INTO {row.NOUN} (corrects, content) VALUES (?, ?)"
-        number = self.file.execute(statement, (row.corrects, content)).lastrowid
-        row = row.model_copy(update={"id": number})
-        self.rows[row.serial].append(row)
-        return row
 
 
 # Photographs: files named by their content, in a folder beside the lab's file.
