@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from sbafab.actuators import build, load_design
 from sbafab.design.laminate_file import laminate_json, read_laminate
@@ -53,13 +53,6 @@ def test_a_template_is_read_back_exactly(name: str, tmp_path: Path) -> None:
     laminate = build(load_design(name))
     assert_read_back(laminate, tmp_path)
     hold("laminate", json.loads(laminate_json(laminate)))
-
-
-@pytest.mark.long
-@settings(max_examples=100)
-@given(valid())
-def test_100_random_laminates_are_read_back_exactly(draft: Draft) -> None:
-    assert_draft_read_back(draft)
 
 
 @share(2, 2)

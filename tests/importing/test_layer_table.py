@@ -73,39 +73,24 @@ def test_drawings_that_no_row_names_are_named(importing: Importing, tmp_path: Pa
     assert json.loads(result.stdout)["remarks"] == [remark]
 
 
-REFUSED: dict[str, tuple[str, str, str]] = {
-    "no column": (LAYERS.replace("role", "layer", 1), CHAMBERS, "has the column layer twice"),
-    "role": (
-        LAYERS.replace("cap", "lid"),
-        CHAMBERS,
-        "layers.csv, line 4: role = 'lid' must be 'base'",
-    ),
-    "no file": (LAYERS.replace("cover", "lid"), CHAMBERS, "layers.csv, line 4: drawing "),
-    "kind": (
-        LAYERS.replace("cover.svg", "cover.png"),
-        CHAMBERS,
-        "line 4: file = 'cover.png' is no",
-    ),
-    "pieces": (
-        LAYERS.replace("FILM,", "FILM,many"),
-        CHAMBERS,
-        "line 2: pieces = 'many' must be a whole number",
-    ),
-    "cells": (f"{LAYERS}a,b,c,d,e,f\n", CHAMBERS, "layers.csv, line 5 has 6 cells for 5 columns"),
-    "mouth": (LAYERS, "name,x,y\npouch,0,0\n", "chambers.csv, line 2 has no mouth_x, of the first"),
-    "second": (
-        LAYERS,
-        f"{CHAMBERS}pouch;5;5;;;;2\n",
-        "line 3: width of pouch stands in an earlier",
-    ),
-}
+MOUTHLESS = "name,x,y\npouch,0,0\n"
+REFUSED = [
+    ("role", "layer", CHAMBERS, "has the column layer twice"),
+    ("cap", "lid", CHAMBERS, "layers.csv, line 4: role = 'lid' must be 'base'"),
+    ("cover", "lid", CHAMBERS, "layers.csv, line 4: drawing "),
+    ("cover.svg", "cover.png", CHAMBERS, "line 4: file = 'cover.png' is no"),
+    ("FILM,", "FILM,many", CHAMBERS, "line 2: pieces = 'many' must be a whole number"),
+    ("cap,,,\n", "cap,,,\na,b,c,d,e,f\n", CHAMBERS, "line 5 has 6 cells for 5 columns"),
+    ("", "", MOUTHLESS, "chambers.csv, line 2 has no mouth_x, of the first"),
+    ("", "", f"{CHAMBERS}pouch;5;5;;;;2\n", "line 3: width of pouch stands in an earlier"),
+]
 
 
-@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize(("old", "new", "chambers", "sentence"), REFUSED)
 def test_a_fault_of_a_table_is_named_by_its_line(
-    name: str, importing: Importing, tmp_path: Path
+    old: str, new: str, chambers: str, sentence: str, importing: Importing, tmp_path: Path
 ) -> None:
-    layers, chambers, sentence = REFUSED[name]
+    layers = LAYERS.replace(old, new, 1)
     assert sentence in importing(pouch(tmp_path, layers, chambers)).output
 
 
