@@ -203,9 +203,7 @@ def _unknown_key(
 
 
 def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:
-    """Return three paths whose last part is most similar to ``key``, as text, the pockets'
-    first.
-    """
+    """Return up to three paths with the last part most similar to ``key``, the pockets' first."""
     leaves: dict[str, list[str]] = {}
     for path in sorted(paths, key=lambda path: not path.startswith("chamber.")):
         leaves.setdefault(path.split(".")[-1], []).append(path)

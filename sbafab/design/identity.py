@@ -16,9 +16,7 @@ from sbafab.laminate.films import Film
 
 
 def design_sha256(design: Design) -> str:
-    """Return the hash of everything that determines the output; a named file counts by its
-    content.
-    """
+    """Return the hash of everything that determines the output, named files by their content."""
     return _sha256(_with_files(with_unused(design), design) | {"kit": kit_of(design).sha256})
 
 

@@ -198,9 +198,7 @@ def load_kit(kit: object, folder: Path) -> Kit:
 def _without_sources(
     table: Mapping[str, Any], prefix: str, sources: dict[str, str], path: Path
 ) -> dict[str, Any]:
-    """The tables with plain values. Raises DesignError for a number, or the films that an adhesive
-    bonds, without a source.
-    """
+    """Return tables of plain values. Raises DesignError for a number or bond without a source."""
     plain: dict[str, Any] = {}
     for key, value in table.items():
         where = f"{prefix}{key}"
@@ -257,9 +255,7 @@ def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _from_folder(table: Mapping[str, Any], kit_folder: Path, folder: Path) -> Mapping[str, Any]:
-    """The table, with the path of a calibration beside the kit made relative to the design's
-    folder.
-    """
+    """Return the table, the path of a calibration beside the kit relative to the design's."""
     name = table.get("calibration")
     if not isinstance(name, str) or not (kit_folder / name).is_file():
         return table
@@ -276,9 +272,7 @@ def _merged(table: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str,
 
 
 def inlet_of_kit(kit: Kit, inlet: Mapping[str, Any], is_named: bool) -> dict[str, Any]:
-    """The kit's tube and adhesive: the first of each, or the size of the tube that the inlet
-    names.
-    """
+    """Return the kit's first adhesive, and its first tube or the one that the inlet names."""
     values: dict[str, Any] = {}
     if kit.adhesives:
         values["adhesive"] = next(iter(kit.adhesives))

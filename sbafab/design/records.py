@@ -187,9 +187,7 @@ class Design(Section):
 
     @property
     def seam_offsets(self) -> dict[str, tuple[float, float]]:
-        """Offsets of tools from their machine's head, mm, by the tools' names; tools at the head
-        have none.
-        """
+        """Offsets, mm, of the tools that are not at their machine's head, by the tools' names."""
         return {} if self.seam_tools is None else self.seam_tools.offsets
 
     @property
@@ -333,9 +331,7 @@ class Design(Section):
 
 @dataclass(frozen=True)
 class Discs:
-    """Round pockets on one axis per stack: their diameters in mm, one per balloon, bottom to
-    top.
-    """
+    """Round pockets on one axis per stack: a diameter in mm for each balloon, from the bottom."""
 
     diameters: tuple[float, ...]
 
@@ -575,9 +571,7 @@ def design_toml(design: Design) -> str:
 
 
 def without_kit(data: Mapping[str, Any], design: Design) -> dict[str, Any]:
-    """Return a design's tables without values from its kit or defaults, so that another kit
-    applies.
-    """
+    """Return a design's tables without what its kit or defaults say, for another kit."""
     kit = load_kit(design.kit, design.folder)
     kit_values = {**kit.tables, "inlet": inlet_of_kit(kit, {}, False)}
     usual = type(design).model_validate({"name": "x", "family": design.family, **kit_values})

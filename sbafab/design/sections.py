@@ -113,9 +113,7 @@ class OrderSection(Section):
 
     @property
     def why(self) -> str:
-        """Sentence on the number made and its chances; empty if no number of good ones is
-        required.
-        """
+        """The number made and its chances as a sentence; empty unless ``good`` is given."""
         if self.good is None:
             return ""
         likely = probability_of(self.good, self.quantity, self.success_rate)

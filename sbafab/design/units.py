@@ -42,9 +42,7 @@ MEASURED = re.compile(rf"\s*([-+]?{_NUMBER})\s*(\S*)\s*")
 
 
 def in_first_unit(text: str, units: Mapping[str, float]) -> float | None:
-    """Return the number of a text, alone or with one of ``units``, in the first of them; None for
-    other text.
-    """
+    """Return the number of a text in the first of ``units``; None for other text."""
     written = MEASURED.fullmatch(text)
     size = written and units.get(written[2] or next(iter(units)))
     return float(written[1]) * size if written and size is not None else None

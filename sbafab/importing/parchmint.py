@@ -414,9 +414,7 @@ class Circuit:
 
 
 def _refuse_unplaced(rows: Sequence[ComponentRow], placed: Mapping[Any, object]) -> None:
-    """Raises DesignError for a netlist without placement: all components at one point, or
-    nowhere.
-    """
+    """Raise DesignError for a netlist without placement: all components at one point or none."""
     positions = [row.params and row.params.position for row in rows if row.id not in placed]
     if len(positions) > 1 and len(set(positions)) == 1:
         raise DesignError(

@@ -80,9 +80,7 @@ def file_name(text: str, fallback: str = "import") -> str:
 
 
 def key_name(text: str, taken: Iterable[str], fallback: str = "x") -> str:
-    """Return a text as a shape's or film's name, unique among ``taken``: small letters, digits,
-    -.
-    """
+    """Return a text as a name of small letters, digits and - that is not ``taken``."""
     stem = re.sub(r"[^a-z0-9-]+", "-", text.lower()).strip("-")[:24]
     if not stem or not stem[0].isalpha():
         stem = f"{fallback}{stem}"
@@ -103,9 +101,7 @@ def named(what: str, places: list[str]) -> list[str]:
 
 
 def read_text(path: Path, most_bytes: int) -> str:
-    """Return the text of a UTF-8 file. Raises DesignError for other encodings or too large a
-    file.
-    """
+    """Return the text of a UTF-8 file. Raises DesignError if it is none, or too large."""
     try:
         size = path.stat().st_size
         text = path.read_text(encoding="utf-8-sig") if size <= most_bytes else ""

@@ -73,9 +73,7 @@ def _pocket(interface: Interface) -> Burst | None:
 
 
 def _spanned(interface: Interface) -> Region:
-    """Return the unbonded film; openings for bores and vias count as film: the other film spans
-    them.
-    """
+    """Return the unbonded film, with bores and vias, which the other film spans."""
     kept = [c for c in interface.unbonded.contours if not c.is_hole or _holds(c, interface.bond)]
     return Region(tuple(kept))
 

@@ -67,9 +67,7 @@ class Film:
 
     @property
     def written(self) -> str:
-        """The material as the bench reads it: "TPE", with the product in parentheses if it is not
-        the paper's.
-        """
+        """The material for the bench; another TPE than the paper's with its product."""
         is_another = self.material == FIRST[0] and self.product != PAPER_PRODUCT
         return f"{self.material} ({self.product})" if is_another else self.material
 

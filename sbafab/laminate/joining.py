@@ -144,9 +144,7 @@ class _Search:
     def order(
         self, waiting: Sequence[_Task], done: Sequence[_Task], failed: set[frozenset[_Task]]
     ) -> list[_Task] | None:
-        """Return the first order without a conflict, or None; ``failed`` are sets that are dead
-        ends.
-        """
+        """Return the first order without a conflict, if any; ``failed`` sets are dead ends."""
         if not waiting:
             return []
         key = frozenset(done)
@@ -283,9 +281,7 @@ class _Search:
         before: Sequence[_Conflict | None],
         count: int,
     ) -> Iterator[Joining]:
-        """Yield a task's joining, after its folds. ``before``: why earlier ones in the list have to
-        wait.
-        """
+        """Yield a task's folds, then its joining. ``before``: why tasks listed earlier wait."""
         gaps = self._body(task, done)
         layers = tuple(range(gaps[0].below.index, gaps[-1].above.index + 1))
         laid = {index for past in done for index in self._layers(past)}

@@ -128,9 +128,7 @@ class Inlet:
         return (x - p[0]) * dx + (y - p[1]) * dy
 
     def offset(self, p: Point) -> float:
-        """Return the lateral distance of a point from the mouth's middle, mm, positive to the
-        right.
-        """
+        """Return how far a point is to the right of the mouth's middle, mm."""
         (x, y), (dx, dy) = self.mouth, self.direction
         return (p[0] - x) * dy - (p[1] - y) * dx
 

@@ -172,9 +172,7 @@ def pressed_layers(laminate: Laminate) -> list[Layer]:
 def films_without_minutes(
     laminate: Laminate, stated: Iterable[tuple[str, float]]
 ) -> tuple[Film, ...]:
-    """Return the structural films in the press, each once, whose product and thickness (mm) have no
-    stated press minutes.
-    """
+    """Return the pressed structural films with a product and thickness (mm) not ``stated``."""
     pairs = tuple(stated)
     films = dict.fromkeys(layer.film for layer in pressed_layers(laminate) if not layer.is_mask)
     return tuple(film for film in films if not any(film.is_a(*pair) for pair in pairs))
