@@ -380,7 +380,17 @@ def build(design: DrawnDesign) -> Laminate:
         layers=stack,
         chambers=chambers,
         bores=bores,
-        inlets=tuple(_inlet(chamber, design) for chamber in design.chambers),
+        inlets=tuple(
+            Inlet(
+                chamber.name,
+                chamber.mouth,
+                unit(chamber.angle),
+                design.strip_width if chamber.width is None else chamber.width,
+                design.inlet.tab_length if chamber.length is None else chamber.length,
+                tube,
+            )
+            for chamber in design.chambers
+        ),
         # With nets a bore is an ordinary hole: masks continue over it, and no pin is in it.
         pins=_pins(design, () if _nets(design) else bores),
         lumen=design.lumen,
@@ -609,13 +619,6 @@ def _pins(design: DrawnDesign, bores: Sequence[Bore]) -> tuple[Pin, ...]:
     if design.lumen is not None:
         pins.append(Pin("lumen", (0.0, 0.0), design.lumen))
     return tuple(pins)
-
-
-def _inlet(chamber: DrawnChamber, design: DrawnDesign) -> Inlet:
-    width = design.strip_width if chamber.width is None else chamber.width
-    length = design.inlet.tab_length if chamber.length is None else chamber.length
-    tube = design.inlet.tube_outer_diameter
-    return Inlet(chamber.name, chamber.mouth, unit(chamber.angle), width, length, tube)
 
 
 FAMILY = Family(DrawnDesign, build)

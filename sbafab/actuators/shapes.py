@@ -24,13 +24,18 @@ from sbafab.geometry.edges import EPSILON, Point
 from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.region import Region, difference, disc, polygon, stadium, strip, union
 
+
+def is_pair(row: object) -> bool:
+    return isinstance(row, list | tuple) and len(row) == 2
+
+
 Coordinate = Annotated[float, Millimetres(-LONGEST, LONGEST)]
 Coordinates = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
 Bulge = Annotated[float, Field(ge=-100, le=100)]
 BulgedCoordinates = Annotated[tuple[Coordinate, Coordinate, Bulge], Field(strict=False)]
 Vertex = Annotated[
     Annotated[Coordinates, Tag("(x, y)")] | Annotated[BulgedCoordinates, Tag("(x, y, bulge)")],
-    Discriminator(lambda row: "(x, y)" if _entries(row) == 2 else "(x, y, bulge)"),
+    Discriminator(lambda row: "(x, y)" if is_pair(row) else "(x, y, bulge)"),
 ]
 Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=200)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
@@ -147,10 +152,6 @@ class NamedShapes(NamedTables):
     what, names = "shape", "[a-z][a-z0-9_-]{0,31}"
     names_are = "a small letter and up to 31 small letters, digits, - or _"
     __pydantic_extra__: dict[str, NamedShape] = Field(init=False)
-
-
-def _entries(value: object) -> int:
-    return len(value) if isinstance(value, list | tuple) else 0
 
 
 class ShapeRegions:

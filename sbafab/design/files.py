@@ -289,17 +289,17 @@ def _hint(missing: Path) -> str:
     """Suggestion for a design that does not exist."""
     names = template_names()
     with suppress(OSError, ValueError):
-        beside = [path.name for path in missing.parent.iterdir() if _may_be_a_design(path)]
+        beside = [
+            path.name
+            for path in missing.parent.iterdir()
+            if path.suffix == ".toml" or (path / "design.toml").is_file()
+        ]
         exact = f"{missing.name}.toml"
         near = [exact] if exact in beside else difflib.get_close_matches(missing.name, beside, 1)
         if near:
             return f"did you mean {missing.with_name(near[0])}?"
     near = difflib.get_close_matches(str(missing), names, 1)
     return f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
-
-
-def _may_be_a_design(path: Path) -> bool:
-    return path.suffix == ".toml" or (path / "design.toml").is_file()
 
 
 def read_toml(path: Path) -> dict[str, Any]:

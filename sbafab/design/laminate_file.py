@@ -50,12 +50,9 @@ ArcRow = Annotated[
 ]
 
 
-def _edge_kind(row: Any) -> str:
-    return "line" if isinstance(row, list | tuple) and len(row) == 4 else "arc"
-
-
 EdgeRow = Annotated[
-    Annotated[LineRow, Tag("line")] | Annotated[ArcRow, Tag("arc")], Discriminator(_edge_kind)
+    Annotated[LineRow, Tag("line")] | Annotated[ArcRow, Tag("arc")],
+    Discriminator(lambda row: "line" if isinstance(row, list | tuple) and len(row) == 4 else "arc"),
 ]
 EdgeRows = Annotated[tuple[EdgeRow, ...], Field(min_length=1)]
 ShapeIndex = Annotated[Index, Field(description="place in shapes, from 0")]
@@ -152,7 +149,8 @@ def _document(laminate: Laminate) -> dict[str, Any]:
 
     def shape(region: Region) -> int:
         if id(region) not in rows:
-            rows[id(region)] = place(shapes, _shape_rows(region))
+            contours = [[_edge_row(edge) for edge in c.edges] for c in region.contours]
+            rows[id(region)] = place(shapes, contours)
         return rows[id(region)]
 
     layers = [
@@ -184,10 +182,6 @@ def _plain(value: Any) -> Any:
     """Records as tables of their values."""
     is_rows = isinstance(value, tuple) and all(map(is_dataclass, value))
     return [asdict(row) for row in value] if is_rows else value
-
-
-def _shape_rows(region: Region) -> list[list[list[float | bool]]]:
-    return [[_edge_row(edge) for edge in contour.edges] for contour in region.contours]
 
 
 def _edge_row(edge: Edge) -> list[float | bool]:
@@ -231,7 +225,9 @@ def read_laminate(path: Path) -> Laminate:
 
 
 def _laminate(document: LaminateDocument) -> Laminate:
-    shapes = [Region(tuple(map(_contour, shape))) for shape in document.shapes]
+    shapes = [
+        Region(tuple(Contour(_edges(contour)) for contour in shape)) for shape in document.shapes
+    ]
     converted: dict[str, Any] = {
         "layers": tuple(
             Layer(
@@ -249,10 +245,6 @@ def _laminate(document: LaminateDocument) -> Laminate:
     }
     plain = LaminateDocument.model_fields.keys() - {"schema_id", "films", "shapes", *converted}
     return Laminate(**{name: getattr(document, name) for name in plain}, **converted)
-
-
-def _contour(rows: Iterable[Sequence[Any]]) -> Contour:
-    return Contour(_edges(rows))
 
 
 def _edges(rows: Iterable[Sequence[Any]]) -> tuple[Edge, ...]:
@@ -284,21 +276,17 @@ def _faults(document: LaminateDocument) -> Iterator[str]:
                 if getattr(row, name) <= 0:
                     yield f"{key}[{i}].{name}: is not above 0"
     for i, shape in enumerate(document.shapes):
-        yield from _shape_faults(f"shapes[{i}]", shape)
+        for j, contour in enumerate(shape):
+            yield from _chain_faults(f"shapes[{i}][{j}]", contour, is_closed=True)
+        p = _crossing([edge for contour in shape for edge in _edges(contour)])
+        if p is not None:
+            yield f"shapes[{i}]: its edges cross at x {p[0]:.4f}, y {p[1]:.4f}"
     for i, seam in enumerate(document.seams):
         for j, chain in enumerate(seam.path):
             yield from _chain_faults(f"seams[{i}].path[{j}]", chain, is_closed=False)
     yield from _layer_faults(document)
     yield from _reference_faults(document)
     yield from _joint_faults(document)
-
-
-def _shape_faults(where: str, shape: Sequence[Sequence[Any]]) -> Iterator[str]:
-    for j, contour in enumerate(shape):
-        yield from _chain_faults(f"{where}[{j}]", contour, is_closed=True)
-    place = _crossing([edge for contour in shape for edge in _edges(contour)])
-    if place is not None:
-        yield f"{where}: its edges cross at x {place[0]:.4f}, y {place[1]:.4f}"
 
 
 def _chain_faults(where: str, rows: Sequence[Any], is_closed: bool) -> Iterator[str]:

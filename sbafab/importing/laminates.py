@@ -24,7 +24,7 @@ from sbafab.errors import DesignError
 from sbafab.geometry.edges import Edge, Line, Point, unit
 from sbafab.importing.records import Imported, file_name, key_name
 from sbafab.laminate.films import Film
-from sbafab.laminate.laminate import Chamber, Inlet, Laminate
+from sbafab.laminate.laminate import Chamber, Laminate
 
 DESIGN = "design.toml"
 OF_A_RUN = ("must not be built; failed:", "waived:", "limits lowered:")
@@ -154,7 +154,7 @@ def _drawn(
     design = dict(tables)
     registration = dict(design.pop("registration", {}))
     design["layers"] = list(_layer_rows(laminate, stock, design.get("layup", {})))
-    design["chambers"] = list(_chamber_rows(laminate, remarks))
+    design["chambers"] = [_chamber_row(laminate, chamber) for chamber in laminate.chambers]
     if not laminate.outline.is_empty:
         design["body"] = OUTLINE
         shapes[OUTLINE] = {"file": FILE, "layer": OUTLINE}
@@ -194,18 +194,14 @@ def _layer_rows(
         yield row
 
 
-def _chamber_rows(laminate: Laminate, remarks: list[str]) -> Iterator[dict[str, Any]]:
-    for chamber in laminate.chambers:
-        inlets = [inlet for inlet in laminate.inlets if inlet.chamber == chamber.name]
-        if len(inlets) != 1:
-            raise DesignError(
-                f"chamber {chamber.name} has {len(inlets)} inlets, and a chamber of drawn layers "
-                "has one; give each inlet a chamber, or join them"
-            )
-        yield _chamber_row(chamber, inlets[0])
-
-
-def _chamber_row(chamber: Chamber, inlet: Inlet) -> dict[str, Any]:
+def _chamber_row(laminate: Laminate, chamber: Chamber) -> dict[str, Any]:
+    inlets = [inlet for inlet in laminate.inlets if inlet.chamber == chamber.name]
+    if len(inlets) != 1:
+        raise DesignError(
+            f"chamber {chamber.name} has {len(inlets)} inlets, and a chamber of drawn layers "
+            "has one; give each inlet a chamber, or join them"
+        )
+    (inlet,) = inlets
     row = {
         "name": chamber.name,
         "centres": [[*centre] for centre in chamber.centres],

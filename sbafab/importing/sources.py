@@ -41,23 +41,16 @@ def import_source(source: Path) -> tuple[str, Imported]:
     )
 
 
-def _holds(mark: str) -> Callable[[Path], bool]:
-    """Return a test for a JSON file with this text near its beginning or anywhere in it."""
+def _is_file(*suffixes: str, mark: str = "") -> Callable[[Path], bool]:
+    """Return a test for a file with one of these suffixes, or for JSON with this text in it."""
 
     def matches(source: Path) -> bool:
-        if source.suffix.lower() != ".json" or not source.is_file():
-            return False
-        return mark in source.read_bytes().decode("utf-8", errors="replace")
+        suffix = source.suffix.lower()
+        if mark and suffix == ".json" and source.is_file():
+            return mark in source.read_bytes().decode("utf-8", errors="replace")
+        return suffix in suffixes and source.is_file()
 
     return matches
-
-
-def _is_polygons(source: Path) -> bool:
-    return source.suffix.lower() in (".yaml", ".yml") or _holds('"geoms"')(source)
-
-
-def _is_popupcad(source: Path) -> bool:
-    return source.suffix.lower() == SUFFIX and source.is_file()
 
 
 _OWN = (
@@ -67,12 +60,14 @@ _OWN = (
     SourceFormat(
         "an output folder, with its design.toml", lambda s: (s / DESIGN).is_file(), import_folder
     ),
-    SourceFormat("a laminate.json", _holds(SCHEMA), import_laminate),
-    SourceFormat("a circuit in ParchMint JSON", _holds('"components"'), import_parchmint),
+    SourceFormat("a laminate.json", _is_file(mark=SCHEMA), import_laminate),
+    SourceFormat("a circuit in ParchMint JSON", _is_file(mark='"components"'), import_parchmint),
     SourceFormat(
-        "a laminate of polygons, with a table of its layers", _is_polygons, refuse_without_table
+        "a laminate of polygons, with a table of its layers",
+        _is_file(".yaml", ".yml", mark='"geoms"'),
+        refuse_without_table,
     ),
-    SourceFormat("a popupCAD design, with a table of its layers", _is_popupcad, refuse_alone),
+    SourceFormat("a popupCAD design, with a table of its layers", _is_file(SUFFIX), refuse_alone),
 )
 
 
