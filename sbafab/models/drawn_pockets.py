@@ -17,7 +17,7 @@ from sbafab.design.outline import read_outline
 from sbafab.design.records import Design, Discs, Drawn, Form
 from sbafab.models.figures import BY_DISC, Figure, LeftOut, Model, PredictionRequest, Relation
 from sbafab.models.formulas import force
-from sbafab.models.kinematics import Actuator
+from sbafab.models.pocket_models import Actuator
 from sbafab.models.quantity import Conditions, ModelId, Quantity
 
 ROUNDNESS = 1.2

@@ -32,17 +32,9 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (as in Gymnasium)
 
-    def __init__(
-        self,
-        stack: Stack,
-        line: Line | None = None,
-        most_pressure: float = 10.0,
-        dt: float = 0.02,
-        steps: int = 200,
-        near: float = 0.2,
-        **load: Any,
-    ) -> None:
-        self._one = ReachVectorEnvironment(stack, 1, line, most_pressure, dt, steps, near, **load)
+    def __init__(self, stack: Stack, line: Line | None = None, **options: Any) -> None:
+        """Make the task; ``options`` are those of ``ReachVectorEnvironment``."""
+        self._one = ReachVectorEnvironment(stack, 1, line, **options)
         self.action_space = self._one.single_action_space
         self.observation_space = self._one.single_observation_space
 

@@ -15,9 +15,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sbafab.documents import Document, PlainNumber, Short, attribute
-from sbafab.models.balloon_map import DEGREE, HEIGHT_SPANS, PIECES, PRESSURE_SPANS
+from sbafab.models.balloon_map import (
+    DEGREE,
+    HEIGHT_SPANS,
+    PIECES,
+    PRESSURE_SPANS,
+    holds_at,
+    map_range,
+)
 from sbafab.models.joint_chain import urdf_text
-from sbafab.models.map_range import holds_at, map_range
 from sbafab.spreadsheet import csv_text
 
 if TYPE_CHECKING:

@@ -71,17 +71,21 @@ class Line:
         """Volume of the tube, ul."""
         return math.pi * self.diameter**2 / 4 * self.length
 
-    def flow(self, source: float, chamber: float) -> float:
-        """Return ul/s, of a gas at the atmosphere, between pressures at pump and in chamber."""
-        drop = self._drop(source, chamber)
-        head = abs(drop)
-        laminar = head * math.pi * self.diameter**4 / (128 * self.fluid.viscosity * self.length)
-        # Blasius: drop = 0.316 Re^-1/4 (length / diameter) density speed^2 / 2, in kPa and mm.
+    @property
+    def _conductance(self) -> tuple[float, float]:
+        """Laminar flow in ul/s by a kPa (Poiseuille), and turbulent flow at 1 kPa, which grows with
+        the pressure to the power of 1 / 1.75 (Blasius): 0.316 Re^-1/4 (length / diameter) density
+        speed^2 / 2, in kPa and mm.
+        """
+        laminar = math.pi * self.diameter**4 / (128 * self.fluid.viscosity * self.length)
         dense = self.fluid.density * 1e-9
         friction = 0.316 * self.length * dense**0.75 * self.fluid.viscosity**0.25
-        speed = (2 * head * self.diameter**1.25 / friction) ** (1 / 1.75)
-        turbulent = speed * math.pi * self.diameter**2 / 4
-        return math.copysign(min(laminar, turbulent), drop)
+        speed = (2 * self.diameter**1.25 / friction) ** (1 / 1.75)
+        return laminar, speed * math.pi * self.diameter**2 / 4
+
+    def flow(self, source: float, chamber: float) -> float:
+        """Return ul/s, of a gas at the atmosphere, between pressures at pump and in chamber."""
+        return float(self.flows(np.array(source), np.array(chamber))[0])
 
     def flows(self, sources: Array, chambers: Array) -> tuple[Array, Array]:
         """Return ``flow`` in ul/s for pressures of any shape, and rates by those in chambers."""
@@ -90,10 +94,7 @@ class Line:
             drops = drops * (1 + (sources + chambers) / (2 * ATMOSPHERE_KPA))
             rates = rates - chambers / ATMOSPHERE_KPA
         heads = np.maximum(np.abs(drops), 1e-300)
-        slope = math.pi * self.diameter**4 / (128 * self.fluid.viscosity * self.length)
-        dense = self.fluid.density * 1e-9
-        friction = 0.316 * self.length * dense**0.75 * self.fluid.viscosity**0.25
-        least = math.pi * self.diameter**2 / 4 * (2 * self.diameter**1.25 / friction) ** (1 / 1.75)
+        slope, least = self._conductance
         # Turbulent flow grows more slowly: laminar flow is the less up to one head.
         is_turbulent = heads > (least / slope) ** (1.75 / 0.75)
         turbulent = least * np.where(is_turbulent, heads, 1.0) ** (1 / 1.75)
@@ -103,19 +104,12 @@ class Line:
 
     def source_pressure(self, flow: float, chamber: float) -> float:
         """Return the pressure in kPa at the pump that drives a flow (ul/s) into a chamber (kPa)."""
-        low, high = chamber, chamber + 1.0
-        while self.flow(high, chamber) < flow:
-            high = chamber + 2 * (high - chamber)
-        for _ in range(60):
-            middle = (low + high) / 2
-            low, high = (middle, high) if self.flow(middle, chamber) < flow else (low, middle)
-        return (low + high) / 2
-
-    def _drop(self, source: float, chamber: float) -> float:
+        laminar, turbulent = self._conductance
+        drop = max(flow / laminar, float((flow / turbulent) ** 1.75))
         if not self.fluid.is_gas:
-            return source - chamber
-        up, down = source + ATMOSPHERE_KPA, chamber + ATMOSPHERE_KPA
-        return (up * up - down * down) / (2 * ATMOSPHERE_KPA)
+            return chamber + drop
+        down = chamber + ATMOSPHERE_KPA
+        return math.sqrt(down * down + 2 * ATMOSPHERE_KPA * drop) - ATMOSPHERE_KPA
 
     def content(self, volume: float, pressure: float) -> float:
         """Return the fluid in ul in a volume, of a gas at the atmosphere."""

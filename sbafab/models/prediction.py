@@ -65,11 +65,11 @@ from sbafab.models.intervals import (
     sizes_of,
     uncertainty_of,
 )
-from sbafab.models.kinematics import NOT_MEASURED, Actuator, Kinematics
-from sbafab.models.kinematics import actuator as actuator_of
 from sbafab.models.mechanisms import mechanism_figures
 from sbafab.models.paper import Counterpart, Measured, counterpart
 from sbafab.models.pneumatics import seconds
+from sbafab.models.pocket_models import NOT_MEASURED, Actuator, Kinematics
+from sbafab.models.pocket_models import actuator as actuator_of
 from sbafab.models.quantity import (
     OF_STACK,
     OVER_FLOW,

@@ -2,7 +2,7 @@
 
 ``balloon`` holds the pocket's edge while its rim ripples, and averages the films' wrinkles. Where
 a pocket is wide beside its ring, CalculiX shows films whose waves fall in step with the rim's, and
-an edge that moves with them. ``rippled`` resolves those waves (``rim_modes``): nothing is
+an edge that moves with them. ``rippled`` resolves those waves (``rim_correction``): nothing is
 averaged, nothing fitted. Rims stay level as a whole. Lengths mm, pressures kPa, volumes ul.
 """
 
@@ -20,7 +20,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes, inflate, ripples_at
 from sbafab.models.film_elements import Array
 from sbafab.models.least_energy import NoEquilibrium, equilibrium
-from sbafab.models.rim_modes import EDGE, PLACES, UP, R, Waves, Waving, Z
+from sbafab.models.rim_correction import EDGE, PLACES, UP, R, Waves, Waving, Z
 from sbafab.process import one_blas_thread
 
 WIDE = 4.0

@@ -8,10 +8,11 @@ newly mapped balloons. The number of balloons is an integer: its rate is half th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,7 @@ KEYS = (
 )
 """Default keys for rates."""
 STRAIGHT = 1e-6
-"""Twice the sine of a turn below which a stack stands straight."""
+"""Turn in rad below which a stack stands straight."""
 SHARE = 0.1
 """Relative step of a key, either way, for newly mapped balloons: maps are fitted, and smaller steps
 show more of their errors. Rates by the modulus come within 8 % of the exact ones."""
@@ -65,15 +66,11 @@ class Sensitivity:
         """Relative change of the bend, as a ratio to the key's change; None if it stands straight
         or is bent by half a turn.
         """
-        turned = self.pose.frames[1][-1]
-        axis = np.array(
-            [turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]
-        )
-        length = float(np.linalg.norm(axis))
-        if length < STRAIGHT:
+        vector = rotation_vector(self.pose.frames[1][-1])
+        angle = float(np.linalg.norm(vector))
+        if not STRAIGHT < angle < math.pi - STRAIGHT:
             return None
-        angle = np.arctan2(length / 2, (np.trace(turned) - 1) / 2)
-        return float(self.rates.turn[:, 0] @ axis) / length * self.value / float(angle)
+        return float(self.rates.turn[:, 0] @ vector) / angle**2 * self.value
 
 
 @dataclass(frozen=True)
@@ -86,19 +83,6 @@ class SensitivityRow:
     value: float
     stroke: float
     bend: float | None
-
-
-class _Held(NamedTuple):
-    """A stack with its plates held: the slope (levels, 3) of its energy against given contact
-    forces, volumes (chambers,), tip (3,) in mm, depths in an outer plate (points,) in mm, and the
-    height of the flat stack.
-    """
-
-    slope: Array
-    volumes: Array
-    tip: Array
-    deep: Array
-    flat: float
 
 
 def sensitivities(
@@ -179,16 +163,19 @@ def _is_film_of_all(design: Design, key: str, factors: Factors) -> bool:
     return films == {design.films.stock[name]} and factors.modulus_mpa is None
 
 
-def _difference(low: Pose, high: Pose) -> Rates:
-    """Return half the difference of two poses."""
-    first, last = low.frames[1][-1], high.frames[1][-1]
-    turned = last @ first.T
+def rotation_vector(turned: Array) -> Array:
+    """Return the axis of a rotation (3, 3) times its angle in rad."""
     vector = np.array(
         [turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]
     )
     sine = float(np.linalg.norm(vector)) / 2
-    angle = np.arctan2(sine, (np.trace(turned) - 1) / 2)
-    vector *= angle / sine / 2 if sine > 1e-12 else 0.5
+    angle = math.atan2(sine, (np.trace(turned) - 1) / 2)
+    return np.asarray(vector * (angle / sine / 2 if sine > 1e-12 else 0.5))
+
+
+def _difference(low: Pose, high: Pose) -> Rates:
+    """Return half the difference of two poses."""
+    vector = rotation_vector(high.frames[1][-1] @ low.frames[1][-1].T)
     return Rates(
         ((high.tip - low.tip) / 2)[:, None],
         (vector / 2)[:, None],
@@ -229,9 +216,7 @@ def _by_key(
     touch = now.touch
     forces = None if touch is None else touch.forces
     low, high = (_held(each, at.freedoms, pose, load, forces) for each in ends)
-    slope, volumes, tip, deep = (
-        (b - a) / (2 * step) for a, b in zip(low[:4], high[:4], strict=True)
-    )
+    slope, volumes, tip, deep = ((b - a) / (2 * step) for a, b in zip(low, high, strict=True))
     pulls, force = -slope, 0.0
     if touch is not None:
         # A stiff plate keeps its contacts.
@@ -240,16 +225,21 @@ def _by_key(
         force = float(harder[:WALL_POINTS].sum())
     motion = np.concatenate([tip, np.zeros(3)])[:, None]
     by_key = at.rates(pulls[..., None], volumes[:, None], motion, force)
-    return Sensitivity(key, value, pose, by_key, (high.flat - low.flat) / (2 * step))
+    return Sensitivity(
+        key, value, pose, by_key, (ends[1].flat_height - ends[0].flat_height) / (2 * step)
+    )
 
 
 def _held(
     other: Stack, freedoms: Array, pose: Pose, load: dict[str, Any], forces: Array | None
-) -> _Held:
+) -> tuple[Array, Array, Array, Array]:
+    """Return of a stack with its plates held the slope (levels, 3) of its energy against given
+    contact forces, volumes (chambers,), tip (3,) in mm and depths in an outer plate (points,) in
+    mm.
+    """
     springs = other.springs(pose.pressures, load.get("sucked", False), by_level=True)
     acting = other.acting(load) or Load(np.zeros(3), None, None)
     now = loaded_energy(springs, other.pitch, acting, freedoms, forces)
     deep = np.zeros(0) if now.touch is None else now.touch.deep
     volumes = springs.contents(freedoms)[0].sum(0)
-    slope = now.gradient.reshape(-1, 3)
-    return _Held(slope, volumes, now.plates.tip, deep, other.flat_height)
+    return now.gradient.reshape(-1, 3), volumes, now.plates.tip, deep

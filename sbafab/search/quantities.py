@@ -63,10 +63,10 @@ from sbafab.models.intervals import (
     sizes_of,
     uncertainty_of,
 )
-from sbafab.models.kinematics import Actuator, actuator
 from sbafab.models.mechanisms import ASKED, mechanism_value
 from sbafab.models.paper import FULL_KPA, HEIGHTS, WATER_FLOW, Counterpart, counterpart
 from sbafab.models.pneumatics import seconds
+from sbafab.models.pocket_models import Actuator, actuator
 from sbafab.models.quantity import ANYWHERE, Conditions, ModelId, Quantity
 from sbafab.models.stack import MOST_PRESSURE, Stack, stack
 from sbafab.search.vary import key_values

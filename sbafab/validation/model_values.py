@@ -24,8 +24,8 @@ from sbafab.models.balloons import balloons_of
 from sbafab.models.figures import Factors, Figure, PredictionRequest
 from sbafab.models.film_elements import Array
 from sbafab.models.formulas import modulus, second_moments, usual_pressures
-from sbafab.models.kinematics import Actuator, actuator
 from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line
+from sbafab.models.pocket_models import Actuator, actuator
 from sbafab.models.prediction import plate_of, predict
 from sbafab.models.priors import UNKNOWNS
 from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count

@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.models.balloon_map import BalloonMap
-from sbafab.models.map_range import map_range
+from sbafab.models.balloon_map import BalloonMap, map_range
 from tests.cli.conftest import Run
 from tests.site.formats import hold
 

@@ -11,18 +11,20 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.models import map_range as map_module
+from sbafab.models import balloon_map as map_module
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import (
     DEGREE,
     HEIGHT_SPANS,
+    MOST_ERROR,
     PRESSURE_SPANS,
     BalloonMap,
     balloon_map,
+    holds_at,
     horner,
+    map_range,
 )
 from sbafab.models.elastic import OUTSIDE
-from sbafab.models.map_range import MOST_ERROR, holds_at, map_range
 from sbafab.models.rippled import compressed_shapes, free_shapes, least_free_states
 from tests.quick import few
 from tests.shared import shared

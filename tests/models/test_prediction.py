@@ -18,7 +18,7 @@ from sbafab.models.calibrated import load_calibration
 from sbafab.models.closed_forms import eq_4, eqs_1_to_3
 from sbafab.models.drawn_pockets import FLAT_PLATES
 from sbafab.models.figures import Factors, Prediction
-from sbafab.models.kinematics import actuator, round_stack, slot_stack
+from sbafab.models.pocket_models import actuator, round_stack, slot_stack
 from sbafab.models.prediction import workspace_relation
 from sbafab.models.quantity import Quantity
 from tests.quick import few

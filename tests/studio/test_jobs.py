@@ -13,7 +13,7 @@ import pytest
 from sbafab import api
 from sbafab.design.sections import rule_names
 from sbafab.errors import DesignError
-from sbafab.models import map_range
+from sbafab.models import balloon_map
 from sbafab.studio import jobs
 from sbafab.studio.app import design_in
 from sbafab.studio.editing import edited
@@ -217,7 +217,7 @@ def test_poses_are_the_stack_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     asked["pose"]["curves"] = True
     pose, curves = answers({**job(tmp_path, text), **asked})
     assert curves["holds"]
-    monkeypatch.setattr(map_range, "MOST_ERROR", 1e-9)
+    monkeypatch.setattr(balloon_map, "MOST_ERROR", 1e-9)
     pose, curves = answers({**job(tmp_path, text), **asked})
     assert not curves["holds"]
     with pytest.raises(DesignError, match="pressures must be 1 finite"):
