@@ -33,9 +33,8 @@ from sbafab.cutting.verify import verify_file
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, rectangle, union
-from sbafab.lab.tables import table_rows
 from sbafab.laminate.films import PTFE_WARNING
-from sbafab.spreadsheet import csv_text
+from sbafab.spreadsheet import csv_text, table_rows
 
 MOST_DEGREES = 200
 """Degrees of freedom from which on Student's t is taken as if there were no more."""

@@ -30,10 +30,9 @@ from sbafab.lab.records import (
     row_of,
 )
 from sbafab.lab.store import Contents, Lab
-from sbafab.lab.tables import table_rows, table_text
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.record_sheet import TESTS_TABLE, RecordTable, record_tables
-from sbafab.spreadsheet import csv_text
+from sbafab.spreadsheet import csv_text, table_rows, table_text
 from sbafab.version import GENERATOR
 
 

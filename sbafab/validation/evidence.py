@@ -4,7 +4,6 @@ TOML files, and CSV tables of a lab's curves.
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,11 +17,9 @@ from sbafab.design.files import checked, hint, listed, read_toml, shown
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.design.toml_table import Section
 from sbafab.errors import DesignError
-from sbafab.spreadsheet import plain_text
+from sbafab.spreadsheet import plain_text, table_rows
 
 FOLDER = Path(__file__).parent
-MOST_BYTES = 1_000_000
-"""Size of a CSV table."""
 MOST_POINTS = 10_000
 
 
@@ -351,7 +348,12 @@ def read_csv(path: Path) -> Evidence:
     line.
     """
     rows_by_curve: dict[str, list[TableRow]] = {}
-    for where, row in _rows(path):
+    for where, cells in table_rows(path, ("quantity", "y")):
+        row = {name: _unmarked(cell) for name, cell in cells.items() if name and cell}
+        for name in row.keys() - set(COLUMNS):
+            raise DesignError(f"{path} has a column {shown(name)}; {hint(name, COLUMNS)}")
+        if "y" not in row:
+            raise DesignError(f"{where} has no y; fill it in or remove the line")
         name = row.get("curve") or row.get("quantity", "")
         if not name:
             raise DesignError(f"{where} names no curve and no quantity; fill in one of the two")
@@ -362,63 +364,9 @@ def read_csv(path: Path) -> Evidence:
     return Evidence(id=path.stem, citation=f"measurements in {path.name}", curves=curves)
 
 
-def _rows(path: Path) -> Iterator[TableRow]:
-    lines = [
-        line
-        for line in enumerate(_text(path).splitlines(), start=1)
-        if line[1].strip(' ,;\t"') and not line[1].lstrip(' "').startswith("#")
-    ]
-    if not lines:
-        raise DesignError(f"{path} is empty; its first line names columns: {', '.join(COLUMNS)}")
-    separator = max(",;\t", key=lines[0][1].count)
-    names = [name.lower() for name in _cells(lines[0][1], separator, str(path))]
-    _check_names(names, path)
-    for number, line in lines[1:]:
-        where = f"{path}, line {number}"
-        cells = _cells(line, separator, where)
-        if len(cells) != len(names):
-            raise DesignError(
-                f"{where} has {len(cells)} cells where the header has {len(names)}; write decimal "
-                "points, or part columns by semicolons"
-            )
-        row = {name: cell for name, cell in zip(names, cells, strict=True) if name and cell}
-        if "y" not in row:
-            raise DesignError(f"{where} has no y; fill it in or remove the line")
-        yield where, row
-
-
-def _text(path: Path) -> str:
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise DesignError(f"{path} is larger than {MOST_BYTES:,} bytes; give fewer values")
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise DesignError(f"{path} is not a text file in UTF-8; save it as CSV") from None
-
-
-def _cells(line: str, separator: str, where: str) -> list[str]:
-    try:
-        return [_unmarked(cell.strip()) for cell in next(csv.reader([line], delimiter=separator))]
-    except csv.Error as error:
-        raise DesignError(f"{where} cannot be read ({error}); save the table as CSV") from None
-
-
 def _unmarked(cell: str) -> str:
     """Return a cell without the mark that keeps a spreadsheet from taking it for a formula."""
     return cell[1:] if cell[:1] == "'" and plain_text(cell[1:]) == cell else cell
-
-
-def _check_names(names: Sequence[str], path: Path) -> None:
-    for name in filter(None, names):
-        if name not in COLUMNS:
-            raise DesignError(f"{path} has a column {shown(name)}; {hint(name, COLUMNS)}")
-        if names.count(name) > 1:
-            raise DesignError(f"{path} has two columns {name}; keep one")
-    for name in ("quantity", "y"):
-        if name not in names:
-            raise DesignError(f"{path} has no column {name}; every value needs it")
 
 
 def _curve_of_rows(name: str, rows: Sequence[TableRow], path: Path) -> MeasuredCurve:

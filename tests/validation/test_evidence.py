@@ -243,9 +243,9 @@ def test_a_cell_of_the_curve_may_stand_in_any_row(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "is empty; its first line names columns"),
+        ("", "has no column quantity"),
         ("quantity,y\n", "has no row below its columns"),
-        ("quantity,z\n", "has a column 'z'"),
+        ("quantity,y,z\nforce_n,1,2\n", "has a column 'z'"),
         ("quantity,y,y\n", "has two columns y"),
         ("quantity,x\nforce_n,1\n", "has no column y"),
         ("quantity,y\nforce_n,1,2\n", "line 2 has 3 cells where the header has 2"),
