@@ -36,7 +36,12 @@ def test_what_is_written_is_read(
     gap = least_gap(region, 0.0)
     assume(min(edge.length for edge in region.edges) > 0.01 and (not gap or gap.value > 0.01))
     drawn = in_chords(region, None, 0.005) if profile == "chords" else region
-    read = read_profile(dxf_text(cutting_sequence(drawn), {}, profile)).region
+    text = dxf_text(cutting_sequence(drawn), {"DESIGN": "a"}, profile)
+    plain = read_profile(text)
+    # A space less makes it another program's file, which ezdxf reads.
+    by_ezdxf = read_profile(text.removeprefix(" "))
+    assert plain == by_ezdxf
+    read = plain.region
     assert Region(in_reading_order(read.contours)) == drawn
     assert read.area == pytest.approx(drawn.area, abs=1e-6)
 
