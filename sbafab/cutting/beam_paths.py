@@ -23,7 +23,7 @@ from sbafab.errors import DesignError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to, left_turn, meeting_points
 from sbafab.geometry.region import Region
-from sbafab.geometry.spatial_index import EdgeIndex, widened
+from sbafab.geometry.spatial_index import EdgeIndex, boxes_meet, widened
 
 CORNER = math.radians(10)
 """A turn from edge to edge by more is a corner."""
@@ -186,8 +186,7 @@ class _Waste:
     ) -> None:
         self._region = Region(tuple(contours))
         strokes = *sheet.engraved, *sheet.parting
-        others = [edge for run in strokes for edge in stroke_run(ENGRAVE, run).edges]
-        self._others = EdgeIndex(others) if others else None
+        self._others = EdgeIndex([e for run in strokes for e in stroke_run(ENGRAVE, run).edges])
         self._clearance, self._frame, self._pins = clearance, sheet.frame, pins
         self._leads: list[Line] = []
 
@@ -200,31 +199,19 @@ class _Waste:
         box = widened(lead.bounds, reach)
         own = set(contour.edges)
         near = [*self._region.index.touching(box)]
-        if any(edge_distance(lead, edge).value < reach for edge in near if edge not in own):
-            return False
-        if not self._leaves(lead, [edge for edge in near if edge in own]):
-            return False
-        if self._others and any(
-            edge_distance(lead, edge).value < reach for edge in self._others.touching(box)
-        ):
-            return False
-        if any(edge_distance(lead, other).value < reach for other in self._leads_near(lead)):
-            return False
-        low_x, low_y, high_x, high_y = box
+        others = [edge for edge in near if edge not in own]
+        others += self._others.touching(box)
+        others += [other for other in self._leads if boxes_meet(other.bounds, box)]
         width, length = self._frame or (math.inf, math.inf)
         is_inside = self._frame is None or (
-            min(low_x, low_y) >= 0 and high_x <= width and high_y <= length
+            min(box[:2]) >= 0 and box[2] <= width and box[3] <= length
         )
-        return is_inside and all(
-            distance_to(lead, (x, y)) >= diameter / 2 + reach for x, y, diameter in self._pins
+        return (
+            is_inside
+            and all(distance_to(lead, (x, y)) >= d / 2 + reach for x, y, d in self._pins)
+            and self._leaves(lead, [edge for edge in near if edge in own])
+            and all(edge_distance(lead, edge).value >= reach for edge in others)
         )
-
-    def _leads_near(self, lead: Line) -> Iterator[Line]:
-        low_x, low_y, high_x, high_y = widened(lead.bounds, self._clearance)
-        for other in self._leads:
-            a, b, c, d = other.bounds
-            if a <= high_x and c >= low_x and b <= high_y and d >= low_y:
-                yield other
 
     def _leaves(self, lead: Line, own: Sequence[Edge]) -> bool:
         """Return True if a lead-in comes to its contour at its end alone."""

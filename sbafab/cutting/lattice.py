@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
-from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab.cutting.nest import TURNS, Turn, placed
 from sbafab.geometry.contour import run_chords
@@ -48,7 +48,7 @@ ROUNDING = 5e-7
 """mm by which a copy may lie past the border: less than the check's tolerance."""
 
 
-Value = TypeVar("Value")
+Value = Any
 """A number, or an array of a number of many rows."""
 
 
@@ -137,7 +137,7 @@ def lattice_of(shape: Region, places: Sequence[tuple[Turn, Point]]) -> Lattice:
     return Lattice(tuple(places[i] for i in order), max(highest, default=0.0))
 
 
-class _Copy(NamedTuple, Generic[Value]):
+class _Copy(NamedTuple):
     """A copy in a row: 1 if it is turned by half, else 0, and its shift in mm."""
 
     half: int
@@ -145,17 +145,17 @@ class _Copy(NamedTuple, Generic[Value]):
     y: Value
 
 
-class _Row(NamedTuple, Generic[Value]):
+class _Row(NamedTuple):
     """Copies that repeat every ``pitch`` mm."""
 
-    copies: tuple[_Copy[Value], ...]
+    copies: tuple[_Copy, ...]
     pitch: Value
 
 
-class _Pattern(NamedTuple, Generic[Value]):
+class _Pattern(NamedTuple):
     """Rows that repeat upward; each begins one of ``steps`` mm to the right of that below it."""
 
-    rows: tuple[_Row[Value], ...]
+    rows: tuple[_Row, ...]
     steps: tuple[Value, ...]
 
 
@@ -179,7 +179,7 @@ class _Rows:
         self.upright = [_sides(outline) for outline in outlines]
         self.lying = [_sides(outline[:, ::-1]) for outline in outlines]
         self.reach: Point = tuple((2 * np.abs(outlines[0]).max(axis=0)).tolist())
-        self._known: dict[tuple[_Row[float], _Row[float], float], float] = {}
+        self._known: dict[tuple[_Row, _Row, float], float] = {}
 
     @cached_property
     def is_symmetric(self) -> bool:
@@ -199,7 +199,7 @@ class _Rows:
         """Return how far above the first copy the second, ``right`` mm to the right, must lie."""
         return _slides(self.lying[first], self.lying[second], right)
 
-    def climb(self, low: _Row[float], high: _Row[float], right: float) -> float:
+    def climb(self, low: _Row, high: _Row, right: float) -> float:
         """Return how far above a row another, ``right`` mm to the right, must lie."""
         key = low, high, round(right % low.pitch, 9)
         if key not in self._known:
@@ -214,7 +214,7 @@ class _Rows:
             self._known[key] = max(heights, default=-math.inf)
         return self._known[key]
 
-    def _ranked_climb(self, low: _Row[Numbers], high: _Row[Numbers], right: Numbers) -> Numbers:
+    def _ranked_climb(self, low: _Row, high: _Row, right: Numbers) -> Numbers:
         """Return about what ``climb`` does, for arrays of rows."""
         best = np.full(np.shape(right), -math.inf)
         reach = math.ceil(self.reach[0] / np.min(low.pitch))
@@ -252,7 +252,7 @@ class _Rows:
         ranked.sort(key=lambda entry: -entry[0])
         return [self._laid(pattern, box) for _, pattern in ranked[:PROMISING]]
 
-    def _families(self) -> Iterator[_Pattern[Numbers]]:
+    def _families(self) -> Iterator[_Pattern]:
         """Yield patterns with arrays of numbers: of rows alike, in turn by half, and of pairs."""
         origin, pitch = np.array(0.0), np.array(self.beside(0, 0, np.zeros(1))[0])
         upright = _Row((_Copy(0, origin, origin),), pitch)
@@ -274,15 +274,13 @@ class _Rows:
         yield _Pattern((pair,), (share * pitches,))
         yield _Pattern((pair,), (share * pitches, -share * pitches))
 
-    def _ranked(
-        self, family: _Pattern[Numbers], box: tuple[float, float]
-    ) -> list[tuple[float, _Pattern[float]]]:
+    def _ranked(self, family: _Pattern, box: tuple[float, float]) -> list[tuple[float, _Pattern]]:
         """Return a family's patterns with the number of copies that they promise."""
         counts = self._promise(family, box)
         best = np.argsort(-counts, kind="stable")[:PROMISING]
         return [(float(counts[i]), _member(family, int(i))) for i in best]
 
-    def _promise(self, family: _Pattern[Numbers], box: tuple[float, float]) -> Numbers:
+    def _promise(self, family: _Pattern, box: tuple[float, float]) -> Numbers:
         rows, steps = family.rows, family.steps
         width, height = (
             side - 2 * half + ROOM
@@ -311,12 +309,12 @@ class _Rows:
             before, up, right = up, higher, right + step
         return counts
 
-    def _laid(self, pattern: _Pattern[float], box: tuple[float, float]) -> list[tuple[Turn, Point]]:
+    def _laid(self, pattern: _Pattern, box: tuple[float, float]) -> list[tuple[Turn, Point]]:
         """Return the copies of a pattern that lie in a box from the origin."""
         rows, steps = pattern.rows, pattern.steps
         copies: list[tuple[Turn, Point]] = []
         right, up = 0.0, -min(copy.y for copy in rows[0].copies)
-        below: list[tuple[_Row[float], float, float]] = []
+        below: list[tuple[_Row, float, float]] = []
         number = 0
         while True:
             row = rows[number % len(rows)]
@@ -331,7 +329,7 @@ class _Rows:
             number += 1
 
     def _in_row(
-        self, row: _Row[float], start: Point, box: tuple[float, float]
+        self, row: _Row, start: Point, box: tuple[float, float]
     ) -> Iterator[tuple[Turn, Point]]:
         width, height = (
             side - 2 * half + ROUNDING
@@ -352,7 +350,7 @@ class _Rows:
                 )
 
 
-def _member(family: _Pattern[Numbers], number: int) -> _Pattern[float]:
+def _member(family: _Pattern, number: int) -> _Pattern:
     """Return a pattern of a family that has arrays for numbers."""
 
     def chosen(values: Numbers) -> float:

@@ -193,30 +193,21 @@ def curves_text(curves: Curves) -> str | None:
 
 
 def curves_of(text: str | None) -> Curves:
-    """Return the drawing of arcs by a manifest's statement. Raises OutputError as
-    ``chord_error_of``.
+    """Return the drawing of arcs that a file or manifest states; true arcs for None.
+
+    Raises OutputError if the statement cannot be understood.
     """
-    return TRUE_ARCS if text is None else Curves("chords", chord_error_of({"CURVES": text}))
-
-
-def chord_error_of(properties: Mapping[str, str]) -> float:
-    """The sagitta in mm that a file states for its chords; 0 if it claims true arcs.
-
-    Raises OutputError if the property cannot be understood.
-    """
-    text = properties.get("CURVES")
     if text is None:
-        return 0.0
-    number = text.removeprefix(CHORDS).removesuffix(" mm")
+        return TRUE_ARCS
     try:
-        error = float(number)
+        error = float(text.removeprefix(CHORDS).removesuffix(" mm"))
     except ValueError:
         error = 0.0
     if not 0 < error <= 0.1:
         raise OutputError(
             f"custom property CURVES is {text!r}, not {CHORDS} up to 0.1 mm; regenerate it."
         )
-    return error
+    return Curves("chords", error)
 
 
 # The layers of a cut file, in the order a laser program takes them.

@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 from sbafab import plugins
 from sbafab.cutting.fixture import write_fixture
-from sbafab.cutting.layer_files import write_layer_files
+from sbafab.cutting.layer_files import write_layer_files, write_seam_files
 from sbafab.cutting.nest import Nest
 from sbafab.cutting.nesting import PLACES, as_dict
 from sbafab.cutting.properties import CutSettings
-from sbafab.cutting.seam_files import write_seam_files
 from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.design.files import kit_names
 from sbafab.design.identity import design_sha256, kit_of

@@ -10,16 +10,7 @@ from typing import NamedTuple
 
 from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.dxf_read import ReadBack, read_profile
-from sbafab.cutting.properties import (
-    CUT_INNER,
-    CUT_OUTER,
-    CutSettings,
-    file_properties,
-    kerf_of,
-    kerf_text,
-    layer_path,
-)
-from sbafab.cutting.seam_files import (
+from sbafab.cutting.layer_files import (
     CENTRED,
     WIDTH,
     moved,
@@ -28,6 +19,15 @@ from sbafab.cutting.seam_files import (
     seam_path,
     seam_properties,
     stated_width,
+)
+from sbafab.cutting.properties import (
+    CUT_INNER,
+    CUT_OUTER,
+    CutSettings,
+    file_properties,
+    kerf_of,
+    kerf_text,
+    layer_path,
 )
 from sbafab.cutting.verify import check_contours, check_datum
 from sbafab.errors import DesignError, GeometryError, OutputError

@@ -17,7 +17,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from sbafab.cutting.fixture import whole_plate
-from sbafab.cutting.seam_files import shift_words
+from sbafab.cutting.layer_files import shift_words
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point, box_round
 from sbafab.geometry.region import Region, coord, disc, rectangle, union

@@ -36,7 +36,6 @@ def test_the_file_holds_the_parts_with_holes_before_outlines(tmp_path: Path) -> 
     assert sheet.path == "sheets/TPE_1.dxf"
     assert found.region.area == pytest.approx(7 * math.pi * (25 - 4))
     assert sheet.parts_area == pytest.approx(7 * math.pi * 21)
-    assert sheet.density == pytest.approx(7 * math.pi * 21 / 4800)
     cut = [layer for layer in found.layers if layer.startswith("CUT_")]
     assert cut == ["CUT_INNER"] * 7 + ["CUT_OUTER"] * 7
     assert sheet.counts == (("demo", "P01", 7),)

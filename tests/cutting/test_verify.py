@@ -9,8 +9,8 @@ import pytest
 
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
+from sbafab.cutting.layer_files import path_difference
 from sbafab.cutting.properties import DxfProfile
-from sbafab.cutting.seam_files import path_difference
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import OutputError

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from sbafab.cutting.dxf_write import seam_text
-from sbafab.cutting.seam_files import read_seam, seam_path
+from sbafab.cutting.layer_files import read_seam, seam_path
 from sbafab.geometry.edges import Edge, Line, Point
 from sbafab.geometry.region import Region, strip
 from sbafab.laminate.laminate import Laminate

@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import groupby
 from typing import Any, Literal, NamedTuple
 
-from sbafab.cutting.seam_files import seam_path, shift_words
+from sbafab.cutting.layer_files import seam_path, shift_words
 from sbafab.geometry.edges import Arc, Bounds, Point, box_round
 from sbafab.geometry.region import Region, chain_data, coord, path_data, union
 from sbafab.laminate.films import FIRST, ink
