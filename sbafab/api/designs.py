@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import wraps
 from inspect import signature
 from io import StringIO
@@ -110,6 +110,52 @@ def template(name: str) -> str:
 def schema() -> dict[str, Any]:
     """Return the JSON schema (2020-12) of a design file: every key, its default and meaning."""
     return actuators.schema(Assembly)
+
+
+NAMED = "NAME"
+"""In a key, a name that the design file chooses, as of a film or a shape."""
+ROW = "[]"
+"""In a key, behind a list of tables."""
+JsonSchema = Mapping[str, Any]
+
+
+def family_tables(schema: JsonSchema) -> Iterator[tuple[str, JsonSchema]]:
+    """Yield each family's name and table of the schema of design files; "assembly" is one."""
+    for reference in schema["oneOf"]:
+        record = _resolved(reference, schema)
+        family = record["properties"]["family"]
+        yield family.get("const") or family["default"], record
+
+
+def schema_keys(
+    table: JsonSchema, schema: JsonSchema, prefix: str = ""
+) -> Iterator[tuple[str, JsonSchema]]:
+    """Yield the dotted keys of a table and of the tables below it, each with its rule."""
+    for key, rule in table.get("properties", {}).items():
+        below = [*_tables(rule, schema)]
+        for infix, inner in below:
+            yield from schema_keys(inner, schema, f"{prefix}{key}{infix}.")
+        if not below:
+            yield f"{prefix}{key}", rule
+
+
+def _tables(rule: JsonSchema, schema: JsonSchema) -> Iterator[tuple[str, JsonSchema]]:
+    """Yield the tables that a key may hold, each with what stands between their keys and it."""
+    for choice in (rule, *rule.get("anyOf", ())):
+        found = _resolved(choice, schema)
+        if isinstance(more := found.get("additionalProperties"), dict):
+            yield from ((f".{NAMED}", table) for _, table in _tables(more, schema))
+        if "items" in found:
+            yield from ((ROW, table) for _, table in _tables(found["items"], schema))
+        if found.get("properties"):
+            yield "", found
+
+
+def _resolved(rule: JsonSchema, schema: JsonSchema) -> JsonSchema:
+    found: JsonSchema = rule
+    if "$ref" in rule:
+        found = schema["$defs"][rule["$ref"].rpartition("/")[2]]
+    return found
 
 
 @overload

@@ -204,10 +204,9 @@ def file_states(source: Path) -> FileStates:
     states: FileStates = {}
     is_folder = source.is_dir()
     for path in source.rglob("*") if is_folder else source.parent.glob("*"):
-        is_watched = path.is_file() if is_folder else path.suffix.lower() in WATCHED_SUFFIXES
         # A file that an editor is replacing is there again at the next poll.
         with suppress(OSError):
-            if is_watched:
+            if path.is_file() if is_folder else path.suffix.lower() in WATCHED_SUFFIXES:
                 state = path.stat()
                 states[path] = state.st_mtime_ns, state.st_size
     return states

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
-from sbafab import actuators
-from sbafab.assemblies.records import Assembly
+from sbafab.api.designs import ROW, JsonSchema, family_tables, schema, schema_keys
 from sbafab.cli import options as opt
 from sbafab.cli import show
 from sbafab.documents import Document
@@ -21,8 +20,6 @@ from sbafab.rules.sentences import Explanation
 from sbafab.search.quantities import QUANTITIES, QuantityName
 
 MEASURED = "a text with its unit"
-NAMED = "NAME"
-"""In a key, a name that the design file chooses, as of a film or a shape."""
 
 
 TERMS: Mapping[str, str] = {
@@ -104,7 +101,7 @@ def explain(name: str | None, as_json: bool) -> None:
         if as_json:
             show.document(ExplainedDocument.of(None, rules=EXPLAINED))
         else:
-            _print_listed({rule: each.holds for rule, each in EXPLAINED.items()})
+            show.names({rule: each.holds for rule, each in EXPLAINED.items()})
         return
     document = _explained(name)
     if as_json:
@@ -121,7 +118,7 @@ def explain(name: str | None, as_json: bool) -> None:
                 [("quantity", row.written), ("unit", row.unit or "none"), ("meaning", row.meaning)]
             )
     elif any(row.key != name for row in document["keys"]):
-        _print_listed({row.key: row.meaning for row in document["keys"]})
+        show.names({row.key: row.meaning for row in document["keys"]})
     else:
         for row in document["keys"]:
             show.facts({**asdict(row), "families": ", ".join(row.families)}.items())
@@ -145,65 +142,27 @@ def _explained(name: str) -> dict[str, Any]:
     raise click.BadParameter(f"{name!r} is not a rule, key or quantity; {hint}", param_hint="NAME")
 
 
-def _print_listed(meanings: Mapping[str, str]) -> None:
-    """Print a line for each name."""
-    width = max(map(len, meanings))
-    for name, meaning in meanings.items():
-        click.echo(f"{name:<{width}}  {meaning}")
-
-
 def explainable_names() -> list[str]:
     """Return the names of all rules, checks, keys, quantities and terms."""
     keys = dict.fromkeys(row.key for row in design_keys())
     return [*EXPLAINED, *keys, *(row.name for row in QUANTITIES), *TERMS]
 
 
-def design_keys(schema: Mapping[str, Any] | None = None) -> list[DesignKey]:
+def design_keys(document: JsonSchema | None = None) -> list[DesignKey]:
     """Return every key of design files from their JSON schema, in the order of the file.
 
     A key that two families have alike stands once, with both names.
     """
-    schema = schema or actuators.schema(Assembly)
+    document = document or schema()
     families: dict[DesignKey, list[str]] = {}
-    for reference in schema["oneOf"]:
-        record = _resolved(reference, schema)
-        name = record["properties"]["family"]["const"]
-        for row in _keys("", record, schema):
+    for name, record in family_tables(document):
+        for key, rule in schema_keys(record, document):
+            meaning = " ".join(rule.get("description", "").split())
+            default = "required" if "const" in rule else _default(rule)
+            allowed = rule["const"] if "const" in rule and key != "family" else _allowed(rule)
+            row = DesignKey(key.replace(ROW, ""), meaning, default, allowed)
             families.setdefault(row, []).append(name)
     return [replace(row, families=tuple(names)) for row, names in families.items()]
-
-
-def _keys(prefix: str, record: Mapping[str, Any], schema: Mapping[str, Any]) -> Iterator[DesignKey]:
-    """Yield the keys of a table and of the tables below it."""
-    for key, value in record.get("properties", {}).items():
-        tables = list(_tables(value, schema))
-        for below, table in tables:
-            yield from _keys(f"{prefix}{key}.{below}", table, schema)
-        if not tables:
-            meaning = " ".join(value.get("description", "").split())
-            constant = "const" in value
-            default = "required" if constant else _default(value)
-            allowed = value["const"] if constant and key != "family" else _allowed(value)
-            yield DesignKey(f"{prefix}{key}", meaning, default, allowed)
-
-
-def _tables(value: Any, schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the tables that a key may hold, each with the part of its keys that follows the key."""
-    for choice in (value, *value.get("anyOf", ())):
-        found = _resolved(choice, schema)
-        more = found.get("additionalProperties")
-        if isinstance(more, dict):
-            for _, table in _tables(more, schema):
-                yield f"{NAMED}.", table
-        if "items" in found:
-            for _, table in _tables(found["items"], schema):
-                yield "", table
-        if found.get("properties"):
-            yield "", found
-
-
-def _resolved(value: Mapping[str, Any], schema: Mapping[str, Any]) -> Any:
-    return schema["$defs"][value["$ref"].rpartition("/")[2]] if "$ref" in value else value
 
 
 def _default(value: Mapping[str, Any]) -> str:

@@ -197,16 +197,14 @@ def _counts_tabs(request: FindRequest) -> bool:
 
 def _print_found(result: FoundDesign, origin: str, target: Path) -> None:
     """Print the design with its figures, what binds and the front; or the nearest miss."""
-    title = "Best design" if result.holds else "Nearest miss"
-    style = "bold" if result.holds else "bold red"
+    title, style = ("Best design", "bold") if result.holds else ("Nearest miss", "bold red")
     show.line(f"{title}: {format_keys(result.best.values)}, from {origin}", style)
     _print_quantities(result)
     for rule in result.best.broken_rules:
         show.line(f"  {rule}")
-    limits = list(_binding_limits(result))
-    if limits:
-        show.line("Binding limits", "bold")
-    for limit in limits:
+    for number, limit in enumerate(_binding_limits(result)):
+        if number == 0:
+            show.line("Binding limits", "bold")
         show.line(f"  {limit}")
     if result.holds and len(result.front) > 1:
         _print_front(result)
@@ -220,8 +218,14 @@ def _print_found(result: FoundDesign, origin: str, target: Path) -> None:
             "KEY=LOW:HIGH:STEP"
         )
         return
+    rows = result.request.requirements
+    is_median = any(row.quantity.label in result.intervals for row in rows)
+    every = "the requirement" if len(rows) == 1 else f"all {len(rows)} requirements"
+    median = " in the median" if is_median and result.request.sure is None else ""
     command = f"sbafab generate {shlex.quote(str(target))}"
-    show.verdict(f"{target} meets {_counted_requirements(result)}. Next: {command}", target)
+    show.verdict(
+        f"{target} meets {every if rows else 'all rules'}{median}. Next: {command}", target
+    )
 
 
 def _binding_limits(result: FoundDesign) -> Iterator[str]:
@@ -240,31 +244,28 @@ def _binding_limits(result: FoundDesign) -> Iterator[str]:
         yield f"{spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, at its limit"
 
 
-def _counted_requirements(result: FoundDesign) -> str:
-    rows = result.request.requirements
-    is_sure = result.request.sure is not None
-    is_median = not is_sure and any(row.quantity.label in result.intervals for row in rows)
-    every = "the requirement" if len(rows) == 1 else f"all {len(rows)} requirements"
-    return f"{every if rows else 'all rules'}{' in the median' if is_median else ''}"
-
-
 def _print_quantities(result: FoundDesign) -> None:
-    """Print the required quantities and the goal of the best design."""
-    request, best = result.request, result.best
+    """Print the required quantities and the goal of the best design, each with its flags and the
+    paper's measured value.
+    """
+    request, best, goal = result.request, result.best, result.request.goal
     is_sure = request.sure is not None
-    shown = set()
+    lines: dict[str, list[str]] = {}
     for row in request.requirements:
         value = figure_text(request, best, row) + ("" if is_sure else _interval_text(result, row))
         missed = "" if best.meets(row) else ": MISSED"
-        show.line(f"  {row.quantity.label} {value}; {row.bound}{missed}")
-        shown.add(row.quantity.label)
-        _print_trust(result, row.quantity.label)
-    goal = request.goal
+        told = f"{row.quantity.label} {value}; {row.bound}{missed}"
+        lines.setdefault(row.quantity.label, []).append(told)
     label = goal.label if result.holds else goal.quantity.label
     value = shown_value(goal.quantity, best.value(goal)) + _interval_text(result, goal)
-    show.line(f"  {label}: {value}")
-    if goal.quantity.label not in shown:
-        _print_trust(result, goal.quantity.label)
+    lines.setdefault(goal.quantity.label, []).append(f"{label}: {value}")
+    for name, told_of in lines.items():
+        for told in told_of:
+            show.line(f"  {told}")
+        for flag in result.flags.get(name, ()):
+            show.wrapped(f"({FLAGS[flag]})", indent="    ")
+        if name in result.measured:
+            show.wrapped(f"({result.measured[name].sentence()})", indent="    ")
     if goal.quantity.label in result.intervals or (result.intervals and not is_sure):
         hint = "" if is_sure else "; --sure 0.9 requires each requirement with that probability"
         note = f"in parentheses the 90 % interval of what would be measured{hint}"
@@ -275,14 +276,6 @@ def _interval_text(result: FoundDesign, subject: Requirement | Goal) -> str:
     """Return the 90 % interval in parentheses; empty without one."""
     ends = result.interval_text(subject)
     return f" ({ends})" if ends else ""
-
-
-def _print_trust(result: FoundDesign, label: str) -> None:
-    """Print the flags of a quantity, and the paper's measured value."""
-    for flag in result.flags.get(label, ()):
-        show.wrapped(f"({FLAGS[flag]})", indent="    ")
-    if label in result.measured:
-        show.wrapped(f"({result.measured[label].sentence()})", indent="    ")
 
 
 USEFUL_KPA = 50.0

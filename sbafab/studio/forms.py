@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
 
 from sbafab import __version__, api
+from sbafab.api.designs import NAMED, ROW, JsonSchema, family_tables, schema_keys
 from sbafab.errors import SbafabError
 from sbafab.studio import places
 
 PLACING = ("on", "at", "angle", "turn", "along", "offset", "glue", "note")
 """Keys of a part's position; its form ends with them."""
-JsonSchema = Mapping[str, Any]
 FormField = dict[str, Any]
 # key: least, most, step of its slider; values beyond it are typed.
 SLIDERS: dict[str, tuple[float, float, float]] = {
@@ -52,8 +52,9 @@ UNITS = (
 def families(schema: JsonSchema) -> dict[str, list[FormField]]:
     """The fields of every family of single designs."""
     return {
-        name: sorted(_fields(table, schema, ""), key=_rank)
-        for name, table in _family_tables(schema)
+        name: sorted(_fields(table, schema), key=_rank)
+        for name, table in family_tables(schema)
+        if name != "assembly"
     }
 
 
@@ -65,17 +66,9 @@ def cards(schema: JsonSchema) -> dict[str, dict[str, str]]:
             "symbol": table.get("symbol", ""),
             "meaning": " ".join(table.get("description", "").split()),
         }
-        for name, table in _family_tables(schema)
+        for name, table in family_tables(schema)
+        if name != "assembly"
     }
-
-
-def _family_tables(schema: JsonSchema) -> Iterator[tuple[str, JsonSchema]]:
-    for record in schema["oneOf"]:
-        table = _named(record["$ref"], schema)
-        family = table["properties"]["family"]
-        name = family.get("const") or family["default"]
-        if name != "assembly":
-            yield name, table
 
 
 def summaries() -> dict[str, str]:
@@ -91,12 +84,12 @@ def _first_comment(text: str) -> str:
 def assembly(schema: JsonSchema) -> dict[str, Any]:
     """The fields of an assembly, and of a part by kind, whose keys start at its table."""
     table = _named("Assembly", schema)
-    assembly_fields = sorted(_fields(table, schema, ""), key=_rank)
+    assembly_fields = sorted(_fields(table, schema), key=_rank)
     (parts,) = table["properties"]["parts"]["patternProperties"].values()
     kinds = {}
     for kind, reference in parts["discriminator"]["mapping"].items():
         part = _named(reference, schema)
-        fields = [field for field in _fields(part, schema, "") if field["key"] != "kind"]
+        fields = [field for field in _fields(part, schema) if field["key"] != "kind"]
         needed = set(part.get("required", ()))
         kinds[kind] = {
             "meaning": part["properties"]["kind"].get("description", ""),
@@ -119,18 +112,13 @@ def _rank(field: FormField) -> int:
     return FIRST.index(section) if section in FIRST else len(FIRST)
 
 
-def _fields(table: JsonSchema, schema: JsonSchema, prefix: str) -> Iterator[FormField]:
-    for name, rule in table["properties"].items():
-        reference = _reference(rule)
-        if reference is not None:
-            inner = _named(reference, schema)
-            if "properties" in inner:
-                yield from _fields(inner, schema, f"{prefix}{name}.")
-            continue
-        key = prefix + name
+def _fields(table: JsonSchema, schema: JsonSchema) -> Iterator[FormField]:
+    """Yield the fields of a table; keys of tables that the user names have views of their own."""
+    for key, rule in schema_keys(table, schema):
         ways = rule.get("anyOf", [rule])
-        is_table = any(w.get("type") == "object" or "$ref" in w.get("items", {}) for w in ways)
-        if key != "family" and not is_table:
+        is_own = ROW in key or NAMED in key.split(".")
+        is_table = any(way.get("type") == "object" or "$ref" in way for way in ways)
+        if key != "family" and not is_own and not is_table:
             yield _field(key, rule)
 
 
@@ -175,13 +163,6 @@ def _kind(kinds: list[str | None], choices: object) -> str:
 
 def _unit(key: str) -> str:
     return next((unit for pattern, unit in UNITS if pattern.search(key)), "")
-
-
-def _reference(rule: JsonSchema) -> str | None:
-    """The reference of a key that is a single table, also of one that may be omitted."""
-    ways = rule.get("allOf") or rule.get("anyOf") or [rule]
-    tables = [way for way in ways if way.get("type") != "null"]
-    return tables[0].get("$ref") if len(tables) == 1 else None
 
 
 def _named(reference: str, schema: JsonSchema) -> JsonSchema:

@@ -28,8 +28,6 @@ READY = 0
 """The number that means the process accepts jobs; jobs count from 1."""
 MOST_WAITING = 24
 """Most waiting jobs of a pool."""
-MOST_HOMES = 64
-"""Number of keys whose last process is remembered."""
 PATIENCE = 2.0
 """Time for a cancelled job to reach its next step, s; then its process is replaced."""
 Key = tuple[str, str]
@@ -76,7 +74,6 @@ class WorkerPool:
         self.processes = processes or max(2, processors())
         self.waiting: dict[Key, WaitingJob] = {}
         self.workers: list[Worker] = []
-        self.homes: dict[Key, Worker] = {}
         self.closed = False
 
     def start(self) -> None:
@@ -125,10 +122,9 @@ class WorkerPool:
             worker = self._idle(waiting.key)
             if worker is not None:
                 del self.waiting[waiting.key]
-                self.homes.pop(waiting.key, None)
-                self.homes[waiting.key] = worker
-                while len(self.homes) > MOST_HOMES:
-                    del self.homes[next(iter(self.homes))]
+                for other in self.workers:
+                    other.keys.discard(waiting.key)
+                worker.keys.add(waiting.key)
                 worker.work(waiting)
         starting = sum(not worker.ready for worker in self.workers)
         needed = sum(not self._ends_soon(key) for key in self.waiting) - starting
@@ -140,8 +136,7 @@ class WorkerPool:
         if self._ends_soon(key):
             return None
         idle = [worker for worker in self.workers if worker.ready and worker.current is None]
-        home = self.homes.get(key)
-        return home if home in idle else next(iter(idle), None)
+        return next((worker for worker in idle if key in worker.keys), next(iter(idle), None))
 
     def _ends_soon(self, key: Key) -> bool:
         """Return True if a process is running a cancelled job of the key."""
@@ -152,7 +147,6 @@ class WorkerPool:
         if worker not in self.workers:
             return
         self.workers.remove(worker)
-        self.homes = {key: home for key, home in self.homes.items() if home is not worker}
         worker.kill()
         if worker.current is not None:
             worker.current.end("superseded" if worker.cancelled else "crashed", message)
@@ -169,6 +163,7 @@ class Worker:
     def __init__(self, pool: WorkerPool) -> None:
         self.pool = pool
         self.current: WaitingJob | None = None
+        self.keys: set[Key] = set()  # whose last job it had
         self.number = 0
         self.ready = False
         self.timers: list[asyncio.TimerHandle] = []
