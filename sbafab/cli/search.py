@@ -119,7 +119,7 @@ def find(source: str | None, **options: Any) -> None:
         print_error("the search was stopped, and no file was written")
         raise
     if result.holds:
-        name = name_of(target) or origin
+        name = name_of(target.stem) or origin
         write_found(found_toml(origin, options["assignments"], name, result, target), target)
     if options["as_json"]:
         show.document(find_document(result, origin, target))

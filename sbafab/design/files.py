@@ -128,50 +128,49 @@ def _is_alternative(part: int | str) -> bool:
     return text in {"float", "int", "str"} or "[" in text or "(" in text
 
 
+ALLOWED = {
+    "greater_than": "must be greater than {gt}",
+    "greater_than_equal": "must be at least {ge}",
+    "less_than": "must be less than {lt}",
+    "less_than_equal": "must be at most {le}",
+    "string_too_long": "must have at most {max_length} letters",
+    "too_long": "must have at most {max_length} entries",
+    "too_short": "must have at least {min_length} entries",
+    "finite_number": "must be a finite number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "int_parsing_size": "is out of range",
+    "float_parsing": "must be a number",
+    "float_type": "must be a number",
+    "string_type": "must be a text in quotes",
+    "string_unicode": "must be plain text; remove what is no letter in it",
+    "bool_type": "must be true or false",
+    "model_type": "must be a table of keys, such as {{key = value}}",
+    "model_attributes_type": "must be a table of keys, such as {{key = value}}",
+    "tuple_type": "must be a list in brackets",
+    "list_type": "must be a list in brackets",
+}
+"""What a value must be, by pydantic's type of problem."""
+
+
 def _allowed(problem: Any) -> str:
     kind, context = problem["type"], problem.get("ctx", {})
     if kind == "value_error":
         return str(context["error"])
-    limits = {
-        "greater_than": "must be greater than {gt}",
-        "greater_than_equal": "must be at least {ge}",
-        "less_than": "must be less than {lt}",
-        "less_than_equal": "must be at most {le}",
-        "string_too_long": "must have at most {max_length} letters",
-        "too_long": "must have at most {max_length} entries",
-        "too_short": "must have at least {min_length} entries",
-    }
     if kind == "literal_error":
-        near = difflib.get_close_matches(
-            shown(problem["input"]).strip("'"), re.findall("'([^']*)'", context["expected"]), 1
-        )
-        hint = f"; did you mean {near[0]}?" if near else ""
-        return f"must be {context['expected']}{hint}"
+        known = re.findall("'([^']*)'", context["expected"])
+        near = difflib.get_close_matches(shown(problem["input"]).strip("'"), known, 1)
+        return f"must be {context['expected']}" + (f"; did you mean {near[0]}?" if near else "")
     if kind == "string_pattern_mismatch":
         return PATTERNS.get(context["pattern"], "must match {pattern}".format(**context))
-    if kind in limits:
-        return limits[kind].format(**context)
-    plain = {
-        "finite_number": "must be a finite number",
-        "int_type": "must be a whole number",
-        "int_from_float": "must be a whole number",
-        "int_parsing": "must be a whole number",
-        "int_parsing_size": "is out of range",
-        "float_parsing": "must be a number",
-        "float_type": "must be a number",
-        "string_type": "must be a text in quotes",
-        "string_unicode": "must be plain text; remove what is no letter in it",
-        "bool_type": "must be true or false",
-        "model_type": "must be a table of keys, such as {key = value}",
-        "model_attributes_type": "must be a table of keys, such as {key = value}",
-        "tuple_type": "must be a list in brackets",
-        "list_type": "must be a list in brackets",
-    }
     if kind == "float_type" and isinstance(problem["input"], str):
         key = str(problem["loc"][-1])
         unit = next((unit for end, unit in KEY_UNITS.items() if key.endswith(end)), "")
-        return plain[kind] + (f" without its unit, in {unit}" if unit else "")
-    return plain.get(kind, f"is not allowed: {problem['msg'].lower()}")
+        return ALLOWED[kind] + (f" without its unit, in {unit}" if unit else "")
+    if kind in ALLOWED:
+        return ALLOWED[kind].format(**context)
+    return f"is not allowed: {problem['msg'].lower()}"
 
 
 def _unknown_key(
@@ -541,15 +540,15 @@ def write_new(template: str, file: Path | None) -> Path:
     return write_copy(templates_folder() / f"{template}.toml", file or Path(f"{template}.toml"))
 
 
-def name_of(file: Path) -> str:
-    """Return a design's name from its file's; empty if no character of it is allowed."""
-    return re.sub(r"[^A-Za-z0-9._-]+", "-", file.stem).strip("-._")[:64]
+def name_of(text: str) -> str:
+    """Return a design's name from a text or a file's stem; empty if no character is allowed."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-._")[:64]
 
 
 def write_copy(source: Path, target: Path) -> Path:
     """Copy a commented file, named after the new one; never over an old one."""
     text = source.read_text(encoding="utf-8")
-    name = name_of(target) or source.stem
+    name = name_of(target.stem) or source.stem
     text = text.replace(f'name = "{source.stem}"', f'name = "{name}"', 1)
     try:
         with target.open("x", encoding="utf-8", newline="\n") as opened:

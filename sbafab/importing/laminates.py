@@ -13,7 +13,7 @@ from typing import Any
 
 from sbafab.actuators import load_design
 from sbafab.actuators.drawn import DRAWN, DrawnDesign
-from sbafab.design.files import ASSEMBLY, checked, kit_names, listed, read_toml
+from sbafab.design.files import ASSEMBLY, checked, kit_names, listed, name_of, read_toml
 from sbafab.design.films import FILM_NAME, HOTTEST, Films
 from sbafab.design.laminate_file import FILE, laminate_json, read_laminate
 from sbafab.design.outline import OUTLINE, seam_layer
@@ -22,7 +22,7 @@ from sbafab.design.records import Design, plain_tables, without_kit, without_non
 from sbafab.design.sections import Inlet as Inlets
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Edge, Line, Point, unit
-from sbafab.importing.records import Imported, file_name, key_name
+from sbafab.importing.records import UNNAMED, Imported, key_name
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Chamber, Laminate
 
@@ -88,7 +88,8 @@ def import_laminate(path: Path) -> Imported:
         if stock[names[film.material]].shade != film.shade:
             # Films of no layer still count when the other films get their colours.
             remarks.append(f"film {film.material}: has another colour in pictures")
-    tables: dict[str, Any] = {"name": file_name(laminate.name), "family": DRAWN, "kit": "paper"}
+    name = name_of(laminate.name) or UNNAMED
+    tables: dict[str, Any] = {"name": name, "family": DRAWN, "kit": "paper"}
     if films:
         tables["films"] = films
     tables["layup"] = _layup(laminate, names)

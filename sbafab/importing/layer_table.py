@@ -16,7 +16,7 @@ from pydantic import Field
 from sbafab.actuators.drawn import DRAWN
 from sbafab.actuators.shapes import Coordinate
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.design.files import checked, shown
+from sbafab.design.files import checked, name_of, shown
 from sbafab.design.outline import read_drawing
 from sbafab.design.records import without_none
 from sbafab.design.toml_table import Section
@@ -26,8 +26,8 @@ from sbafab.geometry.region import Region, union
 from sbafab.importing.popupcad import SUFFIX, cad_layer
 from sbafab.importing.records import (
     LAYERS,
+    UNNAMED,
     Imported,
-    file_name,
     json_of,
     key_name,
     loaded,
@@ -99,7 +99,7 @@ def import_table(folder: Path) -> Imported:
         columns = ", ".join(ChamberEntry.model_fields)
         raise DesignError(f"{folder} has no {CHAMBERS} (columns {columns}); add it")
     tables: dict[str, Any] = {
-        "name": file_name(folder.resolve().name),
+        "name": name_of(folder.resolve().name) or UNNAMED,
         "family": DRAWN,
         "layers": layers,
         "chambers": _chambers(folder / CHAMBERS),
@@ -165,7 +165,7 @@ def _drawing(folder: Path, row: LayerEntry, place: str) -> tuple[str, bytes, lis
         region, remarks = cad_layer(path, layer) if is_cad else (polygon_layer(path, layer), [])
     except DesignError as error:
         raise DesignError(f"{place}: {error}") from None
-    name = f"{path.stem}-{file_name(layer)}.dxf"
+    name = f"{path.stem}-{name_of(layer)}.dxf"
     return name, dxf_text(region.contours, {}).encode(), remarks
 
 

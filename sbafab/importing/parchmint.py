@@ -17,13 +17,13 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from sbafab.actuators.drawn import DRAWN
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.design.files import checked, shown
+from sbafab.design.files import checked, name_of, shown
 from sbafab.design.outline import crossing
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Line, Point, box_round
 from sbafab.geometry.offset import swept
 from sbafab.geometry.region import Region, disc, rectangle, union
-from sbafab.importing.records import Imported, file_name, json_of, key_name, named, read_text
+from sbafab.importing.records import UNNAMED, Imported, json_of, key_name, named, read_text
 from sbafab.laminate.netlist import NO_MASK, VIA, parchmint_labels, parchmint_nets
 
 MM = 0.001
@@ -184,7 +184,7 @@ class Circuit:
     def __init__(self, document: Mapping[str, Any], stem: str) -> None:
         """Raises DesignError with the place in the file."""
         file = checked(CircuitFile, document, {}, file="circuit")
-        self.name = file_name(file.name or stem, file_name(stem))
+        self.name = name_of(file.name or stem) or name_of(stem) or UNNAMED
         self.nets, self.labels = parchmint_nets(document), parchmint_labels(document)
         rows = sorted(file.layers, key=lambda row: row.group_number)
         self.titles = {row.id: row.name or row.id for row in rows if row.is_mask}

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 LAYERS = "layers.csv"
 """The table of layers in a folder of drawings."""
+UNNAMED = "import"
+"""A design's name if its source has none."""
 MOST_NAMED = 20
 """At most this many places of one kind are named one by one."""
 
@@ -71,12 +73,6 @@ def _inline(value: Any) -> str:
         return "[" + ", ".join(map(_inline, value)) + "]"
     # A JSON string with only JSON's own escapes is a TOML string; so are numbers and booleans.
     return json.dumps(value, ensure_ascii=False)
-
-
-def file_name(text: str, fallback: str = "import") -> str:
-    """Return a text as a design's name: letters, digits, dot, dash and underscore, up to 64."""
-    name = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-._")[:64]
-    return name or fallback
 
 
 def key_name(text: str, taken: Iterable[str], fallback: str = "x") -> str:
@@ -213,7 +209,7 @@ def write_imported(imported: Imported, file: Path, source: str) -> Written:
 
 def default_file(imported: Imported) -> Path:
     """Return the default path of an imported design file in this folder."""
-    return Path(f"{file_name(str(imported.tables['name']))}.toml")
+    return Path(f"{imported.tables['name']}.toml")
 
 
 def _built(file: Path) -> tuple[Design, Laminate]:

@@ -39,16 +39,6 @@ def test_every_layer_has_the_pieces_its_role_asks_for(name: str, balloons: int) 
         assert len(layer.profile.pieces) == layer.pieces, layer.name
 
 
-def test_1dof_interfaces_by_closed_formulas() -> None:
-    lam = laminate("1dof-5mm")
-    chamber, separator = lam.interfaces[2], lam.interfaces[1]
-    assert (chamber.kind, separator.kind) == ("chamber", "separator")
-    # Ring wall 2.5 to 3.25; pocket 2.5 less the bore 0.52; neck ring 0.52 to 1.27.
-    assert chamber.bond.area == pytest.approx(math.pi * (3.25**2 - 2.5**2))
-    assert chamber.unbonded.area == pytest.approx(math.pi * (2.5**2 - 0.52**2))
-    assert separator.bond.area == pytest.approx(math.pi * (1.27**2 - 0.52**2))
-
-
 @pytest.mark.parametrize("count", range(2, 9))
 def test_lobes_keep_one_bond_from_lumen_and_from_each_other(count: int) -> None:
     lam = laminate("3dof-15mm", f"chamber.count={count}", "stack.balloons=2")

@@ -10,9 +10,10 @@ import pytest
 
 import sbafab
 from sbafab.actuators import FAMILIES, load_design, schema
-from sbafab.design.files import read_toml, templates_folder
+from sbafab.design.files import templates_folder
 from sbafab.design.records import Design, Free, design_toml, dotted, plain_tables
 from sbafab.errors import DesignError
+from tests.designs import drawn, tables
 
 TEMPLATES = {"1dof": "1dof-5mm", "lobed": "3dof-15mm", "radial": "radial-15mm", "drawn": "pouch"}
 EVERY = {
@@ -37,12 +38,8 @@ def test_each_is_refused_by_name(family: str, key: str, tmp_path: Path) -> None:
         design.with_({section: {name: value}})
     with pytest.raises(DesignError, match=words):
         load_design(TEMPLATES[family], [f"{key}={value if isinstance(value, float) else 'x'}"])
-    file = tmp_path / "design.toml"
-    text = (templates_folder() / f"{TEMPLATES[family]}.toml").read_text(encoding="utf-8")
-    file.write_text(f"{section}.{name} = 1\n{text}", encoding="utf-8")
-    if section not in read_toml(templates_folder() / f"{TEMPLATES[family]}.toml"):
-        with pytest.raises(DesignError, match=words):
-            load_design(file)
+    with pytest.raises(DesignError, match=words):
+        drawn(tmp_path, {**tables(TEMPLATES[family]), section: {name: 1}})
 
 
 def test_sweeps_and_searches_refuse_them(tmp_path: Path) -> None:
