@@ -274,8 +274,7 @@ def stack_svg(laminate: Laminate) -> str:
     elements += _bonds(cut, with_masks=False)
     for fold in cut.folds:
         elements += _fold(fold, cut)
-    elements += [*_breaks(cut), *_dimensions_above(cut), *_dimensions_below(cut)]
-    elements += [*_labels(cut), *_legend(cut, page)]
+    elements += [*_breaks(cut), *_dimensions(cut), *_labels(cut), *_legend(cut, page)]
     return draw.document(PAGE_WIDTH, page, f"{laminate.name}: section", elements)
 
 
@@ -354,61 +353,24 @@ def _wave(start: Point, end: Point) -> str:
     return draw.line(points, colour=draw.GREY, width=0.2)
 
 
-def _dimensions_above(cut: StackSection) -> Iterator[str]:
-    """Yield, over the top balloon: chamber, the bonds beside it, the lumen, and the whole width."""
-    cap = cut.slabs[-1]
-    chambers = [joint for joint in cut.joints if joint.interface.kind == "chamber"]
-    if not chambers:
-        return
-    measured: list[Interval] = []
-    pocket = opening(chambers[-1].spans, 0.0)
-    if pocket is not None:
-        sides = [
-            span for span in chambers[-1].spans if pocket[0] == span[1] or pocket[1] == span[0]
-        ]
-        measured = [*sides, pocket]
-    through = None if cut.lumen is None else opening(cap.spans, cut.lumen)
-    measured += [through] if through else []
-    shown = [(span, "") for span in measured if span[0] > cut.low or not cut.cropped]
-    parts, rows = _rows(cut, shown, cap.top, (0.0, -1.0))
-    yield from parts
-    if not cut.cropped:
-        ends = (cut.x(cap.spans[0][0]), cap.top), (cut.x(cap.spans[-1][1]), cap.top)
-        words = length(cap.spans[-1][1] - cap.spans[0][0])
-        yield from draw.dimension(*ends, words, (0.0, -1.0), ROW_STEP * (rows + 1) + 1.0)
-
-
-def _dimensions_below(cut: StackSection) -> list[str]:
-    """Return, under the stack: the tab, and how far the inlet strip reaches past its mouth."""
-    if cut.tab is None:
-        return []
-    mouth = cut.tab[1]
-    measured = [(cut.tab, "tab")]
-    masks = [slab for slab in cut.slabs if slab.layer.role == "chamber-mask" and slab.spans]
-    reach = max((slab.spans[-1][1] for slab in masks), default=mouth)
-    if reach - mouth > 1e-3:
-        tail = any(rod.middle > mouth for rod in cut.rods)
-        measured.append(((mouth, reach), "tail" if tail else "overhang"))
-    return _rows(cut, measured, cut.slabs[0].bottom, (0.0, 1.0))[0]
-
-
-def _rows(
-    cut: StackSection, measured: Sequence[tuple[Interval, str]], y: float, away: Point
-) -> tuple[list[str], int]:
-    """Return named dimensions in as few rows as keep their words apart, and the number of rows."""
-    rows: list[list[Interval]] = []
-    parts: list[str] = []
-    for span, name in measured:
-        words = _words(name, span)
-        start, end = cut.x(span[0]), cut.x(span[1])
-        half = draw.text_width(words) / 2 + 0.5
-        low, high = (start + end) / 2 - half, (start + end) / 2 + half
-        free = (n for n, row in enumerate(rows) if not any(a < high and low < b for a, b in row))
-        row = next(free, len(rows))
-        rows += [[]] * (row == len(rows))
-        rows[row] = [*rows[row], (low, high)]
-        parts += draw.dimension((start, y), (end, y), words, away, ROW_STEP * (row + 1))
-    return parts, len(rows)
+def _dimensions(cut: StackSection) -> Iterator[str]:
+    """Yield the whole width over the top balloon, and under the stack the tab, and how far the
+    inlet strip reaches past its mouth.
+    """
+    cap, base = cut.slabs[-1], cut.slabs[0]
+    whole = cap.spans[0][0], cap.spans[-1][1]
+    measured = [] if cut.cropped else [(whole, "", cap.top, -ROW_STEP - 1.0)]
+    if cut.tab is not None:
+        mouth = cut.tab[1]
+        measured.append((cut.tab, "tab", base.bottom, ROW_STEP))
+        masks = [slab for slab in cut.slabs if slab.layer.role == "chamber-mask" and slab.spans]
+        past = mouth, max((slab.spans[-1][1] for slab in masks), default=mouth)
+        if past[1] - mouth > 1e-3:
+            name = "tail" if any(rod.middle > mouth for rod in cut.rods) else "overhang"
+            measured.append((past, name, base.bottom, 2 * ROW_STEP))
+    for span, name, y, away in measured:
+        ends, way = [(cut.x(s), y) for s in span], (0.0, math.copysign(1.0, away))
+        yield from draw.dimension(*ends, _words(name, span), way, abs(away))
 
 
 def _words(name: str, span: Interval) -> str:
