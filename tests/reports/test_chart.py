@@ -14,7 +14,6 @@ from sbafab.reports.charts import (
     ChartBars,
     ChartCurve,
     ChartPoints,
-    ChartSpecks,
     Panel,
     chart_svg,
     relation_svg,
@@ -130,13 +129,3 @@ def test_bars_stand_on_each_other_above_their_names() -> None:
     x, low, height = upper[0]
     assert (x, low + height) == pytest.approx(lower[0][:2])
     assert {"4", "4.5", "long", "a", "b"} <= set(texts(svg))
-
-
-def test_specks_lie_where_the_ticks_say_and_equal_ones_are_drawn_once() -> None:
-    specks = ChartSpecks("many", [1.0, 1.0, 4.0] * 1000, [2.0, 2.0, 3.0] * 1000, "#111111", 1)
-    svg = panel(specks=[specks])
-    (places,) = paths(group(svg, "specks1.1"))
-    across, up = ticks(svg, "x"), ticks(svg, "y")
-    # To a quarter of a millimetre.
-    for found, expected in zip(places, [(across[1], up[2]), (across[4], up[3])], strict=True):
-        assert found == pytest.approx(expected, abs=0.13)

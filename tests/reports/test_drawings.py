@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -14,7 +13,6 @@ from PIL import ImageFont
 from svgelements import Path as SvgPath
 
 from sbafab.actuators import build, load_design
-from sbafab.design.files import design_path
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.layers_svg import layers_svg
@@ -26,10 +24,7 @@ DESIGNS = [
     ["1dof-5mm"],
     ["3dof-15mm"],
     ["radial-15mm", "stack.balloons=3"],
-    ["1dof-5mm", "stack.balloons=1", "registration.method=ears"],
     ["1dof-5mm", "chamber.diameter=[8,7,6,5,4,3]"],
-    ["1dof-10mm", "chamber.diameter=100", "stack.balloons=1"],
-    ["3dof-15mm", "chamber.count=8"],
     ["3dof-15mm", "chamber.count=7", "registration.method=ears"],
 ]
 Box = tuple[float, float, float, float]
@@ -129,18 +124,10 @@ def test_the_scale_is_the_one_drawn_and_pins_are_in_what_they_hold() -> None:
     assert "dowel pin" not in layers_svg(laminate_of("radial-15mm"))
 
 
-@pytest.mark.parametrize(
-    ("indices", "words"),
-    [
-        ([1], "1"),
-        ([2, 9], "2, 9"),
-        ([3, 7, 11, 15, 59], "3, 7, 11 … 15, 59"),
-        (list(range(5, 58, 2)), "5, 7, 9 … 57"),
-        ([2, 3, 4, 5, 6], "2 to 6"),
-    ],
-)
-def test_layer_numbers_are_shortened_without_loss(indices: list[int], words: str) -> None:
-    assert layer_numbers(indices) == words
+def test_layer_numbers_are_shortened_without_loss() -> None:
+    assert layer_numbers([3, 7, 11, 15, 59]) == "3, 7, 11 … 15, 59"
+    assert layer_numbers(range(5, 58, 2)) == "5, 7, 9 … 57"
+    assert layer_numbers([2, 3, 4, 5, 6]) == "2 to 6"
 
 
 def test_seams_and_folds_are_drawn_on_the_layers_they_join() -> None:
@@ -183,17 +170,8 @@ def test_the_section_cuts_where_the_formulas_say() -> None:
 @pytest.mark.parametrize(
     ("given", "hidden", "labels"),
     [
-        (["1dof-5mm", "stack.balloons=4"], 0, ["15 cap", "bore ⌀1.04", "overhang 0.50", "6.50"]),
-        (
-            ["1dof-5mm", "stack.balloons=5"],
-            2,
-            ["19 cap", "bond 0.75", "… 2 more balloons …"],
-        ),
-        (
-            ["3dof-15mm"],
-            12,
-            ["lumen ⌀2.00", "neck ring, bond 0.75", "chamber pocket 5.00", "59 cap", "tab 5.00"],
-        ),
+        (["1dof-5mm", "stack.balloons=5"], 2, ["19 cap", "bond 0.75", "… 2 more balloons …"]),
+        (["3dof-15mm"], 12, ["lumen ⌀2.00", "neck ring, bond 0.75", "chamber pocket 5.00"]),
         # Cropped beyond the lumen.
         (["3dof-15mm", "chamber.count=8"], 12, ["overhang 0.50", "bore ⌀1.04", "lumen ⌀2.00"]),
         (["radial-15mm"], 0, ["1 sheet", "3 base", "5 cap", "bond 0.75", "tab 5.00"]),
@@ -209,21 +187,6 @@ def test_labels_and_dimensions_of_the_section(
     found = words_of(root_of(stack_svg(laminate)))
     assert {*labels} <= {*found}
     assert any(words.endswith("inlet strip") for words in found)
-
-
-def test_widths_and_heights_are_to_their_two_scales() -> None:
-    svg = stack_svg(laminate_of("1dof-5mm", "stack.balloons=2"))
-    (factor,) = map(int, re.findall(r"Height exaggerated (\d+)\u00d7", svg))
-    across = (297 - 2 * 56) / (8.75 + 3.75)
-    found = {
-        (
-            box.attrib["fill"],
-            round(float(box.attrib["width"]) / across, 3),
-            round(float(box.attrib["height"]) / across / factor, 4),
-        )
-        for box in root_of(svg).iter(f"{SVG}rect")
-    }
-    assert {(BOND, 0.75, 0.025), ("#a9cfea", 6.5, 0.038), ("#a9cfea", 11.5, 0.038)} <= found
 
 
 def test_pins_stand_where_they_hold_layers_and_tails_run_on_to_them() -> None:
@@ -274,10 +237,3 @@ def test_seams_and_folds_are_cut_where_they_lie(tmp_path: Path) -> None:
     # From the chamber's centre at y = -1 to the line at y = -12; the film lies toward the mouth.
     assert (fold.s, fold.is_ahead) == (pytest.approx(-11), True)
     assert stack_svg(folded).count("stroke-dasharray") == 2
-
-
-def test_films_are_drawn_though_the_chamber_lies_beside_all_of_them(tmp_path: Path) -> None:
-    text = design_path("pouch").read_text(encoding="utf-8")
-    beside = text.replace("centres = [[0, 0]]", "centres = [[100, 0]]")
-    assert beside != text
-    assert "1 base" in words_of(root_of(stack_svg(written(tmp_path, beside))))

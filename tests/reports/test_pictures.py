@@ -16,7 +16,6 @@ from click.testing import CliRunner
 from PIL import Image
 
 import sbafab
-from sbafab.assemblies.shapes import BOUGHT, FILMS, linear
 from sbafab.cli import app
 from sbafab.errors import DesignError
 from sbafab.geometry.region import disc, rectangle
@@ -31,7 +30,7 @@ from sbafab.reports.inflated_picture import (
     pose_of,
     write_picture,
 )
-from sbafab.reports.solid_png import assembly_png, cutaway, solid_png
+from sbafab.reports.solid_png import cutaway, solid_png
 
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 CHANGES = ("stack.balloons=4",)
@@ -64,18 +63,6 @@ def test_a_body_covers_its_area_without_gaps_and_hides_what_lies_below() -> None
     assert (bright.body[:143] == -1).all()
     assert bright.light.max() == pytest.approx(1)
     assert dim.light.max() < 0.7
-
-
-def test_every_part_outside_is_seen_in_its_colour() -> None:
-    made = sbafab.assemble("brace", "parts.arm.set.stack.balloons=2")
-    picture = assembly_png(made, width=400, height=300)
-    assert picture == assembly_png(made, width=400, height=300)
-    upper = np.asarray(image_of(picture), dtype=float)[: round(300 * 0.8)].reshape(-1, 3)
-    share = upper / np.maximum(upper.max(axis=1, keepdims=True), 1)
-    for colour in (BOUGHT["tube"], BOUGHT["cup"], BOUGHT["line"], *FILMS[:2]):
-        wanted = np.array(colour) / max(colour)
-        assert (np.abs(share - wanted).max(axis=1) < 0.04).sum() > 5, colour
-    assert linear((0, 255, 188)) == pytest.approx((0, 1, 0.5029), abs=1e-3)
 
 
 @pytest.mark.parametrize("template", ["3dof-15mm", "radial-15mm"])
@@ -241,7 +228,6 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(
     design = str(GALLERY / f"{name}.toml") if name == "oval" else name
     flat = [design, "--set", "stack.balloons=1"]
     monkeypatch.chdir(tmp_path)
-    # Unnamed, it is named as what it is.
     for more in (["--width", "160"], ["--to", "shown.glb"]):
         code, said = run(*flat, *more)
         assert code == 0
@@ -253,9 +239,8 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(
     # Metres, and y is up.
     thickness = sbafab.build(design, "stack.balloons=1").thickness
     assert mesh.extents[1] == pytest.approx(thickness / 1000, rel=1e-5)
-    for extra in (["--width", "160"], ["--azimuth", "3"], ["--pressure", "5"], ["--volume", "5"]):
-        code, said = run(*flat, "--to", "other.glb", *extra)
-        assert (code, f"{extra[0]} is for " in said) == (2, True)
+    code, said = run(*flat, "--to", "other.glb", "--pressure", "5")
+    assert (code, "--pressure is for " in said) == (2, True)
     code, said = run(*flat, "--to", "other.webp")
     assert (code, "a .png or .glb shows it flat" in said) == (2, True)
     assert not list(Path().glob("other.*"))

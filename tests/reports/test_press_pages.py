@@ -14,7 +14,6 @@ import shapely
 from sbafab.laminate.lay_up import press_steps
 from sbafab.reports.drawing import text_width
 from sbafab.reports.prints import seams_pdf
-from sbafab.reports.traveller.bench import film_classes, pressure_range
 from sbafab.reports.traveller.lay_up import beds
 from sbafab.reports.traveller.page import straight_run
 from sbafab.reports.traveller.pictures import plan
@@ -58,19 +57,6 @@ def test_the_hole_table_has_every_pin_from_the_plates_corner() -> None:
     shifts = {tuple(round(float(r[4 + i]) - float(r[6 + i]), 2) for i in (0, 1)) for r in rows}
     assert len(shifts) == 1
     assert all(60 < value < 95 for value in shifts.pop())
-
-
-def test_the_places_of_a_full_plate_are_said_as_a_grid() -> None:
-    work = work_of("1dof-5mm", "stack.balloons=2", "order.copies=60", "order.at_once=60")
-    words = words_of(bench(work))
-    found = re.search(
-        r"rows of (\d+): .* next ([\d.]+) mm to the right, .* next ([\d.]+) mm", words
-    )
-    assert found is not None
-    columns, right, back = int(found[1]), float(found[2]), float(found[3])
-    for n, place in enumerate(work.cycles.places):
-        assert place == pytest.approx(((n % columns) * right, (n // columns) * back), abs=2e-2)
-    assert "place 2 by" not in words
 
 
 def edges_by_eye(step: PressPage) -> dict[str, set[tuple[str, float | None, str, bool]]]:
@@ -139,17 +125,9 @@ def test_every_piece_on_a_sheet_has_its_place() -> None:
         assert not any(step.places for step in step_pages(work_of(*other)))
 
 
-def test_the_underlay_is_laid_where_it_has_a_line() -> None:
-    printed = [step.printed for step in step_pages(work_of("1dof-5mm"))]
-    assert printed == [[], ["P01", "P03"], ["P04"], ["P01", "P03", "P04", "P07"]]
-    assert not any(step.printed for step in step_pages(work_of("1dof-5mm", EARS)))
-
-
 @pytest.mark.parametrize(
     "design",
     [
-        ("3dof-15mm", EARS),
-        ("1dof-5mm", EARS),
         ("radial-15mm", EARS),
         ("3dof-15mm", EARS, "chamber.count=4", "chamber.diameter=6.5", "lumen.diameter=3"),
         ("3dof-15mm",),
@@ -172,17 +150,6 @@ def test_names_in_the_top_view_are_apart(design: tuple[str, ...]) -> None:
         assert {pin.name for pin in part.pins} <= names
         for one, other in itertools.combinations([boxes[name] for name in names], 2):
             assert one.intersection(other).area <= 0.1 * min(one.area, other.area)
-
-
-def test_the_indicating_film_covers_what_the_films_get() -> None:
-    low, high = pressure_range([work_of("3dof-15mm")])
-    # The platen's 110 kPa to the 216 at the edge of the last step (docs, In the press).
-    assert (round(low), round(high)) == (110, 216)
-    classes = film_classes(low, high)
-    assert min(one.low for one in classes) <= low
-    assert max(one.high for one in classes) >= high
-    assert [one.product for one in classes] == ["4LW", "LLLW"]
-    assert [one.product for one in film_classes(110, 190)] == ["4LW"]
 
 
 # Seams and folds of drawn layers.

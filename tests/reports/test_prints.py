@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import math
 import re
-from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,15 +14,12 @@ import pypdfium2.raw as pdfium
 import pytest
 import shapely
 import shapely.affinity
-from lxml import html as lxml_html
 
 from sbafab.actuators import build, load_design
 from sbafab.cutting.fixture import plate_corner
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.cycles import Runs, design_runs, runs_of
 from sbafab.reports.prints import guides, leaves, tray_pdf, underlay_pdf
-from sbafab.reports.traveller.page import tray_html
-from sbafab.reports.traveller.work import Work
 
 SHA = "0123456789abcdef" * 4
 MM = 25.4 / 72
@@ -236,21 +232,3 @@ def test_each_place_of_a_cycle_has_its_pages_with_its_serials() -> None:
         place = page + 1
         names = [f"24-{c}-{place:02d}" for c in ("ABC" if place < 7 else "AB")]
         assert f"place {place} ({', '.join(names)})" in words(document, page)
-
-
-def test_the_page_for_the_phone_counts_patterns_by_cycle() -> None:
-    design = load_design("1dof-5mm", ["order.copies=9", "stack.balloons=3"])
-    laminate = build(design)
-    text = tray_html(Work(design, laminate, ()))
-    assert text is not None
-    assert "<script" not in text
-    page = lxml_html.fromstring(text)
-    cards = {card.findtext(".//h2"): card for card in page.xpath("//li")}
-    patterns = Counter(layer.pattern for layer in laminate.layers)
-    assert set(cards) == set(patterns)
-    for name, card in cards.items():
-        assert card.xpath(".//svg//use/@href") == [f"#shape-{name}"]
-        # Nine copies in cycles of five and four.
-        counts = [int(b.text) for b in card.xpath(".//label/b")]
-        assert counts == [5 * patterns[name], 4 * patterns[name]]
-        assert card.xpath(".//span[@class='each']")[0].text.startswith(f"{patterns[name]} each")

@@ -14,12 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import shapely
 from lxml import html as lxml_html
 
 from sbafab.cutting.properties import COLOURS, CUT_SEQUENCE, REFERENCE
 from sbafab.design.sections import Acceptance
-from sbafab.geometry.region import Region
 from sbafab.lab.recording import entries_of
 from sbafab.reports.traveller import formatting
 from sbafab.reports.traveller.bench import cutting, held_films
@@ -120,34 +118,6 @@ def test_the_same_design_gives_the_same_bytes() -> None:
     assert len(printed) == 1
 
 
-def test_the_bill_counts_what_is_needed(sheet_files: Any) -> None:
-    work = work_of("3dof-15mm", "order.copies=2", sheets=sheet_files)
-    rows = page(work).get_element_by_id("materials").getparent().findall(".//tbody/tr")
-    bill = [[words_of(cell) for cell in row][1:] for row in rows]
-    found = {(name, what): quantity for name, what, quantity in bill}
-    # A hole has one depth, so two stacks, 0.063 and 1.726 mm high, take two lengths of pins; both
-    # copies lie in the press at once.
-    pins = {
-        tuple(map(float, re.findall(r"([\d.]+) mm", what))): quantity
-        for (name, what), quantity in found.items()
-        if name == "Dowel pins"
-    }
-    assert sorted(pins) == [(1, 3), (1, 5), (2, 5), (2, 6)]
-    assert [pins[size] for size in sorted(pins)] == ["6 + 3 spare"] * 2 + ["2 + 2 spare"] * 2
-    assert {"Base plate", "Release film", "Press pad"} <= {name for name, _ in found}
-    assert found["Tube", "Braintree RPT040, outer diameter 1.016 mm"] == "6 pieces + 1 spare"
-    area = 2 * sum(
-        shapely.Polygon(rings[0], rings[1:]).area
-        for layer in work.laminate.tpe_layers
-        for rings in layer.profile.polygons(1e-4)
-    )
-    what = next(what for name, what, _ in bill if name == "TPE film")
-    stated = re.search(r"([\d.]+) cm² of parts in (\d+) layers", what)
-    assert stated is not None
-    assert float(stated[1]) == pytest.approx(area / 100, abs=0.051)
-    assert int(stated[2]) == 2 * 30
-
-
 def test_the_cut_list_counts_every_pattern(sheet_files: Any) -> None:
     work = work_of("3dof-15mm", "order.copies=3", sheets=sheet_files)
     on_sheets: Counter[str] = Counter()
@@ -165,30 +135,6 @@ def test_the_cut_list_counts_every_pattern(sheet_files: Any) -> None:
     ]
     spares = {row.pattern: row.spares for row in cut_list(replace(work, sheets=sheets))}
     assert {pattern: n for pattern, n in spares.items() if n} == {"P02": 2, "P06": 2}
-
-
-def corners_of(use: Any, part: Region) -> tuple[float, float, float, float]:
-    """Bounds on the page of a part that an SVG element draws through its matrix."""
-    a, b, c, d, e, f = map(float, re.findall(r"-?[\d.]+", use.get("transform")))
-    rings = [ring for piece in part.polygons(1e-3) for ring in piece]
-    points = [(a * x + c * y + e, b * x + d * y + f) for ring in rings for x, y in ring]
-    return shapely.MultiPoint(points).bounds
-
-
-def test_the_map_shows_parts_where_the_nest_puts_them(sheet_files: Any) -> None:
-    work = work_of("3dof-15mm", sheets=sheet_files)
-    figures = page(work).findall(".//div[@class='sheets']/figure")
-    for sheet, figure in zip(work.sheets, figures, strict=True):
-        placements = sheet.nest.on_sheet(sheet.number - 1)
-        frame = max(figure.iter("rect"), key=lambda rect: float(rect.get("width")))
-        left, top, wide, high = (float(frame.get(key)) for key in ("x", "y", "width", "height"))
-        scale, foot = wide / sheet.width, top + high
-        for use, placement in zip(figure.iter("use"), placements, strict=True):
-            low_x, low_y, high_x, high_y = sheet.nest.region(placement).bounds
-            x0, x1, y0, y1 = (scale * value for value in (low_x, high_x, low_y, high_y))
-            assert corners_of(use, sheet.nest.parts[placement.part].region) == pytest.approx(
-                (left + x0, foot - y1, left + x1, foot - y0), abs=2e-3
-            )
 
 
 def test_times_add_up_to_the_papers() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import math
 import re
 from importlib.util import find_spec
 from pathlib import Path
@@ -25,6 +23,8 @@ TEXTS = {
     for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md")))
 }
 BLOCKS = [found.group(2, 3) for text in TEXTS.values() for found in BLOCK.finditer(text)]
+RATE = re.compile(r"[\d,]+ (?:poses|designs|equilibria) a second")
+COMMAND = "generate 3dof-15mm"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.json"))
 
 
@@ -75,20 +75,20 @@ def test_the_rules_of_the_page_are_rules_of_the_deck() -> None:
     assert set(listed) <= {*EXPLAINED} >= {*rule_names()}
 
 
-def test_the_page_on_cutting_counts_the_sheets_of_the_record() -> None:
-    with (FOLDER / "nesting.csv").open(encoding="utf-8", newline="") as opened:
-        rows = list(csv.DictReader(opened))
-    totals = {name: sum(int(row[name]) for row in rows) for name in ("sbafab", "bottom_left")}
-    least = [max(1, int(row["area"]), int(row["rectangle"])) for row in rows]
-    page = text("cutting")
-    assert "take {sbafab} sheets, by bottom-left alone {bottom_left}".format(**totals) in page
-    assert f"no fewer than {sum(least)}" in page
-    assert "sparrow saves none" in page
-    open_rows = [row for row, bound in zip(rows, least, strict=True) if int(row["sbafab"]) > bound]
-    assert open_rows
-    for row in open_rows:
-        if row["most"]:
-            assert row["one_more"] == "no"
-            assert int(row["sbafab"]) == math.ceil(int(row["parts"]) / int(row["most"]))
-        else:
-            assert int(row["sparrow"]) >= int(row["sbafab"])
+def test_the_readme_s_seconds_are_the_record_s() -> None:
+    readme, tables = " ".join(TEXTS[ROOT / "README.md"].split()), record("benchmarks").tables
+    (usage,) = (row[1] for row in tables["commands"].rows if row[0] == "sbafab --help")
+    for pattern, measured_s in (
+        (r"`sbafab generate 3dof-15mm` takes ([\d.]+) s", tables["versions"].cell(COMMAND, "now")),
+        (r"`sbafab --help` ([\d.]+) s", usage),
+    ):
+        stated = re.search(pattern, readme)
+        assert stated is not None, pattern
+        assert float(stated[1]) == pytest.approx(float(measured_s), rel=0.05)
+
+
+def test_no_rate_stands_in_a_text_by_hand() -> None:
+    pages = [page for page in DOCS.rglob("*.md") if "_made" not in page.parts]
+    for path in (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(pages)):
+        by_hand = BLOCK.sub("", path.read_text(encoding="utf-8"))
+        assert RATE.findall(" ".join(by_hand.split())) == [], path
