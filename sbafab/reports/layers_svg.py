@@ -18,6 +18,7 @@ from sbafab.laminate.lay_up import pins_when_added
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import (
     Circle,
+    Dimension,
     WidthDimension,
     balloons,
     dimensions,
@@ -71,12 +72,13 @@ def layers_svg(laminate: Laminate) -> str:
 
 
 def _grid(cards: Sequence[Card], block: float) -> PageGrid:
-    """The largest scale at which all cards fit A3; a longer page rather than tiny drawings."""
+    """Return the largest scale at which all cards fit A3; rather a longer page than tiny cards."""
     wide = PAGE[0] - 2 * MARGIN
     largest = max(max(card.size) for card in cards)
     best: PageGrid | None = None
     for scale in SCALES:
-        cell = _cell(cards, scale)
+        sizes = [card.cell(scale) for card in cards]
+        cell = max(size[0] for size in sizes), max(size[1] for size in sizes)
         columns = min(len(cards), math.floor(wide / cell[0]))
         if columns:
             rows = math.ceil(len(cards) / columns)
@@ -88,12 +90,6 @@ def _grid(cards: Sequence[Card], block: float) -> PageGrid:
                 break
     page = cell[0] + 2 * MARGIN, len(cards) * cell[1] + 2 * MARGIN + block
     return best or PageGrid(SCALES[-1], 1, cell, page)
-
-
-def _cell(cards: Sequence[Card], scale: float) -> Point:
-    """The cell size that holds every card at this scale."""
-    sizes = [card.cell(scale) for card in cards]
-    return max(size[0] for size in sizes), max(size[1] for size in sizes)
 
 
 def _keys(laminate: Laminate, pinned: bool) -> Iterator[tuple[str, str]]:
@@ -119,7 +115,7 @@ def _title_block(
     keys: Sequence[tuple[str, str]],
     grid: PageGrid,
     block: float,
-) -> list[str]:
+) -> Iterator[str]:
     width, height = grid.page
     x, y = low = MARGIN, height - MARGIN - block
     chambers = len(laminate.chambers)
@@ -128,48 +124,31 @@ def _title_block(
         f"{chambers} chamber{'' if chambers == 1 else 's'}, {len(laminate.layers)} layers of "
         f"{len(laminate.patterns)} patterns, {coord(laminate.thickness)} thick (nominal)"
     )
-    end = y + block - 2.1
-    return [
-        draw.box(low, (width - MARGIN, height - MARGIN), fill="none", stroke=draw.DARK, width=0.25),
-        draw.text((x + 3.0, y + 7.2), laminate.name, size=4.6, bold=True),
-        draw.text((x + 3.0, y + 12.0), facts),
-        *(
-            draw.text((x + 3.0, y + 16.2 + NOTE_ROW * row), note, bold=True)
-            for row, note in enumerate(laminate.notes)
-        ),
-        *(
-            draw.text((x + 3.0, end - NOTE_ROW * row), warning)
-            for row, warning in enumerate(reversed(warnings))
-        ),
-        *(
-            draw.key((width / 2 + 18.0, y + 6.2 + FILM_ROW * row), *key)
-            for row, key in enumerate(keys)
-        ),
-        *_scale_bar(grid.scale, (width - MARGIN - 4.0, y + 6.0)),
-    ]
+    far = width - MARGIN, height - MARGIN
+    yield draw.box(low, far, fill="none", stroke=draw.DARK, width=0.25)
+    yield draw.text((x + 3.0, y + 7.2), laminate.name, size=4.6, bold=True)
+    yield draw.text((x + 3.0, y + 12.0), facts)
+    for row, note in enumerate(laminate.notes):
+        yield draw.text((x + 3.0, y + 16.2 + NOTE_ROW * row), note, bold=True)
+    for row, warning in enumerate(reversed(warnings)):
+        yield draw.text((x + 3.0, y + block - 2.1 - NOTE_ROW * row), warning)
+    for row, key in enumerate(keys):
+        yield draw.key((width / 2 + 18.0, y + 6.2 + FILM_ROW * row), *key)
+    yield from _scale_bar(grid.scale, (width - MARGIN - 4.0, y + 6.0))
 
 
-def _scale_bar(scale: float, end: Point) -> list[str]:
-    """A bar of a round length up to 60 mm on the page, ticked, and the units."""
-    length = max(step for step in TICKS if step * scale <= 60.0)
+def _scale_bar(scale: float, end: Point) -> Iterator[str]:
+    """Yield a bar of a round length up to 60 mm on the page, ticked, and the units."""
+    long = max(step for step in TICKS if step * scale <= 60.0)
     x1, y = end
-    tick = length * scale / TICKS[length]
-    x0 = x1 - length * scale
+    tick, x0 = long * scale / TICKS[long], x1 - long * scale
     ratio = f"{coord(scale)}:1" if scale >= 1 else f"1:{coord(1 / scale)}"
-    return [
-        *(
-            draw.box(
-                (x0 + n * tick, y - 0.6),
-                (x0 + (n + 1) * tick, y + 0.6),
-                fill="#ffffff" if n % 2 else draw.DARK,
-                stroke=draw.DARK,
-            )
-            for n in range(TICKS[length])
-        ),
-        draw.text((x0, y - 1.8), "0", anchor="middle", size=draw.SMALL),
-        draw.text((x1, y - 1.8), f"{length} mm", anchor="end", size=draw.SMALL),
-        draw.text((x1, y + 6.6), f"scale {ratio}, all dimensions in mm", anchor="end"),
-    ]
+    for n in range(TICKS[long]):
+        ends = (x0 + n * tick, y - 0.6), (x0 + (n + 1) * tick, y + 0.6)
+        yield draw.box(*ends, fill="#ffffff" if n % 2 else draw.DARK, stroke=draw.DARK)
+    yield draw.text((x0, y - 1.8), "0", anchor="middle", size=draw.SMALL)
+    yield draw.text((x1, y - 1.8), f"{long} mm", anchor="end", size=draw.SMALL)
+    yield draw.text((x1, y + 6.6), f"scale {ratio}, all dimensions in mm", anchor="end")
 
 
 # The drawing of one pattern: exact outline, dimensions, callouts, caption.
@@ -185,7 +164,7 @@ class Card:
 
     layers: tuple[Layer, ...]
     pins: Sequence[Pin]
-    marks: Sequence[Circle | WidthDimension]
+    marks: Sequence[Dimension]
     bounds: Bounds
     seams: Sequence[Seam]
     folds: Sequence[Fold]
@@ -226,7 +205,7 @@ class Card:
 def _card(
     laminate: Laminate, layers: tuple[Layer, ...], holding: Mapping[int, Sequence[Pin]]
 ) -> Card:
-    """The card of the layers that share one pattern; ``holding``: the pins that hold each layer."""
+    """Return the card of layers of one pattern; ``holding``: the pins that hold each layer."""
     marks = dimensions(laminate, layers[0])
     around = [mark.radius for mark in marks if isinstance(mark, Circle) and mark.phantom]
     joined = {layer.index for layer in layers}
@@ -251,86 +230,77 @@ class CardFrame(NamedTuple):
         return self.left + p[0] * self.scale, self.top - p[1] * self.scale
 
 
-def _drawn(card: Card, scale: float, corner: Point, cell: Point) -> list[str]:
-    """The card's elements, in a cell whose upper left corner is given."""
+def _drawn(card: Card, scale: float, corner: Point, cell: Point) -> Iterator[str]:
+    """Yield the card's elements, in a cell whose upper left corner is given."""
     x, y = corner
     low_x, _, high_x, high_y = card.bounds
-    width, height = card.size[0] * scale, card.size[1] * scale
-    spare_x = cell[0] - LEFT - width - card.words_width
-    spare_y = cell[1] - CAPTION - UNDER - height
-    frame = CardFrame(
-        x + LEFT + spare_x / 2 - low_x * scale,
-        y + CAPTION + spare_y / 2 + high_y * scale,
-        scale,
-    )
+    spare_x = cell[0] - LEFT - card.size[0] * scale - card.words_width
+    spare_y = cell[1] - CAPTION - UNDER - card.size[1] * scale
+    left, top = x + LEFT + spare_x / 2, y + CAPTION + spare_y / 2
+    frame = CardFrame(left - low_x * scale, top + high_y * scale, scale)
+    yield f'<g id="{card.layers[0].pattern}">'
+    yield from _heading(card, corner, cell)
+    yield from _outline(card, frame)
+    for seam in card.seams:
+        yield from _seam(seam, frame)
+    for fold in card.folds:
+        yield from _fold(fold, card.layers[0], frame)
+    yield from _overall(card, frame)
     column = frame.at((high_x, 0.0))[0] + LEAD
-    return [
-        f'<g id="{card.layers[0].pattern}">',
-        *_heading(card, corner, cell),
-        *_outline(card, frame),
-        *(part for seam in card.seams for part in _seam(seam, frame)),
-        *(part for fold in card.folds for part in _fold(fold, card.layers[0], frame)),
-        *_overall(card, frame),
-        *_callouts(card, frame, column, (y + CAPTION + 2.0, y + cell[1] - UNDER)),
-        "</g>",
-    ]
+    yield from _callouts(card, frame, column, (y + CAPTION + 2.0, y + cell[1] - UNDER))
+    yield "</g>"
 
 
-def _heading(card: Card, corner: Point, cell: Point) -> list[str]:
-    x, y = corner
-    film = card.layers[0].film
+def _heading(card: Card, corner: Point, cell: Point) -> Iterator[str]:
+    (x, y), film = corner, card.layers[0].film
     line = ink(film).line
     name, material, numbers = card.caption
-    return [
-        draw.box(corner, (x + cell[0], y + cell[1]), fill="none", stroke="#c8c8c8"),
-        draw.box((x + 2.5, y + 2.7), (x + 5.0, y + 5.2), fill=draw.film_fill(film), stroke=line),
-        draw.text((x + 6.5, y + 5.0), name, bold=True),
-        draw.text((x + 6.5, y + 9.4), material, colour=line),
-        draw.text((x + 6.5, y + 13.6), numbers),
-    ]
+    yield draw.box(corner, (x + cell[0], y + cell[1]), fill="none", stroke="#c8c8c8")
+    yield draw.box((x + 2.5, y + 2.7), (x + 5.0, y + 5.2), fill=draw.film_fill(film), stroke=line)
+    yield draw.text((x + 6.5, y + 5.0), name, bold=True)
+    yield draw.text((x + 6.5, y + 9.4), material, colour=line)
+    yield draw.text((x + 6.5, y + 13.6), numbers)
 
 
-def _outline(card: Card, frame: CardFrame) -> list[str]:
-    """The profile, phantom circles round it, centre marks of its holes, and pins."""
+def _outline(card: Card, frame: CardFrame) -> Iterator[str]:
+    """Yield the profile, phantom circles round it, centre marks of its holes, and pins."""
     layer, scale = card.layers[0], frame.scale
     shape = layer.profile.mapped(frame.at, scale, mirror=True)
     look = draw.style(ink(layer.film).line, 0.25, fill=draw.film_fill(layer.film))
-    parts = [draw.path(path_data(shape), look)]
+    yield draw.path(path_data(shape), look)
     for mark in card.marks:
         if isinstance(mark, Circle) and mark.phantom:
             phantom = draw.style(draw.GREY, dashes="3 0.8 0.6 0.8")
-            parts.append(draw.circle(frame.at(mark.centre), mark.radius * scale, phantom))
+            yield draw.circle(frame.at(mark.centre), mark.radius * scale, phantom)
     for hole in layer.profile.holes:
         if hole.circle is not None:
             (x, y), arm = frame.at(hole.circle[0]), min(0.6 * hole.circle[1] * scale, 1.2)
-            for dx, dy in ((arm, 0.0), (0.0, arm)):
-                ends = [(x - dx, y - dy), (x + dx, y + dy)]
-                parts.append(draw.line(ends, colour=draw.GREY, width=0.1))
-    return [*parts, *(_pin(frame.at(pin.centre), pin.diameter * scale / 2) for pin in card.pins)]
+            yield draw.line([(x - arm, y), (x + arm, y)], colour=draw.GREY, width=0.1)
+            yield draw.line([(x, y - arm), (x, y + arm)], colour=draw.GREY, width=0.1)
+    for pin in card.pins:
+        yield _pin(frame.at(pin.centre), pin.diameter * scale / 2)
 
 
 def _pin(centre: Point, radius: float) -> str:
-    """A dowel pin in its hole, seen from above."""
+    """Return a dowel pin in its hole, seen from above."""
     return draw.circle(centre, 0.62 * radius, f'fill="{draw.DARK}"')
 
 
-def _seam(seam: Seam, frame: CardFrame) -> list[str]:
-    """A seam as wide as it bonds, and the path of its tool."""
+def _seam(seam: Seam, frame: CardFrame) -> Iterator[str]:
+    """Yield a seam as wide as it bonds, and the path of its tool."""
     data = "".join(
         f"{chain_data(chain)}{'Z' if chain[0].start == chain[-1].end else ''}"
         for chain in seam.path
     )
-    styles = draw.seam_styles(seam.width, draw.THIN / frame.scale, seam.tool != "roller")
     x, y, scale = map(coord, frame)
-    return [
-        f'<g transform="translate({x} {y}) scale({scale} -{scale})">',
-        *(draw.path(data, style) for style in styles),
-        "</g>",
-    ]
+    yield f'<g transform="translate({x} {y}) scale({scale} -{scale})">'
+    for look in draw.seam_styles(seam.width, draw.THIN / frame.scale, seam.tool != "roller"):
+        yield draw.path(data, look)
+    yield "</g>"
 
 
 def _fold(fold: Fold, layer: Layer, frame: CardFrame) -> Iterator[str]:
-    """The line of a fold along the edges of a layer that end there, and past them."""
+    """Yield the line of a fold along the edges of a layer that end there, and past them."""
     for edge in layer.profile.edges:
         if lies_on(edge, [fold.line]):
             (x, y), (u, v) = frame.at(edge.start), frame.at(edge.end)
@@ -341,7 +311,7 @@ def _fold(fold: Fold, layer: Layer, frame: CardFrame) -> Iterator[str]:
 
 
 def _overall(card: Card, frame: CardFrame) -> list[str]:
-    """Width below and height at the left, outside the whole drawing."""
+    """Return width below and height at the left, outside the whole drawing."""
     profile = card.layers[0].profile
     low_x, low_y, high_x, high_y = profile.bounds
     (x0, top), (right, bottom) = frame.at((low_x, high_y)), frame.at((high_x, low_y))
@@ -350,35 +320,31 @@ def _overall(card: Card, frame: CardFrame) -> list[str]:
     corners, width = ((x0, bottom), (right, bottom)), length(high_x - low_x)
     if is_disc(profile, profile.outers[0]):
         return draw.dimension(*corners, f"⌀{width}", (0.0, 1.0), below)
-    height = length(high_y - low_y)
-    return [
-        *draw.dimension(*corners, width, (0.0, 1.0), below),
-        *draw.dimension((x0, top), (x0, bottom), height, (-1.0, 0.0), beside),
-    ]
+    sides, height = ((x0, top), (x0, bottom)), length(high_y - low_y)
+    across = draw.dimension(*corners, width, (0.0, 1.0), below)
+    return across + draw.dimension(*sides, height, (-1.0, 0.0), beside)
 
 
-def _callouts(card: Card, frame: CardFrame, column: float, room: Point) -> list[str]:
-    """Labels in a column at the right, each with a leader to its feature."""
+def _callouts(card: Card, frame: CardFrame, column: float, room: Point) -> Iterator[str]:
+    """Yield labels in a column at the right, each with a leader to its feature."""
     aims = sorted(((_aim(mark, frame), mark) for mark in card.marks), key=lambda item: item[0][1])
     rows = draw.spread([aim[1] for aim, _ in aims], ROW, *room)
-    parts: list[str] = []
     for (aim, mark), row in zip(aims, rows, strict=True):
         elbow, label = (column - 1.6, row), (column - 0.4, row)
-        parts.append(draw.text((column, row + 1.05), mark.words))
+        yield draw.text((column, row + 1.05), mark.words)
         if isinstance(mark, WidthDimension):
-            parts += draw.across(frame.at(mark.start), frame.at(mark.end))
-            parts.append(draw.line([aim, elbow, label], colour=draw.GREY))
+            yield from draw.across(frame.at(mark.start), frame.at(mark.end))
+            yield draw.line([aim, elbow, label], colour=draw.GREY)
             continue
-        tip = aim
+        (x, y), r = aim, 0.0
         if mark.toward is None and not mark.phantom:
             # The arrow meets the circle radially under its leader.
-            (x, y), r = aim, mark.radius * frame.scale / math.dist(aim, elbow)
-            tip = x + r * (elbow[0] - x), y + r * (elbow[1] - y)
-        parts += draw.leader(tip, elbow, label, dot=False)
-    return parts
+            r = mark.radius * frame.scale / math.dist(aim, elbow)
+        tip = x + r * (elbow[0] - x), y + r * (elbow[1] - y)
+        yield from draw.leader(tip, elbow, label, dot=False)
 
 
-def _aim(mark: Circle | WidthDimension, frame: CardFrame) -> Point:
+def _aim(mark: Dimension, frame: CardFrame) -> Point:
     """Return the point on the page that a mark's label should be near."""
     if isinstance(mark, WidthDimension):
         return min(frame.at(mark.start), frame.at(mark.end), key=lambda p: (-p[0], p[1]))

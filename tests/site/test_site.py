@@ -86,16 +86,6 @@ def test_readme_is_published_with_absolute_links() -> None:
 
 TITLE = "A Collapsible Soft Actuator Facilitates Performance in Constrained Environments"
 NAMES = "Rogatinsky Gomatam Lim Lee Kinnicutt Duriez Thomson McDonald Ranzani"
-    "Rogatinsky",
-    "Gomatam",
-    "Lim",
-    "Lee",
-    "Kinnicutt",
-    "Duriez",
-    "Thomson",
-    "McDonald",
-    "Ranzani",
-]
 DOCS = sorted((ROOT / "docs").glob("*.md")) + sorted((ROOT / "docs" / "learn").glob("*.md"))
 
 
