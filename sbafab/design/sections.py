@@ -59,8 +59,7 @@ class OrderSection(Section):
     """Name of the batch, before its serials: "24" makes "24-A-03" of "A-03". None by default; set
     one if a design is made again, as records identify an actuator by design and serial."""
     tray: bool | None = None
-    """True if a tray plan (tray.pdf, 1:1) and a page of counts for a phone (tray.html) are written;
-    by default for more than one copy."""
+    """True if a tray plan (tray.pdf, 1:1) is written; by default for more than one copy."""
     cure_hours: float | None = Field(default=None, gt=0, le=168)
     """Hours in which the adhesive of the tubes cures, by its package; by default the time of the
     kit's adhesive, else the traveller's times assume 24 (ours)."""

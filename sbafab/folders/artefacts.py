@@ -352,22 +352,10 @@ def _tray_pdf(folder: DesignFolder) -> bytes | None:
     # Only a batch, or a design that asks for it, has a tray plan.
     from sbafab.reports.prints import tray_pdf
 
-    if not _has_tray(folder):
+    build, asked = folder.build, folder.design.order.tray
+    if not (build.cycles.copies > 1 if asked is None else asked):
         return None
-    build = folder.build
     return tray_pdf(build.laminate, build.cycles, build.sha256, folder.design.order.batch)
-
-
-def _tray_html(folder: DesignFolder) -> str | None:
-    # Only a batch, or a design that asks for it, has a page for the phone.
-    from sbafab.reports.traveller.page import tray_html
-
-    return tray_html(folder.work) if _has_tray(folder) else None
-
-
-def _has_tray(folder: DesignFolder) -> bool:
-    asked = folder.design.order.tray
-    return folder.build.cycles.copies > 1 if asked is None else asked
 
 
 def _bill(folder: DesignFolder) -> str | None:
@@ -450,7 +438,6 @@ _OWN: tuple[Artefact, ...] = (
     ),
     Artefact("press.csv", "press", "the press schedule as a table", _press_csv),
     Artefact("tray.pdf", "press", "of a batch: a place for every part, 1:1", _tray_pdf),
-    Artefact("tray.html", "press", "of a batch: patterns and counts for a phone", _tray_html),
     Artefact("underlay.pdf", "press", "guides for placing parts by hand, 1:1", _underlay),
     Artefact("seams.pdf", "press", "paths of seams on the films in hand, 1:1", _seams),
     Artefact("mesh", "mesh", "solid, cavities, and meshes for simulation", _write_meshes),

@@ -79,11 +79,11 @@ class PictureRequest:
     frames: int = FRAMES
 
 
-def pose_of(laminate: Laminate, stack: Stack, wish: PictureRequest) -> Pose:
+def pose_of(laminate: Laminate, stack: Stack, request: PictureRequest) -> Pose:
     """The pose of a request. Raises DesignError for an unknown chamber."""
-    if wish.volumes_ul is not None:
-        volumes = _by_chamber(laminate, wish.volumes_ul)
-        empty = [c.name for c in laminate.chambers if not {"", c.name} & set(wish.volumes_ul)]
+    if request.volumes_ul is not None:
+        volumes = _by_chamber(laminate, request.volumes_ul)
+        empty = [c.name for c in laminate.chambers if not {"", c.name} & set(request.volumes_ul)]
         try:
             return pressed(stack, volumes)
         except DesignError as error:
@@ -93,7 +93,7 @@ def pose_of(laminate: Laminate, stack: Stack, wish: PictureRequest) -> Pose:
             raise DesignError(
                 f"{error}; a chamber not named counts as empty: name {shown}"
             ) from None
-    return stack.pose(_by_chamber(laminate, wish.pressures_kpa))
+    return stack.pose(_by_chamber(laminate, request.pressures_kpa))
 
 
 def _by_chamber(laminate: Laminate, values: Mapping[str, float]) -> tuple[float, ...]:
@@ -107,7 +107,7 @@ def _by_chamber(laminate: Laminate, values: Mapping[str, float]) -> tuple[float,
 def write_picture(
     laminate: Laminate,
     stack: Stack,
-    wish: PictureRequest,
+    request: PictureRequest,
     path: Path,
     progress: Callable[[int, int], None] | None = None,
 ) -> Pose:
@@ -118,7 +118,7 @@ def write_picture(
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         raise _wrong_ending(path)
-    pose = pose_of(laminate, stack, wish)
+    pose = pose_of(laminate, stack, request)
     if ending == ".glb":
         nodes = [
             Node(part.name, part.surface, "TPE", linear(_colour(part, pose, max(pose.pressures))))
@@ -126,10 +126,10 @@ def write_picture(
         ]
         write_scene(nodes, path)
     elif ending == ".png":
-        path.write_bytes(pictures_at_one_scale([(laminate, stack, pose)], wish)[0])
+        path.write_bytes(pictures_at_one_scale([(laminate, stack, pose)], request)[0])
     else:
-        poses = _poses(stack, pose, wish)
-        path.write_bytes(_animation(laminate, stack, poses, wish, ending, progress))
+        poses = _poses(stack, pose, request)
+        path.write_bytes(_animation(laminate, stack, poses, request, ending, progress))
     return pose
 
 
@@ -138,15 +138,15 @@ def _wrong_ending(path: Path) -> DesignError:
 
 
 def pictures_at_one_scale(
-    shown: Sequence[tuple[Laminate, Stack, Pose]], wish: PictureRequest
+    shown: Sequence[tuple[Laminate, Stack, Pose]], request: PictureRequest
 ) -> list[bytes]:
     """Return a picture of each actuator with a caption as PNG, all seen from one place."""
     every = [inflated(laminate, stack, pose) for laminate, stack, pose in shown]
     if not every:
         return []
-    view = _view([part.surface for parts in every for part in parts], wish)
+    view = _view([part.surface for parts in every for part in parts], request)
     return [
-        png(_image(pose, parts, view, wish, _caption(laminate, pose, stack.calibration)))
+        png(_image(pose, parts, view, request, _caption(laminate, pose, stack.calibration)))
         for (laminate, stack, pose), parts in zip(shown, every, strict=True)
     ]
 
@@ -155,7 +155,7 @@ def _animation(
     laminate: Laminate,
     stack: Stack,
     poses: Sequence[Pose],
-    wish: PictureRequest,
+    request: PictureRequest,
     ending: str,
     progress: Callable[[int, int], None] | None,
 ) -> bytes:
@@ -163,12 +163,12 @@ def _animation(
     from PIL import Image
 
     every = [inflated(laminate, stack, pose, COARSE) for pose in poses]
-    view = _view([part.surface for parts in every for part in parts], wish)
+    view = _view([part.surface for parts in every for part in parts], request)
     most = max(max(pose.pressures) for pose in poses)
     caption = [f"{laminate.name}, {_model(laminate, stack.calibration)}"]
     images = []
     for pose, parts in zip(poses, every, strict=True):
-        images.append(_image(pose, parts, view, wish, caption, most))
+        images.append(_image(pose, parts, view, request, caption, most))
         if progress is not None:
             progress(len(images), len(poses))
     out = BytesIO()
@@ -188,47 +188,60 @@ def _animation(
     return out.getvalue()
 
 
-def _poses(stack: Stack, last: Pose, wish: PictureRequest) -> list[Pose]:
+def _poses(stack: Stack, last: Pose, request: PictureRequest) -> list[Pose]:
     """Poses of an animation, which ends where it began."""
-    turns = [number / wish.frames * math.tau for number in range(wish.frames)]
+    turns = [number / request.frames * math.tau for number in range(request.frames)]
     steps = [[p * ((1 - math.cos(turn)) / 2) ** 1.5 for p in last.pressures] for turn in turns]
-    if wish.motion == "circle":
+    if request.motion == "circle":
         if stack.chambers < 3:
             raise DesignError("pressure goes round three chambers or more; use motion inflate")
         most = max(last.pressures)
         at = [math.atan2(float(y), float(x)) for x, y in stack.axes]
-        steps = [[most * _swell(turn - angle) for angle in at] for turn in turns]
+        # Full at a chamber's own angle, none from 120 degrees on.
+        steps = [
+            [most * max(0.0, (math.cos(turn - angle) + 0.5) / 1.5) ** 1.5 for angle in at]
+            for turn in turns
+        ]
     poses: list[Pose] = []
     for step in steps:
         poses.append(stack.pose(tuple(step), near=poses[-1] if poses else None))
     return poses
 
 
-def _swell(angle: float) -> float:
-    """Share of the pressure at an angle from a chamber: full at 0, none from 120 degrees on."""
-    share: float = max(0.0, (math.cos(angle) + 0.5) / 1.5) ** 1.5
-    return share
-
-
-def _view(surfaces: Sequence[Surface], wish: PictureRequest) -> View:
+def _view(surfaces: Sequence[Surface], request: PictureRequest) -> View:
     """The view of a picture before it is reduced."""
-    box = framed(ENLARGED * wish.width, ENLARGED * wish.height, MARGIN, FOOT)
-    return view_of(surfaces, wish.elevation, wish.azimuth, box)
+    box = framed(ENLARGED * request.width, ENLARGED * request.height, MARGIN, FOOT)
+    return view_of(surfaces, request.elevation, request.azimuth, box)
 
 
 def _image(
     pose: Pose,
     parts: Sequence[InflatedPart],
     view: View,
-    wish: PictureRequest,
+    request: PictureRequest,
     caption: Sequence[str],
     most: float | None = None,
 ) -> Image:
-    """One pose in colours up to the pressure ``most``, by default its highest."""
+    """One pose in colours up to the pressure ``most``, by default its highest, with a caption, on a
+    white background with its shadow on the ground.
+    """
     most = max(pose.pressures) if most is None else most
-    image = _rendered(parts, [_colour(part, pose, most) for part in parts], view, wish)
-    size = max(11, round(wish.height / 40))
-    inscribe(image, caption, size, pixels_per_mm=view.scale / ENLARGED)
+    size = request.width * ENLARGED, request.height * ENLARGED
+    lamp = np.array(LAMP) / np.linalg.norm(LAMP)
+    surfaces = [part.surface for part in parts]
+    buffer = rasterize(surfaces, view, *size, lamp, [part.normals for part in parts])
+    palette = np.array([*(_colour(part, pose, most) for part in parts), PAPER], dtype=float)
+    is_paper = buffer.body < 0
+    share = (buffer.light - AMBIENT) / (1 - AMBIENT)
+    level = (0.62 + 0.42 * share) * (1 - _crevices(buffer, view.scale))
+    level[edges(buffer, EDGE_MM) & ~is_paper] *= EDGE
+    rgb = palette[buffer.body] * np.where(is_paper, 1.0, level)[:, :, None]
+    gloss = GLOSS * np.clip(share, 0, 1) ** SHARPNESS
+    rgb += np.where(is_paper, 0.0, gloss)[:, :, None] * (255 - rgb)
+    shadow = _shadow(surfaces, view, size)
+    image = image_of(rgb * np.where(is_paper, 1 - SHADOW * shadow, 1.0)[:, :, None])
+    letters = max(11, round(request.height / 40))
+    inscribe(image, caption, letters, pixels_per_mm=view.scale / ENLARGED)
     return image
 
 
@@ -305,26 +318,6 @@ EDGE_MM = 0.5  # jump in depth that is drawn as an edge
 EDGE = 0.72
 GLOSS, SHARPNESS = 0.22, 14.0
 SHADOW, SOFT_MM = 0.34, 0.9
-
-
-def _rendered(
-    parts: Sequence[InflatedPart], colours: Sequence[RGB], view: View, wish: PictureRequest
-) -> Image:
-    """The parts on a white background, with their shadow on the ground."""
-    size = wish.width * ENLARGED, wish.height * ENLARGED
-    lamp = np.array(LAMP) / np.linalg.norm(LAMP)
-    surfaces = [part.surface for part in parts]
-    buffer = rasterize(surfaces, view, *size, lamp, [part.normals for part in parts])
-    palette = np.array([*colours, PAPER], dtype=float)
-    is_paper = buffer.body < 0
-    share = (buffer.light - AMBIENT) / (1 - AMBIENT)
-    level = (0.62 + 0.42 * share) * (1 - _crevices(buffer, view.scale))
-    level[edges(buffer, EDGE_MM) & ~is_paper] *= EDGE
-    rgb = palette[buffer.body] * np.where(is_paper, 1.0, level)[:, :, None]
-    gloss = GLOSS * np.clip(share, 0, 1) ** SHARPNESS
-    rgb += np.where(is_paper, 0.0, gloss)[:, :, None] * (255 - rgb)
-    shadow = _shadow(surfaces, view, size)
-    return image_of(rgb * np.where(is_paper, 1 - SHADOW * shadow, 1.0)[:, :, None])
 
 
 def _crevices(buffer: Buffer, scale: float) -> Floats:

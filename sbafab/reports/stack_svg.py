@@ -369,8 +369,8 @@ def _dimensions(cut: StackSection) -> Iterator[str]:
             name = "tail" if any(rod.middle > mouth for rod in cut.rods) else "overhang"
             measured.append((past, name, base.bottom, 2 * ROW_STEP))
     for span, name, y, away in measured:
-        ends, way = [(cut.x(s), y) for s in span], (0.0, math.copysign(1.0, away))
-        yield from draw.dimension(*ends, _words(name, span), way, abs(away))
+        start, end, way = (cut.x(span[0]), y), (cut.x(span[1]), y), math.copysign(1.0, away)
+        yield from draw.dimension(start, end, _words(name, span), (0.0, way), abs(away))
 
 
 def _words(name: str, span: Interval) -> str:

@@ -16,7 +16,7 @@ from sbafab.assemblies.files import assembly_of
 from sbafab.design.files import read_toml, templates_folder
 from sbafab.reports.traveller.assembly_page import AssemblyWork, assembly_html
 from sbafab.reports.traveller.bench import bench_html
-from sbafab.reports.traveller.page import traveller_html, tray_html
+from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.work import Work
 from sbafab.rules.finding import Finding, Place
 from tests.reports.pages import APPROVED, DOUBLE, EARS, TPU, lines_of, work_of
@@ -62,8 +62,6 @@ def test_pages_of_a_design(name: str, sheet_files: Any) -> None:
     pages = [traveller_html(work)]
     if name in ("1dof", "ears", "folded", "radial", "tpu"):
         pages.append(bench_html(work.design.name, work.sha256, [work]))
-    if work.copies > 1:
-        pages.append(tray_html(work))
     approve(name, "\n".join(map(lines_of, pages)))
 
 

@@ -1,7 +1,7 @@
 """traveller.html: one page that goes from the laser to the press and comes back with an actuator.
 
 Self-contained: style and pictures are inline, nothing is fetched. Same input, same bytes: the
-browser writes the date of a print. Beside it tray.html for a phone.
+browser writes the date of a print.
 """
 
 from __future__ import annotations
@@ -316,12 +316,10 @@ def proof(work: Work) -> Proof:
     return Proof(min(stated, most), estimate.kpa, stated)
 
 
-# Several copies: places on the plate, counts for each press cycle, serials, and tray.html.
+# Several copies: places on the plate, counts for each press cycle, and serials.
 
 
 WIDEST = 110.0  # width of the platen's picture on the page, mm
-MOST_CYCLES = 6
-"""Up to this many cycles each has a box on tray.html; otherwise cycles of one size share one."""
 
 
 def _batch(work: Work) -> dict[str, Any] | None:
@@ -382,20 +380,3 @@ def _places_picture(work: Work, runs: Runs) -> str:
     )
     picture.add(draw.text((1.0, scale * high + 6), words, size=2.2))
     return picture.svg()
-
-
-def tray_html(work: Work) -> str:
-    """Return tray.html: the patterns with their counts, for a phone beside the tray."""
-    laminate, runs = work.laminate, work.cycles
-    cycles = [(f"Cycle {cycle_name(n)}", size) for n, size in enumerate(runs.cycles, 1)]
-    if len(cycles) > MOST_CYCLES:
-        cycles = [(cycles_of(runs, size), size) for size in dict.fromkeys(runs.cycles)]
-    return render(
-        "tray.html.j2",
-        name=laminate.name,
-        short_hash=work.sha256[:SHORT_HASH],
-        shapes=definitions(pattern_regions(laminate)),
-        runs=runs,
-        cycles=cycles,
-        cards=[(cut, len(laminate.patterns[cut.pattern])) for cut in cut_list(work)],
-    )
