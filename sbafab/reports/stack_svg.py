@@ -31,7 +31,7 @@ PAST = 2.0  # a pin's axis and a fold's line extend past their ends by this, mm 
 Spans = Sequence[Interval]
 
 
-class Plane(NamedTuple):
+class SectionPlane(NamedTuple):
     """The plane of the section: a point on it and a unit vector along it."""
 
     origin: Point
@@ -150,7 +150,7 @@ class StackSection:
             yield SectionSlab(layer, self._clipped(cuts[layer.pattern]), y, top)
             y = top - BREAK * (layer.index == self.break_above)
 
-    def _joints(self, plane: Plane) -> Iterator[Joint]:
+    def _joints(self, plane: SectionPlane) -> Iterator[Joint]:
         for gap in self.laminate.interfaces:
             levels = [mask.index for mask in gap.masks] or [*gap.layer_indices]
             if (gap.masks or gap.seams) and self.by_index.keys() >= {*levels}:
@@ -161,7 +161,7 @@ class StackSection:
                 spans = self._clipped(plane.cut(gap.bond))
                 yield Joint(gap, spans, bottom + half, top - half)
 
-    def _fold_ends(self, plane: Plane) -> Iterator[FoldEnd]:
+    def _fold_ends(self, plane: SectionPlane) -> Iterator[FoldEnd]:
         """Yield the folds cut by the plane, if the films shown end at them."""
         (a, b), (dx, dy) = plane
         for fold in self.laminate.folds:
@@ -192,15 +192,15 @@ class StackSection:
         return [joint for joint in self.joints if joint.interface.kind == kind and joint.spans]
 
 
-def _plane(laminate: Laminate) -> tuple[str, Plane]:
+def _plane(laminate: Laminate) -> tuple[str, SectionPlane]:
     """Return the name of the first chamber, or of the first port, and the plane through it."""
     if not laminate.chambers:
         port = laminate.ports[0]
-        return port.name, Plane(port.at, (1.0, 0.0))
+        return port.name, SectionPlane(port.at, (1.0, 0.0))
     chamber = laminate.chambers[0]
     bored = (bore.centre for bore in laminate.bores if bore.chamber == chamber.name)
     inlets = (inlet.direction for inlet in laminate.inlets if inlet.chamber == chamber.name)
-    return chamber.name, Plane(next(bored, chamber.centres[0]), next(inlets, (1.0, 0.0)))
+    return chamber.name, SectionPlane(next(bored, chamber.centres[0]), next(inlets, (1.0, 0.0)))
 
 
 def _shown(laminate: Laminate) -> tuple[Sequence[Layer], int, int]:
@@ -217,7 +217,7 @@ def _shown(laminate: Laminate) -> tuple[Sequence[Layer], int, int]:
     return (*bottom, *top), count - 3, bottom[-1].index
 
 
-def _rods(laminate: Laminate, plane: Plane) -> Iterator[Rod]:
+def _rods(laminate: Laminate, plane: SectionPlane) -> Iterator[Rod]:
     """Yield the pins that hold layers and that the plane meets, in the laminate's order."""
     (u, v), steps = plane.direction, press_steps(laminate)
     for pin in laminate.pins:
