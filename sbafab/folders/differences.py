@@ -12,13 +12,14 @@ import json
 import math
 import re
 import tomllib
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from itertools import pairwise, zip_longest
 from pathlib import Path
 from typing import Any
-from zipfile import ZipFile
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,10 @@ GREY = 1.0
 """Mean difference of two pictures by antialiasing, of 255 levels."""
 VISIBLE, VISIBLE_SHARE = 48, 2e-4
 """Visible difference of a pixel, of 255 levels, and permitted share of such pixels."""
-UNREADABLE = (ValueError, LookupError, ArithmeticError, RecursionError, csv.Error)
+UNREADABLE = (
+    *(ValueError, LookupError, ArithmeticError, RecursionError, csv.Error, BadZipFile, OSError),
+    *(NotImplementedError, zlib.error),
+)
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 PICTURE = re.compile(r"data:image/png;base64,([A-Za-z0-9+/=\s]+)")
@@ -174,13 +178,22 @@ def _readers() -> dict[str, Callable[[Path, Path], str]]:
         ".dxf": _drawing_difference,
         ".png": lambda *paths: _picture_difference(*(path.read_bytes() for path in paths)),
         **dict.fromkeys((".svg", ".html", ENDING), _text_difference),
-        **dict.fromkeys((".stl", ".3mf", ".glb"), mesh_difference),
+        ".3mf": lambda here, there: value_difference(_members(here), _members(there)),
+        **dict.fromkeys((".stl", ".glb"), mesh_difference),
     }
 
 
 def _text(path: Path) -> str:
     with path.open(encoding="utf-8", newline="") as file:
         return file.read()
+
+
+def _members(path: Path) -> dict[str, str]:
+    """Return the texts in an archive by name: compression depends on the library."""
+    with ZipFile(path) as archive:
+        if sum(info.file_size for info in archive.infolist()) > MAX_MESH_BYTES:
+            raise OutputError(f"holds more than {MAX_MESH_BYTES:,} bytes")
+        return {name: archive.read(name).decode() for name in sorted(archive.namelist())}
 
 
 def _table(text: str) -> dict[str, Any]:
@@ -327,7 +340,7 @@ def _are_same(points: Sequence[Point], others: Sequence[Point]) -> bool:
     )
 
 
-# Surfaces read back from STL, 3MF and GLB files, and compared.
+# Surfaces read back from STL and GLB files, and compared.
 
 
 POINT_TOLERANCE = 2e-5
@@ -337,9 +350,6 @@ MESH_SHARE = 1e-5
 MAX_MESH_BYTES = 500_000_000
 MAX_COORDINATE = 1e5
 """Largest coordinate, mm."""
-MODEL = "3D/3dmodel.model"
-VERTEX = re.compile(r'<vertex x="([^"]*)" y="([^"]*)" z="([^"]*)" */>')
-TRIANGLE = re.compile(r'<triangle v1="([^"]*)" v2="([^"]*)" v3="([^"]*)" */>')
 
 
 MeshBody = tuple[Surface, str]
@@ -358,16 +368,27 @@ def mesh_difference(actual: Path, expected: Path) -> str:
 
 
 def bodies(path: Path) -> list[MeshBody]:
-    """Read the bodies of a mesh file, mm. Raises OutputError for an unsound file."""
+    """Read the bodies of an STL or GLB file, mm or m. Raises OutputError for an unsound file."""
     if path.stat().st_size > MAX_MESH_BYTES:
         raise OutputError(f"larger than {MAX_MESH_BYTES:,} bytes")
-    readers = {".stl": _stl, ".3mf": _3mf, ".glb": _glb}
+    # Only a mesh that differs is read.
+    import trimesh
+
+    read: list[MeshBody] = []
     try:
-        return readers[path.suffix](path)
-    except OutputError:
-        raise
+        scene = trimesh.load_scene(path, process=False)
+        for node in sorted(scene.graph.nodes_geometry):
+            transform, name = scene.graph[node]
+            mesh = scene.geometry[name]
+            points, places = np.unique(np.array(mesh.vertices), axis=0, return_inverse=True)
+            material = getattr(mesh.visual, "material", None)
+            looks = ("name", "baseColorFactor", "roughness")
+            paint = [str(getattr(material, look, None)) for look in looks]
+            surface = Surface(points, places.reshape(-1)[mesh.faces])
+            read.append((surface, json.dumps([node, transform.tolist(), paint])))
     except Exception as error:  # readers of libraries raise anything on a damaged file
         raise OutputError(f"no sound mesh: {error}") from error
+    return read
 
 
 def _body_difference(found: MeshBody, designed: MeshBody) -> str:
@@ -429,44 +450,3 @@ def _unmatched_point(
         unmatched = unmatched[[row.tobytes() not in reference_cells for row in point_cells]]
     stray: NDArray[np.float64] | None = unmatched[0] if len(unmatched) else None
     return stray
-
-
-def _stl(path: Path) -> list[MeshBody]:
-    from trimesh.exchange.stl import load_stl_binary
-
-    with path.open("rb") as file:
-        mesh = load_stl_binary(file)
-    points, faces = np.unique(mesh["vertices"], axis=0, return_inverse=True)
-    surface = Surface(points.astype(np.float64), faces.reshape(-1, 3))
-    edges = surface.points[surface.faces]
-    normal = np.cross(edges[:, 1] - edges[:, 0], edges[:, 2] - edges[:, 0])
-    if (np.einsum("ij,ij->i", normal, mesh["face_normals"]) < 0).any():
-        raise OutputError("a triangle's normal points inward")
-    return [(surface, "")]
-
-
-def _3mf(path: Path) -> list[MeshBody]:
-    with ZipFile(path) as archive:
-        if sum(info.file_size for info in archive.infolist()) > MAX_MESH_BYTES:
-            raise OutputError(f"holds more than {MAX_MESH_BYTES:,} bytes")
-        parts = {name: archive.read(name).decode() for name in sorted(archive.namelist())}
-    model = parts.pop(MODEL)
-    points = np.array(VERTEX.findall(model), dtype=np.float64).reshape(-1, 3)
-    faces = np.array(TRIANGLE.findall(model), dtype=np.int64).reshape(-1, 3)
-    frame = TRIANGLE.sub("", VERTEX.sub("", model)).split()
-    return [(Surface(points, faces), json.dumps([parts, frame]))]
-
-
-def _glb(path: Path) -> list[MeshBody]:
-    import trimesh
-
-    scene = trimesh.load_scene(path, process=False)
-    mesh_bodies: list[MeshBody] = []
-    for node in sorted(scene.graph.nodes_geometry):
-        transform, name = scene.graph[node]
-        mesh = scene.geometry[name]
-        surface = Surface(np.array(mesh.vertices), np.array(mesh.faces))
-        material = mesh.visual.material
-        paint = [material.name, *map(str, (material.baseColorFactor, material.roughnessFactor))]
-        mesh_bodies.append((surface, json.dumps([node, transform.tolist(), paint])))
-    return mesh_bodies

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -108,29 +107,6 @@ def test_the_same_assembly_gives_the_same_bytes(standing: Run, tmp_path: Path) -
 
 def words(node: Any) -> str:
     return " ".join(node.text_content().split())
-
-
-def test_the_page_makes_every_design_and_joins_every_part(brace: Run) -> None:
-    page = (brace.folder / "traveller.html").read_text(encoding="utf-8")
-    tree = lxml_html.fromstring(page)
-    ids = [node.get("id") for node in tree.iter() if node.get("id")]
-    assert [name for name, count in Counter(ids).items() if count > 1] == []
-    links = [
-        value.removeprefix("#")
-        for node in tree.iter()
-        for name, value in node.attrib.items()
-        if name in ("href", "aria-labelledby") and not value.startswith("data:")
-    ]
-    assert set(links) <= set(ids)
-    assert [words(h) for h in tree.findall(".//h2[@class='design']")] == [
-        "Make 1 copy of radial-15mm (A)",
-        "Make 1 copy of 3dof-15mm (B)",
-    ]
-    joined = [words(a.find("h3")) for a in tree.iterfind(".//article") if "join" in a.get("class")]
-    assert [title.split()[1] for title in joined] == ["tube", "grip", "vacuum", "arm", "cup"]
-    assert "laminated at once, as in the paper" in page
-    assert "Not pressed together: radial-15mm and 3dof-15mm" in page
-    assert "3M 1587" in page
 
 
 def test_the_total_counts_what_is_known_where_press_minutes_are_not(
