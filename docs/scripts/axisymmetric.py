@@ -88,9 +88,9 @@ def axisymmetric_states(
         folder = Path(place)
         deck = "".join(_deck(pressures, section, film))
         (folder / f"{JOB}.inp").write_text(deck, encoding="ascii", newline="\n")
-        ending = run_ccx(folder, JOB, pressures[-1], LIMIT)
-        if ending.stopped is not None:
-            raise OutputError(f"ccx stopped at {ending.time:g} kPa: {ending.stopped.words}")
+        reached, stopped = run_ccx(folder, JOB, pressures[-1], LIMIT)
+        if stopped is not None:
+            raise OutputError(f"ccx stopped at {reached:g} kPa: {stopped.words}")
         frames = read_frd(folder / f"{JOB}.frd", len(section.nodes))
     times = np.array([frame.time for frame in frames])
     flat = np.array(section.nodes)

@@ -278,10 +278,10 @@ def sector_states(one: Sector, pressures: Sequence[float] = PRESSURES) -> list[S
         folder = Path(place)
         text = "".join(deck(one, made, pressures))
         (folder / f"{JOB}.inp").write_text(text, encoding="ascii", newline="\n")
-        ending = run_ccx(folder, JOB, one.ramp, LIMIT)
-        frames = read_frd(folder / f"{JOB}.frd", len(made.points), whole=ending.stopped is None)
-    if ending.stopped is not None:
-        print(f"ccx stopped at {pressures[-1] * (ending.time / one.ramp) ** 3:g} kPa")
+        reached, stopped = run_ccx(folder, JOB, one.ramp, LIMIT)
+        frames = read_frd(folder / f"{JOB}.frd", len(made.points), whole=stopped is None)
+    if stopped is not None:
+        print(f"ccx stopped at {pressures[-1] * (reached / one.ramp) ** 3:g} kPa")
     found = []
     times = np.array([frame.time for frame in frames])
     for pressure, time in zip(pressures, _times(one, pressures), strict=True):

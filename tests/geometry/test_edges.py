@@ -86,16 +86,6 @@ def test_edges_that_meet() -> None:
     assert meeting_points(Line((0, 0), (1, 0)), Line((2, -1), (2, 1))) == []
 
 
-def test_the_box_of_an_arc_holds_ends_that_lie_off_its_circle() -> None:
-    """By 0.2 nm, as snapped ends may: here beyond the extreme of the circle that they are near."""
-    for turn, side in ((180.0, 0), (270.0, 1), (0.0, 2), (90.0, 3)):
-        (ux, uy), (vx, vy) = unit(turn), unit(turn + 60.0)
-        start = (2.0000000002 * ux, 2.0000000002 * uy)
-        arc = Arc(start, (2.0 * vx, 2.0 * vy), (0.0, 0.0), 2.0, True)
-        assert arc.bounds[side] == start[side % 2]
-        assert arc.reversed().bounds == arc.bounds
-
-
 # Edges are gathered by line and circle, and never round a corner, however finely it is drawn.
 
 

@@ -8,7 +8,7 @@ from random import Random
 import pytest
 
 from sbafab.geometry.edges import Arc, edge_from_bulge
-from sbafab.geometry.offset import beam_path, dragged, fillet, grow, shrink, swept
+from sbafab.geometry.offset import dragged, fillet, grow, shrink, swept
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 
 CONVEX = [
@@ -39,26 +39,6 @@ def test_growing_a_convex_shape_adds_a_band(shape: Region, distance: float) -> N
     assert back.bounds == pytest.approx(shape.bounds, abs=1e-5)
     assert len(back.edges) == len(shape.edges)
     assert fillet(shape, distance).area == pytest.approx(shape.area, abs=1e-7)
-
-
-def test_shrinking_past_the_inner_radius_leaves_nothing() -> None:
-    assert shrink(disc((0, 0), 1), 1.1).is_empty
-    assert shrink(disc((0, 0), 1), 1.0).is_empty
-    assert shrink(rectangle((0, 0), (9, 2)), 1.0).is_empty
-    assert shrink(stadium((0, 0), 2, 9), 1.0).is_empty
-    assert shrink(disc((0, 0), 3) - disc((0, 0), 1), 1.0).is_empty
-
-
-def test_gaps_of_exactly_twice_the_distance_close() -> None:
-    pair = rectangle((0, 0), (2, 4)) | rectangle((3, 0), (5, 4))
-    grown = grow(pair, 0.5)
-    assert len(grown.pieces) == 1
-    # Two notches remain above and below the seam, between the corner arcs.
-    assert grown.area == pytest.approx(6 * 5 - 4 * FULL_CORNER / 4 - 4 * FULL_CORNER / 4)
-    apart = grow(pair, 0.499)
-    assert len(apart.pieces) == 2
-    slot = rectangle((0, 0), (9, 4)) - rectangle((4, 1), (5, 4))
-    assert grow(slot, 0.5).area == pytest.approx(10 * 5 - FULL_CORNER - 2 * FULL_CORNER / 4)
 
 
 @pytest.mark.parametrize("radius", [0.3, 1.0, 1.999])
@@ -96,15 +76,6 @@ def test_segments_grow_round_their_sharp_tips(radius: float, distance: float) ->
         expected = cap_area(radius, height) + around * distance + math.pi * distance**2
         # The line and the arc each end within 4 nm of the tip.
         assert grow(shape, distance).area == pytest.approx(expected, abs=1e-5 * around)
-
-
-def test_a_kerf_wider_than_an_outline_is_high_keeps_it() -> None:
-    for height in (0.05, 0.02):
-        path = beam_path(segment(7.5, height), 0.1)
-        assert path.lost is None
-        half = math.acos(1 - height / 7.5)
-        grown = cap_area(7.5, height) + 15 * (half + math.sin(half)) * 0.05 + math.pi * 0.05**2
-        assert path.region.area == pytest.approx(grown, abs=1e-5)
 
 
 @pytest.mark.parametrize("seed", range(8))

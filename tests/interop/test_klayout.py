@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -10,9 +9,8 @@ import pytest
 from hypothesis import given, settings
 
 from sbafab.actuators import build, load_design
-from sbafab.geometry.offset import fillet
-from sbafab.geometry.region import Region, disc, polygon, rectangle, strip
-from sbafab.geometry.width import least_gap, least_width
+from sbafab.geometry.region import Region, disc, polygon, strip
+from sbafab.geometry.width import least_width
 from sbafab.laminate.laminate import Laminate
 from tests.interop.judging import TOLERANCE, compared, overhang, widths
 from tests.properties.designs import Draft, valid
@@ -47,37 +45,6 @@ def test_both_measure_the_width_that_a_closed_formula_gives(
     assert found.how == "square"
     assert ours.value == pytest.approx(expected)
     assert found.theirs == pytest.approx(expected, abs=TOLERANCE)
-
-
-@pytest.mark.parametrize("bottom", [0.1, 0.8])
-def test_both_measure_a_slot_that_tapers_to_a_rounded_bottom(bottom: float) -> None:
-    """Fillets of 0.3 meet in a bottom of 0.1; between them some of a bottom of 0.8 is left."""
-    lean, tall = math.radians(6.0), 8.0
-    half = bottom / 2 + tall * math.tan(lean)
-    slot = polygon([(0.0, -bottom / 2), (tall, -half), (tall, half), (0.0, bottom / 2)])
-    region = fillet(rectangle((-2.0, -4.0), (6.0, 4.0)) - slot, 0.3)
-    found = compared("slot", region, 1, least_gap(region, 15.0))
-    expected = 0.6 * math.cos(lean)
-    if bottom > expected:
-        expected = bottom + 0.6 * math.tan((math.pi / 2 - lean) / 2) * math.sin(lean)
-    assert found is not None
-    assert found.ours == pytest.approx(expected)
-    assert found.agrees, found
-
-
-def test_both_measure_a_slot_between_discs_whose_bottom_bulges() -> None:
-    """Two lobes 60 degrees off an axis, and the disc between them that ends their slot."""
-    hub, lobe, away, turn = 5.565, 5.721, 8.0, math.radians(60.0)
-    region = disc((0.0, 0.0), hub)
-    for side in (-1, 1):
-        centre = away * math.cos(turn), side * away * math.sin(turn)
-        region = region | disc(centre, lobe)
-    found = compared("slot", region, 1, least_gap(region, 15.0))
-    # Hub and lobe meet where the law of cosines says; the slot ends between two such corners.
-    corner = turn - math.acos((hub**2 + away**2 - lobe**2) / (2 * hub * away))
-    assert found is not None
-    assert found.ours == pytest.approx(2 * hub * math.sin(corner))
-    assert found.agrees, found
 
 
 @settings(max_examples=6)

@@ -63,14 +63,6 @@ def test_films_share_the_nodes_of_their_bond_and_no_other(meshes: ConformingMesh
     assert np.isclose(mesh.points[above[inside], 2], 3 * FILM).any()
 
 
-def test_tetrahedra_fill_the_same_space(two_balloons: Laminate, meshes: ConformingMeshes) -> None:
-    tets = conforming_meshes(two_balloons, MeshSettings(h=0.5, element="tet")).volume
-    assert tets.cells.shape == (3 * len(meshes.volume.cells), 10)
-    for name in meshes.volume.cell_sets:
-        assert held(tets, name) == pytest.approx(held(meshes.volume, name), rel=1e-9)
-    assert len(tets.face_sets["cavity_A"]) > 0
-
-
 def test_cavities_hold_pockets_and_bores(
     two_balloons: Laminate, with_gaps: ConformingMeshes
 ) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from docs.scripts.axisymmetric import axisymmetric_strokes
 from sbafab.actuators import build, load_design
 from sbafab.cli import app
 from sbafab.errors import OutputError, VoidError
@@ -57,13 +56,6 @@ def test_the_balloon_in_3d_before_it_wrinkles(tmp_path: Path) -> None:
     # What the air has done, the films of four quarters store, as ccx says, but for what is damped.
     stored = re.findall(r"internal energy.*\n\n +(\S+)", (tmp_path / "actuator.dat").read_text())
     assert last.work == pytest.approx(4 * 1000 * float(stored[-1]), rel=0.05)
-
-
-@needs_ccx
-def test_a_run_that_diverges() -> None:
-    # A film as soft as this thins faster than its curvature grows: it bursts.
-    with pytest.raises(OutputError, match="kPa: its iterations no longer converge"):
-        axisymmetric_strokes([6.0, 3000.0])
 
 
 @needs_ccx
@@ -199,6 +191,6 @@ def test_what_ended_a_run(
 ) -> None:
     stand_in("ccx", f"{HALF_WAY}\nprint({says!r})\nraise SystemExit({code})")
     # A step that is tried again is no failure where the end is reached.
-    ending = run_ccx(tmp_path, "job", 0.5 if reason == "None" else 1.0, 30.0)
-    assert ending.time == 0.5
-    assert reason in str(ending.stopped)
+    reached, stopped = run_ccx(tmp_path, "job", 0.5 if reason == "None" else 1.0, 30.0)
+    assert reached == 0.5
+    assert reason in str(stopped)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from functools import cache
@@ -136,17 +135,6 @@ def test_films_of_a_chamber_at_rest_touch_and_do_not_pass_through_each_other(
     model.write_text(model.read_text().replace('ipc="enable"', 'contact="disable"'))
     apart = inflate(films, request, tmp_path, ignore_progress).figures["overlap"]
     assert apart > 10 * touching + 0.1
-
-
-def test_the_script_says_the_same(tmp_path: Path) -> None:
-    written(tmp_path, *BALLOON, pressure=6)
-    command = [sys.executable, "inflate.py", "--seconds=3"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
-    words = done.stdout.splitlines()[-1].split()
-    assert words[:3] == ["3.00", "s", "tip"]
-    found = inflated((6.0,), BALLOON, 8, 3)
-    assert float(words[5]) == pytest.approx(found.last.stroke, abs=2e-3)
-    assert float(words[-2]) == pytest.approx(found.volumes["chamber1"], abs=2e-2)
 
 
 def spoil(folder: Path, file: str, before: str, after: str) -> None:

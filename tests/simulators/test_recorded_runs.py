@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.errors import DesignError, OutputError, VoidError
+from sbafab.errors import OutputError, VoidError
 from sbafab.laminate.laminate import Laminate
 from sbafab.process import ignore_progress
 from sbafab.simulators.coarse import nearly_flat
@@ -115,15 +115,6 @@ def test_what_cannot_be_voids_a_run_whose_log_is_clean(
         run(laminate(), request, tmp_path / "sofa", ignore_progress)
 
 
-def test_a_run_that_takes_too_long_keeps_what_it_has_reached(
-    tmp_path: Path, stand_in: StandIn
-) -> None:
-    stand_in("runSofa", f"{SOFA}\nwrite(0, 1)\nwrite(0.1, 1.5)\ntime.sleep(60)")
-    found = ran(tmp_path, minutes=0.02)
-    assert found.last.time == pytest.approx(0.1)
-    assert "ran to 0.1 of 0.2 s: it was stopped after 0.02 minutes" in str(found.stopped)
-
-
 def test_what_runs_below_a_program_is_ended_with_it(tmp_path: Path, stand_in: StandIn) -> None:
     child = "subprocess.Popen(['sleep', '60'])"
     stand_in(
@@ -152,14 +143,6 @@ def test_a_program_that_is_missing_or_cannot_start_says_so(
         ran(tmp_path)
     with pytest.raises(OutputError, match="nowhere could not be started"):
         run_program([str(tmp_path / "nowhere")], tmp_path / "log", 1.0, lambda: None)
-
-
-def test_each_scene_is_run_with_its_own_step(tmp_path: Path, stand_in: StandIn) -> None:
-    stand_in("runSofa", f"{GOOD}open('arguments', 'w').write(' '.join(sys.argv[1:]))")
-    ran(tmp_path, "frames")
-    assert (tmp_path / "sofa" / "arguments").read_text() == "-g batch -n 5 recorded.scn"
-    with pytest.raises(DesignError, match="scene beam needs three chambers or more"):
-        ran(tmp_path, "beam")
 
 
 # What is read and judged.

@@ -152,21 +152,6 @@ def every_node(scene: ET.Element) -> np.ndarray:
     return np.array(numbers(places)).reshape(-1, 3)
 
 
-def test_chambers_are_pressurised_apart() -> None:
-    laminate = sbafab.build("3dof-15mm", "stack.balloons=2")
-    pressures = {"chamber1": 4.0, "chamber2": 0.0, "chamber3": 2.5}
-    scene = ET.fromstring(scenes_of(laminate, pressures)["shell"].text().encode())
-    told = {
-        node.attrib["name"]: element.attrib
-        for node in scene.iter("Node")
-        for element in node.findall("SurfacePressureForceField")
-    }
-    assert {name: float(fields["pressure"]) for name, fields in told.items()} == pressures
-    assert told["chamber1"]["pressureSpeed"] == "4"
-    assert float(told["chamber3"]["pressureLowerBound"]) == pytest.approx(2.5, rel=1e-5)
-    assert "pulseMode" not in told["chamber2"]
-
-
 @pytest.mark.parametrize("name", ["actuator_frames.scn", "actuator_beam.scn"])
 def test_skin_weights_are_linear_along_the_backbone(folder: Path, name: str) -> None:
     scene = parsed(folder / name)
@@ -291,14 +276,3 @@ def test_other_pockets_have_the_shell_scene_alone(tmp_path: Path, square: Path) 
     for element in parsed(tmp_path / "sofa" / "actuator.scn").iter():
         if element.tag != "Node":
             assert set(element.attrib) <= known_fields(element.tag), element.tag
-
-
-def test_each_film_of_a_stack_stretches_as_itself() -> None:
-    """E t of TPE, of a cap of PET, and of the two bonded; 3,000 MPa, 0.012 mm."""
-    film = ("films.pet.kind=structural", "films.pet.product=P", "films.pet.thickness=0.012")
-    film += ("films.pet.density=1390", "films.pet.modulus=3000", "films.pet.poisson=0.3")
-    laminate = sbafab.build("1dof-5mm", "stack.balloons=1", *film, "layup.cap=pet")
-    groups = conforming_shell(laminate).membranes
-    stiffness = {round(group.stiffness): group.poisson for group in groups}
-    assert set(stiffness) == {380, 36_000, 36_380}
-    assert (stiffness[380], stiffness[36_000]) == (0.2, 0.3)

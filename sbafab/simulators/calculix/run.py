@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -86,9 +86,9 @@ def read_frd(path: Path, nodes: int, whole: bool = True) -> list[Frame]:
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise OutputError(f"{path.name} cannot be read: {error.strerror}; run ccx again") from None
+        raise _unread(path, f"cannot be read: {error.strerror}") from None
     if whole and not content.rstrip().endswith(b"9999"):
-        raise _cut_short(path)
+        raise _unread(path, CUT_SHORT)
     frames: list[Frame] = []
     at: float | None = None
     moved = None
@@ -98,12 +98,15 @@ def read_frd(path: Path, nodes: int, whole: bool = True) -> list[Frame]:
         elif moved is not None and time == at:
             frames.append(Frame(time, moved, values))
     if whole and not frames:
-        raise OutputError(f"{path.name} holds no displacement and stress; run ccx again")
+        raise _unread(path, "holds no displacement and stress")
     return frames
 
 
-def _cut_short(path: Path) -> OutputError:
-    return OutputError(f"{path.name} is cut short: its last block is not whole; run ccx again")
+CUT_SHORT = "is cut short: its last block is not whole"
+
+
+def _unread(path: Path, fault: str) -> OutputError:
+    return OutputError(f"{path.name} {fault}; run ccx again")
 
 
 def _blocks(
@@ -115,37 +118,32 @@ def _blocks(
         if size is None:
             continue
         if int(head[2]) != nodes:
-            raise OutputError(
-                f"{path.name} is of a mesh of {int(head[2])} nodes, not of this one of {nodes}; "
-                "run ccx again"
-            )
+            raise _unread(path, f"is of a mesh of {int(head[2])} nodes, not of this one of {nodes}")
         width = NODE + VALUE * size + 1
         rows = np.frombuffer(content[head.end() : head.end() + nodes * width], dtype="S1")
         if len(rows) < nodes * width or content[head.end() + len(rows) :][:3] != b" -3":
             if whole:
-                raise _cut_short(path)
+                raise _unread(path, CUT_SHORT)
             return
         cells = rows.reshape(nodes, width)[:, NODE:-1]
-        texts = np.ascontiguousarray(cells).view(f"S{VALUE}")
         try:
-            yield float(head[1]), head[3], texts.astype(np.float64)
+            values = np.ascontiguousarray(cells).view(f"S{VALUE}").astype(np.float64)
         except ValueError:
-            raise OutputError(
-                f"{path.name} holds something that is not a number at time {float(head[1]):g} s; "
-                "run ccx again"
-            ) from None
+            fault = f"holds something that is not a number at time {float(head[1]):g} s"
+            raise _unread(path, fault) from None
+        yield float(head[1]), head[3], values
 
 
-def read_sta(path: Path) -> list[float]:
-    """Times in s at which a run has converged so far; a partly written line is ignored."""
-    times = []
+def read_sta(path: Path) -> float:
+    """The time in s up to which a run has converged so far; a partly written line is ignored."""
+    reached = 0.0
     lines = path.read_text(encoding="ascii", errors="replace").split("\n") if path.is_file() else []
     for line in lines[2:-1]:
         fields = line.split()
         # A U after the number of attempts marks an increment that did not converge.
         if len(fields) == 7 and fields[2].isdigit():
-            times.append(float(fields[4]))
-    return times
+            reached = max(reached, float(fields[4]))
+    return reached
 
 
 # History of a run: stroke, air and wall stress against pressure.
@@ -184,23 +182,22 @@ def history(
     for frame in (unloaded, *frames):
         points = mesh.points + frame.displacement
         moved = frame.displacement[tips].mean(axis=0) - frame.displacement[bases].mean(axis=0)
+        x, y, z = moved.tolist()
         part = settings.share(frame.time)
         pressures = {name: part * value for name, value in settings.pressures.items()}
         meshed = {name: _volume(points, walls[name]) / shares[name] for name in set(stand.values())}
         volumes = {name: meshed[stand[name]] for name in walls}
-        work = states[-1].work + _work(states[-1], pressures, volumes) if states else 0.0
-        states.append(
-            LoadedState(
-                frame.time,
-                pressures,
-                flat + float(moved[2]),
-                (float(moved[0]), float(moved[1]), float(moved[2])),
-                _tilt(mesh.points[tips], points[tips]),
-                volumes,
-                float(frame.von_mises.max()),
-                work,
-            )
-        )
+        work = 0.0
+        if states:
+            # The work of the air since the state before, in uJ (kPa x ul).
+            before = states[-1]
+            means = {n: (before.pressures[n] + kpa) / 2 for n, kpa in pressures.items()}
+            came = {name: volumes[name] - before.volumes[name] for name in volumes}
+            work = before.work + sum(means[name] * ul for name, ul in came.items())
+        tilt = _tilt(mesh.points[tips], points[tips])
+        stress = float(frame.von_mises.max())
+        tip, height = (x, y, z), flat + z
+        states.append(LoadedState(frame.time, pressures, height, tip, tilt, volumes, stress, work))
     return states
 
 
@@ -219,16 +216,6 @@ def films_meet(mesh: Mesh, chamber: str, frame: Frame) -> bool:
     facing &= np.diff(start[:, 2]) > SAME_PLACE
     apart = np.diff(start[:, 2] + frame.displacement[ranked, 2])
     return bool((apart[facing] < 0).any())
-
-
-def _work(
-    before: LoadedState, pressures: Mapping[str, float], volumes: Mapping[str, float]
-) -> float:
-    """Return the work of the air since a state, in uJ (kPa x ul)."""
-    return sum(
-        (before.pressures[name] + pressures[name]) / 2 * (volumes[name] - before.volumes[name])
-        for name in volumes
-    )
 
 
 def _poles(mesh: Mesh, laminate: Laminate, name: str) -> NDArray[np.int64]:
@@ -410,11 +397,8 @@ LOG = "ccx.log"
 DIVERGED = Stop("diverged", "its iterations no longer converge, however small the step")
 
 
-class Ending(NamedTuple):
-    """End of a run: the last converged time in s, and the reason if it was stopped, else None."""
-
-    time: float
-    stopped: Stop | None
+Ending = tuple[float, Stop | None]
+"""End of a run: the last converged time in s, and the reason if it was stopped, else None."""
 
 
 def find_ccx() -> str:
@@ -440,18 +424,12 @@ def run_ccx(
 
     def look() -> None:
         if report is not None:
-            report(_reached(sta))
+            report(read_sta(sta))
 
     code, stopped = run_program([find_ccx(), "-i", job], folder / LOG, timeout, look)
-    reached = _reached(sta)
-    if stopped is not None:
-        return Ending(reached, stopped)
+    reached = read_sta(sta)
     is_there = reached >= end * (1 - SAME_TIME)
-    return Ending(reached, _complaint(folder / LOG, code, is_there))
-
-
-def _reached(sta: Path) -> float:
-    return max(read_sta(sta), default=0.0)
+    return reached, stopped or _complaint(folder / LOG, code, is_there)
 
 
 def _complaint(log: Path, code: int, is_there: bool) -> Stop | None:
@@ -510,15 +488,20 @@ def simulate(
         progress(f"ccx, {top * settings.share(reached) + 0.0:.3g} of {top:g} kPa", 0, 1)
 
     report(0.0)
-    ending = run_ccx(folder, JOB, settings.ramp, timeout, report)
+    reached, stop = run_ccx(folder, JOB, settings.ramp, timeout, report)
     progress("results", 0, 1)
-    run_mesh = started(mesh, settings)
-    frames = converged_frames(folder / f"{JOB}.frd", run_mesh, ending)
+    run_mesh, frd = started(mesh, settings), folder / f"{JOB}.frd"
+    place = f"{reached:.4g} s, {top * settings.share(reached):.3g} of {top:g} kPa"
+    frames = []
+    if stop is None or frd.exists():
+        # ccx adds an unconverged frame when it gives up.
+        every = read_frd(frd, len(mesh.points), whole=stop is None)
+        frames = [frame for frame in every if frame.time <= reached * (1 + SAME_TIME)]
     if not frames:
-        stop = ending.stopped or Stop("failed", "it wrote no result")
+        stop = stop or Stop("failed", "it wrote no result")
         raise OutputError(
-            f"ccx stopped at {_place(ending.time, settings)}, before the first result: "
-            f"{stop.words}; {_advice(stop, settings)}"
+            f"ccx stopped at {place}, before the first result: {stop.words}; "
+            f"{_advice(stop, settings)}"
         )
     states = history(run_mesh, laminate, mesh_settings.symmetry, settings, frames)
     wrong = _first_wrong(run_mesh, laminate, settings, frames, states)
@@ -532,17 +515,13 @@ def simulate(
         frames, states = frames[:number], states[: number + 1]
     _write_results(run_mesh, laminate.name, mesh_settings.symmetry, states, frames[-1], folder)
     _tidy(folder)
-    stopped = None
-    if ending.stopped is not None:
-        place, last = _place(ending.time, settings), _largest(states[-1])
-        stopped = (
-            f"ccx stopped at {place}: {ending.stopped.words}; results up to {last:.3g} kPa are "
-            f"kept; {_advice(ending.stopped, settings)}"
-        )
+    stopped, last = None, f"{_largest(states[-1]):.3g} kPa"
     if wrong is not None:
+        stopped = f"beyond {last} the result cannot be: {wrong[1]}; results up to there are kept"
+    elif stop is not None:
         stopped = (
-            f"beyond {_largest(states[-1]):.3g} kPa the result cannot be: {wrong[1]}; results up "
-            "to there are kept"
+            f"ccx stopped at {place}: {stop.words}; results up to {last} are kept; "
+            f"{_advice(stop, settings)}"
         )
     figures = {"stress": states[-1].stress, "work": states[-1].work}
     return Result("calculix", tuple(states), figures, stopped)
@@ -592,26 +571,9 @@ def _first_wrong(
     return None
 
 
-def converged_frames(frd: Path, mesh: Mesh, ending: Ending) -> list[Frame]:
-    """The frames of a result file up to the last converged one.
-
-    ccx adds an unconverged frame when it gives up. Raises OutputError if the file of a successful
-    run is truncated.
-    """
-    if ending.stopped is not None and not frd.exists():
-        return []
-    frames = read_frd(frd, len(mesh.points), whole=ending.stopped is None)
-    return [frame for frame in frames if frame.time <= ending.time * (1 + SAME_TIME)]
-
-
 def _largest(state: State) -> float:
     """The pressure in kPa that is farthest from 0."""
     return max(state.pressures.values(), key=abs)
-
-
-def _place(time: float, settings: DeckSettings) -> str:
-    reached = settings.largest * settings.share(time)
-    return f"{time:.4g} s, {reached:.3g} of {settings.largest:g} kPa"
 
 
 def _advice(stop: Stop, settings: DeckSettings) -> str:
