@@ -93,24 +93,6 @@ def on_a_contour(p: Point) -> bool:
     return any(line(c.edges).distance(shapely.Point(p)) < 0.01 for c in PARTS.contours)
 
 
-@pytest.mark.parametrize(
-    "lead_ins",
-    [
-        LeadIns(lead_in=1.0),
-        LeadIns(overcut=2.0),
-        LeadIns(tab_width=1.0, tabs=5),
-        LeadIns(lead_in=0.3, tab_width=0.2, tabs=1, kerf=0.1),
-    ],
-)
-def test_each_is_there_alone(lead_ins: LeadIns) -> None:
-    runs = runs_of(PARTS, lead_ins)
-    plain = runs_of(PARTS, LeadIns())
-    assert sum(map(length, plain)) == pytest.approx(sum(c.length for c in PARTS.contours))
-    outlines = len(PARTS.outers)
-    more = 4 * (lead_ins.lead_in + lead_ins.overcut) - outlines * lead_ins.tabs * lead_ins.gap
-    assert sum(map(length, runs)) == pytest.approx(sum(map(length, plain)) + more)
-
-
 # Lead-ins find room, or are refused.
 
 

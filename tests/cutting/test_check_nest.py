@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -61,27 +59,6 @@ def test_nothing_may_lie_in_a_hole_which_is_cut_first() -> None:
         check_placed([("frame", frame), ("inside", disc((40.0, 40.0), 2.5))], STOCK)
     with pytest.raises(OutputError, match="pin"):
         check_placed([("frame", frame)], STOCK)
-
-
-@pytest.mark.parametrize(
-    ("a", "b", "expected"),
-    [
-        (disc((0, 0), 2), disc((5, 0), 2), 1.0),
-        (disc((0, 0), 2), disc((3, 4), 1), 2.0),
-        (disc((0, 0), 2), rectangle((3, -5), (4, 5)), 1.0),
-        (rectangle((0, 0), (1, 1)), rectangle((4, 5), (6, 6)), 5.0),
-        (disc((0, 0), 9) - disc((0, 0), 5), disc((1.5, 0), 2), 1.5),
-        (disc((0, 0), 9) - disc((0, 0), 5), disc((0, 0), 2), 3.0),
-        (disc((0, 0), 9), disc((0, 0), 2), 0.0),
-        (disc((0, 0), 2), disc((0, 0), 9), 0.0),
-        (disc((0, 0), 2), disc((3, 0), 2), 0.0),
-        (disc((0, 0), 2), disc((4, 0), 2), 0.0),
-        (disc((0, 0), 9) - disc((0, 0), 5), rectangle((-3, -1), (3, 1)), 5 - math.sqrt(10)),
-    ],
-)
-def test_least_distances_by_closed_forms(a: Region, b: Region, expected: float) -> None:
-    assert least_distance(a, b, 10.0).value == pytest.approx(expected, abs=1e-9)
-    assert least_distance(b, a, 10.0).value == pytest.approx(expected, abs=1e-9)
 
 
 spots = st.tuples(st.floats(-4, 4), st.floats(-4, 4))

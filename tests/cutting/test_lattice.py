@@ -15,7 +15,7 @@ from shapely import STRtree, unary_union
 from shapely.geometry import Point as ShapelyPoint
 from shapely.geometry import Polygon, box
 
-from sbafab.actuators import build, load_design
+from sbafab.actuators import load_design
 from sbafab.cutting.lattice import Lattice, lattices_of
 from sbafab.cutting.nest import TURNS, Nest, NestPart, Stock, placed
 from sbafab.cutting.nest_check import check_nest
@@ -77,20 +77,6 @@ def test_right_triangles_lie_in_pairs() -> None:
     width = across * pair + (across - 1) * 0.3 + 0.02
     laid = best(polygon([(0.0, 0.0), (10.0, 0.0), (0.0, 10.0)]), 0.3, width, up * 10.3 - 0.28)
     assert len(laid.places) >= 2 * across * up
-
-
-def test_the_commonest_plate_lies_closer_than_bottom_left_puts_it() -> None:
-    """Walls of the 15 mm actuator at 1.23 mm on 132.4 mm: 105 a sheet, 96 by bottom-left alone."""
-    laminate = build(load_design("3dof-15mm"))
-    walls = max(
-        (layers for layers in laminate.patterns.values() if layers[0].role == "wall"), key=len
-    )
-    stock = Stock(spacing=1.23)
-    part = NestPart("3dof", "P05", 1, "TPE", walls[0].profile, 210)
-    (result,) = nest([part], {"TPE": stock})
-    check_nest(result)
-    assert result.sheets == 2
-    judged(result)
 
 
 sizes = st.floats(3.0, 12.0)

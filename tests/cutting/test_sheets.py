@@ -8,14 +8,12 @@ from pathlib import Path
 import pytest
 import shapely
 
-from sbafab.cutting import sheets as module
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.nest import Nest, NestPart, Stock
 from sbafab.cutting.nesting import nest
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.design.sections import Laser, Sheets
-from sbafab.errors import OutputError
 from sbafab.geometry.region import disc
 
 SETTINGS = CutSettings("demo", "cd" * 32, generator="sbafab 1.2.3")
@@ -111,25 +109,3 @@ def test_a_roll_is_cut_off_one_border_past_its_parts(tmp_path: Path) -> None:
     assert found.layers.index("CUT_SHEET") > max(
         i for i, layer in enumerate(found.layers) if layer == "CUT_OUTER"
     )
-
-
-def test_engraving_that_runs_through_a_part_is_found(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def through(*_: object) -> tuple[tuple[tuple[float, float], ...], ...]:
-        return (((0.0, 11.0), (60.0, 11.0)), ((7.0, 11.0), (8.0, 11.0)))
-
-    monkeypatch.setattr(module, "_sheet_label", through)
-    with pytest.raises(OutputError, match=r"engraving at .* lies in a part"):
-        write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER, PLAIN)
-
-
-def test_a_frame_of_another_size_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from sbafab.cutting.dxf_write import dxf_text
-
-    def scaled(contours, properties, profile, around):  # type: ignore[no-untyped-def]
-        return dxf_text(contours, properties, profile, around._replace(frame=(61.0, 80.0)))
-
-    monkeypatch.setattr(module, "dxf_text", scaled)
-    with pytest.raises(OutputError, match="REFERENCE"):
-        write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER, PLAIN)

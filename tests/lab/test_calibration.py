@@ -80,8 +80,6 @@ def test_mean_and_uncertainty_by_hand() -> None:
     assert found.kerf.half_width == pytest.approx(4.30265 * expected, rel=1e-5)
 
 
-KINDS: tuple[Kind, ...] = ("outer", "window")
-AXES: tuple[Axis, ...] = ("x", "y")
 COUPONS = 150
 
 
@@ -207,13 +205,11 @@ COMMAS = POINTS.replace(",", ";").replace(".", ",")
 READABLE = {
     "points": POINTS,
     "commas and semicolons": COMMAS,
-    "points and semicolons": POINTS.replace(",", ";"),
     "commas and tabs": COMMAS.replace(";", "\t"),
     "rows of a spreadsheet under our header": HEADER + COMMAS.partition("\n")[2],
     "typed beside our commas": f"{HEADER}A outer,x,24,;23,9\nB window,y,10,;10,1;\n",
     "quoted": f'{HEADER}"A outer","x","24","23,9"\nB window,y,10,"10,1"\n',
     "quoted header": POINTS.replace(HEADER[:-1], '"{}"'.format(HEADER[:-1].replace(",", '","'))),
-    "with remarks": f"{HEADER[:-1]},remark\nA outer,x,24,23.9,2\nB window,y,10,10.1,worn\n",
     "another order": "measured_mm,axis,nominal_mm,feature\n23.9,x,24,A outer\n10.1,y,10,B window",
 }
 
@@ -232,24 +228,14 @@ def test_a_table_that_reads_one_way_only_is_read(tmp_path: Path, name: str) -> N
         ("", "no column feature"),
         ("feature,axis,nominal_mm\nA outer,x,20\n", "no column measured_mm"),
         (f"{HEADER}A outer,x,20,about 20\n", "line 2: measured_mm is 'about 20', not a number"),
-        (f"{HEADER}A outer,x,,19.9\n", "nominal_mm is '', not a number"),
         (f"{HEADER}A outer,x,20,nan\n", "'nan', not a number"),
-        (f"{HEADER}A outer,x,20,1_9\n", "'1_9', not a number"),
         (f"{HEADER}A outer,x,20,1.019,9\n", "5 cells where the header has 4; write decimal points"),
         (f"{HEADER}A outer,x,24,23,9\n", "line 2 has 5 cells where the header has 4"),
-        (f"{HEADER}A outer,x,24,0,23,9\n", "line 2 has 6 cells"),
         (f"{HEADER}A outer,x,19.9\n", "line 2 has 3 cells where the header has 4"),
-        (f"{HEADER[:-1]},\nA outer,x,24,23,9\n", "line 2 has 5 cells where the header has 4"),
         (f"{HEADER[:-1]},remark\nA outer,x,24,23,9\n", "may say 23 or 23,9 for measured_mm"),
-        (
-            "feature,nominal_mm,remark,axis,measured_mm\nA outer,24,5,x,23\n",
-            "may say 24 or 24,5 for nominal_mm",
-        ),
         (f"{HEADER}A outer,x,20,'19.9\n".replace("'", '"'), "line 2 has a quotation mark"),
         ("feature,axis,nominal_mm,measured_mm,Axis\nA outer,x,20,19.9,y\n", "two columns axis"),
         ("feature;axis;nominal_mm;measured_mm\nA outer;x;20;19;9\n", "one cell a column"),
-        ("feature;axis;nominal_mm;measured_mm\nA outer;x;20;1.019,9\n", "not a number"),
-        (f"{HEADER}A outer,x,20,-19.9\n", "above 0"),
         (f"{HEADER}A outer,x,20,10000.1\n", "10000.1; .* above 0 and at most 10000"),
         (f"{HEADER}A outer,z,20,19.9\n", "axis must be x or y"),
         (f"{HEADER}A,x,20,19.9\n", "feature must end in outer, window or piece"),
