@@ -11,19 +11,20 @@ import io
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from html import escape
 from typing import Any
 
 import numpy as np
 
 from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
+from sbafab.geometry.region import coord
 from sbafab.lab.coupon import COLUMNS, INSTRUMENT, Value, student_t
 from sbafab.lab.cut_sheet import DrawnSheet
 from sbafab.lab.edges import EdgeFit, Reference, Scale, fitted, scale_of
 from sbafab.lab.picture import ScanPicture, outlines
 from sbafab.lab.pieces import PieceFinding, piece_findings
-from sbafab.lab.registration import SMALLEST, Content, Location, PointArray, locate
+from sbafab.lab.registration import SMALLEST, Content, Location, locate
+from sbafab.reports.drawing import TEXT, box, document, line, text
 from sbafab.spreadsheet import csv_text
 
 FEWEST = 100
@@ -210,34 +211,41 @@ def _gain(fit: EdgeFit, contour: int, axis: int, ends: tuple[float, float]) -> f
 # The picture with deviations.
 
 
-SHOWN_SIDE = 1600
-"""Longer side of the picture in the drawing, pixels."""
+SHOWN_SIDE, PAGE = 1600, 240.0
+"""Longer side of the picture in the drawing, pixels and mm."""
+LEGEND = 230.0
+"""Least width of the page, mm: the legend's."""
 STEPS = (-0.05, -0.02, -0.01, 0.01, 0.02, 0.05)
 """Step between the colours, mm."""
 COLOURS = ("#2166ac", "#67a9cf", "#b9d9ea", "#4daf4a", "#fdcf9c", "#ef8a62", "#b2182b")
 """From film too small to film too large, distinct for the colour blind too."""
-UNSEEN = "#ff00ff"
+UNSEEN, AMISS = "#ff00ff", "#e6007e"
 
 
 def drawing(inspection: Inspection) -> str:
     """Return an SVG: the picture, its edges coloured by deviation, faulty pieces named."""
-    rows, columns = inspection.picture.pixels.shape
-    factor = SHOWN_SIDE / max(rows, columns)
+    sheet, picture, warp = inspection.sheet, inspection.picture, inspection.fit.warp
+    rows, columns = picture.pixels.shape
+    factor = PAGE / max(rows, columns)
     width, height = columns * factor, rows * factor
-    size = max(12.0, width / 90)
-    image = _embedded(inspection.picture)
-    lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} '
-        f'{height + 4 * size:.0f}" font-family="sans-serif" font-size="{size:.0f}">',
-        f"<title>{escape(inspection.sheet.name)}: {escape(inspection.picture.path.name)}</title>",
-        '<rect width="100%" height="100%" fill="white"/>',
-        f'<image width="{width:.0f}" height="{height:.0f}" href="{image}"/>',
-        *_coloured(inspection, factor),
-        *_named(inspection, factor, size),
-        *_legend(size, height),
-        "</svg>\n",
+    places = [
+        (warp(np.array([(piece.x, piece.y)]))[0] + 0.5) * factor for piece in inspection.amiss
     ]
-    return "\n".join(lines)
+    names = [
+        text((x, y + line), words, anchor="middle", bold=True, colour=AMISS)
+        for piece, (x, y) in zip(inspection.amiss, places, strict=True)
+        for line, words in ((0.0, piece.name), (1.1 * TEXT, piece.verdict))
+    ]
+    elements = [
+        f'<image width="{coord(width)}" height="{coord(height)}" href="{_embedded(picture)}"/>',
+        *_coloured(inspection.fit, factor),
+        '<g stroke="white" stroke-width="0.5" paint-order="stroke">',
+        *names,
+        "</g>",
+        *_legend(height),
+    ]
+    title = f"{sheet.name}: {picture.path.name}"
+    return document(max(width, LEGEND), height + 4 * TEXT, title, elements)
 
 
 def _embedded(picture: ScanPicture) -> str:
@@ -250,9 +258,8 @@ def _embedded(picture: ScanPicture) -> str:
     return f"data:image/jpeg;base64,{base64.b64encode(data.getvalue()).decode()}"
 
 
-def _coloured(inspection: Inspection, factor: float) -> Iterator[str]:
+def _coloured(fit: EdgeFit, factor: float) -> Iterator[str]:
     """Yield lines along the measured edges, each of one colour."""
-    fit = inspection.fit
     measured = np.isfinite(fit.outside) & (fit.weights > 0)
     kinds = np.where(measured, np.digitize(fit.residuals, STEPS), len(COLOURS))
     at = (fit.warp(fit.samples.points) + 0.5) * factor
@@ -263,35 +270,15 @@ def _coloured(inspection: Inspection, factor: float) -> Iterator[str]:
         # Up to the next sample, so that colours are continuous.
         ends = [*run, last] if last < len(at) and contours[last] == contours[run[0]] else list(run)
         colour = (*COLOURS, UNSEEN)[kinds[run[0]]]
-        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in at[ends])
-        yield f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2"/>'
+        yield line([(float(x), float(y)) for x, y in at[ends]], colour=colour, width=0.3)
 
 
-def _named(inspection: Inspection, factor: float, size: float) -> Iterator[str]:
-    for piece in inspection.amiss:
-        (x, y) = (inspection.fit.warp(_row(piece.x, piece.y))[0] + 0.5) * factor
-        for line, text in enumerate((piece.name, piece.verdict)):
-            yield (
-                f'<text x="{x:.0f}" y="{y + line * 1.1 * size:.0f}" text-anchor="middle" '
-                f'fill="#e6007e" stroke="white" stroke-width="{size / 5:.1f}" '
-                f'paint-order="stroke" font-weight="bold">{escape(text)}</text>'
-            )
-
-
-def _row(x: float, y: float) -> PointArray:
-    return np.array([(x, y)])
-
-
-def _legend(size: float, height: float) -> Iterator[str]:
-    texts = [
-        f"under {STEPS[0]:g}",
-        *(f"{low:g} to {high:g}" for low, high in zip(STEPS, STEPS[1:], strict=False)),
-        f"over {STEPS[-1]:g} mm",
-        "no such edge",
-    ]
-    head = "Film beyond the drawn edge, apart from kerf, scale and the piece's own place"
-    yield f'<text x="{size:.0f}" y="{height + 1.4 * size:.0f}">{head}:</text>'
-    for k, (colour, text) in enumerate(zip((*COLOURS, UNSEEN), texts, strict=True)):
-        x, y = size + k * 9.5 * size, height + 2.9 * size
-        yield f'<rect x="{x:.0f}" y="{y - 0.8 * size:.0f}" width="{size:.0f}" height="{size:.0f}" '
-        yield f'fill="{colour}"/><text x="{x + 1.4 * size:.0f}" y="{y:.0f}">{escape(text)}</text>'
+def _legend(height: float) -> Iterator[str]:
+    between = [f"{low:g} to {high:g}" for low, high in zip(STEPS, STEPS[1:], strict=False)]
+    words = [f"under {STEPS[0]:g}", *between, f"over {STEPS[-1]:g} mm", "no such edge"]
+    head = "Film beyond the drawn edge, apart from kerf, scale and the piece's own place:"
+    yield text((TEXT, height + 1.4 * TEXT), head)
+    for number, (colour, label) in enumerate(zip((*COLOURS, UNSEEN), words, strict=True)):
+        x, y = TEXT + number * LEGEND / len(words), height + 2.9 * TEXT
+        yield box((x, y - 0.8 * TEXT), (x + TEXT, y + 0.2 * TEXT), fill=colour)
+        yield text((x + 1.4 * TEXT, y), label)
