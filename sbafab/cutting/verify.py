@@ -40,7 +40,7 @@ def verify_file(
         if read.units != "mm":
             raise OutputError("it does not say that its units are millimetres.")
         _check_properties(read.properties, expected_properties)
-        _check_sequence(read)
+        check_sequence(read)
         check_contours(read.region, expected, TOLERANCE)
         off = abs(read.region.area - expected.area)
         if off > AREA_TOLERANCE * expected.area:
@@ -115,7 +115,8 @@ def _check_properties(properties: Mapping[str, str], expected: Mapping[str, str]
             )
 
 
-def _check_sequence(read: ReadBack) -> None:
+def check_sequence(read: ReadBack) -> None:
+    """Raise OutputError if an outline is cut before a hole, or any layer out of sequence."""
     ranks = [CUT_SEQUENCE.index(layer) for layer in read.layers if layer in CUT_SEQUENCE]
     for before, after in pairwise(ranks):
         if before > after:

@@ -220,10 +220,6 @@ def _press_json(folder: DesignFolder) -> str:
     return as_json(press_json(schedule))
 
 
-def _press_csv(folder: DesignFolder) -> str:
-    return press_csv(folder.build.schedule)
-
-
 def _underlay(folder: DesignFolder) -> bytes | None:
     # Only a folder with a traveller has an underlay.
     from sbafab.reports.prints import underlay_pdf
@@ -400,10 +396,6 @@ def _checks(folder: DesignFolder) -> str:
     return as_json(checks(folder.build.findings, "design", design.name, [design]))
 
 
-def _laminate(folder: DesignFolder) -> str:
-    return laminate_json(folder.marked)
-
-
 def _design(folder: DesignFolder) -> str:
     """Return the design as a file; a drawing and a kit of the user's come to lie beside it."""
     design = folder.design
@@ -436,7 +428,12 @@ _OWN: tuple[Artefact, ...] = (
         _press_json,
         PressDocument.SCHEMA,
     ),
-    Artefact("press.csv", "press", "the press schedule as a table", _press_csv),
+    Artefact(
+        "press.csv",
+        "press",
+        "the press schedule as a table",
+        lambda folder: press_csv(folder.build.schedule),
+    ),
     Artefact("tray.pdf", "press", "of a batch: a place for every part, 1:1", _tray_pdf),
     Artefact("underlay.pdf", "press", "guides for placing parts by hand, 1:1", _underlay),
     Artefact("seams.pdf", "press", "paths of seams on the films in hand, 1:1", _seams),
@@ -492,7 +489,7 @@ _OWN: tuple[Artefact, ...] = (
         LAMINATE_FILE,
         "",
         "the layers with exact edges, for other programs",
-        _laminate,
+        lambda folder: laminate_json(folder.marked),
         LAMINATE_SCHEMA,
     ),
     Artefact(

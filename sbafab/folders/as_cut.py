@@ -29,7 +29,7 @@ from sbafab.cutting.properties import (
     kerf_text,
     layer_path,
 )
-from sbafab.cutting.verify import check_contours, check_datum
+from sbafab.cutting.verify import check_contours, check_datum, check_sequence
 from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.folders.build import Build
 from sbafab.folders.differences import (
@@ -37,7 +37,6 @@ from sbafab.folders.differences import (
     DESIGNED,
     INTEGRITY,
     Problem,
-    check_sequence,
     sound_digest,
 )
 from sbafab.geometry.contour import Contour, circle

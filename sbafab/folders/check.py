@@ -11,6 +11,7 @@ import json
 import os
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from filecmp import cmp
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -424,7 +425,7 @@ def _compared(folder: Path, fresh: Path, listed: Collection[str], generator: str
             difference = f"{name} is missing"
         elif not found.is_file():
             rule, difference = INTEGRITY, f"{name}: not a plain file"
-        elif _are_equal(found, path):
+        elif cmp(found, path, shallow=False):
             continue
         elif name.endswith(f"/{MANIFEST}"):
             rule, difference = CLAIMS, _index_difference(found, _read_json(path), {"files"})
@@ -442,12 +443,6 @@ def _compared(folder: Path, fresh: Path, listed: Collection[str], generator: str
         )
         problems.append(Problem(CLAIMS, message, verdict="warn"))
     return problems
-
-
-def _are_equal(found: Path, expected: Path) -> bool:
-    """Return True if two files have the same bytes; one of another size is not read."""
-    sizes = found.stat().st_size, expected.stat().st_size
-    return sizes[0] == sizes[1] and found.read_bytes() == expected.read_bytes()
 
 
 def _is_compared(path: str, generator: str) -> bool:

@@ -16,7 +16,7 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
-from itertools import pairwise, zip_longest
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile, ZipFile
@@ -24,10 +24,9 @@ from zipfile import BadZipFile, ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.cutting.dxf_read import ReadBack, read_profile
+from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.laser_programs import ENDING, PROGRAMS, rdworks_difference
-from sbafab.cutting.properties import CUT_SEQUENCE
-from sbafab.cutting.verify import TOLERANCE, check_contours
+from sbafab.cutting.verify import TOLERANCE, check_contours, check_sequence
 from sbafab.errors import OutputError
 from sbafab.folders.swap import CUT_FOLDERS
 from sbafab.geometry.edges import Edge, Point
@@ -113,16 +112,6 @@ def sound_digest(path: Path) -> str:
         if isinstance(error, OutputError):
             raise
         raise OutputError(f"cannot be read ({error.strerror or error}); regenerate it") from None
-
-
-def check_sequence(drawing: ReadBack) -> None:
-    """Raise OutputError if an outline is cut before a hole, or any other layer out of sequence."""
-    ranks = [CUT_SEQUENCE.index(layer) for layer in drawing.layers if layer in CUT_SEQUENCE]
-    for before, after in pairwise(ranks):
-        if before > after:
-            raise OutputError(
-                f"{CUT_SEQUENCE[before]} is cut before {CUT_SEQUENCE[after]}; regenerate it"
-            )
 
 
 # Two files compared.

@@ -228,16 +228,13 @@ def _saved(parts: Sequence[NestPart], design: Design, path: Path) -> tuple[Nest,
             return None
         data: Any = json.loads(path.read_text(encoding="utf-8"))
         nests = from_dict(data, parts, stocks(design))
-        if nests is None or not all(_is_possible(nested) for nested in nests):
+        if nests is None:
             return None
         for nested in nests:
+            turns, placed = nested.stock.turns, nested.placements
+            if nested.sheets > nested.stock.most or any(p.turn not in turns for p in placed):
+                return None
             check_nest(nested)
     except (OSError, ValueError, ArithmeticError, RecursionError, OutputError):
         return None
     return nests
-
-
-def _is_possible(nested: Nest) -> bool:
-    """Return True if the stock allows as many sheets and such turns."""
-    turns = nested.stock.turns
-    return nested.sheets <= nested.stock.most and all(p.turn in turns for p in nested.placements)
