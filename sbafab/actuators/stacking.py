@@ -503,31 +503,15 @@ def _check_tabs(
     design: Design, outlines: Sequence[Region], feeds: Sequence[tuple[Region, Region, Inlet]]
 ) -> None:
     """Raises DesignError if a tab is nearer than one overhang to another lobe or tab."""
-    room = design.mask.overhang
-    for i, (tab, _, inlet) in enumerate(feeds):
-        aside = [
-            j
-            for j, outline in enumerate(outlines)
-            if j != i
-            and not all(_lies_ahead(tab, part, inlet, room) for part in (outline, feeds[j][0]))
-        ]
-        if not aside:
-            continue
-        free = grow(tab - outlines[i], room)
-        for j in aside:
-            if _overlap(free, outlines[j]) or _overlap(free, feeds[j][0]):
+    for (tab, _, inlet), outline in zip(feeds, outlines, strict=True):
+        free = grow(tab - outline, design.mask.overhang) if len(feeds) > 1 else Region()
+        for other, (other_tab, _, neighbour) in zip(outlines, feeds, strict=True):
+            if neighbour is not inlet and any(_overlap(free, part) for part in (other, other_tab)):
                 raise DesignError(
                     f"the inlet tab of {inlet.chamber} ({inlet.width + 2 * design.bond.width:g} "
-                    f"wide) meets the lobe or tab of {feeds[j][2].chamber}; make inlet.width "
+                    f"wide) meets the lobe or tab of {neighbour.chamber}; make inlet.width "
                     "smaller, chamber.axis_radius larger or chamber.count smaller"
                 )
-
-
-def _lies_ahead(tab: Region, part: Region, inlet: Inlet, room: float) -> bool:
-    """True if all of a tab is farther out along its inlet than another part, by a margin."""
-    (x, y), centre = inlet.direction, (0.0, 0.0)
-    nearest = -max(edge.farthest_along(centre, (-x, -y)) for edge in tab.edges)
-    return nearest - max(edge.farthest_along(centre, (x, y)) for edge in part.edges) > room
 
 
 def _overlap(a: Region, b: Region) -> bool:
