@@ -13,10 +13,10 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, GetCoreSchemaHandler, PlainValidator
 
 MILLIMETRES = {
+    "mm": 1.0,
     "um": 0.001,
     "\u00b5m": 0.001,
     "\u03bcm": 0.001,
-    "mm": 1.0,
     "cm": 10.0,
     "m": 1000.0,
     "in": 25.4,
@@ -36,7 +36,6 @@ KILOPASCALS = {
 MILLILITRES_PER_MINUTE = {"ml/min": 1.0, "ul/min": 0.001, "ml/s": 60.0, "l/min": 1000.0}
 """Size of each unit in ml/min."""
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_WRITTEN = re.compile(rf"\s*([-+]?{_NUMBER})\s*([^\d\s]*)\s*")
 MEASURED = re.compile(rf"\s*([-+]?{_NUMBER})\s*(\S*)\s*")
 """A number, and the unit after it."""
 
@@ -60,10 +59,8 @@ def millimetres(value: object) -> float:
     Raises ValueError with a sentence on the allowed form.
     """
     if isinstance(value, str):
-        written = _WRITTEN.fullmatch(value)
-        if written is None or (written[2] and written[2] not in MILLIMETRES):
-            raise ValueError('must be a length such as 0.75, "0.75 mm", "38 um" or "6 in"')
-        return round(float(written[1]) * MILLIMETRES[written[2] or "mm"], 9)
+        read = in_first_unit(value, MILLIMETRES)
+        value = None if read is None else round(read, 9)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError('must be a length such as 0.75, "0.75 mm", "38 um" or "6 in"')
     try:

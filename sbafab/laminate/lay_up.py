@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from sbafab.geometry.cache import stored
 from sbafab.laminate.films import Film
@@ -74,11 +74,11 @@ def _laying(laminate: Laminate) -> tuple[LayUpStep, ...]:
     for joining in joinings(laminate):
         is_pressed = joining.process == PRESS
         adds = tuple(body[0] for body in joining.bodies if len(body) == 1)
-        plans = [_Plan("flash_middle", "flash", joining.bodies, adds)]
+        plans = [_plan("flash_middle", "flash", joining.bodies, adds)]
         if is_pressed and adds == joining.layers:
             plans = _plans(laminate, joining.layers)
         elif is_pressed:
-            plans = [_Plan("bond_all", "full", joining.bodies, adds)]
+            plans = [_plan("bond_all", "full", joining.bodies, adds)]
         for plan in plans:
             step = _step(len(steps) + 1, plan, laminate)
             pins = step.pins if is_pressed else ()
@@ -96,16 +96,15 @@ def _steps(laminate: Laminate) -> tuple[LayUpStep, ...]:
     return tuple(_step(number, plan, laminate) for number, plan in enumerate(plans, 1))
 
 
-class _Plan(NamedTuple):
-    """A step without its number and pins."""
-
-    name: StepName
-    bond: BondState
-    stacks: tuple[tuple[int, ...], ...]
-    adds: tuple[int, ...]
+Stacks = tuple[tuple[int, ...], ...]
 
 
-def _plans(laminate: Laminate, indices: tuple[int, ...]) -> list[_Plan]:
+def _plan(name: StepName, bond: BondState, stacks: Stacks, adds: tuple[int, ...]) -> LayUpStep:
+    """A step before its number and its pins are known."""
+    return LayUpStep(0, name, bond, tuple(stack for stack in stacks if stack), adds, ())
+
+
+def _plans(laminate: Laminate, indices: tuple[int, ...]) -> list[LayUpStep]:
     """Return the press steps of these layers that add any."""
     films = [layer for layer in map(laminate.layer, indices) if not layer.is_mask]
     base = next((layer for layer in films if layer.role == "base"), films[0]).index
@@ -116,40 +115,37 @@ def _plans(laminate: Laminate, indices: tuple[int, ...]) -> list[_Plan]:
     between = tuple(core[1:])
     if laminate.middle_first and len(between) > 1:
         return [
-            _Plan("flash_middle", "flash", (between,), between),
-            _Plan("bond_all", "full", (under, (base,), between, (last,)), (*under, base, last)),
+            _plan("flash_middle", "flash", (between,), between),
+            _plan("bond_all", "full", (under, (base,), between, (last,)), (*under, base, last)),
         ]
     bottom = (base, *upper)
     over = tuple(index for index in indices if index > wall)
     middle, cap = (over[:-1], over[-1:]) if len(over) > 2 else ((), over)
     plans = [
-        _Plan("flash_bottom", "flash", (upper,), upper),
-        _Plan("bond_bottom", "full", ((base,), upper), (base,)),
+        _plan("flash_bottom", "flash", (upper,), upper),
+        _plan("bond_bottom", "full", ((base,), upper), (base,)),
     ]
     if len(upper) < 2:
-        plans = [_Plan("bond_bottom", "full", (bottom,), bottom)]
+        plans = [_plan("bond_bottom", "full", (bottom,), bottom)]
     plans += [
-        _Plan("flash_middle", "flash", (middle,), middle),
-        _Plan("bond_all", "full", (under, bottom, middle, cap), under + cap),
+        _plan("flash_middle", "flash", (middle,), middle),
+        _plan("bond_all", "full", (under, bottom, middle, cap), under + cap),
     ]
     return [plan for plan in plans if plan.adds]
 
 
-def _tacked(plan: _Plan) -> tuple[_Plan, ...]:
+def _tacked(plan: LayUpStep) -> tuple[LayUpStep, ...]:
     """A full bond as two steps: a flash bond of the same stacks, then their full bond."""
     if plan.bond == "flash":
         return (plan,)
     tack: StepName = "tack_bottom" if plan.name == "bond_bottom" else "tack_all"
-    whole = tuple(index for stack in plan.stacks for index in stack)
-    return plan._replace(name=tack, bond="flash"), plan._replace(stacks=(whole,), adds=())
+    return replace(plan, name=tack, bond="flash"), replace(plan, stacks=(plan.layers,), adds=())
 
 
-def _step(number: int, plan: _Plan, laminate: Laminate) -> LayUpStep:
-    layers = [index for stack in plan.stacks for index in stack]
+def _step(number: int, plan: LayUpStep, laminate: Laminate) -> LayUpStep:
     is_eared = laminate.registration == "ears" and laminate.pins_in_full_bonds
-    pins = _pins_in(laminate, layers) if plan.bond == "flash" or is_eared else ()
-    stacks = tuple(stack for stack in plan.stacks if stack)
-    return LayUpStep(number, plan.name, plan.bond, stacks, plan.adds, pins)
+    pins = _pins_in(laminate, plan.layers) if plan.bond == "flash" or is_eared else ()
+    return replace(plan, number=number, pins=pins)
 
 
 def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Pin, ...]:
