@@ -83,7 +83,7 @@ from sbafab.models.quantity import (
 from sbafab.models.stack import Stack
 
 SAMPLES = 61
-Items = Iterator[Figure | LeftOut]
+FigureItems = Iterator[Figure | LeftOut]
 
 GEOMETRY = Model(ModelId.GEOMETRY, "of the cut files", "exact for what is cut")
 SCALED_HEIGHT = Model(
@@ -293,7 +293,7 @@ def _figures(
     )
 
 
-def _geometric_figures(actuator: Actuator, request: PredictionRequest) -> Items:
+def _geometric_figures(actuator: Actuator, request: PredictionRequest) -> FigureItems:
     has_model, form = bool(actuator.kinematics), actuator.form
     yield from _sizes(actuator, request.factors)
     if has_model and form.is_parallel:
@@ -368,7 +368,7 @@ def _mass(laminate: Laminate) -> Figure | LeftOut:
         return LeftOut("mass", str(error), (Quantity.MASS,))
 
 
-def _tubes(actuator: Actuator) -> Items:
+def _tubes(actuator: Actuator) -> FigureItems:
     if not actuator.laminate.inlets:
         yield LeftOut("tube", "it has no inlet strip: tubes are glued on holes of its films")
         return
@@ -399,7 +399,7 @@ def _burst(laminate: Laminate) -> Figure | LeftOut:
 # Strokes, forces, work and time of chambers in step.
 
 
-def _strokes(actuator: Actuator, request: PredictionRequest) -> Items:
+def _strokes(actuator: Actuator, request: PredictionRequest) -> FigureItems:
     """Yield the full state, the largest volumes, and strokes at each volume of the request."""
     stroke = actuator.reference_stroke
     if actuator.has_reference:
@@ -469,7 +469,7 @@ def _forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
                 yield Figure(Quantity.BLOCKED_FORCE, value, model, at)
 
 
-def _power(actuator: Actuator, request: PredictionRequest, mass_g: float | None) -> Items:
+def _power(actuator: Actuator, request: PredictionRequest, mass_g: float | None) -> FigureItems:
     """Yield time, work, speed and power density, all of it at the volume of the reference stroke:
     where that is not known only times to the volumes of the request, and without a mass no power
     density.
@@ -517,7 +517,7 @@ def _power(actuator: Actuator, request: PredictionRequest, mass_g: float | None)
 # Bending and stiffness of parallel chambers.
 
 
-class Path(NamedTuple):
+class TipPath(NamedTuple):
     """Motion of 1, 2 ... neighbouring chambers from flat to the reference stroke: stroke (mm),
     angle (rad), lateral displacement and height of the tip (mm).
     """
@@ -529,7 +529,7 @@ class Path(NamedTuple):
     height: Array
 
 
-def _paths(actuator: Actuator, others_full: bool = False) -> list[Path]:
+def _paths(actuator: Actuator, others_full: bool = False) -> list[TipPath]:
     """Return one path for 1, 2 ... chambers next to each other; the others flat, or full.
 
     A path ends where the top has turned by half a turn.
@@ -543,11 +543,11 @@ def _paths(actuator: Actuator, others_full: bool = False) -> list[Path]:
         bent = bend(lengths, axes)
         aside = np.hypot(bent.tip[:, 0], bent.tip[:, 1])
         columns = stroke, bent.angle, aside, bent.tip[:, 2]
-        paths.append(Path(chambers, *(column[bent.angle <= math.pi] for column in columns)))
+        paths.append(TipPath(chambers, *(column[bent.angle <= math.pi] for column in columns)))
     return paths
 
 
-def _bending(actuator: Actuator) -> Items:
+def _bending(actuator: Actuator) -> FigureItems:
     """Yield the largest bend of each number of chambers, and the lateral tip displacement."""
     quantity, largest = Quantity.REFERENCE_BEND, Quantity.LARGEST_ASIDE
     if not actuator.has_reference:
@@ -573,7 +573,7 @@ def plate_of(laminate: Laminate) -> Region | None:
     return laminate.tpe_layers[-1].profile
 
 
-def _stiffness(actuator: Actuator) -> Items:
+def _stiffness(actuator: Actuator) -> FigureItems:
     """Yield the bending stiffness of a full actuator by the paper's cantilever formula."""
     quantity, plate = Quantity.REFERENCE_STIFFNESS, plate_of(actuator.laminate)
     reason = ""
