@@ -63,7 +63,7 @@ def _hull(first: Ends | None, second: Ends | None) -> Ends | None:
     return min(first[0], second[0]), max(first[1], second[1])
 
 
-_Size = Annotated[float, Field(gt=0)]
+_Size = Annotated[int | float, Field(gt=0)]
 _Range = Annotated[tuple[_Size, _Size], Field(strict=False)]
 _Row = Annotated[tuple[float, ...], Field(strict=False)]
 _Texts = Annotated[tuple[str, ...], Field(strict=False)]

@@ -36,12 +36,15 @@ WALKERS, STEPS, BURN_IN, THINNING = 40, 2000, 800, 20
 SEED = 20220085
 
 
+MIDDLES, LEAST, MOST = (
+    np.array([unknown.coordinate(getattr(unknown, name)) for unknown in UNKNOWNS])
+    for name in ("middle", "least", "most")
+)
+SPREADS = np.array([unknown.spread for unknown in UNKNOWNS])
+"""Means, bounds and standard deviations of the unknowns' coordinates by the priors."""
 NODES = (11, 6, 6)
 """Nodes of a curve's table by modulus ratio, pocket loss and press factor."""
-NODE_COORDINATES = [
-    np.linspace(unknown.coordinate(unknown.least), unknown.coordinate(unknown.most), count)
-    for unknown, count in zip(UNKNOWNS, NODES, strict=False)
-]
+NODE_COORDINATES = [np.linspace(*ends) for ends in zip(LEAST, MOST, NODES, strict=False)]
 """The nodes' coordinates by each design unknown, evenly spaced."""
 
 
@@ -157,16 +160,13 @@ def discrepancies(scales: Array, points: int, generator: np.random.Generator) ->
 
 def log_prior(coordinates: Array) -> Array:
     """Return the log prior at coordinates (n, unknowns + groups), up to a constant."""
-    scales = coordinates[:, len(UNKNOWNS) :]
+    places, scales = np.split(coordinates, [len(UNKNOWNS)], axis=-1)
     total = -0.5 * (((scales - math.log(SCALE_MIDDLE)) / SCALE_SPREAD) ** 2).sum(-1)
-    for column, unknown in enumerate(UNKNOWNS):
-        place = coordinates[:, column]
-        middle = unknown.coordinate(unknown.middle)
-        total = total - 0.5 * ((place - middle) / unknown.spread) ** 2
-        low = unknown.coordinate(unknown.least)
-        high = unknown.coordinate(unknown.most)
-        total = np.where((place < low) | (place > high), -np.inf, total)
-    return np.asarray(total)
+    # One after the other: another order of rounding leads the chains elsewhere.
+    for square in (((places - MIDDLES) / SPREADS) ** 2).T:
+        total = total - 0.5 * square
+    is_inside = ((places >= LEAST) & (places <= MOST)).all(-1)
+    return np.where(is_inside, total, -np.inf)
 
 
 def log_likelihood(curves: Sequence[SampledCurve], coordinates: Array) -> Array:
@@ -209,10 +209,8 @@ def sampled(curves: Sequence[SampledCurve], seed: int = SEED, steps: int = STEPS
 
 def _start(generator: np.random.RandomState) -> Array:
     """Return places within the prior to start from: (walkers, unknowns + groups)."""
-    columns = []
-    for unknown in UNKNOWNS:
-        low, high = unknown.coordinate(unknown.least), unknown.coordinate(unknown.most)
-        drawn = unknown.coordinate(unknown.middle) + 0.5 * unknown.spread * generator.randn(WALKERS)
-        columns.append(np.clip(drawn, low + 1e-3 * (high - low), high - 1e-3 * (high - low)))
+    drawn = MIDDLES[:, None] + 0.5 * SPREADS[:, None] * generator.randn(len(UNKNOWNS), WALKERS)
+    margin = 1e-3 * (MOST - LEAST)
+    places = np.clip(drawn.T, LEAST + margin, MOST - margin)
     scales = math.log(SCALE_MIDDLE) + 0.5 * SCALE_SPREAD * generator.randn(WALKERS, len(GROUPS))
-    return np.concatenate([np.stack(columns, -1), scales], -1)
+    return np.concatenate([places, scales], -1)

@@ -91,38 +91,29 @@ def test_a_hinge_rests_where_its_section_is_largest() -> None:
         pouch.moment(10.0, 2.0, 10.0, 10.0)
 
 
-def test_wrinkling_takes_up_the_tension_of_the_pressure() -> None:
-    """The end caps pull p r / 2 along the tube; a beam's stress M / pi r^2 takes all of it."""
+def test_a_beam_wrinkles_and_collapses_by_the_pressure_on_its_cap() -> None:
+    """The end caps pull p r / 2 along the tube; a beam's stress M / pi r^2 takes all of it. It
+    collapses where the pressure on the cap turns about the last taut line.
+    """
     kpa, width = 20.0, 31.41592653589793
     r = pouch.tube_radius(width)
     assert r == pytest.approx(10.0)
-    moment = pouch.wrinkling_moment(kpa, width)
-    assert moment / (math.pi * r**2) == pytest.approx(0.02 * r / 2)
     # By hand: pi x 0.02 x 1000 / 2 N mm.
-    assert moment == pytest.approx(31.4159, rel=1e-5)
-
-
-def test_collapse_is_the_pressure_on_the_cap_about_the_last_taut_line() -> None:
-    kpa, width = 20.0, 31.41592653589793
-    r = pouch.tube_radius(width)
+    moment = pouch.wrinkling_moment(kpa, width)
+    assert moment == pytest.approx(31.4159, rel=1e-5) == math.pi * r**2 * 0.02 * r / 2
     assert pouch.collapse_moment(kpa, width) == pytest.approx(0.02 * math.pi * r**2 * r)
 
 
-def test_sheets_jam_n_squared_times_as_stiff() -> None:
-    sheets = {"width": 20.0, "thickness": 0.1, "sheets": 10}
-    loose = pouch.loose_stiffness(3000.0, **sheets)
+def test_sheets_jam_n_squared_times_as_stiff_and_slip_where_shear_reaches_friction() -> None:
+    width, thick, count = 20.0, 0.1, 10
+    loose = pouch.loose_stiffness(3000.0, width, thick, count)
     # By hand: 10 x 3000 x 20 x 0.001 / 12.
     assert loose == pytest.approx(50.0)
-    assert pouch.jammed_stiffness(3000.0, **sheets) == pytest.approx(100 * loose)
-
-
-def test_sheets_slip_where_the_shear_of_a_solid_beam_reaches_friction() -> None:
-    vacuum, friction, width, thick, count = 80.0, 0.3, 20.0, 0.1, 10
-    load = pouch.slip_force(vacuum, friction, width, thick, count)
-    depth = count * thick
+    assert pouch.jammed_stiffness(3000.0, width, thick, count) == pytest.approx(100 * loose)
+    load, depth = pouch.slip_force(80.0, 0.3, width, thick, count), count * thick
     # F S / I b at the middle, with S = b H^2 / 8 and I = b H^3 / 12.
     shear = load * (width * depth**2 / 8) / (width * depth**3 / 12 * width)
-    assert shear == pytest.approx(friction * vacuum / 1000)
+    assert shear == pytest.approx(0.3 * 80.0 / 1000)
 
 
 def test_a_hinge_without_a_stiff_plate_has_no_moment() -> None:

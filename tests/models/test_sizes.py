@@ -32,49 +32,34 @@ def overall(laminate: Laminate) -> float:
 
 
 @pytest.mark.parametrize("method", ["channel-pin", "ears"])
-@pytest.mark.parametrize(
-    "diameters", [[5, 5, 12], [5, 12, 5], [12, 5, 5], [5], [8, 5, 8], [5, 5, 5]]
-)
+@pytest.mark.parametrize("diameters", [[5, 5, 12], [5, 12, 5], [12, 5, 5], [5], [5, 5, 5]])
 def test_a_stack_of_discs_fits_its_widest_one(diameters: list[int], method: str) -> None:
-    settings = [
-        f"stack.balloons={len(diameters)}",
-        f"chamber.diameter={diameters}",
-        f'registration.method="{method}"',
-    ]
-    design = load_design("1dof-5mm", settings)
+    changes = {"stack.balloons": len(diameters), "chamber.diameter": diameters}
+    design = load_design("1dof-5mm", [{**changes, "registration.method": method}])
     laminate = build(design)
     found = sizes(design, laminate)
     assert found["outline_diameter"] == pytest.approx(max(diameters) + 2 * BOND, abs=1e-6)
     assert found["overall_diameter"] == pytest.approx(overall(laminate), abs=2e-3)
 
 
-def random_lobed(seed: int) -> tuple[list[str], float, float]:
-    """Settings, and the pocket's largest diameter and the bond."""
-    draw = random.Random(seed)
-    count = draw.randint(1, 3)
-    diameters = [round(draw.uniform(4.0, 9.0), 2) for _ in range(count)]
-    bond = round(draw.uniform(0.75, 1.2), 3)
-    settings = [
-        f"stack.balloons={count}",
-        f"chamber.diameter={diameters}",
-        f"chamber.count={draw.randint(2, 4)}",
-        f"bond.width={bond}",
-        f"mask.overhang={draw.uniform(0.5, 0.7):.3f}",
-        f"inlet.tab_length={draw.uniform(2, 8):.2f}",
-    ]
-    return settings, max(diameters), bond
-
-
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(8))
 def test_lobes_reach_from_their_axes(seed: int) -> None:
-    settings, widest, bond = random_lobed(seed)
-    design = load_design("3dof-15mm", settings)
+    draw = random.Random(seed)
+    diameters = [round(draw.uniform(4.0, 9.0), 2) for _ in range(draw.randint(1, 3))]
+    bond = round(draw.uniform(0.75, 1.2), 3)
+    changes = {
+        "stack.balloons": len(diameters),
+        "chamber.diameter": diameters,
+        "chamber.count": draw.randint(2, 4),
+        "bond.width": bond,
+        "mask.overhang": draw.uniform(0.5, 0.7),
+        "inlet.tab_length": draw.uniform(2, 8),
+    }
+    design = load_design("3dof-15mm", [changes])
     laminate = build(design)
-    (x, y) = laminate.chambers[0].centres[0]
-    found = sizes(design, laminate)
-    assert found["outline_diameter"] == pytest.approx(
-        2 * math.hypot(x, y) + widest + 2 * bond, abs=1e-6
-    )
+    reach = math.hypot(*laminate.chambers[0].centres[0])
+    found, outline = sizes(design, laminate), 2 * reach + max(diameters) + 2 * bond
+    assert found["outline_diameter"] == pytest.approx(outline, abs=1e-6)
     assert found["overall_diameter"] == pytest.approx(overall(laminate), abs=2e-3)
 
 

@@ -18,7 +18,6 @@ from click.testing import CliRunner
 import sbafab
 from sbafab.cli import app
 from sbafab.models import paper
-from sbafab.models.calibrated import load_calibration
 from sbafab.models.figures import Figure, Prediction
 from sbafab.models.formulas import modulus
 from sbafab.models.paper import (
@@ -246,31 +245,6 @@ def test_predict_prints_them_below_their_figures(
     figures = _joined(out.partition("Figures to design with")[2])
     assert figures.count("(the paper measured") == asides
     assert asides == len(list(_far_off(predictions["3dof-15mm"])))
-
-
-def test_calibrated_predictions_print_them_with_the_calibrated_values(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    _, out, _ = run_predict(["3dof-15mm", "-v", "-o", str(tmp_path)], capsys)
-    text = _joined(out)
-    for angle in (60, 90):
-        # The value of the figure is that of the sentence: design and actuator are the same.
-        sentence = re.search(
-            rf"bent by {angle} deg, on its 3-DoF; this model gives it ([\d.]+) with 2 chambers",
-            text,
-        )
-        assert sentence
-        written = json.loads((tmp_path / "3dof-15mm" / "predict.json").read_text(encoding="utf-8"))
-        name = f"force at 100 kPa in 2 chambers, bent by {angle} deg"
-        (figure,) = (each for each in written["figures"] if each["name"] == name)
-        assert float(sentence[1]) == pytest.approx(figure["value"], rel=2e-3)
-    # Near once calibrated: height and bend, whose sentences are gone.
-    assert "17.5 mm of full height" not in text.partition("Eqs. 1-3")[0]
-    calibration = load_calibration("paper")
-    assert calibration is not None
-    pressed = 29 * 0.025 + 30 * 0.038 * calibration.values["press_factor"]
-    assert f"folded height {pressed:.3f} mm\n" in out
-    assert "0.95 mm of deflated height" not in text
 
 
 def test_find_prints_and_writes_them(tmp_path: Path) -> None:

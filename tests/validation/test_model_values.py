@@ -152,16 +152,6 @@ def test_times_are_volume_over_flow_without_a_tube(three: Stack) -> None:
     assert air == pytest.approx(water * (1 + 4 / 101.325), rel=5e-3)
 
 
-def test_work_is_the_integral_of_pressure_over_volume() -> None:
-    single = sbafab.stack("1dof-5mm", "models.calibration=none")
-    pressures = [0.001, *(k / 50 for k in range(1, 51))]
-    volumes = [float(single.pose((p,)).volumes.sum()) for p in pressures]
-    pairs = list(zip(pressures, volumes, strict=True))
-    steps = [((p + q) / 2, w - v) for (p, v), (q, w) in zip(pairs, pairs[1:], strict=False)]
-    (work,) = values(curve("energy_mj", "pressure_kpa", (1.0,)))[""]
-    assert work == pytest.approx(sum(p * v for p, v in steps) / 1000, rel=0.06)
-
-
 @pytest.mark.parametrize(
     ("of", "words"),
     [

@@ -26,52 +26,34 @@ def radius_about_axis(region: Region) -> float:
     return max(edge.farthest_from((0.0, 0.0)) for edge in region.edges)
 
 
-def test_3dof_has_30_tpe_15_chamber_masks_and_14_separators() -> None:
+def test_layers_of_the_3dof() -> None:
+    """30 TPE, 15 chamber masks of three discs of 5 round 4.25, 14 separators in a circle of 16;
+    walls in one of 15, a lumen of 2 in every layer, 1.865 thick (docs/paper.md).
+    """
     lam = laminate("3dof-15mm")
-    assert len(lam.tpe_layers) == 30
-    assert len(of_role(lam, "chamber-mask")) == 15
-    assert len(of_role(lam, "separator-mask")) == 14
-
-
-def test_3dof_walls_fit_a_circle_of_15() -> None:
-    lam = laminate("3dof-15mm")
+    chambers, separators = of_role(lam, "chamber-mask"), of_role(lam, "separator-mask")
+    assert (len(lam.tpe_layers), len(chambers), len(separators)) == (30, 15, 14)
     plain = [layer.profile for layer in lam.tpe_layers if layer.balloon != 1]
     assert len(plain) == 28
-    for profile in plain:
-        assert 2 * radius_about_axis(profile) == pytest.approx(15.0, abs=0.002)
+    for profiles, diameter in ((plain, 15.0), (separators, 16.0)):
+        for profile in profiles:
+            assert 2 * radius_about_axis(profile) == pytest.approx(diameter, abs=0.002)
     assert sizes(load_design("3dof-15mm"), lam)["outline_diameter"] == pytest.approx(15.0)
-
-
-def test_3dof_lumen_clears_2_in_every_layer() -> None:
-    for layer in laminate("3dof-15mm").layers:
+    for layer in lam.layers:
         if layer.role == "chamber-mask":
             assert layer.profile.distance_to_edge((0.0, 0.0)) > 1.0
             assert not layer.profile.contains((0.0, 0.0))
         else:
             lumen = [hole for hole in layer.profile.holes if hole.circle == ((0.0, 0.0), 1.0)]
             assert len(lumen) == 1
-
-
-def test_3dof_separators_fit_a_circle_of_16() -> None:
-    for profile in of_role(laminate("3dof-15mm"), "separator-mask"):
-        assert 2 * radius_about_axis(profile) == pytest.approx(16.0, abs=0.002)
-
-
-def test_3dof_chamber_masks_are_three_discs_of_5_round_4_25() -> None:
-    upper = of_role(laminate("3dof-15mm"), "chamber-mask")[1:]
-    assert len(upper) == 14
-    for profile in upper:
+    for profile in chambers[1:]:
         circles = [outer.circle for outer in profile.outers]
-        assert len(circles) == 3
-        for circle in circles:
-            assert circle is not None
-            assert circle[1] == pytest.approx(2.5)
-            assert math.hypot(*circle[0]) == pytest.approx(4.25)
-
-
-def test_3dof_nominal_thickness_is_1_865() -> None:
-    # 30 x 0.038 + 29 x 0.025; the paper measures 0.95 (docs/paper.md says why they differ).
-    assert laminate("3dof-15mm").thickness == pytest.approx(1.865, abs=1e-9)
+        assert [circle and circle[1] for circle in circles] == pytest.approx([2.5] * 3)
+        assert [circle and math.hypot(*circle[0]) for circle in circles] == pytest.approx(
+            [4.25] * 3
+        )
+    # 30 x 0.038 + 29 x 0.025; the paper measures 0.95.
+    assert lam.thickness == pytest.approx(1.865, abs=1e-9)
 
 
 @pytest.mark.parametrize(("name", "diameter"), [("1dof-5mm", 6.5), ("1dof-10mm", 11.5)])
