@@ -105,20 +105,18 @@ def _with_marks(assembly: AssemblyWork) -> AssemblyWork:
     marks = assembly.marks
     if len(marks) == 1:
         return assembly
+
+    def marked(thing: Any, design: str) -> Any:
+        return replace(thing, pattern=f"{marks[design]} {thing.pattern}")
+
     sheets = []
     for sheet in assembly.sheets:
-        parts = tuple(
-            replace(part, pattern=f"{marks[part.design]} {part.pattern}")
-            for part in sheet.nest.parts
-        )
+        parts = tuple(marked(part, part.design) for part in sheet.nest.parts)
         counts = tuple((name, f"{marks[name]} {pattern}", n) for name, pattern, n in sheet.counts)
         sheets.append(replace(sheet, counts=counts, nest=replace(sheet.nest, parts=parts)))
     works = []
     for work in assembly.works:
-        mark = marks[work.design.name]
-        layers = tuple(
-            replace(layer, pattern=f"{mark} {layer.pattern}") for layer in work.laminate.layers
-        )
+        layers = tuple(marked(layer, work.design.name) for layer in work.laminate.layers)
         works.append(replace(work, laminate=replace(work.laminate, layers=layers), sheets=sheets))
     return replace(assembly, works=works, sheets=sheets)
 
@@ -131,11 +129,13 @@ POUR = 10.0  # smallest amount of silicone that can be weighed and mixed well, m
 
 def _bill(assembly: AssemblyWork) -> list[Item]:
     """Return the films of all designs together, each design's other items, and bought items."""
-    items = [*film_items(assembly.works)]
-    for work in assembly.works:
-        for item in items_of_part(work):
-            items.append(Item(f"{item.name} ({work.design.name})", item.what, item.quantity))
-    return list(dict.fromkeys([*items, *_bought(assembly.assembled)]))
+    of_designs = [
+        Item(f"{item.name} ({work.design.name})", item.what, item.quantity)
+        for work in assembly.works
+        for item in items_of_part(work)
+    ]
+    films, bought = film_items(assembly.works), _bought(assembly.assembled)
+    return list(dict.fromkeys([*films, *of_designs, *bought]))
 
 
 def _bought(assembled: Assembled) -> Iterator[Item]:
@@ -164,19 +164,18 @@ def _bought(assembled: Assembled) -> Iterator[Item]:
 
 
 def _size(part: AnyPart) -> str:
+    mm = millimetres
     if isinstance(part, Tube):
-        outer, inner, length = map(
-            millimetres, (part.outer_diameter, part.inner_diameter, part.length)
+        inner, long = mm(part.inner_diameter), mm(part.length)
+        return (
+            f"{part.material}, outer diameter {mm(part.outer_diameter)}, inner {inner}, {long} long"
         )
-        return f"{part.material}, outer diameter {outer}, inner {inner}, {length} long"
     if isinstance(part, Magnet):
-        across, thick = millimetres(part.diameter), millimetres(part.thickness)
-        return f"{part.part}, {across} across, {thick} thick"
+        return f"{part.part}, {mm(part.diameter)} across, {mm(part.thickness)} thick"
     if isinstance(part, Cup):
-        return f"cast from {part.material}, rim {millimetres(part.diameter)}"
+        return f"cast from {part.material}, rim {mm(part.diameter)}"
     if isinstance(part, Line):
-        outer, length = millimetres(part.outer_diameter), millimetres(part.length)
-        return f"{part.tubing}, outer diameter {outer}, {length}"
+        return f"{part.tubing}, outer diameter {mm(part.outer_diameter)}, {mm(part.length)}"
     assert isinstance(part, Base)
     return f"{part.material}, {size(part.width, part.length)}"
 
@@ -255,12 +254,15 @@ def _mark_angle(placed: PlacedPart) -> float:
 
 def joints(assembled: Assembled) -> list[PartJoint]:
     """Return a step for each part, in the order in which they can be joined."""
-    found = []
-    for placed in _in_order(assembled):
-        lines = [line.name for line in _lines_through(assembled, placed)]
-        supply = supply_runs(placed, assembled)
-        found.append(PartJoint(placed, assembled.on(placed), lines, supply))
-    return found
+    return [
+        PartJoint(
+            placed,
+            assembled.on(placed),
+            [line.name for line in _lines_through(assembled, placed)],
+            supply_runs(placed, assembled),
+        )
+        for placed in _in_order(assembled)
+    ]
 
 
 def _in_order(assembled: Assembled) -> Iterator[PlacedPart]:

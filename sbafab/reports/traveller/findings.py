@@ -72,28 +72,24 @@ def other_hands(laminate: Laminate, design: Design) -> tuple[Hand, ...]:
     """Return the yields at smaller and larger placement errors; empty if the largest loses no
     build.
     """
-    *steadier, largest = (_by_hand(design, factor) for factor in ROUGHER)
+    rougher = [_by_hand(design, factor) for factor in ROUGHER]
     # The margins that the largest error can violate serve smaller errors too.
-    places = Measures(laminate, largest)
-    roughest = _hand(places, largest)
-    if roughest.share == 1:
-        return ()
-    return (*(_hand(places, other) for other in steadier), roughest)
+    places = Measures(laminate, rougher[-1])
+    hands = []
+    for other in reversed(rougher):
+        builds = simulate(laminate, other, measures=places.by_hand(other))
+        errors = other.registration
+        hands.append(Hand(errors.hand_placement, errors.hand_turn, builds.whole.value))
+        if hands[0].share == 1:
+            return ()
+    return tuple(reversed(hands))
 
 
 def _by_hand(design: Design, factor: float) -> Design:
     """Return a design whose hand is ``factor`` times as rough, and whose yield is a slope's."""
     errors = design.registration
-    hand = {
-        "hand_placement": factor * errors.hand_placement,
-        "hand_turn": factor * errors.hand_turn,
-    }
+    names = ("hand_placement", "hand_turn")
+    hand = {name: factor * getattr(errors, name) for name in names}
     rules = design.rules.model_copy(update={"yield_builds": BUILDS})
     registration = errors.model_copy(update=hand)
     return design.model_copy(update={"registration": registration, "rules": rules})
-
-
-def _hand(places: Measures, design: Design) -> Hand:
-    builds = simulate(places.laminate, design, measures=places.by_hand(design))
-    hand = design.registration
-    return Hand(hand.hand_placement, hand.hand_turn, builds.whole.value)
