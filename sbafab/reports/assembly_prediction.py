@@ -366,7 +366,7 @@ class _Scene:
         return [solid.transform(rows) for solid in _unmoved(placed, self.stacks, poses)]
 
     def _moving(self, name: str) -> dict[str, PlacedPart]:
-        """Return what is fixed on a part, directly or not, by name."""
+        """Return the parts fixed on a part, directly or not, by name."""
         names: dict[str, PlacedPart] = {}
         for part in self.assembled.parts:
             if part.part.on == name or part.part.on in names:

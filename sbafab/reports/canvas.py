@@ -220,7 +220,7 @@ def inscribe(
 ) -> None:
     """Write a legend along the foot, lines over it, and over those a length bar at the right.
 
-    ``size`` is the letters', pixels, in Pillow's own font; without a scale there is no bar.
+    ``size`` is the letters', pixels, in Pillow's own font; a bar is drawn if a scale is given.
     """
     from PIL import ImageDraw, ImageFont
 

@@ -162,18 +162,12 @@ def dimension(a: Point, b: Point, words: str, away: Point, distance: float) -> l
     between the extension lines, they point inward from outside.
     """
     (u, v) = away
-    along = _unit(a, b)
     start, end = _shifted(a, away, distance), _shifted(b, away, distance)
     parts = [
         line([_shifted(p, away, 0.8), _shifted(p, away, distance + 1.0)], colour=GREY)
         for p in (a, b)
     ]
-    back = (-along[0], -along[1])
-    if math.dist(start, end) >= 3.2 * ARROW:
-        parts += [line([start, end], colour=GREY), arrow(start, back), arrow(end, along)]
-    else:
-        tails = _shifted(start, back, 2.2 * ARROW), _shifted(end, along, 2.2 * ARROW)
-        parts += [line(tails, colour=GREY), arrow(start, along), arrow(end, back)]
+    parts += _arrows(start, end, 3.2, 2.2)
     middle = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
     if abs(v) > abs(u):
         clear = 0.8 if math.dist(start, end) > text_width(words) else 1.5
@@ -195,11 +189,19 @@ def leader(feature: Point, elbow: Point, label: Point, *, dot: bool = True) -> l
 
 def across(a: Point, b: Point) -> list[str]:
     """A width marked on the part itself, its label elsewhere; arrows outside if it is narrow."""
-    (u, v) = _unit(a, b)
-    if math.dist(a, b) >= 6 * ARROW:
-        return [line([a, b], colour=GREY), arrow(a, (-u, -v)), arrow(b, (u, v))]
-    tails = _shifted(a, (-u, -v), 2 * ARROW), _shifted(b, (u, v), 2 * ARROW)
-    return [line(tails, colour=GREY), arrow(a, (u, v)), arrow(b, (-u, -v))]
+    return _arrows(a, b, 6.0, 2.0)
+
+
+def _arrows(a: Point, b: Point, least: float, tail: float) -> list[str]:
+    """A line with arrows between two points; outside them, on tails, if they are nearer than
+    ``least`` arrows.
+    """
+    (u, v), is_near = _unit(a, b), math.dist(a, b) < least * ARROW
+    out, back = (u, v), (-u, -v)
+    if not is_near:
+        return [line([a, b], colour=GREY), arrow(a, back), arrow(b, out)]
+    tails = _shifted(a, back, tail * ARROW), _shifted(b, out, tail * ARROW)
+    return [line(tails, colour=GREY), arrow(a, out), arrow(b, back)]
 
 
 def spread(targets: Sequence[float], gap: float, low: float, high: float) -> list[float]:

@@ -43,15 +43,6 @@ ROW = 4.8
 LEAD = 5.0
 
 
-class PageGrid(NamedTuple):
-    """Equal cells on a page, and the scale of everything drawn in them."""
-
-    scale: float
-    columns: int
-    cell: Point
-    page: Point
-
-
 def layers_svg(laminate: Laminate) -> str:
     """Every distinct pattern in plan at one scale, as a drawing for A3 (longer if need be)."""
     holding = pins_when_added(laminate)
@@ -61,21 +52,24 @@ def layers_svg(laminate: Laminate) -> str:
     warnings = list(filter(None, dict.fromkeys(x.film.warning for x in laminate.layers)))
     rows = max(0, len(laminate.notes) - 1) + max(0, len(warnings) - 1)
     block = BLOCK + max(NOTE_ROW * rows, FILM_ROW * max(0, len(keys) - pinned - 2))
-    grid = _grid(cards, block)
+    scale, columns, cell, page = _grid(cards, block)
     elements: list[str] = []
     for place, card in enumerate(cards):
-        row, column = divmod(place, grid.columns)
-        corner = MARGIN + column * grid.cell[0], MARGIN + row * grid.cell[1]
-        elements += _drawn(card, grid.scale, corner, grid.cell)
-    elements += _title_block(laminate, warnings, keys, grid, block)
-    return draw.document(*grid.page, f"{laminate.name}: layers", elements)
+        row, column = divmod(place, columns)
+        corner = MARGIN + column * cell[0], MARGIN + row * cell[1]
+        elements += _drawn(card, scale, corner, cell)
+    elements += _title_block(laminate, warnings, keys, page, block)
+    elements += _scale_bar(scale, (page[0] - MARGIN - 4.0, page[1] - MARGIN - block + 6.0))
+    return draw.document(*page, f"{laminate.name}: layers", elements)
 
 
-def _grid(cards: Sequence[Card], block: float) -> PageGrid:
-    """Return the largest scale at which all cards fit A3; rather a longer page than tiny cards."""
+def _grid(cards: Sequence[Card], block: float) -> tuple[float, int, Point, Point]:
+    """Return the largest scale at which all cards fit A3 (rather a longer page than tiny cards),
+    the columns, and the sizes of a cell and of the page.
+    """
     wide = PAGE[0] - 2 * MARGIN
     largest = max(max(card.size) for card in cards)
-    best: PageGrid | None = None
+    best: tuple[float, int, Point, Point] | None = None
     for scale in SCALES:
         sizes = [card.cell(scale) for card in cards]
         cell = max(size[0] for size in sizes), max(size[1] for size in sizes)
@@ -85,11 +79,11 @@ def _grid(cards: Sequence[Card], block: float) -> PageGrid:
             columns = math.ceil(len(cards) / rows)
             height = rows * cell[1] + 2 * MARGIN + block
             if best is None or height <= PAGE[1] or largest * scale >= LEAST_DRAWN:
-                best = PageGrid(scale, columns, (wide / columns, cell[1]), (PAGE[0], height))
+                best = scale, columns, (wide / columns, cell[1]), (PAGE[0], height)
             if height <= PAGE[1]:
                 break
     page = cell[0] + 2 * MARGIN, len(cards) * cell[1] + 2 * MARGIN + block
-    return best or PageGrid(SCALES[-1], 1, cell, page)
+    return best or (SCALES[-1], 1, cell, page)
 
 
 def _keys(laminate: Laminate, pinned: bool) -> Iterator[tuple[str, str]]:
@@ -113,10 +107,10 @@ def _title_block(
     laminate: Laminate,
     warnings: Sequence[str],
     keys: Sequence[tuple[str, str]],
-    grid: PageGrid,
+    page: Point,
     block: float,
 ) -> Iterator[str]:
-    width, height = grid.page
+    width, height = page
     x, y = low = MARGIN, height - MARGIN - block
     chambers = len(laminate.chambers)
     facts = (
@@ -134,7 +128,6 @@ def _title_block(
         yield draw.text((x + 3.0, y + block - 2.1 - NOTE_ROW * row), warning)
     for row, key in enumerate(keys):
         yield draw.key((width / 2 + 18.0, y + 6.2 + FILM_ROW * row), *key)
-    yield from _scale_bar(grid.scale, (width - MARGIN - 4.0, y + 6.0))
 
 
 def _scale_bar(scale: float, end: Point) -> Iterator[str]:

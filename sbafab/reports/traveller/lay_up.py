@@ -112,15 +112,6 @@ def inlets_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Inlet, ...]:
 # Alignment of layers laid by hand: along an edge, or at a place on their sheet.
 
 
-class Lip(NamedTuple):
-    """Distance in mm by which an edge lies outside another, below 0 inside; ``all_round`` if it
-    does so without breaks.
-    """
-
-    outside: float
-    all_round: bool
-
-
 @dataclass(frozen=True)
 class PiecePlace:
     """The place of a piece: mm from the lower left corner of its sheet.
@@ -182,15 +173,15 @@ class Things:
         neighbour = _widest(self.laminate, beside[::-1] if place else beside)
         own = layer.index if len(self.things[place]) > 1 else 0
         edge = Alignment(own, len(layer.profile.pieces) > 1, film_name(neighbour), place == 0)
-        edge_lip = lip(layer.profile, neighbour.profile)
-        if edge_lip is None:
+        lip = _lip(layer.profile, neighbour.profile)
+        if lip is None:
             return edge if neighbour.role == "sheet" else None
         films = [i for i in beside if not self.laminate.layer(i).is_mask] or beside
         upper = self.laminate.layer(films[-1]) if place else neighbour
-        is_on = upper is not neighbour and lip(layer.profile, upper.profile) == (0.0, True)
+        is_on = upper is not neighbour and _lip(layer.profile, upper.profile) == (0.0, True)
         return edge._replace(
-            outside=0.0 if abs(edge_lip.outside) < EQUAL else edge_lip.outside,
-            all_round=edge_lip.all_round,
+            outside=0.0 if abs(lip[0]) < EQUAL else lip[0],
+            all_round=lip[1],
             on=film_name(upper) if is_on else "",
             numbers=(neighbour.index, upper.index),
         )
@@ -236,8 +227,10 @@ def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
 
 
 @cached
-def lip(region: Region, reference: Region) -> Lip | None:
-    """Return the distance between the outlines of two regions; None if it mostly varies."""
+def _lip(region: Region, reference: Region) -> tuple[float, bool] | None:
+    """Return the distance in mm by which a region's outline lies outside that of another, below 0
+    inside, and True if it does so without breaks; None if the distance mostly varies.
+    """
     outline = Region(reference.outers)
     distances = []
     for edge in (edge for contour in region.outers for edge in contour.edges):
@@ -250,7 +243,7 @@ def lip(region: Region, reference: Region) -> Lip | None:
     near = sum(abs(distance - usual) < EQUAL for distance in distances)
     if 2 * near < len(distances):
         return None
-    return Lip(round(usual, 2) + 0.0, near == len(distances))
+    return round(usual, 2) + 0.0, near == len(distances)
 
 
 def places(laminate: Laminate, step: LayUpStep, lying: Sequence[Bed]) -> list[PiecePlace]:

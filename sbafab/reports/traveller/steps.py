@@ -320,7 +320,7 @@ class SeamPage(NamedTuple):
 
 class FoldPage(NamedTuple):
     """A fold on the page: its lower half, the masks in it, and the film unfolded: the lengths of
-    the lower and the upper half perpendicular to the line, mm, and what is at their ends.
+    the lower and the upper half perpendicular to the line, mm, and their ends in text.
     """
 
     step: FoldStep
