@@ -48,7 +48,7 @@ ROUNDING = 5e-7
 """mm by which a copy may lie past the border: less than the check's tolerance."""
 
 
-Value = Any
+_Value = Any
 """A number, or an array of a number of many rows."""
 
 
@@ -141,22 +141,22 @@ class _Copy(NamedTuple):
     """A copy in a row: 1 if it is turned by half, else 0, and its shift in mm."""
 
     half: int
-    x: Value
-    y: Value
+    x: _Value
+    y: _Value
 
 
 class _Row(NamedTuple):
     """Copies that repeat every ``pitch`` mm."""
 
     copies: tuple[_Copy, ...]
-    pitch: Value
+    pitch: _Value
 
 
 class _Pattern(NamedTuple):
     """Rows that repeat upward; each begins one of ``steps`` mm to the right of that below it."""
 
     rows: tuple[_Row, ...]
-    steps: tuple[Value, ...]
+    steps: tuple[_Value, ...]
 
 
 class _Rows:
