@@ -44,7 +44,7 @@ from sbafab.search.space import FindRequest, figure_text, read_free
 from sbafab.search.sweep import SweepDocument, SweepRequest, SweepStopped
 from sbafab.search.vary import format_keys, format_value, varied_keys
 
-Value = TypeVar("Value")
+Outcome = TypeVar("Outcome")
 FOUND = "found.toml"
 """The default file name in the folder of ``-o``."""
 HELP = """Find the best design that meets requirements.
@@ -143,9 +143,9 @@ def _request(name: str, options: dict[str, Any]) -> FindRequest:
     return request
 
 
-def _each(names: Iterable[str], value: Callable[[str], Value]) -> dict[str, Value]:
+def _each(names: Iterable[str], value: Callable[[str], Outcome]) -> dict[str, Outcome]:
     """Return a value for each name that has one. Raises DesignError if none has."""
-    values: dict[str, Value] = {}
+    values: dict[str, Outcome] = {}
     problems = []
     for name in names:
         try:

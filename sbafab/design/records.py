@@ -65,7 +65,7 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.base_plate import PlateMachine, lone_pin_error, pin_error
 from sbafab.laminate.films import Material
 from sbafab.laminate.joints import FaceBond
-from sbafab.notebook import table_html
+from sbafab.markup import table_html
 
 if TYPE_CHECKING:
     from pydantic import GetJsonSchemaHandler

@@ -29,8 +29,8 @@ from sbafab.folders.order import JOB_SCHEMA, SCHEMA, Order, make_order
 from sbafab.folders.swap import listed_files, refuse_busy, replaced_folder
 from sbafab.laminate.burst import burst
 from sbafab.laminate.laminate import Laminate
+from sbafab.markup import table_html
 from sbafab.models.figures import Prediction
-from sbafab.notebook import table_html
 from sbafab.pressing.schedule import Schedule
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Finding, Findings

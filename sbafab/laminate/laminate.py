@@ -19,8 +19,7 @@ from sbafab.geometry.region import Region, coord, path_data, union
 from sbafab.laminate.films import Film, density_of, in_order, ink
 from sbafab.laminate.folding import flat_part, fold_roots, unfolded
 from sbafab.laminate.joints import PRESS, FaceBond, Fold, Net, Port, Seam, chamber_gaps
-from sbafab.markup import escape
-from sbafab.notebook import table_html
+from sbafab.markup import escape, table_html
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
 ROLES: tuple[Role, ...] = get_args(Role)

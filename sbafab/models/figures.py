@@ -17,6 +17,7 @@ from pydantic import AfterValidator, Field, PlainSerializer, WithJsonSchema
 from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError
 from sbafab.laminate.lay_up import folded_height
+from sbafab.markup import data_frame, table_html
 from sbafab.models import paper
 from sbafab.models.closed_forms import eq_4
 from sbafab.models.paper import Counterpart, CounterpartEntry
@@ -29,7 +30,6 @@ from sbafab.models.quantity import (
     ModelId,
     Quantity,
 )
-from sbafab.notebook import data_frame, table_html
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from sbafab.notebook import data_frame, table_html
+from sbafab.markup import data_frame, table_html
 from sbafab.rules.sentences import FAIL, REMEDY, Clause, is_said, say, tell
 
 if TYPE_CHECKING:

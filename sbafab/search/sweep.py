@@ -20,9 +20,9 @@ from sbafab.design.records import Design, plain_tables
 from sbafab.documents import Document, attribute
 from sbafab.errors import OutputError
 from sbafab.folders.swap import MANIFEST
+from sbafab.markup import data_frame
 from sbafab.models.formulas import refuse_pressure, usual_pressures
 from sbafab.models.intervals import factors_of
-from sbafab.notebook import data_frame
 from sbafab.process import Progress, ignore_progress
 from sbafab.search.sweep_report import (
     CSV,

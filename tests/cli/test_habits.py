@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -69,18 +67,6 @@ def test_limits_say_whether_they_are_the_least_or_the_most(
     assert senses["mask-overhang", "fail"] is False
     assert senses["press-fit", "fail"] is True
     assert {sense for (_, verdict), sense in senses.items() if verdict == "pass"} == {False, True}
-
-
-def test_the_module_is_the_command() -> None:
-    """Where pip's folder of scripts is not on the path, as on many a Windows machine."""
-    ended = subprocess.run(
-        [sys.executable, "-m", "sbafab", "check", "1dof-6mm"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert ended.returncode == 2
-    assert ended.stderr.startswith("sbafab: '1dof-6mm' is neither a template nor a design file")
 
 
 def test_every_rule_and_check_is_explained(run: Run) -> None:

@@ -64,16 +64,6 @@ def _table_reads_well(out: str) -> None:
     assert sum("force at 10 kPa, flat" in line for line in lines[:others]) == 1
 
 
-def test_json_is_what_is_written(run: Run) -> None:
-    code, out, _ = run("predict 1dof-5mm --json --pressure 50")
-    assert code == 0
-    printed = json.loads(out)
-    folder = Path(printed.pop("folder"))
-    assert printed.pop("failed") == []
-    assert printed == json.loads((folder / "predict.json").read_text(encoding="utf-8"))
-    assert printed["asked"]["pressures_kpa"] == [50]
-
-
 def test_a_prediction_goes_beside_another_designs_folder_and_says_so(run: Run) -> None:
     wide = sbafab.load("1dof-5mm", "stack.balloons=1", "chamber.diameter=6")
     folder = generate(RunRequest(wide, Path("out"), ("cut",))).folder

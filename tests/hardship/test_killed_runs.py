@@ -82,27 +82,6 @@ def test_killed_before_random_file_operations(runs: Runs, output: Output) -> Non
     assert output.leftovers() == set()
 
 
-@pytest.mark.parametrize(
-    ("place", "holds"), [("before exchange", "0.8"), ("after exchange", "0.75")]
-)
-def test_killed_on_either_side_of_the_exchange(
-    place: str, holds: str, runs: Runs, output: Output
-) -> None:
-    kill = f"os.kill(os.getpid(), {signal.SIGKILL:d})"
-    first, second = (kill, "real(a, b)") if place == "before exchange" else ("real(a, b)", kill)
-    before = (
-        "import os; from sbafab.folders import swap; real = swap._exchange\n"
-        f"swap._exchange = lambda a, b, os=os, real=real: ({first}, {second})"
-    )
-    ended = runs.run(output.arguments("0.75"), output.folder, before)
-    assert ended.code == -signal.SIGKILL
-    assert output.held() == holds
-    assert len(output.leftovers()) == 1
-    assert runs.run(output.arguments(OTHER[holds]), output.folder).code == 0
-    assert output.held() == OTHER[holds]
-    assert output.leftovers() == set()
-
-
 def test_killed_between_two_renames_the_old_folder_comes_back(
     runs: Runs, output: Output, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,7 +13,6 @@ import pytest
 from sbafab import api
 from sbafab.design.sections import rule_names
 from sbafab.errors import DesignError
-from sbafab.models import balloon_map
 from sbafab.studio import jobs
 from sbafab.studio.app import design_in
 from sbafab.studio.editing import edited
@@ -204,24 +203,6 @@ def test_a_link_holds_a_design() -> None:
     ):
         with pytest.raises(DesignError, match="holds no design"):
             design_in(broken)
-
-
-@pytest.mark.long
-def test_poses_are_the_stack_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = api.template("1dof-5mm")
-    asked: dict[str, Any] = {"do": "motion", "pose": {"pressures": [20.0], "plate": 3.0}}
-    (pose,) = answers({**job(tmp_path, text), **asked})
-    theirs = api.stack(api.loads(text)).pose((20.0,), plate=3.0)
-    assert pose["force"] == pytest.approx(theirs.force, rel=1e-4)
-    assert pose["height"] == pytest.approx(theirs.height, abs=1e-3)
-    asked["pose"]["curves"] = True
-    pose, curves = answers({**job(tmp_path, text), **asked})
-    assert curves["holds"]
-    monkeypatch.setattr(balloon_map, "MOST_ERROR", 1e-9)
-    pose, curves = answers({**job(tmp_path, text), **asked})
-    assert not curves["holds"]
-    with pytest.raises(DesignError, match="pressures must be 1 finite"):
-        answers({**job(tmp_path, text), "do": "motion", "pose": {"pressures": [1, 2]}})
 
 
 @pytest.mark.long
