@@ -78,20 +78,3 @@ def test_a_few_cases_stay_in_the_suite_and_the_rest_is_long(
     cases = few(range(size), count)
     assert [getattr(case, "values", (case,)) for case in cases] == [(n,) for n in range(size)]
     assert {n for n, case in enumerate(cases) if not is_long(case)} == stay
-
-
-def test_cases_keep_their_names_marks_and_values() -> None:
-    skipped = pytest.param(1, 2, id="named", marks=pytest.mark.skip)
-    kept, long, pair = few([(0, 0), skipped, (3, 4), (5, 6)], 1, names=2)[:3]
-    assert kept == (0, 0)
-    assert (long.values, long.id) == ((1, 2), "named")
-    assert [mark.name for mark in long.marks] == ["skip", "long"]
-    assert pair.values == (3, 4)
-    assert few(["a", ("b", "c")], 1)[1].values == (("b", "c"),)
-    marks = [getattr(case, "marks", ()) for case in few(range(10), 2, long=3)]
-    assert [mark.name for (mark,) in filter(None, marks)] == [
-        *("long", "campaign", "campaign", "campaign"),
-        *("long", "campaign", "campaign", "long"),
-    ]
-    with pytest.raises(ValueError, match="count = 0"):
-        few([1], 0)
