@@ -401,13 +401,10 @@ class Recipe(Section):
         same = abs(self.thickness_mm - film.thickness) < SAME_THICKNESS
         return same and (self.film, self.machine) == (film.product, machine)
 
-    def is_rival(self, other: Recipe) -> bool:
-        """Return True if both are for one film, thickness, machine and operation."""
-        ours, theirs = (
-            (recipe.film, round(recipe.thickness_mm, 6), recipe.machine, recipe.operation)
-            for recipe in (self, other)
-        )
-        return ours == theirs
+    @property
+    def purpose(self) -> tuple[str, float, str, str]:
+        """What it is for: film, thickness, machine and operation."""
+        return self.film, round(self.thickness_mm, 6), self.machine, self.operation
 
 
 def recipes_for(

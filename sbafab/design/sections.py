@@ -520,13 +520,14 @@ class Laser(Section):
 
     @model_validator(mode="after")
     def _recipes_are_one_each(self) -> Self:
-        recipes = self.recipe or ()
-        for place, recipe in enumerate(recipes):
-            if any(recipe.is_rival(other) for other in recipes[:place]):
+        purposes = set()
+        for recipe in self.recipe or ():
+            if recipe.purpose in purposes:
                 raise ValueError(
                     f"has two recipes to {recipe.operation} {recipe.film} of "
                     f"{recipe.thickness_mm:g} mm on {recipe.machine}; keep one"
                 )
+            purposes.add(recipe.purpose)
         return self
 
 

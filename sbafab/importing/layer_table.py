@@ -206,7 +206,7 @@ def polygon_layer(path: Path, layer: str) -> Region:
 
     Raises DesignError with the file, the layer and the unreadable geometry.
     """
-    layers = polygon_layers(path)
+    layers = _geometries(path, read_text(path, MOST_OF_POLYGONS))
     if not layer.isdecimal() or not 1 <= int(layer) <= len(layers):
         raise DesignError(
             f"{path} has no layer {shown(layer)}; its layers are 1 to {len(layers)}, bottom to top"
@@ -219,14 +219,9 @@ def polygon_layer(path: Path, layer: str) -> Region:
     return region
 
 
-def polygon_layers(path: Path) -> list[list[str]]:
-    """Return the geometries of every layer, as text. Raises DesignError."""
-    return _geometries(path, read_text(path, MOST_OF_POLYGONS))
-
-
 def refuse_without_table(path: Path) -> NoReturn:
     """Refuse a laminate of polygons that is imported without a table of its layers."""
-    count = len(polygon_layers(path))
+    count = len(_geometries(path, read_text(path, MOST_OF_POLYGONS)))
     raise DesignError(
         f"{path} holds {count} layers of polygons and not what they are for; write {LAYERS} beside "
         f'it, with a row "{path.name},ROLE,NUMBER" a layer under "file,role,layer", and import the '
@@ -236,6 +231,7 @@ def refuse_without_table(path: Path) -> NoReturn:
 
 @lru_cache(maxsize=4)
 def _geometries(path: Path, text: str) -> list[list[str]]:
+    """Return the geometries of every layer, as text. Raises DesignError."""
     document = _document(path, text)
     rows = document.get("layers") if isinstance(document, dict) else None
     if not isinstance(rows, list) or not rows:
