@@ -86,16 +86,6 @@ def test_a_valve_fills_to_its_pressure_and_no_further(three: Stack) -> None:
     assert pose.bend == pytest.approx(three.pose((5, 0, 0)).bend, rel=1e-3)
 
 
-def test_small_steps_and_large_ones_agree(three: Stack) -> None:
-    ends = []
-    for count in (8, 32):
-        motion = three.motion(line=Line(WATER))
-        for _ in range(count):
-            motion.step(0.8 / count, pressures=(8, 8, 8))
-        ends.append(motion.pose.height)
-    assert ends[0] == pytest.approx(ends[1], rel=0.02)
-
-
 def test_shut_chambers_keep_their_air(three: Stack) -> None:
     motion = three.motion((5, 5, 5), line=Line(AIR))
     motion.load = {"tip_load": (0.0, 0.0, -0.005)}

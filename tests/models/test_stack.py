@@ -30,20 +30,6 @@ def three() -> Stack:
     return sbafab.stack("3dof-15mm", "models.calibration=none")
 
 
-def test_a_map_is_the_balloon_that_it_was_made_from(three: Stack) -> None:
-    """At places that no balloon of the map was computed at, and where films are slack."""
-    balloon = three.maps[0]
-    p, h = np.array([0.7, 3.3, 8.1, 47.0]), np.array([0.33, 0.81, 1.6, 0.52])
-    found = inflate(balloon.balloon, p, h, tied=True)
-    assert balloon.force(p, h) == pytest.approx(found.force, rel=0.025, abs=1.0)
-    assert balloon.volume(p, h) == pytest.approx(found.volume, rel=0.01)
-    p, h = (g.ravel() for g in np.meshgrid([0.005, 0.02, 0.05, 0.2], [0.01, 0.02, 0.05, 0.1, 0.4]))
-    found = inflate(balloon.balloon, p, h, tied=True)
-    assert balloon.volume(p, h) == pytest.approx(found.volume, rel=0.07)
-    assert balloon.force(p, h) == pytest.approx(found.force, rel=0.02, abs=0.05)
-    assert balloon.volume([0.0, 0.1, 10.0], np.zeros(3)) == pytest.approx(0.0, abs=0.05)
-
-
 @pytest.mark.parametrize(("chambers", "angle"), [(1, 30.0), (2, 60.0), (1, 90.0)])
 def test_a_bend_is_met_by_the_one_pressure_that_gives_it(
     three: Stack, chambers: int, angle: float
@@ -141,15 +127,14 @@ def test_one_chamber_is_its_balloons_in_series() -> None:
 
 
 def test_a_tapered_stack_pushes_at_most_as_its_smallest_balloon() -> None:
-    sizes = [10.0, 6.0]
-    changes = {"chamber.diameter": sizes}, "stack.balloons=2", "models.calibration=none"
-    taper = sbafab.stack("1dof-10mm", *changes)
-    bound = 100e-3 * math.pi * 3.0**2
+    changes = {"chamber.diameter": [6.0, 5.0]}, "stack.balloons=2", "models.calibration=none"
+    taper = sbafab.stack("1dof-5mm", *changes)
+    bound = 100e-3 * math.pi * 2.5**2
     found = blocked_force(taper, 100.0, np.linspace(0, 2, 7))
     assert (found <= bound).all()
     assert (np.diff(found) <= 1e-9).all()
     assert found[0] > 0.9 * bound
-    predicted = sbafab.predict("1dof-10mm", *changes)
+    predicted = sbafab.predict("1dof-5mm", *changes)
     for model in ("elastic-stack", "work-on-eq-4", "work-on-eqs-1-to-3"):
         assert predicted.value("blocked_force", model, kpa=100, share=0) <= bound
 
@@ -328,13 +313,3 @@ def test_a_plate_that_is_hardly_met_is_met_from_any_start(three: Stack) -> None:
         assert pose.tip[:2] == pytest.approx([0.0, 0.0], abs=1e-4)
         assert pose.stable
         assert (pose.force > 0) == (rim > 12.0)
-
-
-def test_following_a_path_ends_where_a_fresh_start_does(three: Stack) -> None:
-    load = {"tip_load": (0.0, 0.005, -0.005), "gravity": True}
-    followed = three.pose((6, 3, 1), **load)  # type: ignore[arg-type]
-    for share in np.linspace(0, 1, 11):
-        followed = three.pose((6 - share, 3 + share, 1), near=followed, **load)  # type: ignore[arg-type]
-    fresh = three.pose((5, 4, 1), **load)  # type: ignore[arg-type]
-    assert followed.tip == pytest.approx(fresh.tip, abs=1e-4)
-    assert followed.volumes == pytest.approx(fresh.volumes, rel=1e-5)

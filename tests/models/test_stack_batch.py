@@ -11,10 +11,7 @@ import pytest
 import sbafab
 from sbafab.errors import DesignError
 from sbafab.models import motion as motions
-from sbafab.models.derivatives import hessian
-from sbafab.models.pneumatics import AIR, WATER, Line
 from sbafab.models.stack import Plate, Stack, StackBatch
-from sbafab.models.stack_loads import loaded_energy
 
 
 @pytest.fixture(scope="module")
@@ -28,22 +25,6 @@ def drawn_pressures(chambers: int, count: int = 8) -> np.ndarray:
     drawn = numbers.uniform(0.0, 10.0, (count, chambers))
     drawn[: count // 2] *= numbers.integers(0, 2, (count // 2, chambers))
     return drawn
-
-
-@pytest.mark.parametrize("design", ["3dof-15mm", "1dof-5mm"])
-def test_poses_are_the_single_ones(design: str) -> None:
-    stack = sbafab.stack(design)
-    pressures = drawn_pressures(stack.chambers, 6)
-    batch = StackBatch(stack).poses(pressures)
-    again = StackBatch(stack).poses(pressures[::-1], near=batch)
-    for number, row in enumerate(pressures):
-        pose = stack.pose(row.tolist())
-        for poses, at in ((batch, number), (again, len(pressures) - 1 - number)):
-            assert poses.tips[at] == pytest.approx(pose.tip, abs=1e-6)
-            assert poses.freedoms[at] == pytest.approx(pose.freedoms, abs=1e-6)
-            assert poses.volumes[at] == pytest.approx(pose.volumes, abs=1e-5)
-            assert poses.bends[at] == pytest.approx(pose.bend, abs=1e-5)
-    assert batch.heights == pytest.approx(batch.tips[:, 2])
 
 
 def test_levels_of_unlike_balloons_turn_each_in_its_own_plane(three: Stack) -> None:
@@ -61,6 +42,7 @@ def test_levels_of_unlike_balloons_turn_each_in_its_own_plane(three: Stack) -> N
 
 
 LOADS: dict[str, dict[str, Any]] = {
+    "free": {},
     "tip": {"tip_load": (0.002, 0.005, -0.005)},
     "gravity": {"gravity": (0.3, 0.6, -1.0)},
     "both": {"tip_load": (0.0, 0.005, -0.005), "gravity": True},
@@ -80,27 +62,6 @@ def test_loaded_poses_are_the_single_ones(three: Stack, load: str) -> None:
             assert poses.tips[number] == pytest.approx(pose.tip, abs=1e-6)
             assert poses.freedoms[number] == pytest.approx(pose.freedoms, abs=1e-6)
             assert poses.volumes[number] == pytest.approx(pose.volumes, abs=1e-5)
-
-
-@pytest.mark.parametrize("load", LOADS)
-def test_many_states_have_the_energy_of_each(three: Stack, load: str) -> None:
-    """With gradients and second derivatives, of two kinds of balloons, away from equilibrium."""
-    kinds = (three.maps[0], three.maps[0].stiffened(2.0))
-    mixed = replace(three, maps=kinds, levels=np.array([0, 1, 1, 0]))
-    acting, numbers = mixed.acting(LOADS[load]), np.random.default_rng(5)
-    assert acting is not None
-    pressures = numbers.uniform(1.0, 9.0, (3, 3))
-    freedoms = numbers.uniform([0.6, -0.05, -0.05], [1.0, 0.05, 0.05], (3, 4, 3))
-    springs = mixed.springs(pressures, by_level=True)
-    many = loaded_energy(springs, mixed.pitch, acting, freedoms)
-    matrices = hessian(many, many.rest(), freedoms, mixed.pitch)
-    for state in range(3):
-        alone = mixed.springs(pressures[state], by_level=True)
-        one = loaded_energy(alone, mixed.pitch, acting, freedoms[state])
-        assert many.value[state] == pytest.approx(float(one.value), rel=1e-12)
-        assert many.gradient[state] == pytest.approx(one.gradient, rel=1e-12, abs=1e-8)
-        matrix = hessian(one, one.rest(), freedoms[state], mixed.pitch)
-        assert matrices[state] == pytest.approx(matrix, rel=1e-12, abs=1e-6)
 
 
 @pytest.mark.parametrize("load", ["tip", "gravity"])
@@ -124,27 +85,6 @@ def test_loaded_motions_are_the_single_ones(
     assert moving.tips[0] == pytest.approx(short.pose((0, 0, 0), **LOADS[load]).tip, abs=1e-6)
 
 
-@pytest.mark.parametrize("line", [Line(AIR, delay=0.03), Line(WATER)])
-def test_motions_are_the_single_ones(
-    three: Stack, line: Line, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(motions, "TOLERANCE", 1e-7)
-    numbers = np.random.default_rng(3)
-    moving = StackBatch(three).motion(3, line)
-    singles = [three.motion(line=line) for _ in range(3)]
-    for number in range(6):
-        valves = numbers.uniform(0.0, 10.0, (3, 3)) * (number < 4)
-        moving.step(0.02, valves)
-        for single, row in zip(singles, valves.tolist(), strict=True):
-            single.step(0.02, pressures=row)
-        assert moving.tips == pytest.approx(np.array([s.pose.tip for s in singles]), abs=2e-5)
-        pressures = np.array([single.pressures for single in singles])
-        assert moving.pressures == pytest.approx(pressures, rel=2e-5, abs=1e-6)
-    assert moving.times == pytest.approx(0.12)
-    volumes = np.array([single.pose.volumes for single in singles])
-    assert moving.poses.volumes == pytest.approx(volumes, abs=0.01)
-
-
 @pytest.mark.parametrize("load", [{}, {"tip_load": (0.0, 0.0, -0.002)}])
 def test_a_state_that_takes_many_steps_is_solved_alone(
     three: Stack, load: dict[str, Any], monkeypatch: pytest.MonkeyPatch
@@ -154,19 +94,6 @@ def test_a_state_that_takes_many_steps_is_solved_alone(
     moving = StackBatch(three).motion(1, **load)
     moving.step(0.02, [[5.0, 1.0, 0.0]])
     assert moving.tips[0] == pytest.approx(expected, abs=1e-3)
-
-
-@pytest.mark.parametrize("line", [Line(AIR), Line(WATER)])
-def test_flows_of_many_are_those_of_one(line: Line) -> None:
-    sources, chambers = np.meshgrid([0.0, 1e-3, 0.5, 10.0, 60.0], [0.0, 2e-3, 0.6, 10.0, 50.0])
-    flows, rates = line.flows(sources, chambers)
-    step = 1e-7
-    for at in np.ndindex(sources.shape):
-        source, chamber = float(sources[at]), float(chambers[at])
-        assert flows[at] == pytest.approx(line.flow(source, chamber), rel=1e-9)
-        if source != chamber:
-            ends = line.flow(source, chamber + step), line.flow(source, chamber - step)
-            assert rates[at] == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-3)
 
 
 @pytest.mark.parametrize(
