@@ -240,8 +240,8 @@ def linearised(
             stiff = (now.touch.stiff * now.touch.touches)[:WALL_POINTS]
             push = (stiff @ now.deeper(now.touch)[:WALL_POINTS]).reshape(-1, 3)
             hardness = float(stiff.sum())
-    films, _ = each.slopes(freedoms)
-    _, filling, swelling = each.volumes(freedoms)
+    films, filling = each.order(freedoms, [0, 1])[1]
+    swelling, _ = each.order(freedoms, 2, with_rates=False)
     return Linearised(
         freedoms,
         matrices,

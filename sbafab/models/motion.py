@@ -184,7 +184,8 @@ class SupplyStep(NamedTuple):
         stack, count = self.stack, len(p)
         springs = stack.springs(p, True, by_level=self.load is not None, orders=3)
         now = tangent(stack, springs, self.load, at)
-        volumes, filling, swelling = springs.volumes(at)
+        volumes, filling = springs.order(at, 1)
+        swelling, _ = springs.order(at, 2, with_rates=False)
         pulls = np.concatenate([filling, -now.gradient.reshape(*at.shape[:2], 1, 3)], axis=2)
         moves = now.solved(pulls.swapaxes(2, 3).reshape(count, now.gradient.shape[1], -1))
         counts = stack.row_counts[self.load is None]

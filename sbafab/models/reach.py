@@ -309,7 +309,7 @@ class Search:
         """
         (count, size), touch = now.gradient.shape, now.touch
         tip, motions = now.top(self.stack, run.at)
-        by_pressure = now.springs.slopes(run.at)[1].swapaxes(-1, -2)
+        by_pressure = now.springs.order(run.at, 1)[1].swapaxes(-1, -2)
         filling = (by_pressure * (P0 * np.cosh(run.x))[:, None, None]).reshape(count, size, -1)
         if touch is None:
             moves = now.solved(np.concatenate([-now.gradient[..., None], filling], -1))

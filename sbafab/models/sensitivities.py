@@ -241,5 +241,5 @@ def _held(
     acting = other.acting(load) or Load(np.zeros(3), None, None)
     now = loaded_energy(springs, other.pitch, acting, freedoms, forces)
     deep = np.zeros(0) if now.touch is None else now.touch.deep
-    volumes = springs.contents(freedoms)[0].sum(0)
+    volumes = springs.order(freedoms, 1, with_rates=False)[0].sum(0)
     return now.gradient.reshape(-1, 3), volumes, now.plates.tip, deep

@@ -257,9 +257,9 @@ class Stack:
         if springs is None:
             springs = self.springs(pressures, sucked, by_level=load is not None)
         counts = self.row_counts[load is None]
-        each, stored = springs.contents(found.freedoms)
+        stored, each = springs.order(found.freedoms, [0, 1], with_rates=False)[0]
         volumes = counts @ each
-        energies = stored @ counts + (pressures * volumes).sum(-1)
+        energies = stored.sum(-1) @ counts + (pressures * volumes).sum(-1)
         excess = self.excess(found.freedoms, load)
         return Equilibria(pressures, found.freedoms, volumes, energies, *found[1:], excess)
 

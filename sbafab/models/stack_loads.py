@@ -15,7 +15,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon_map import DEGREE, BalloonMap, horner
@@ -328,48 +328,22 @@ class Springs:
             matrix += stiffer
         return value, gradient, matrix
 
-    def _orders(
-        self, freedoms: Array, first: int, last: int, with_rates: bool = True
+    def order(
+        self, freedoms: Array, number: ArrayLike, with_rates: bool = True
     ) -> tuple[Array, Array]:
-        """Return potentials (order 0), volumes (1) and their rates by pressure (2) from ``first``
-        to ``last``, without contacts, at each point of the rings, and their derivatives by height:
-        (orders, ..., rows, points) each.
+        """Return of each balloon its potential (order 0), its volume in ul (1) or the volume's rate
+        by pressure with all plates held (2), without contacts: (..., rows, chambers); and this by
+        its level's freedoms: (..., rows, chambers, 3). Several orders come first.
         """
         gaps = by_row(freedoms, self.places.meet)[..., : len(self.places.chambers)]
-        steps = self.step * np.arange(first, last + 1)
+        steps = self.step * np.asarray(number)
         begins = self.begins + steps[(..., *(None,) * self.begins.ndim)]
-        return horner(self.table, begins, gaps, self.stride, with_rates)[:2]
-
-    def _by_freedoms(self, rates: Array) -> Array:
-        """Return rates (..., rows, points) by height as those of each balloon by its level's
-        freedoms: (..., rows, chambers, 3).
-        """
+        values, rates, _ = horner(self.table, begins, gaps, self.stride, with_rates)
+        value = values.reshape(*values.shape[:-1], -1, RING_POINTS).mean(-1)
+        if not with_rates:
+            return value, np.zeros(0)
         by_point = rates[..., None] * self.places.ring
-        return np.asarray(by_point.reshape(*rates.shape[:-1], -1, RING_POINTS, 3).sum(-2))
-
-    def slopes(self, freedoms: Array) -> tuple[Array, Array]:
-        """Return by each freedom the potential of each balloon in mN (or mN mm), without contacts,
-        and its volume in ul: (..., rows, chambers, 3) each.
-        """
-        films, filling = self._by_freedoms(self._orders(freedoms, 0, 1)[1])
-        return films, filling
-
-    def contents(self, freedoms: Array) -> tuple[Array, Array]:
-        """Return ul in each balloon (..., rows, chambers), and the potential of each row."""
-        (stored, volumes), _ = self._orders(freedoms, 0, 1, with_rates=False)
-        return _by_chamber(volumes), stored @ self.places.shares
-
-    def volumes(self, freedoms: Array) -> tuple[Array, Array, Array]:
-        """Return ul in each balloon (..., rows, chambers), its rates by freedoms (..., rows,
-        chambers, 3), and by pressure with all plates held (..., rows, chambers).
-        """
-        (values, swelling), (first, _) = self._orders(freedoms, 1, 2)
-        return _by_chamber(values), self._by_freedoms(first), _by_chamber(swelling)
-
-
-def _by_chamber(values: Array) -> Array:
-    """Return the mean over the points of each balloon's ring: (..., chambers)."""
-    return np.asarray(values.reshape(*values.shape[:-1], -1, RING_POINTS).mean(-1))
+        return value, by_point.reshape(*rates.shape[:-1], -1, RING_POINTS, 3).sum(-2)
 
 
 # External loads, and the energy of a stack under them.
