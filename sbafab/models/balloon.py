@@ -53,6 +53,8 @@ PLATE_STIFFNESS = 20_000.0
 """Penalty of a plate: the pressure on the film presses it in by 1 / PLATE_STIFFNESS mm."""
 FEW = 4
 """Number of balloons up to which solving by blocks is faster than all rows together."""
+BAND = 6
+"""Coordinates that a film couples, from each one on."""
 WRINKLE_ROUNDS = 3
 """Iterations between the shape and the wrinkles' stress, which depends on the tension."""
 
@@ -394,7 +396,16 @@ def _motion(films: Films, is_free: bool) -> FilmMotion:
         widening = math.log((balloon.pocket + balloon.ring) / balloon.pocket)
         twist[shared + len(rim)] = math.tau * bonded_bending_stiffness(films) * widening
     inverse = np.asarray(np.linalg.pinv(bases.reshape(-1, count)), dtype=float)
-    return FilmMotion(bases, inverse, least_energy.packing(bases, 6, 2 * rim), twist)
+    # Entries of each film: those of its band, and of the rim's radii, which ripples couple.
+    first, second = np.divmod(np.arange(bases.shape[1] * BAND), BAND)
+    first = np.concatenate([first, np.repeat(2 * rim, len(rim))])
+    second = np.concatenate([first[: len(second)] + second, np.tile(2 * rim, len(rim))])
+    good = np.flatnonzero((second < bases.shape[1]) & (first <= second))
+    part = np.repeat(np.arange(several), len(good))
+    source = np.tile(good, several)
+    i, j = first[source], second[source]
+    packing = least_energy.packing(bases, source + part * len(first), part, i, j, i != j)
+    return FilmMotion(bases, inverse, packing, twist)
 
 
 class FilmEnergy:

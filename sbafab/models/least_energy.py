@@ -4,6 +4,7 @@ linear algebra (banded solvers, safeguarded steps).
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -128,14 +129,14 @@ def solve(band: Array, right_side: Array) -> Array:
         full[1:, reach:], (size, reach, reach, rows), (step, step - across, across, row)
     )
     lower, pivots = np.empty((size, reach, 1, rows)), np.empty((size, 1, rows))
-    product, side = np.empty((reach, reach, rows)), np.empty((reach, *several.shape[1:]))
+    square, side = np.empty((reach, reach, rows)), np.empty((reach, *several.shape[1:]))
     for i in range(size):
         right = full[i, reach + 1 :]
         pivot = np.abs(full[i, reach], out=pivots[i, 0])
         share = lower[i]
         np.divide(right, pivot, out=share[:, 0])
-        np.multiply(share, right, out=product)
-        squares[i] -= product
+        np.multiply(share, right, out=square)
+        squares[i] -= square
         np.multiply(share, solution[i], out=side)
         solution[i + 1 : i + width] -= side
     solution[:size] /= pivots
@@ -208,30 +209,36 @@ class Packing(NamedTuple):
         return whole.reshape(*self.shape, -1)
 
 
-def packing(bases: Array, width: int, block: NDArray[np.int_]) -> Packing:
-    """Return the map from bands of parts to the band of their unknowns, by the motion of each
-    part's coordinates by a unit of each unknown, ``bases`` (parts, coordinates, unknowns).
+def packing(
+    bases: Array,
+    source: NDArray[np.int_],
+    part: NDArray[np.int_],
+    first: NDArray[np.int_],
+    second: NDArray[np.int_],
+    is_pair: NDArray[np.bool_],
+) -> Packing:
+    """Return the map of entries to the band of unknowns, by the motion of each part's coordinates
+    by a unit of each unknown, ``bases`` (parts, coordinates, unknowns).
 
-    Entries are, part after part, those of its band (coordinates, ``width``), and of the matrix of
-    the coordinates in ``block``, which couples them further.
+    An entry, a number in ``source``, couples the coordinates ``first`` and ``second`` of a part; a
+    pair stands for the second with the first as well.
     """
-    size, count = bases.shape[1:]
-    band = np.add.outer(np.arange(size), np.arange(width))
-    first = np.concatenate([np.repeat(np.arange(size), width), np.repeat(block, len(block))])
-    second = np.concatenate([band.ravel(), np.tile(block, len(block))])
+    most = int((bases != 0).sum(-1).max())
+    columns = np.argsort(bases == 0, axis=-1, kind="stable")[..., :most]
+    weights = np.take_along_axis(bases, columns, -1)
     found = []
-    for part, basis in enumerate(bases):
-        for entry in np.flatnonzero((second < size) & (first <= second)).tolist():
-            i, j = first[entry], second[entry]
-            for a in np.flatnonzero(basis[i]).tolist():
-                for b in np.flatnonzero(basis[j]).tolist():
-                    weight = basis[i, a] * basis[j, b] * (2 if i != j and a == b else 1)
-                    if i != j or a <= b:
-                        found.append((min(a, b), abs(a - b), part * len(first) + entry, weight))
-    row, off, source, weight = (np.array(each) for each in zip(*sorted(found), strict=True))
+    for one, other in product(range(most), repeat=2):
+        a, b = columns[part, first, one], columns[part, second, other]
+        weight = weights[part, first, one] * weights[part, second, other]
+        good = (weight != 0) & (is_pair | (a <= b))
+        twice = np.where(is_pair & (a == b), 2.0, 1.0)
+        each = np.minimum(a, b), np.abs(a - b), source, weight * twice
+        found.append([values[good] for values in each])
+    row, off, sources, weight = (np.concatenate(each) for each in zip(*found, strict=True))
     wide = int(off.max()) + 1
-    into, starts = np.unique(row * wide + off, return_index=True)
-    return Packing(source, weight, starts, into, (count, wide))
+    order = np.argsort(row * wide + off, kind="stable")
+    into, starts = np.unique((row * wide + off)[order], return_index=True)
+    return Packing(sources[order], weight[order], starts, into, (bases.shape[2], wide))
 
 
 def dense(band: Array) -> Array:

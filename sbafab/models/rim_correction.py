@@ -51,14 +51,6 @@ def first_of(overtone: int) -> int:
     return 3 * overtone - 1
 
 
-class BlockPacking(NamedTuple):
-    """Index map from entries of node blocks to a band of a size."""
-
-    from_: NDArray[np.int_]
-    into: NDArray[np.int_]
-    size: tuple[int, int]
-
-
 @dataclass(frozen=True, eq=False)
 class Waving:
     """Kinematics of a balloon with a number of waves round its rim.
@@ -125,46 +117,52 @@ class Waving:
         return np.flatnonzero(self.is_free.ravel())
 
     @cached_property
-    def tail(self) -> Array:
-        """Places of the last film element's two nodes, and of the rim's, by the last freedoms:
-        (nodes x places, freedoms).
+    def ends(self) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+        """Numbers of each element's ends in the chain of the film's nodes, then the rim's: at the
+        pocket's edge each has one of its own.
         """
-        balloon, edge = self.balloon, self.balloon.edge
-        free = self.is_free[edge - 1 :]
-        number = np.where(free, np.cumsum(free).reshape(free.shape) - 1, -1)
-        rim = len(balloon.nodes) - edge
-        tail = np.zeros((2 + rim, PLACES, int(free.sum())))
-        for node, of in enumerate([0, 1, *range(1, 1 + rim)]):
-            places = np.flatnonzero(number[of] >= 0)
-            if node >= 2:
-                places = places[(places != EDGE) & (places != UP)]
-            tail[node, places, number[of, places]] = 1.0
-        # The section tilts: by -2 / thickness for each mm that the film's end goes out.
-        tail[2:, UP, number[1, UP]] = 1.0
-        tail[2:, UP, number[1, EDGE]] = (
-            -2 * (balloon.nodes[edge:] - balloon.pocket) / balloon.thickness
-        )
-        return tail.reshape(-1, tail.shape[-1])
+        elements = np.arange(len(self.balloon.nodes) - 1)
+        first = elements + (elements >= self.balloon.edge)
+        return first, first + 1
 
     @cached_property
-    def packing(self) -> BlockPacking:
-        """Index map of blocks: of each node, with the next, and with the one after that."""
-        nodes = len(self.is_free)
-        number = np.full(self.is_free.size, -1)
-        number[self.freedoms] = np.arange(len(self.freedoms))
-        by_node = number.reshape(nodes, PLACES)
-        from_, row, off, begin = [], [], [], 0
-        for apart in range(3):
-            first = np.repeat(by_node[: nodes - apart, :, None], PLACES, 2)
-            second = np.repeat(by_node[apart:, None, :], PLACES, 1)
-            good = (first >= 0) & (second >= first)
-            from_.append(begin + np.flatnonzero(good))
-            row.append(first[good])
-            off.append((second - first)[good])
-            begin += first.size
-        width = max(int(each.max()) for each in off) + 1
-        into = np.concatenate(row) * width + np.concatenate(off)
-        return BlockPacking(np.concatenate(from_), into, (len(self.freedoms), width))
+    def motion(self) -> Array:
+        """Places of the chain's nodes by the freedoms: (nodes x places, freedoms)."""
+        balloon, edge = self.balloon, self.balloon.edge
+        number = np.where(self.is_free, np.cumsum(self.is_free).reshape(self.is_free.shape) - 1, -1)
+        node_of = np.concatenate([np.arange(edge + 1), np.arange(edge, len(balloon.nodes))])
+        motion = np.zeros((len(node_of), PLACES, len(self.freedoms)))
+        node, place = np.nonzero(self.is_free[node_of])
+        motion[node, place, number[node_of[node], place]] = 1.0
+        # The neck stays level.
+        motion[: balloon.neck_edge, Z, number[balloon.neck_edge, Z]] = 1.0
+        # The section tilts: by -2 / thickness for each mm that the film's end goes out.
+        tilt = -2 * (balloon.nodes[edge:] - balloon.pocket) / balloon.thickness
+        rim = motion[edge + 1 :]
+        rim[:, [EDGE, UP]] = 0.0
+        rim[:, UP, number[edge, UP]], rim[:, UP, number[edge, EDGE]] = 1.0, tilt
+        return motion.reshape(-1, motion.shape[-1])
+
+    @cached_property
+    def packing(self) -> least_energy.Packing:
+        """Index map to the band of freedoms, from blocks of places: of each node; of each element's
+        ends; and of those of each two neighbours up to the rim's first element, first with first,
+        first with second, second with first, second with second.
+        """
+        first, second = self.ends
+        nodes, before, behind = np.arange(len(self.motion) // PLACES), first[:-1], first[1:]
+        edge = self.balloon.edge
+        pairs = [(nodes, nodes), (first, second)]
+        pairs += [((before + a)[:edge], (behind + b)[:edge]) for a in (0, 1) for b in (0, 1)]
+        rows, columns = (PLACES * np.concatenate(each) for each in zip(*pairs, strict=True))
+        place = np.arange(PLACES)
+        i = np.broadcast_to(rows[:, None, None] + place[:, None], (len(rows), PLACES, PLACES))
+        j = np.broadcast_to(columns[:, None, None] + place, i.shape)
+        is_diagonal = (np.arange(len(rows)) < len(nodes))[:, None, None]
+        good = np.flatnonzero(~is_diagonal | (i <= j))
+        is_pair = ~(is_diagonal & (i == j)).ravel()[good]
+        i, j = i.ravel()[good], j.ravel()[good]
+        return least_energy.packing(self.motion[None], good, np.zeros_like(i), i, j, is_pair)
 
     @cached_property
     def plate(self) -> Array:
@@ -204,89 +202,45 @@ class Parts(NamedTuple):
     means: Array
 
 
-class Sums:
-    """An energy's derivatives assembled by node: ``by_node`` (rows, nodes, places), and second ones
-    of each node, ``diagonal``, with the ``next`` one and with the one ``after`` that.
+class Sums(NamedTuple):
+    """An energy's derivatives by the places of nodes in the chain: ``by_node`` (rows, nodes,
+    places), and second ones of each node, ``diagonal``, across each element, and of neighbours by
+    their changes, over their lengths (``kinks``).
     """
 
-    def __init__(self, of: Waving, parts: Parts, kinks: Array) -> None:
+    by_node: Array
+    diagonal: Array
+    across: Array
+    kinks: Array
+
+    @classmethod
+    def of(cls, of: Waving, parts: Parts, kinks: Array) -> Sums:
         """Assemble parts; ``kinks`` (rows, elements - 1, places, places) couple neighbours."""
-        self.of = of
-        nodes, edge = len(of.balloon.nodes), of.balloon.edge
+        (first, second), edge = of.ends, of.balloon.edge
         one_over = 1 / of.balloon.film.lengths[:, None]
         by_change, by_mean = parts.by_change * one_over, parts.by_mean / 2
         changes = parts.changes * (one_over**2)[:, None]
         mixed, quarter = parts.mixed * one_over[:, None] / 2, parts.means / 4
-        turned = mixed.swapaxes(2, 3)
-        inner, outer = by_mean - by_change, by_mean + by_change
-        first, second = changes - mixed - turned + quarter, changes + mixed + turned + quarter
-        across = quarter - changes - mixed + turned
-        kinks = kinks * (one_over[:-1] * one_over[1:])[:, None]
-        count = len(by_mean)
-        self.by_node = np.zeros((count, nodes, PLACES))
-        self.by_node[:, :edge] += inner[:, :edge]
-        self.by_node[:, 1 : edge + 1] += outer[:, :edge]
-        self.diagonal = np.zeros((count, nodes, PLACES, PLACES))
-        self.diagonal[:, :edge] += first[:, :edge]
-        self.diagonal[:, 1 : edge + 1] += second[:, :edge]
-        self.next = np.zeros((count, nodes - 1, PLACES, PLACES))
-        self.next[:, :edge] += across[:, :edge]
-        self.after = np.zeros((count, nodes - 2, PLACES, PLACES))
-        inside = kinks[:, : edge - 1]
-        self.diagonal[:, 1:edge] -= inside + inside.swapaxes(2, 3)
-        self.next[:, 1:edge] += inside
-        self.next[:, : edge - 1] += inside
-        self.after[:, : edge - 1] -= inside
-        self._rim(
-            inner[:, edge:],
-            outer[:, edge:],
-            (first[:, edge:], second[:, edge:]),
-            across[:, edge:],
-            kinks[:, edge - 1],
-        )
+        turned, count = mixed.swapaxes(2, 3), second[-1] + 1
+        by_node = np.zeros((len(by_mean), count, PLACES))
+        by_node[:, first] += by_mean - by_change
+        by_node[:, second] += by_mean + by_change
+        diagonal = np.zeros((len(by_mean), count, PLACES, PLACES))
+        diagonal[:, first] += changes - mixed - turned + quarter
+        diagonal[:, second] += changes + mixed + turned + quarter
+        between = kinks[:, :edge] * (one_over[:edge] * one_over[1 : edge + 1])[:, None]
+        return cls(by_node, diagonal, quarter - changes - mixed + turned, between)
 
-    def _rim(
-        self, inner: Array, outer: Array, diagonal: tuple[Array, Array], across: Array, kink: Array
-    ) -> None:
-        """Assemble the rim, and the kink between it and the film, by the last freedoms."""
-        tail, rim = self.of.tail, inner.shape[1]
-        by = np.zeros((len(inner), rim + 3, PLACES))
-        by[:, 2:-1] += inner
-        by[:, 3:] += outer
-        whole = np.zeros((len(inner), rim + 3, PLACES, rim + 3, PLACES))
-        for i in range(rim):
-            a, b = 2 + i, 3 + i
-            whole[:, a, :, a] += diagonal[0][:, i]
-            whole[:, b, :, b] += diagonal[1][:, i]
-            whole[:, a, :, b] += across[:, i]
-            whole[:, b, :, a] += across[:, i].swapaxes(1, 2)
-        for a, b, sign in ((0, 2, 1), (0, 3, -1), (1, 2, -1), (1, 3, 1)):
-            whole[:, a, :, b] += sign * kink
-            whole[:, b, :, a] += sign * kink.swapaxes(1, 2)
-        size = len(tail)
-        self.by_tail = by.reshape(-1, size) @ tail
-        self.tails = tail.T @ whole.reshape(-1, size, size) @ tail
-
-    def by_freedoms(self) -> tuple[Array, Array]:
+    def by_freedoms(self, of: Waving) -> tuple[Array, Array]:
         """Return the gradient by coordinate (nodes x places, rows), 0 for fixed ones, and the
         tangent stiffness as a band (freedoms, width, rows).
         """
-        of, how = self.of, self.of.packing
         count = len(self.by_node)
-        slopes = np.where(of.is_free.ravel()[:, None], self.by_node.reshape(count, -1).T, 0.0)
-        ends = len(self.by_tail[0])
-        slopes[of.freedoms[-ends:]] += self.by_tail.T
-        blocks = np.concatenate(
-            [part.reshape(count, -1) for part in (self.diagonal, self.next, self.after)], 1
-        )
-        size, width = how.size
-        flat = np.zeros((size * width, count))
-        flat[how.into] = blocks[:, how.from_].T
-        band = flat.reshape(size, width, count)
-        for k in range(min(ends, width)):
-            number = np.arange(ends - k)
-            band[size - ends + number, k] += self.tails[:, number, number + k].T
-        return slopes, band
+        slopes = np.zeros((of.is_free.size, count))
+        slopes[of.freedoms] = of.motion.T @ self.by_node.reshape(count, -1).T
+        blocks = [self.diagonal, self.across, self.kinks, -self.kinks, -self.kinks, self.kinks]
+        entries = np.concatenate([part.reshape(count, -1) for part in blocks], axis=1)
+        return slopes, of.packing.band(entries.T)
 
 
 # The energy of one film and its share of the rim.
@@ -364,13 +318,9 @@ class Waves:
     def total(self, x: Array, rows: NDArray[np.int_]) -> WaveTotal:
         """Return the energy at coordinates ``x`` of these rows."""
         of, balloon = self.of, self.of.balloon
-        p, neck_edge, edge = self.pressure[rows], balloon.neck_edge, balloon.edge
-        places = x.reshape(len(balloon.nodes), PLACES, -1).transpose(2, 0, 1).copy()
-        places[:, :neck_edge, Z] = places[:, neck_edge, None, Z]
-        ends = of.tail.shape[1]
-        rim = (of.tail @ x[of.freedoms[-ends:]]).T.reshape(len(p), -1, PLACES)
-        inner = np.concatenate([places[:, :edge], rim[:, 2:-1]], 1)
-        outer = np.concatenate([places[:, 1 : edge + 1], rim[:, 3:]], 1)
+        p, edge = self.pressure[rows], balloon.edge
+        places = (of.motion @ x[of.freedoms]).T.reshape(len(p), -1, PLACES)
+        inner, outer = (places[:, end] for end in of.ends)
         change, mean = (outer - inner) / balloon.film.lengths[:, None], (outer + inner) / 2
         slices = self._slices(change, mean)
         stored = self._stretched(slices)
@@ -378,7 +328,7 @@ class Waves:
         volume = self._air(slices, p)
         parts = self._parts(slices, change, mean)
         stored = stored + bent + self._waves_bend(parts, rows) + self._plate_bends(parts)
-        sums = Sums(of, parts, self._joined(kinks))
+        sums = Sums.of(of, parts, self._joined(kinks))
         volume = volume + self._inner_face(sums, places, p) + self._lid(sums, places, p)
         # The film's end, and with it the whole film, comes down as the rim tilts.
         down = p * math.pi * balloon.pocket**2 / (2 * balloon.thickness)
@@ -386,7 +336,7 @@ class Waves:
         sums.by_node[:, edge, EDGE] += 2 * down * end
         sums.diagonal[:, edge, EDGE, EDGE] += 2 * down
         energy = stored - p * volume + down * end**2
-        return WaveTotal(energy, *sums.by_freedoms(), stored, volume)
+        return WaveTotal(energy, *sums.by_freedoms(of), stored, volume)
 
     def _slices(self, change: Array, mean: Array) -> Slices:
         """Return the rates in each slice, with all derivatives 0."""
@@ -512,21 +462,13 @@ class Waves:
             (by.reshape(*size, -1) @ pair).reshape(*size, PLACES, PLACES)
             for by, pair in zip((at.alongs, at.mixed, at.arounds), of.products, strict=False)
         )
-        parts = Parts(change, mean, first, second, *blocks)
-        # The neck stays level.
-        neck_edge = of.balloon.neck_edge
-        parts.by_change[:, :neck_edge, Z] = parts.changes[:, :neck_edge, Z] = parts.changes[
-            :, :neck_edge, :, Z
-        ] = 0.0
-        parts.mixed[:, :neck_edge, Z] = 0.0
-        return parts
+        return Parts(change, mean, first, second, *blocks)
 
     def _joined(self, kinks: Array) -> Array:
         """Return the coupling of neighbours' changes: (rows, elements - 1, places, places)."""
         size = kinks.shape[:2]
-        blocks = (kinks.reshape(*size, -1) @ self.of.products[3]).reshape(*size, PLACES, PLACES)
-        blocks[:, : self.of.balloon.neck_edge, Z] = 0.0
-        return blocks
+        blocks = kinks.reshape(*size, -1) @ self.of.products[3]
+        return np.asarray(blocks.reshape(*size, PLACES, PLACES))
 
     def _waves_bend(self, parts: Parts, rows: NDArray[np.int_]) -> Array:
         """Add the bending of films round the hoop, wave by wave, and return its energy: (rows,)."""
@@ -567,29 +509,28 @@ class Waves:
     def _inner_face(self, sums: Sums, places: Array, p: Array) -> Array:
         """Add the volume between the film's middle and its inner face; return it in ul."""
         balloon = self.of.balloon
-        lie = Elements.of(places[:, :, R], places[:, :, Z])
+        film = slice(balloon.edge + 1)
+        lie = Elements.of(places[:, film, R], places[:, film, Z])
         thick, thin = (
             air_volume(replace(balloon.film, thickness=by), balloon.edge, lie)
             for by in (balloon.thickness, 0.0)
         )
         slopes = [a - b for a, b in zip(thick.slopes, thin.slopes, strict=True)]
         curves = [a - b for a, b in zip(thick.curves, thin.curves, strict=True)]
-        none = np.zeros((len(p), balloon.edge))
-        size = (len(p), len(balloon.nodes), 2)
-        sums.by_node[:, :, :2] -= p[:, None, None] * assembled_gradient(slopes).T.reshape(size)
+        none = np.zeros((len(p), balloon.edge - 1))
+        size = (len(p), balloon.edge + 1, 2)
+        sums.by_node[:, film, :2] -= p[:, None, None] * assembled_gradient(slopes).T.reshape(size)
         band = -p[:, None, None] * assembled_tangent(curves, [none] * 4).transpose(2, 0, 1)
         r, z = band[:, 0::2], band[:, 1::2]
-        sums.diagonal[:, :, R, R] += r[:, :, 0]
-        sums.diagonal[:, :, Z, Z] += z[:, :, 0]
-        sums.diagonal[:, :, R, Z] += r[:, :, 1]
-        sums.diagonal[:, :, Z, R] += r[:, :, 1]
+        for i, j, by in ((R, R, r[:, :, 0]), (Z, Z, z[:, :, 0]), (R, Z, r[:, :, 1])):
+            sums.diagonal[:, film, i, j] += by
         for i, j, by in (
             (R, R, r[:, :, 2]),
             (R, Z, r[:, :, 3]),
             (Z, R, z[:, :, 1]),
             (Z, Z, z[:, :, 2]),
         ):
-            sums.next[:, :, i, j] += by[:, :-1]
+            sums.across[:, : balloon.edge, i, j] += by[:, :-1]
         return thick.energy - thin.energy
 
     def _lid(self, sums: Sums, places: Array, p: Array) -> Array:
@@ -601,7 +542,6 @@ class Waves:
         sums.by_node[:, neck_edge, Z] += press * r**2
         sums.diagonal[:, neck_edge, R, R] += 2 * press * z
         sums.diagonal[:, neck_edge, R, Z] += 2 * press * r
-        sums.diagonal[:, neck_edge, Z, R] += 2 * press * r
         return np.asarray(math.pi * r**2 * z)
 
 

@@ -383,8 +383,9 @@ def _rung_of_paper(balloon: Balloon, waves: int, k: int) -> Rung:
     x = _continued(of, x, p[0] / STEP, p[0])
     rows = np.arange(x.shape[1])
     energy = Waves(of, np.repeat(p, len(rows)), _normals(of, x)).total(x, rows).energy
-    best = int(energy.argmin())
-    return Rung(x[:, best], in_step or energy[best] < energy[0] * (1 + CLEARLY))
+    # Of equal ones the plain start's: its waves are of the branch below.
+    gains = bool(energy[-1] < energy[0] * (1 + CLEARLY))
+    return Rung(x[:, -1 if gains else 0], in_step or gains)
 
 
 def _film_wave(of: Waving) -> Array:
