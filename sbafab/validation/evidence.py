@@ -234,8 +234,8 @@ class Evidence(Section):
     missing: Sentences = ()
 
     def curve(self, name: str) -> MeasuredCurve:
-        """Return the curve of an id. Raises StopIteration without one."""
-        return next(curve for curve in self.curves if curve.id == name)
+        """Return the curve of an id. Raises KeyError without one."""
+        return {curve.id: curve for curve in self.curves}[name]
 
 
 class _EvidenceFile(Section):
@@ -263,8 +263,8 @@ def load_evidence(source: str | Path) -> Evidence:
     path = Path(source)
     if path.suffix.lower() not in (".toml", ".csv"):
         raise DesignError(
-            f"{shown(source)} is neither evidence that ships ({', '.join(evidence_ids())}) nor a "
-            f"file that ends in .toml or .csv; {hint(str(source), evidence_ids())}"
+            f"{shown(source)} is neither evidence that ships nor a file that ends in .toml or "
+            f".csv; {hint(str(source), evidence_ids())}"
         )
     return read_csv(path) if path.suffix.lower() == ".csv" else read_evidence(path)
 

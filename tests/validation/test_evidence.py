@@ -210,7 +210,7 @@ def test_faults_of_a_file_are_one_sentence(
 
 
 def test_no_such_source_says_what_there_is() -> None:
-    with pytest.raises(DesignError, match=r"neither evidence that ships \(paper, .*mean paper\?"):
+    with pytest.raises(DesignError, match=r"neither evidence that ships .*mean paper\?"):
         load_evidence("papr")
     with pytest.raises(DesignError, match="cannot be read"):
         load_evidence("none-here.csv")
