@@ -10,9 +10,10 @@ number of balloons, more is assumed to be missed.
 
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
@@ -24,7 +25,6 @@ from sbafab.design.files import checked, listed, read_toml, shown
 from sbafab.design.toml_table import Section
 from sbafab.errors import DesignError
 from sbafab.models.figures import Factors
-from sbafab.models.priors import UNKNOWNS
 
 FOLDER = Path(__file__).parent / "calibrations"
 NONE: Literal["none"] = "none"
@@ -61,6 +61,54 @@ def _hull(first: Ends | None, second: Ends | None) -> Ends | None:
     if first is None or second is None:
         return first or second
     return min(first[0], second[0]), max(first[1], second[1])
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One unknown of the models; ``field`` names the field of ``Factors``.
+
+    The prior is normal in the coordinate, which is the logarithm of the value (``is_log``) or the
+    value itself: ``middle`` is the value at its mean, ``spread`` its standard deviation in the
+    coordinate, and ``source`` its reason. Values lie from ``least`` to ``most``.
+    """
+
+    field: str
+    title: str
+    unit: str
+    is_log: bool
+    middle: float
+    spread: float
+    least: float
+    most: float
+    source: str
+
+    def coordinate(self, value: float) -> float:
+        """Return the coordinate of a value."""
+        return math.log(value) if self.is_log else value
+
+    def value(self, coordinate: float) -> float:
+        """Return the value at a coordinate, within its bounds."""
+        value = math.exp(coordinate) if self.is_log else coordinate
+        return min(max(value, self.least), self.most)
+
+    def shown(self, value: float) -> str:
+        """Return a value to three digits, with its unit."""
+        return f"{value:.3g} {self.unit}".rstrip()
+
+
+def _priors() -> Iterator[Unknown]:
+    with Path(__file__).with_name("priors.csv").open(encoding="utf-8", newline="") as opened:
+        for cells in csv.DictReader(opened):
+            middle, spread, least, most = (
+                float(cells[name]) for name in ("middle", "spread", "least", "most")
+            )
+            names = cells["field"], cells["title"], cells["unit"]
+            is_log, source = cells["is_log"] == "yes", cells["source"]
+            yield Unknown(*names, is_log, middle, spread, least, most, source)
+
+
+UNKNOWNS = tuple(_priors())
+"""What calibration estimates, in the order of a calibration's mean and covariance."""
 
 
 _Size = Annotated[int | float, Field(gt=0)]

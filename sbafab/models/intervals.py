@@ -20,6 +20,7 @@ from sbafab.laminate.lay_up import folded_height
 from sbafab.models.calibrated import (
     DESIGN_UNKNOWNS,
     SHARE,
+    UNKNOWNS,
     ModelCalibration,
     SizeRange,
     deviations,
@@ -27,7 +28,6 @@ from sbafab.models.calibrated import (
 )
 from sbafab.models.figures import EXTRAPOLATION, Factors, Figure, Flag, LeftOut
 from sbafab.models.paper import BALLOONS, CALIBRATED_MODELS
-from sbafab.models.priors import UNKNOWNS
 from sbafab.models.quantity import FigureKey, Quantity
 
 Items = Sequence[Figure | LeftOut]

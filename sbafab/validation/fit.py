@@ -14,11 +14,10 @@ import numpy as np
 import tomli_w
 
 from sbafab.errors import DesignError
-from sbafab.models.calibrated import GROUPS, SHARE, ModelCalibration, SizeRange
+from sbafab.models.calibrated import GROUPS, SHARE, UNKNOWNS, ModelCalibration, SizeRange
 from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
 from sbafab.models.intervals import sizes_of
-from sbafab.models.priors import UNKNOWNS
 from sbafab.process import Progress
 from sbafab.validation.evidence import Evidence, MeasuredCurve
 from sbafab.validation.model_values import ModelledActuator, ModelValues, NoModel, model_values

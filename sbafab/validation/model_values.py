@@ -21,13 +21,13 @@ from sbafab.models import elastic, paper
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
+from sbafab.models.calibrated import UNKNOWNS
 from sbafab.models.figures import Factors, Figure, PredictionRequest
 from sbafab.models.film_elements import Array
 from sbafab.models.formulas import modulus, second_moments, usual_pressures
 from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line
 from sbafab.models.pocket_models import Actuator, actuator
 from sbafab.models.prediction import plate_of, predict
-from sbafab.models.priors import UNKNOWNS
 from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count
 from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack

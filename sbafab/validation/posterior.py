@@ -20,9 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.calibrated import GROUPS
+from sbafab.models.calibrated import GROUPS, UNKNOWNS
 from sbafab.models.film_elements import Array
-from sbafab.models.priors import UNKNOWNS
 
 SHARED = 0.5
 """Share of the discrepancy's variance that the points of a curve have in common."""

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.models.calibrated import GROUPS
-from sbafab.models.priors import UNKNOWNS
+from sbafab.models.calibrated import GROUPS, UNKNOWNS
 from sbafab.validation.posterior import (
     NODE_COORDINATES,
     SCALE_MIDDLE,

@@ -15,6 +15,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import balloon_map
 from sbafab.models.calibrated import (
+    UNKNOWNS,
     ModelCalibration,
     deviations,
     load_calibration,
@@ -22,7 +23,6 @@ from sbafab.models.calibrated import (
 )
 from sbafab.models.figures import Factors
 from sbafab.models.intervals import Uncertainty, calibration_of, factors_of
-from sbafab.models.priors import UNKNOWNS
 
 
 @pytest.fixture(scope="module")

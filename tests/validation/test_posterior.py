@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from docs.scripts.measured import FOLDER, record
-from sbafab.models.calibrated import GROUPS
-from sbafab.models.priors import UNKNOWNS
+from sbafab.models.calibrated import GROUPS, UNKNOWNS
 from sbafab.validation.fit import correlated
 from sbafab.validation.posterior import (
     NODE_COORDINATES,

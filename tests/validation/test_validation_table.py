@@ -8,9 +8,8 @@ import pytest
 
 from docs.scripts.tables import table
 from docs.scripts.validate import PATH, validation
-from sbafab.models.calibrated import load_calibration
+from sbafab.models.calibrated import UNKNOWNS, load_calibration
 from sbafab.models.closed_forms import eq_4, eqs_1_to_3
-from sbafab.models.priors import UNKNOWNS
 from sbafab.validation.evidence import load_evidence
 
 RESIDUAL = re.compile(r"([+-][\d.e+-]+), [+-][\d.]+%")
