@@ -188,7 +188,7 @@ def crossing(loop: Polyline) -> Point | None:
             if min(math.dist(p, end) for end in ends) > JOIN:
                 return p
     corners: set[Point] = set()
-    for edge, pieces in zip(loop, split_edges(loop).parts, strict=True):
+    for edge, pieces in zip(loop, split_edges(loop)[0], strict=True):
         start = pieces[0].start if pieces else edge.start
         if len(pieces) != 1 or start in corners:
             return pieces[0].end if len(pieces) > 1 else edge.start

@@ -85,11 +85,8 @@ class Piece(NamedTuple):
     turns: int
 
 
-class Overlay(NamedTuple):
-    """Pieces, and True if some were bent and may therefore cross uncut."""
-
-    pieces: list[Piece]
-    bent: bool
+Overlay = tuple[list[Piece], bool]
+"""Pieces, and True if some were bent and may therefore cross uncut."""
 
 
 def overlaid(owners: Sequence[Iterable[Edge]], tolerance: float = EPSILON) -> Overlay:
@@ -120,7 +117,7 @@ def overlay(
         ]
         if not bent:
             break
-    return Overlay(_merged(entries, tolerance), bent)
+    return _merged(entries, tolerance), bent
 
 
 def by_owner(turns: int, owners: int) -> list[int]:
@@ -130,11 +127,8 @@ def by_owner(turns: int, owners: int) -> list[int]:
     return [(raised >> DIGIT * i) % (2 * half) - half for i in range(owners)]
 
 
-class Split(NamedTuple):
-    """The parts of each edge, and True if one was bent to meet another."""
-
-    parts: list[list[Edge]]
-    bent: bool
+Split = tuple[list[list[Edge]], bool]
+"""The parts of each edge, and True if one was bent to meet another."""
 
 
 def split_edges(
@@ -161,25 +155,15 @@ def split_edges(
     ends = [p for edge in edges for p in (edge.start, edge.end)]
     pool = PointPool(ends, [p for points in cuts for p in points], 2 * tolerance)
     stops = [_stops(edge, points, pool) for edge, points in zip(edges, cuts, strict=True)]
-    return Split(
-        [
-            [edge]
-            if len(ends_of_parts) == 2
-            and ends_of_parts[0] == edge.start
-            and ends_of_parts[1] == edge.end
-            and ends_of_parts[0] != ends_of_parts[1]
-            else [edge.part(a, b) for a, b in pairwise(ends_of_parts) if a != b]
-            for edge, ends_of_parts in zip(whole, stops, strict=True)
-        ],
-        any(
-            abs(edge.to_left(p)) > BENT
-            for edge, ends_of_parts in zip(edges, stops, strict=True)
-            if len(ends_of_parts) > 2
-            or ends_of_parts[0] != edge.start
-            or ends_of_parts[-1] != edge.end
-            for p in ends_of_parts
-        ),
-    )
+    parts: list[list[Edge]] = []
+    bent = False
+    for edge, on_circle, (start, *inner, end) in zip(whole, edges, stops, strict=True):
+        if not inner and start == edge.start and end == edge.end:
+            parts.append([edge] if start != end else [])
+            continue
+        parts.append([edge.part(a, b) for a, b in pairwise([start, *inner, end]) if a != b])
+        bent = bent or any(abs(on_circle.to_left(p)) > BENT for p in (start, *inner, end))
+    return parts, bent
 
 
 def _share(
@@ -334,7 +318,7 @@ class Arrangement:
     """Pieces, each of them two halves: 2 i along piece i, 2 i + 1 against it."""
 
     def __init__(self, overlay: Overlay) -> None:
-        self.pieces = overlay.pieces
+        self.pieces, bent = overlay
         self._drawn = [from_end_to_end(edge) for edge, _ in self.pieces]
         self.origin = [p for edge, _ in self.pieces for p in (edge.start, edge.end)]
         rings: dict[Point, list[int]] = defaultdict(list)
@@ -350,7 +334,7 @@ class Arrangement:
             p: self._in_order(halves) if len(halves) > 2 else halves for p, halves in rings.items()
         }
         """The halves that leave each point, counter-clockwise."""
-        if overlay.bent:
+        if bent:
             self.tangled.update(self.rings)
         self.left = self._wound()
         """Winding number of the chains to the left of each half."""

@@ -184,31 +184,6 @@ def circle(centre: Point, radius: float) -> Contour:
     return contour
 
 
-# Similarities of the plane.
-
-
-def shift(dx: float, dy: float) -> Similarity:
-    return lambda p: (p[0] + dx, p[1] + dy)
-
-
-def turn(direction: Point, about: Point) -> Similarity:
-    """Return the rotation about a point that turns the x axis into a direction."""
-    (c, s), (ax, ay) = direction, about
-    return lambda p: (
-        ax + (p[0] - ax) * c - (p[1] - ay) * s,
-        ay + (p[0] - ax) * s + (p[1] - ay) * c,
-    )
-
-
-def scale(factor: float) -> Similarity:
-    return lambda p: (p[0] * factor, p[1] * factor)
-
-
-def flip(p: Point) -> Point:
-    """Return the point mirrored in the y axis."""
-    return -p[0], p[1]
-
-
 # Chords of arcs. On one circle they end at the same angles in every contour: at multiples of a
 # step that divides a quarter turn.
 

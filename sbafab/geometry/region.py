@@ -19,10 +19,6 @@ from sbafab.geometry.contour import (
     Contour,
     Similarity,
     circle,
-    flip,
-    scale,
-    shift,
-    turn,
 )
 from sbafab.geometry.edges import (
     EPSILON,
@@ -180,18 +176,24 @@ class Region(Exact):
 
     def moved(self, dx: float, dy: float) -> Region:
         """Return the region moved by ``dx`` and ``dy`` mm."""
-        return self.mapped(shift(dx, dy), 1.0, False)
+        return self.mapped(lambda p: (p[0] + dx, p[1] + dy), 1.0, False)
 
     def turned(self, degrees: float, about: Point = (0.0, 0.0)) -> Region:
         """Return the region turned counter-clockwise; quarter turns are exact."""
-        return self.mapped(turn(unit(degrees), about), 1.0, False)
+        (c, s), (ax, ay) = unit(degrees), about
+
+        def turned(p: Point) -> Point:
+            x, y = p[0] - ax, p[1] - ay
+            return ax + x * c - y * s, ay + x * s + y * c
+
+        return self.mapped(turned, 1.0, False)
 
     def scaled(self, factor: float) -> Region:
-        return self.mapped(scale(factor), factor, False)
+        return self.mapped(lambda p: (p[0] * factor, p[1] * factor), factor, False)
 
     def mirrored(self) -> Region:
         """Return the region mirrored in the y axis."""
-        return self.mapped(flip, 1.0, True)
+        return self.mapped(lambda p: (-p[0], p[1]), 1.0, True)
 
     def shapely(self, chord_error: float = 0.001) -> shapely.MultiPolygon:
         """The region for shapely; chords stay within ``chord_error`` mm of the arcs."""

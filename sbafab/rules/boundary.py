@@ -41,7 +41,7 @@ def edges_along(region: Region, boundary: Region) -> tuple[Edge, ...]:
     for group in grouped(chains_of([*contours, *boundary_contours])):
         pieces = [Piece(edge, turns) for edge, turns in group.edges]
         if not group.is_alone:
-            pieces = overlay(group.edges, EPSILON, group.clear).pieces
+            pieces, _ = overlay(group.edges, EPSILON, group.clear)
         for edge, turns in pieces:
             turn, boundary_turn = by_owner(turns, 2)
             if turn * boundary_turn > 0:

@@ -13,7 +13,6 @@ from sbafab.errors import GeometryError, InconsistentError
 from sbafab.geometry import arrangement
 from sbafab.geometry.arrangement import (
     Arrangement,
-    Overlay,
     Piece,
     PointPool,
     by_owner,
@@ -157,7 +156,7 @@ def test_bent_pieces_that_cross_between_their_ends_are_found() -> None:
     corners: list[Point] = [(0.0, 0.0), (4.0, 3.0), (4.0, 0.0), (0.0, 3.0)]
     loop = [Line(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
     with pytest.raises(InconsistentError):
-        Arrangement(Overlay([Piece(edge, 1) for edge in loop], bent=True))
+        Arrangement(([Piece(edge, 1) for edge in loop], True))
     # As it is cut, each half is wound round once, and one of them the other way.
     assert laid_over(loop).area == pytest.approx(3)
 
