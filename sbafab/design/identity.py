@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any
 
 from sbafab.design.files import FITS, checked, override
@@ -95,8 +95,9 @@ def kit_of(design: Design) -> Kit:
 def departures(design: Design) -> list[str]:
     """Return the dotted keys that a design sets differently from its kit."""
     kit = kit_of(design)
-    values, kit_values = with_unused(design), dict(_values(kit))
-    keys = [key for key, value in kit_values.items() if _at(values, key) != value]
+    record = checked(KitFile, {"schema": SCHEMA, "name": "x", "version": "x", **kit.tables}, {})
+    values, usual = with_unused(design), without_none(record.model_dump(mode="json"))
+    keys = [key for key, _ in dotted(kit.tables) if _at(values, key) != _at(usual, key)]
     tube = kit.tubes.get(design.inlet.tube)
     if kit.tubes and tube is None:
         keys.append("inlet.tube")
@@ -131,14 +132,6 @@ def cure_hours(design: Design) -> float | None:
         return design.order.cure_hours
     adhesive = kit_of(design).adhesives.get(design.inlet.adhesive)
     return None if adhesive is None else adhesive.cure_hours
-
-
-def _values(kit: Kit) -> Iterator[tuple[str, object]]:
-    """Every key given by a kit, with its value in a design."""
-    record = checked(KitFile, {"schema": SCHEMA, "name": "x", "version": "x", **kit.tables}, {})
-    usual = without_none(record.model_dump(mode="json"))
-    for key, _ in dotted(kit.tables):
-        yield key, _at(usual, key)
 
 
 def _at(table: Any, key: str) -> object:

@@ -156,11 +156,7 @@ def kit_path(kit: object, folder: Path) -> Path:
 
 def read_kit(path: Path) -> Kit:
     """Return the kit of a file. Raises DesignError with one sentence for a fault in it."""
-    return _kit(read_toml(path), path, path.read_bytes())
-
-
-def _kit(tables: Mapping[str, Any], path: Path, contents: bytes) -> Kit:
-    sources: dict[str, str] = {}
+    tables, sources = read_toml(path), dict[str, str]()
     plain = _without_sources(tables, "", sources, path)
     for key in OF_A_DESIGN:
         section, _, name = key.partition(".")
@@ -181,13 +177,11 @@ def _kit(tables: Mapping[str, Any], path: Path, contents: bytes) -> Kit:
         sources=sources,
         tubes=record.tubes,
         adhesives=record.adhesives,
-        text=contents,
+        text=path.read_bytes(),
     )
 
 
-@cache
-def _shipped(path: Path) -> Kit:
-    return read_kit(path)
+_shipped = cache(read_kit)
 
 
 def load_kit(kit: object, folder: Path) -> Kit:
