@@ -4,6 +4,7 @@ TOML files, and CSV tables of a lab's curves.
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,14 +25,16 @@ MOST_POINTS = 10_000
 
 
 class CurveQuantity(NamedTuple):
-    """A measured quantity: its unit, its title, and the axes that it is measured against.
-
-    The axis "" means that the quantity is measured without an axis.
+    """A measured quantity: its unit, its title, and the axes that it is measured against, of which
+    "" means without an axis; the ``group`` of its discrepancy if calibrations are fitted to it, and
+    why it is ``without_model``.
     """
 
     unit: str
     title: str
-    axes: tuple[str, ...] = ("",)
+    axes: tuple[str, ...]
+    group: str
+    without_model: str
 
 
 NO_AXIS = ""
@@ -45,35 +48,16 @@ AXES = {
 }
 """Axes and their units. ``height_share`` counts from the flat to the full height, as the source
 counts it; ``volume_ul`` is one balloon's for ``balloon_stroke_mm``, else all chambers' in total."""
-BY_AIR = ("pressure_kpa", "volume_ul", NO_AXIS)
-QUANTITIES = {
-    "force_n": CurveQuantity(
-        "N", "blocked force", ("height_share", "stroke_mm", "bend_deg", "pressure_kpa", NO_AXIS)
-    ),
-    "stroke_mm": CurveQuantity("mm", "free stroke", BY_AIR),
-    "balloon_stroke_mm": CurveQuantity("mm", "stroke of one balloon", BY_AIR),
-    "height_mm": CurveQuantity("mm", "height", BY_AIR),
-    "flat_height_mm": CurveQuantity("mm", "deflated height"),
-    "bend_deg": CurveQuantity("deg", "bend", BY_AIR),
-    "energy_mj": CurveQuantity("mJ", "pneumatic input work", ("pressure_kpa",)),
-    "loss_mj": CurveQuantity("mJ", "work lost in a cycle", ("pressure_kpa",)),
-    "loss_share": CurveQuantity(
-        "", "share of the input work lost in a cycle", ("pressure_kpa", NO_AXIS)
-    ),
-    "time_s": CurveQuantity("s", "time", ("pressure_kpa", "bend_deg")),
-    "modulus_kpa": CurveQuantity("kPa", "modulus in bending", ("pressure_kpa", NO_AXIS)),
-    "burst_kpa": CurveQuantity("kPa", "burst pressure"),
-    "geometric_kpa": CurveQuantity("kPa", "pressure that ends the geometric regime"),
-    "deflated_diameter_mm": CurveQuantity("mm", "deflated diameter"),
-    "inflated_diameter_mm": CurveQuantity("mm", "inflated diameter"),
-    "folded_diameter_mm": CurveQuantity("mm", "folded diameter"),
-    "mass_g": CurveQuantity("g", "mass"),
-    "success_share": CurveQuantity("", "share of builds that hold"),
-    "build_time_h": CurveQuantity("h", "time to build"),
-    "cutting_error_mm": CurveQuantity("mm", "largest error of the laser's cut"),
-    "pin_error_mm": CurveQuantity("mm", "error of the dowel pins"),
-    "density_kg_m3": CurveQuantity("kg/m3", "density of the film"),
-}
+
+
+def _quantities() -> Iterator[tuple[str, CurveQuantity]]:
+    with (FOLDER / "quantities.csv").open(encoding="utf-8", newline="") as opened:
+        for name, unit, title, axes, group, reason in list(csv.reader(opened))[1:]:
+            names = tuple(axis.removeprefix("-") for axis in axes.split())
+            yield name, CurveQuantity(unit, title, names, group, reason)
+
+
+QUANTITIES = dict(_quantities())
 """Quantities by name."""
 KINDS = {
     "standard deviation": 1.0,

@@ -19,7 +19,7 @@ from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
 from sbafab.models.intervals import sizes_of
 from sbafab.process import Progress
-from sbafab.validation.evidence import Evidence, MeasuredCurve
+from sbafab.validation.evidence import QUANTITIES, Evidence, MeasuredCurve
 from sbafab.validation.model_values import ModelledActuator, ModelValues, NoModel, model_values
 from sbafab.validation.posterior import (
     LEAST_ERROR,
@@ -71,18 +71,7 @@ class Fit:
     left_out: tuple[tuple[str, str], ...]
 
 
-GROUP_OF = {
-    "force_n": "force",
-    "stroke_mm": "motion",
-    "balloon_stroke_mm": "motion",
-    "height_mm": "motion",
-    "bend_deg": "motion",
-    "flat_height_mm": "flat height",
-    "energy_mj": "work",
-    "time_s": "time",
-    "modulus_kpa": "stiffness",
-    "loss_share": "loss",
-}
+GROUP_OF = {name: each.group for name, each in QUANTITIES.items() if each.group}
 """Quantities that calibration is fitted to, and the groups of their discrepancies."""
 
 

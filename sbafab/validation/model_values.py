@@ -31,7 +31,7 @@ from sbafab.models.prediction import plate_of, predict
 from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count
 from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack
-from sbafab.validation.evidence import MeasuredCurve
+from sbafab.validation.evidence import QUANTITIES, MeasuredCurve
 
 ModelValue = float | None
 """A value of a model; None if the model has no such state."""
@@ -84,24 +84,13 @@ def model_values(
     """
     answer = ANSWERS.get(curve.quantity)
     if answer is None:
-        return NoModel(WITHOUT_MODEL[curve.quantity])
+        return NoModel(QUANTITIES[curve.quantity].without_model)
     if not curve.is_described:
         return NoModel("no design describes the actuator")
     try:
         return ModelValues(*answer(ModelledActuator(curve, factors or Factors(), shares_maps)))
     except DesignError as error:
         return NoModel(str(error))
-
-
-WITHOUT_MODEL = {
-    "geometric_kpa": "no model: the elastic ones stretch at every pressure",
-    "success_share": "no model: leaks and over-melting are not in any of them",
-    "build_time_h": "no model: the schedule's minutes are the paper's",
-    "cutting_error_mm": "no model: it is an input",
-    "pin_error_mm": "no model: it is an input",
-    "density_kg_m3": "no model: it is an input",
-}
-"""Why a quantity has no model."""
 
 
 @lru_cache(maxsize=64)
@@ -539,4 +528,4 @@ ANSWERS: dict[str, Callable[[ModelledActuator], NamedSeries]] = {
     "folded_diameter_mm": partial(_of_prediction, Quantity.FOLDED_DIAMETER),
     "mass_g": partial(_of_prediction, Quantity.MASS),
 }
-"""Functions that answer by quantity; the others are in WITHOUT_MODEL."""
+"""Functions that answer by quantity; the others say why they have none."""
