@@ -55,16 +55,14 @@ def record(
     """
     designs = [built] if isinstance(built, Design) else [part.design for part in built.designs]
     kit = ", ".join(dict.fromkeys(kit_of(design).name for design in designs))
-    rows = [_with_kit(row, kit) for row in rows]
+    rows = [
+        row.model_copy(update={"kit": kit}) if isinstance(row, Record) and not row.kit else row
+        for row in rows
+    ]
     sha256 = recorded_sha256(built)
     known = lab.contents().builds.get(sha256) if lab.path.exists() else None
     build = promised(built) if known is None or known.generator != GENERATOR else None
     return lab.add(sha256, build, rows, is_again)
-
-
-def _with_kit(row: Row, kit: str) -> Row:
-    is_result = isinstance(row, Record) and not row.kit
-    return row.model_copy(update={"kit": kit}) if is_result else row
 
 
 def record_sheet(built: Design | Assembled) -> tuple[RecordTable, ...]:
@@ -184,12 +182,17 @@ def write_history(contents: Contents, path: Path) -> int:
 
     Raises DesignError for another suffix, and OutputError.
     """
-    writers = {".csv": csv_history, ".json": json_history}
+    writers = {".csv": _csv_history, ".json": _json_history}
     writer = writers.get(path.suffix.lower())
     if writer is None:
         raise DesignError(f"{path} ends in none of {', '.join(writers)}; choose one of them")
-    devices = _devices(contents)
-    save_text(path, writer(devices, contents.builds))
+    rows: dict[tuple[str, str], list[LabRow]] = defaultdict(list)
+    for row in (*contents.entries, *contents.records):
+        rows[contents.builds[row.design_sha256].actuator, row.serial].append(row)
+    # Each device, its entries first, by design and serial.
+    devices = [(contents.builds[rows[0].design_sha256], rows) for rows in rows.values()]
+    devices.sort(key=lambda device: (device[0].name, device[1][0].serial))
+    save_text(path, writer(devices))
     return len(devices)
 
 
@@ -201,23 +204,13 @@ def save_text(path: Path, text: str) -> None:
         raise OutputError(f"{path} cannot be written: {error.strerror or error}") from None
 
 
-def _devices(contents: Contents) -> list[Sequence[LabRow]]:
-    """Return the rows of each device, entries first, in order of work; sorted by design, serial."""
-    rows: dict[tuple[str, str], list[LabRow]] = defaultdict(list)
-    for row in (*contents.entries, *contents.records):
-        build = contents.builds[row.design_sha256]
-        rows[build.actuator, row.serial].append(row)
-    return sorted(
-        rows.values(),
-        key=lambda rows: (contents.builds[rows[0].design_sha256].name, rows[0].serial),
-    )
+_Devices = Sequence[tuple[RecordedDesign, Sequence[LabRow]]]
 
 
-def json_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, RecordedDesign]) -> str:
+def _json_history(devices: _Devices) -> str:
     """Return a document with the rows grouped by device."""
     listed = []
-    for rows in devices:
-        build = builds[rows[0].design_sha256]
+    for build, rows in devices:
         head = {"design": build.name, "actuator_sha256": build.actuator}
         records = [row for row in rows if isinstance(row, Record)]
         entries = [row for row in rows if isinstance(row, HistoryEntry)]
@@ -226,15 +219,17 @@ def json_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, Recorded
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
-def csv_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, RecordedDesign]) -> str:
+def _csv_history(devices: _Devices) -> str:
     """Return a table with one row per row of each device."""
-    cells = [_cells(row, builds[rows[0].design_sha256].name) for rows in devices for row in rows]
-    return csv_text([CSV_COLUMNS, *([each.get(c) for c in CSV_COLUMNS] for each in cells)])
-
-
-def _cells(row: LabRow, design: str) -> dict[str, Any]:
-    head = {name: getattr(row, name) for name in ("recorded", "design_sha256", "attempt")}
-    corrects = None if row.corrects is None else f"{row.SIGN}{row.corrects}"
-    marks = {"row": row.number, "design": design, "corrects": corrects}
-    expired = {"expired": int(row.is_expired)} if isinstance(row, HistoryEntry) else {}
-    return {**head, **marks, "withdrawn": int(row.withdrawn), **row.cells, **expired}
+    lines = []
+    for build, rows in devices:
+        for row in rows:
+            cells = {name: getattr(row, name) for name in ("recorded", "design_sha256", "attempt")}
+            cells |= {"row": row.number, "design": build.name, "withdrawn": int(row.withdrawn)}
+            cells |= row.cells
+            if row.corrects is not None:
+                cells["corrects"] = f"{row.SIGN}{row.corrects}"
+            if isinstance(row, HistoryEntry):
+                cells["expired"] = int(row.is_expired)
+            lines.append([cells.get(column) for column in CSV_COLUMNS])
+    return csv_text([CSV_COLUMNS, *lines])
