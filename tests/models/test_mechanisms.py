@@ -49,11 +49,6 @@ def test_pull_is_virtual_work(share: float) -> None:
     )
 
 
-def test_pull_by_hand() -> None:
-    """At t = 1 rad: 1 - sin 1 = 0.158529 shorter, p D L cos 1 = 0.01 x 40 x 30 x 0.540302 N."""
-    assert float(pouch.pull(10.0, 0.15852901519, 30.0, 40.0)) == pytest.approx(6.48363, rel=1e-5)
-
-
 def test_a_pouch_shortens_by_36_percent_at_most() -> None:
     with pytest.raises(DesignError, match=r"contraction = 0\.4 .* give 0 to 0\.363"):
         pouch.half_angle(0.4)
