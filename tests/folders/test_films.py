@@ -22,7 +22,7 @@ from sbafab.rules.deck import has_failed
 from sbafab.simulators.calculix.deck import deck_settings
 from sbafab.simulators.coarse import coarse_shell, round_stack, why_not_round
 from sbafab.simulators.mujoco.run import model_text
-from sbafab.simulators.sofa.scenes import why_no_scene
+from sbafab.simulators.sofa.run import why_not
 
 FILMS = """
 [films.tpu50]
@@ -162,7 +162,7 @@ def test_calculix_takes_each_film_and_the_coarse_shell_one_that_is_known(
     assert stack.bending(1) == pytest.approx(20e3 * 0.05**3 / 12 / (1 - 0.09))
     assert shells[0].mass / shells[1].mass == pytest.approx(0.05 * 1200 / (0.038 * 1122))
     assert "add films.pet.modulus, in MPa" in (why_not_round(pet) or "")
-    assert why_no_scene(tpu) is None
+    assert why_not(tpu) is None
     with pytest.raises(DesignError, match=r"add films.pet.modulus, in MPa"):
         deck_settings(laminate)
     stiff = build(design.with_("films.pet.modulus=3000", "films.pet.poisson=0.3"))

@@ -112,14 +112,33 @@ def model_text(
     )
 
 
-def write_model(
-    laminate: Laminate, folder: Path, pressures: Mapping[str, float], sectors: int = SECTORS
-) -> RecordedFilms:
-    """Write the model, its cavities, and the script that inflates it; return its films.
+# The run.
 
-    ``pressures`` in kPa by chamber; ``sectors`` is the number of nodes per ring. Raises
-    DesignError if the pockets are not round.
+
+USES = ("seconds",)
+SECONDS = 5.0
+LEAST_TIME = 2 * RAMP
+OLDEST = 4
+"""Oldest major version: up to 3.17 a flex of dimension 2 stretches at a quarter of its modulus."""
+INSTALL = 'install it with: pip install "sbafab[mujoco]"'
+ENDED = re.compile(r"^(\S+) steps/s$", re.MULTILINE)
+
+
+def why_not(laminate: Laminate) -> str | None:
+    """Return why a coarse mesh is impossible: it consists of rings, so pockets must be round."""
+    return why_not_round(laminate)
+
+
+def export(
+    laminate: Laminate, request: SimulationRequest, folder: Path, sectors: int = SECTORS
+) -> RecordedFilms:
+    """Write the model, its cavities, and a script that inflates it; return its films.
+
+    ``sectors`` is the number of nodes per ring. Raises DesignError if the pockets are not round.
     """
+    refuse_time(SECONDS if request.seconds is None else request.seconds, LEAST_TIME)
+    names = [chamber.name for chamber in laminate.chambers]
+    pressures = chamber_pressures(names, request, DEFAULT_PRESSURE)
     stack = round_stack(laminate)
     shell = shell_of(stack, pressures, sectors)
     data = {
@@ -142,33 +161,6 @@ def write_model(
     }
     write_files(texts, folder)
     return RecordedFilms(laminate, shell, shell.poles, pressures, pressures.values())
-
-
-# The run.
-
-
-USES = ("seconds",)
-SECONDS = 5.0
-LEAST_TIME = 2 * RAMP
-OLDEST = 4
-"""Oldest major version: up to 3.17 a flex of dimension 2 stretches at a quarter of its modulus."""
-INSTALL = 'install it with: pip install "sbafab[mujoco]"'
-ENDED = re.compile(r"^(\S+) steps/s$", re.MULTILINE)
-
-
-def why_not(laminate: Laminate) -> str | None:
-    """Return why a coarse mesh is impossible: it consists of rings, so pockets must be round."""
-    return why_not_round(laminate)
-
-
-def export(
-    laminate: Laminate, request: SimulationRequest, folder: Path, sectors: int = SECTORS
-) -> RecordedFilms:
-    """Write the model, with ``sectors`` nodes per ring, and a script that inflates it."""
-    refuse_time(SECONDS if request.seconds is None else request.seconds, LEAST_TIME)
-    names = [chamber.name for chamber in laminate.chambers]
-    pressures = chamber_pressures(names, request, DEFAULT_PRESSURE)
-    return write_model(laminate, folder, pressures, sectors)
 
 
 def run(

@@ -8,7 +8,7 @@ from pathlib import Path
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.process import Progress
-from sbafab.simulators.coarse import why_not_round
+from sbafab.simulators.coarse import elastic_of, why_not_round
 from sbafab.simulators.simulator import (
     DEFAULT_PRESSURE,
     PERIOD,
@@ -19,7 +19,7 @@ from sbafab.simulators.simulator import (
     refuse_time,
     run_model,
 )
-from sbafab.simulators.sofa.scenes import Scene, scenes_of, why_no_scene, write_scenes
+from sbafab.simulators.sofa.scenes import Scene, scenes_of, write_scenes
 
 RECORDED_SCENE = "recorded.scn"
 SECONDS = 8.0
@@ -28,7 +28,12 @@ USES = ("scene", "seconds", "volumes")
 
 def why_not(laminate: Laminate) -> str | None:
     """Return why no scene can be made: the modulus of a film is not known."""
-    return why_no_scene(laminate)
+    try:
+        for layer in laminate.tpe_layers:
+            elastic_of(layer.film)
+    except DesignError as reason:
+        return str(reason)
+    return None
 
 
 def export(laminate: Laminate, request: SimulationRequest, folder: Path) -> dict[str, Scene]:

@@ -386,16 +386,6 @@ def prism(
 # The scenes of a design.
 
 
-def why_no_scene(laminate: Laminate) -> str | None:
-    """The reason why no scene can be written for a laminate, or None."""
-    try:
-        for layer in laminate.tpe_layers:
-            elastic_of(layer.film)
-    except DesignError as reason:
-        return str(reason)
-    return None
-
-
 def scenes_of(
     laminate: Laminate,
     pressures: Mapping[str, float],
