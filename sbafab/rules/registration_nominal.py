@@ -26,20 +26,25 @@ def check(measures: Measures) -> list[Finding]:
     departures = [*_off_axis(laminate), *_off_pins(laminate), *_off_outline(laminate)]
     if not departures:
         return [judged(NAME, True, TOLERANCE, None, "mm", Place(), "none")]
-    return [max(departures, key=lambda departure: departure.measured or 0.0)]
+    _, worst = max(departures, key=lambda departure: departure[0])
+    return [worst]
 
 
 RULE = Rule(NAME, check, explained(NAME), at_most=True)
 
 
-def _departure(off: float, layers: tuple[int, ...], p: Point, says: str, **facts: Any) -> Finding:
+def _departure(
+    off: float, layers: tuple[int, ...], p: Point, says: str, **facts: Any
+) -> tuple[float, Finding]:
+    """Return a departure before it is rounded, and its finding."""
     good = off <= TOLERANCE + 1e-9
     sentence = "aligned" if good else says
     facts |= {"off": max(off, 1e-6)} if good else {}
-    return judged(NAME, good, TOLERANCE, off, "mm", Place(None, layers, *p), sentence, **facts)
+    place = Place(None, layers, *p)
+    return off, judged(NAME, good, TOLERANCE, off, "mm", place, sentence, **facts)
 
 
-def _off_axis(laminate: Laminate) -> Iterator[Finding]:
+def _off_axis(laminate: Laminate) -> Iterator[tuple[float, Finding]]:
     for channel in channels(laminate):
         for layer in channel.layers if channel.has_axis else ():
             centre = _opening_centre(layer, channel)
@@ -59,7 +64,7 @@ def _opening_centre(layer: Layer, channel: Channel) -> Point | None:
     return min(round_ones, key=lambda circle: circle[1])[0] if round_ones else None
 
 
-def _off_pins(laminate: Laminate) -> Iterator[Finding]:
+def _off_pins(laminate: Laminate) -> Iterator[tuple[float, Finding]]:
     """Tooling holes off their pin; one that a layer lacks is off by the pin's diameter."""
     for pin in tooling_pins(laminate):
         off = {name: _off_pin(layers[0], pin) for name, layers in laminate.patterns.items()}
@@ -79,7 +84,7 @@ def _off_pin(layer: Layer, pin: Pin) -> float:
     return min([pin.diameter, *(math.dist(centre, pin.centre) for centre, _ in circles)])
 
 
-def _off_outline(laminate: Laminate) -> Iterator[Finding]:
+def _off_outline(laminate: Laminate) -> Iterator[tuple[float, Finding]]:
     for distinct in distinct_interfaces(laminate):
         interface = distinct.interface
         if interface.kind != "chamber" or interface.below.pattern == interface.above.pattern:
