@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -36,13 +35,13 @@ from sbafab.importing.records import (
     yaml_of,
 )
 from sbafab.laminate.laminate import Role
+from sbafab.spreadsheet import table_rows
 
 CHAMBERS, KIT = "chambers.csv", "kit.toml"
 MOUTH = ("mouth_x", "mouth_y", "angle", "width")
 """Columns of a chamber's first row."""
 DRAWINGS = (".dxf", ".svg")
 MOST_ROWS = 1000
-MOST_BYTES = 1_000_000
 Pieces = Annotated[int, Field(ge=1, strict=False)]
 MouthAngle = Annotated[float, Field(strict=False)]
 AnyRow = TypeVar("AnyRow", bound=Section)
@@ -118,33 +117,16 @@ def import_table(folder: Path) -> Imported:
 
 
 def read_table(path: Path, record: type[AnyRow]) -> Iterator[tuple[str, AnyRow]]:
-    """Yield place and record of every row of a CSV file.
+    """Yield place and record of every row of a CSV file. Raises DesignError with line and column.
 
-    Separators are commas, semicolons or tabs. Raises DesignError with file, line and column.
+    An empty cell states nothing, unless its column is not known.
     """
-    lines = read_text(path, MOST_BYTES).splitlines()
-    head = next((line for line in lines if line.strip()), "")
-    separator = max(",;\t", key=head.count)
-    try:
-        cells = list(csv.reader(lines, delimiter=separator, strict=True))
-    except csv.Error as error:
-        raise DesignError(f"{path} is damaged ({error}); save it again as CSV") from None
-    numbered = [(n, row) for n, row in enumerate(cells, start=1) if any(map(str.strip, row))]
-    if len(numbered) < 2 or len(numbered) > MOST_ROWS:
-        raise DesignError(f"{path} has {max(0, len(numbered) - 1)} rows under its head; add some")
-    (_, first), *rest = numbered
-    names = [name.strip().lower() for name in first]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise DesignError(f"{path} has the column {twice} twice; remove one")
-    for number, row in rest:
-        place = f"{path.name}, line {number}"
-        if len(row) > len(names):
-            raise DesignError(f"{place} has {len(row)} cells for {len(names)} columns; remove some")
-        filled = dict.fromkeys(names) | dict(zip(names, map(str.strip, row), strict=False))
-        # An empty cell states nothing, unless its column is not known.
-        known = record.model_fields
-        filled = {name: cell for name, cell in filled.items() if cell or name not in known}
+    rows = [*table_rows(path)]
+    if not 0 < len(rows) <= MOST_ROWS:
+        raise DesignError(f"{path} has {len(rows)} rows under its head; add some")
+    for where, row in rows:
+        place = where.replace(str(path), path.name)
+        filled = {key: cell for key, cell in row.items() if cell or key not in record.model_fields}
         yield place, checked(record, filled, {}, f"{place}: ", "table")
 
 

@@ -75,12 +75,12 @@ def test_drawings_that_no_row_names_are_named(importing: Importing, tmp_path: Pa
 
 MOUTHLESS = "name,x,y\npouch,0,0\n"
 REFUSED = [
-    ("role", "layer", CHAMBERS, "has the column layer twice"),
+    ("role", "layer", CHAMBERS, "layers.csv has two columns layer; keep one"),
     ("cap", "lid", CHAMBERS, "layers.csv, line 4: role = 'lid' must be 'base'"),
     ("cover", "lid", CHAMBERS, "layers.csv, line 4: drawing "),
     ("cover.svg", "cover.png", CHAMBERS, "line 4: file = 'cover.png' is no"),
     ("FILM,", "FILM,many", CHAMBERS, "line 2: pieces = 'many' must be a whole number"),
-    ("cap,,,\n", "cap,,,\na,b,c,d,e,f\n", CHAMBERS, "line 5 has 6 cells for 5 columns"),
+    ("cap,,,\n", "cap,,,\na,b,c,d,e,f\n", CHAMBERS, "line 5 has 6 cells where the header has 5"),
     ("", "", MOUTHLESS, "chambers.csv, line 2 has no mouth_x, of the first"),
     ("", "", f"{CHAMBERS}pouch;5;5;;;;2\n", "line 3: width of pouch stands in an earlier"),
 ]
