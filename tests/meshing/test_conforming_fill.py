@@ -50,6 +50,8 @@ def test_a_balloon_rises_as_the_paraboloid(one_balloon: Laminate) -> None:
             ("3dof-15mm", ("stack.balloons=2",), 8.0),
             ("radial-15mm", ("chamber.count=1", "tube.outer_diameter=4"), 40.0),
             ("1dof-5mm", ("stack.balloons=2", "registration.method=ears"), 4.0),
+            ("1dof-5mm", ("chamber.diameter=[5, 4]", "stack.balloons=2"), 3.0),
+            ("3dof-15mm", ("stack.balloons=1", "chamber.count=5"), 3.0),
         ],
         2,
         names=3,

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sbafab.api import build
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.element_mesh import check_mesh
@@ -99,26 +98,6 @@ def test_base_tip_and_inlet_are_where_they_belong(meshes: ConformingMeshes) -> N
     places = meshes.volume.points[meshes.volume.node_sets["inlet_A"]]
     assert places[:, 0] == pytest.approx(8.25)
     assert np.ptp(places[:, 1]) == pytest.approx(1.6)
-
-
-@pytest.mark.parametrize(
-    ("template", "changes"),
-    [
-        ("1dof-5mm", ("stack.balloons=2", "registration.method=ears")),
-        ("1dof-5mm", ("chamber.diameter=[5, 4]", "stack.balloons=2")),
-        ("3dof-15mm", ("stack.balloons=1", "chamber.count=5")),
-        ("radial-15mm", ("chamber.count=2", "tube.outer_diameter=8.2", "inlet.manifold=true")),
-    ],
-)
-def test_every_family_meshes(template: str, changes: tuple[str, ...]) -> None:
-    laminate = build(template, *changes)
-    meshes = conforming_meshes(laminate, MeshSettings(h=0.7, wrapped=False))
-    films = sum(layer.profile.area * layer.film.thickness for layer in laminate.tpe_layers)
-    figures = meshes.statistics["volume"]
-    assert figures["volume_mm3"] == pytest.approx(films, rel=1e-3)
-    assert figures["least_scaled_jacobian"] > 0.05
-    assert set(meshes.volume.cavities) == {chamber.name for chamber in laminate.chambers}
-    assert figures["elements"] == len(meshes.volume.cells)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 import xml.etree.ElementTree as ET
@@ -18,7 +17,7 @@ from sbafab.errors import OutputError
 from sbafab.process import ignore_progress
 from sbafab.simulators.coarse import round_stack
 from sbafab.simulators.mujoco import run as of_mujoco
-from sbafab.simulators.mujoco.run import export, inflate, run, shell_of, why_not
+from sbafab.simulators.mujoco.run import export, inflate, run, shell_of
 from sbafab.simulators.simulator import Result, SimulationRequest
 from tests.quick import few
 
@@ -160,21 +159,6 @@ def test_a_run_that_goes_wrong_is_not_believed(
     spoil(tmp_path, *change)
     with pytest.raises(OutputError, match=rf"did not run to its end: its log says .*({words})"):
         inflate(films, request, tmp_path, ignore_progress)
-
-
-def test_it_is_one_of_the_simulators(tmp_path: Path) -> None:
-    laminate = sbafab.build(*BALLOON)
-    assert why_not(laminate) is None
-    assert "lie on a sheet" in (why_not(sbafab.build("radial-15mm")) or "")
-    found = run(laminate, SimulationRequest(6.0, seconds=2.0), tmp_path, ignore_progress)
-    assert {file.name for file in tmp_path.iterdir()} == {
-        "actuator.xml",
-        "actuator.json",
-        "inflate.py",
-    }
-    rows = {name: value for name, value, _ in found.rows}
-    assert rows["air chamber1"] == found.volumes["chamber1"]
-    json.dumps(found.as_dict())
 
 
 def test_without_a_fitting_mujoco_the_extra_is_named(
