@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
@@ -98,28 +97,21 @@ def _undo_crossings(path: list[Contour], here: Point) -> bool:
 
 
 def _spread(path: Sequence[Contour], heat_distance: float) -> list[Contour]:
-    """The path with the next contour that is not near the last one, time after time."""
-    if heat_distance <= 0.0:
-        return list(path)
-    rest = deque(path)
+    """Return the path with the next contour that is not near the last one, time after time."""
+    rest = list(path)
     spread: list[Contour] = []
     while rest:
-        last = spread[-1].bounds if spread else None
-        index = next(
-            (
-                i
-                for i, contour in enumerate(rest)
-                if last is None or _apart(last, contour.bounds) >= heat_distance
-            ),
-            0,
+        far = (
+            number
+            for number, contour in enumerate(rest)
+            if not spread or _apart(spread[-1].bounds, contour.bounds) >= heat_distance
         )
-        spread.append(rest[index])
-        del rest[index]
+        spread.append(rest.pop(next(far, 0)))
     return spread
 
 
 def _apart(a: Bounds, b: Bounds) -> float:
-    """The gap between two bounding boxes in mm."""
+    """Return the gap between two bounding boxes in mm."""
     across = max(a[0] - b[2], b[0] - a[2], 0.0)
     along = max(a[1] - b[3], b[1] - a[3], 0.0)
     return math.hypot(across, along)
