@@ -133,7 +133,7 @@ def boxes_round(p: Floats, q: Floats, margin: float) -> Floats:
 def crossings(
     origin: Floats, unit: Floats, edges: EdgeTable, tolerance: float = EPSILON
 ) -> tuple[Floats, Bools]:
-    """Return distances along straight lines to where each meets the line or circle of its own edge.
+    """Return distances along straight lines to where each meets its edge's line or circle.
 
     Three rows (the foot of a tangent, and two crossings), and a mask of the ones that exist.
     """

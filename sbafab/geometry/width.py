@@ -303,7 +303,7 @@ class Corner:
         self.normal = (-ux * s - uy * c, ux * c - uy * s)
 
     def may_face(self, side: BoundarySide) -> bool:
-        """Return True if the normals of a side are somewhere opposed to those of the corner.
+        """Return True if the normals of a side are somewhere opposed to the corner's.
 
         An edge facing a convex corner may be square on neither of its edges.
         """
@@ -473,4 +473,4 @@ def inscribed_disc(region: Region) -> InscribedDisc:
 DISC_SHARE = 1e-4
 """Relative accuracy of an inscribed disc's radius."""
 MANY_EDGES = 40
-"""More edges than those of a pocket that is drawn with few lines and arcs."""
+"""Most edges of a pocket that is drawn with few lines and arcs."""

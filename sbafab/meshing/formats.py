@@ -378,7 +378,7 @@ _OWN = (
 
 @cache
 def mesh_formats() -> tuple[MeshFormat, ...]:
-    """Return all formats in the order of files, those of other packages last."""
+    """Return all formats in the order of files, other packages' last."""
     own = [row.ending for row in _OWN]
     return _OWN + plugins.added(plugins.MESH_FORMATS, "mesh format", MeshFormat, own)
 

@@ -269,7 +269,7 @@ class Mesh:
         return {name: self.cell_sets[name] for name in names}
 
     def surface(self, triangles: NDArray[np.int64]) -> tuple[Surface, NDArray[np.int64]]:
-        """Triangles of nodes as a surface of their own, and the node of each of its points."""
+        """Triangles of nodes as a separate surface, and the node of each of its points."""
         nodes, faces = np.unique(triangles, return_inverse=True)
         return Surface(self.points[nodes], faces.reshape(-1, 3)), nodes
 
