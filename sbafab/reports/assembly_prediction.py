@@ -142,24 +142,24 @@ def predict_assembly(
     actuators = [placed for placed in assembled.parts if isinstance(placed, PlacedSba)]
     for placed in actuators:
         refuse_beyond_burst(placed.made.laminate, pressure_kpa)
-    found: list[AssemblyFigure | Touch | BentTouch] = []
+    items: list[AssemblyFigure | Touch | BentTouch] = []
     left_out: list[str] = []
     scene = _Scene(assembled, pressure_kpa)
     for placed in actuators:
         pause()
         hold = grip(assembled, placed)
         if hold is not None:
-            found += _grip_figures(hold, placed.made.design.form.stacks, pressure_kpa, load_g)
+            items += _grip_figures(hold, placed.made.design.form.stacks, pressure_kpa, load_g)
             if hold.push is None:
                 left_out.append(f"{placed.name}, {', '.join(IN_THE_LUMEN)}: {hold.why_none}")
         elif placed.name in scene.stacks:
-            found += _arm_figures(placed, scene.stacks[placed.name], pressure_kpa, load_g)
-            found += scene.touches(placed)
+            items += _arm_figures(placed, scene.stacks[placed.name], pressure_kpa, load_g)
+            items += scene.touches(placed)
             pause()
-            found += scene.bends(placed, pause)
+            items += scene.bends(placed, pause)
         else:
             left_out.append(f"{placed.name}: no model knows the form of a drawn pocket outline")
-    figures = [item for item in found if isinstance(item, AssemblyFigure)]
+    figures = [item for item in items if isinstance(item, AssemblyFigure)]
     if assembled.assembly.name not in PAPERS:
         figures = [replace(figure, paper="") for figure in figures]
     return AssemblyPrediction(
@@ -167,9 +167,9 @@ def predict_assembly(
         pressure_kpa,
         load_g,
         tuple(figures),
-        tuple(item for item in found if isinstance(item, Touch)),
+        tuple(item for item in items if isinstance(item, Touch)),
         tuple(left_out),
-        tuple(item for item in found if isinstance(item, BentTouch)),
+        tuple(item for item in items if isinstance(item, BentTouch)),
         tuple(p.name for p in actuators if is_near_burst(p.made.laminate, pressure_kpa)),
     )
 
@@ -327,9 +327,9 @@ class _Scene:
 
     def __init__(self, assembled: Assembled, pressure: float) -> None:
         self.assembled, self.pressure = assembled, pressure
-        made = cache(_stack_of)
+        stack_of = cache(_stack_of)
         self.stacks = {
-            placed.name: made(placed.made)
+            placed.name: stack_of(placed.made)
             for placed in assembled.parts
             if isinstance(placed, PlacedSba) and isinstance(placed.made.design.form.pockets, Discs)
         }
@@ -379,11 +379,11 @@ class _Scene:
         apart = {placed.name, placed.part.on, *self._moving(placed.name)}
         names = [part.name for part in self.assembled.parts]
         apart.update(name for name in names[: names.index(placed.name)] if name in self.stacks)
-        for other, theirs in self.solids.items():
-            if other not in apart:
+        for name_there, theirs in self.solids.items():
+            if name_there not in apart:
                 volume = _shared_volume(self.solids[placed.name], theirs)
                 if volume > TOUCH:
-                    yield Touch(placed.name, other, volume)
+                    yield Touch(placed.name, name_there, volume)
 
     def bends(
         self, placed: PlacedSba, pause: Callable[[], None]
@@ -462,8 +462,8 @@ def _is_seen(placed: PlacedPart) -> bool:
     return placed.part.kind != "line"
 
 
-def _stack_of(made: PartDesign) -> Stack:
-    return stack(made.design, made.laminate, factors=factors_of(made.design))
+def _stack_of(part: PartDesign) -> Stack:
+    return stack(part.design, part.laminate, factors=factors_of(part.design))
 
 
 def _ways(chambers: int) -> list[tuple[int, ...]]:
@@ -476,17 +476,21 @@ def _unmoved(placed: PlacedPart, stacks: Mapping[str, Stack], poses: Mapping[str
     """Return a part on flat hosts: balloons and webs of a stack in its pose; of others the part
     with its pockets filled, or the free inflated cylinder of one around a tube.
     """
-    made = placed.made
-    if made is not None and placed.name in stacks:
-        parts = inflated(made.laminate, stacks[placed.name], poses[placed.name], COARSE)
+    part_design = placed.made
+    if part_design is not None and placed.name in stacks:
+        parts = inflated(part_design.laminate, stacks[placed.name], poses[placed.name], COARSE)
         surfaces = [Surface(placed.upright(x.surface.points), x.surface.faces) for x in parts]
         return [piece for surface in surfaces for piece in surface.manifold().decompose()]
-    widest = None if made is None else sizes(made.design, made.laminate).get("inflated_diameter")
-    if made is None or widest is None:
+    widest = (
+        None
+        if part_design is None
+        else sizes(part_design.design, part_design.laminate).get("inflated_diameter")
+    )
+    if part_design is None or widest is None:
         return [placed_surface(placed, filled=True).manifold()]
     import manifold3d
 
-    _, low, _, high = made.laminate.layers[0].profile.turned(placed.turn).bounds
+    _, low, _, high = part_design.laminate.layers[0].profile.turned(placed.turn).bounds
     cylinder = manifold3d.Manifold.cylinder(high - low, widest / 2)
     rows = np.column_stack([np.array(placed.pose.rows), np.array(placed.pose.shift)])
     return [cylinder.translate((0.0, 0.0, low)).transform(rows)]

@@ -159,8 +159,8 @@ def _paint(buffer: Buffer, body: int, front: Ints, corners: Floats, light: Float
         # Shares along the first side, and from there to the third corner.
         s, t = (grid.ravel() for grid in np.meshgrid(*(np.linspace(0, 1, k) for k in (n, m))))
         shares = np.stack([(1 - t) * (1 - s), (1 - t) * s, t], axis=-1)
-        alike = np.flatnonzero((grids == (n, m)).all(axis=1))
-        for part in np.array_split(alike, max(1, len(alike) * n * m // MOST)):
+        cells = np.flatnonzero((grids == (n, m)).all(axis=1))
+        for part in np.array_split(cells, max(1, len(cells) * n * m // MOST)):
             number, at = _nearest(buffer, shares @ corners[part])
             place, which = number, part[at // len(shares)]
             buffer.light.reshape(-1)[place] = (light[which] * shares[at % len(shares)]).sum(axis=1)
@@ -188,13 +188,13 @@ def edges(buffer: Buffer, step: float, borders: bool = False) -> NDArray[np.bool
     beside another body.
     """
     depth = np.where(buffer.body < 0, -1e9, buffer.depth)
-    found = np.zeros(depth.shape, dtype=bool)
+    is_edge = np.zeros(depth.shape, dtype=bool)
     for axis in (0, 1):
         jumps = np.abs(np.diff(depth, axis=axis)) > step
         if borders:
             jumps |= np.diff(buffer.body, axis=axis) != 0
-        found[: jumps.shape[0], : jumps.shape[1]] |= jumps
-    return found
+        is_edge[: jumps.shape[0], : jumps.shape[1]] |= jumps
+    return is_edge
 
 
 def image_of(rgb: Floats) -> Image:

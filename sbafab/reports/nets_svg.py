@@ -56,21 +56,21 @@ class NetMap:
     faults: tuple[NetFault, ...]
 
 
-def net_map(laminate: Laminate, found: Connectivity) -> NetMap:
+def net_map(laminate: Laminate, connectivity: Connectivity) -> NetMap:
     """Return the areas of the voids by interface, bottom to top, in the colours of their nets."""
     colours = dict(zip((net.name for net in declared(laminate)), cycle(COLOURS)))
     areas = []
-    for cavity, owners in zip(found.cavities, found.owners, strict=True):
+    for cavity, owners in zip(connectivity.cavities, connectivity.owners, strict=True):
         layers = laminate.interfaces[cavity.interface - 1].layer_indices
         name = owners[0] if owners else ""
         colour = colours.get(name, NO_NET)
         areas.append(NetArea(name, owners, cavity.interface, layers, colour, cavity.region))
-    return NetMap(colours, tuple(areas), found.faults)
+    return NetMap(colours, tuple(areas), connectivity.faults)
 
 
-def nets_svg(laminate: Laminate, found: Connectivity) -> str:
+def nets_svg(laminate: Laminate, connectivity: Connectivity) -> str:
     """Return a drawing 180 mm wide: a plan of every interface that has a void, and the key."""
-    shown = net_map(laminate, found)
+    shown = net_map(laminate, connectivity)
     low_x, low_y, high_x, high_y = laminate.bounds
     numbers = sorted({area.interface for area in shown.areas if area.net or not area.nets})
     columns = min(MOST_COLUMNS, max(1, len(numbers)))

@@ -238,8 +238,8 @@ def _stands(laminate: Laminate, pin: Pin) -> Sequence[tuple[int, int]]:
         if pin in laminate.pins_holding(layers[0])
         for layer in layers
     }
-    held = [pinned.intersection(s.layers) for s in press_steps(laminate) if pin in s.pins]
-    spans = dict.fromkeys((min(joined), max(joined)) for joined in held if joined)
+    joined_layers = [pinned.intersection(s.layers) for s in press_steps(laminate) if pin in s.pins]
+    spans = dict.fromkeys((min(joined), max(joined)) for joined in joined_layers if joined)
     return tuple(
         (low, high)
         for low, high in spans
@@ -450,7 +450,7 @@ def _feature_labels(cut: StackSection) -> Iterator[SideLabel]:
     """Yield the first of each: bond, pocket, neck ring, overhang, bore and lumen."""
     films = [slab for slab in cut.slabs if not slab.layer.is_mask]
     bore = "bore ⌀" if cut.laminate.bores else "opening "
-    for found in (
+    for labels in (
         _bond_beside(cut),
         _pocket(cut),
         _neck_ring(cut),
@@ -458,7 +458,7 @@ def _feature_labels(cut: StackSection) -> Iterator[SideLabel]:
         _openings(bore, 0.0, films),
         () if cut.lumen is None else _openings("lumen ⌀", cut.lumen, cut.slabs[-1:]),
     ):
-        for at, words, place in found:
+        for at, words, place in labels:
             yield place.middle, at, words, draw.DARK
             break
 

@@ -55,7 +55,7 @@ def _chapter(build: Build) -> dict[str, Any]:
     if laminate.nets:
         drawing = nets_svg(laminate, connectivity(laminate, design))
         chapter["nets"] = drawing[drawing.index("<svg") :]
-    measured = next((one.measured for one in build.findings if one.rule == YIELD), None)
+    measured = next((finding.measured for finding in build.findings if finding.rule == YIELD), None)
     if measured is not None:
         hand = design.registration
         chapter |= {
@@ -76,9 +76,9 @@ def other_hands(laminate: Laminate, design: Design) -> tuple[Hand, ...]:
     # The margins that the largest error can violate serve smaller errors too.
     places = Measures(laminate, rougher[-1])
     hands = []
-    for other in reversed(rougher):
-        builds = simulate(laminate, other, measures=places.by_hand(other))
-        errors = other.registration
+    for rougher_design in reversed(rougher):
+        builds = simulate(laminate, rougher_design, measures=places.by_hand(rougher_design))
+        errors = rougher_design.registration
         hands.append(Hand(errors.hand_placement, errors.hand_turn, builds.whole.value))
         if hands[0].share == 1:
             return ()

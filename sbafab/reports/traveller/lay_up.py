@@ -171,8 +171,10 @@ class Things:
         beside = self.things[place - 1 if place else 1]
         layer = _widest(self.laminate, self.things[place])
         neighbour = _widest(self.laminate, beside[::-1] if place else beside)
-        own = layer.index if len(self.things[place]) > 1 else 0
-        edge = Alignment(own, len(layer.profile.pieces) > 1, film_name(neighbour), place == 0)
+        layer_index = layer.index if len(self.things[place]) > 1 else 0
+        edge = Alignment(
+            layer_index, len(layer.profile.pieces) > 1, film_name(neighbour), place == 0
+        )
         lip = _lip(layer.profile, neighbour.profile)
         if lip is None:
             return edge if neighbour.role == "sheet" else None
@@ -284,4 +286,4 @@ def _widest(laminate: Laminate, layers: Sequence[int]) -> Layer:
     }
     most = max(reach.values())
     layer = (laminate.layer(index) for index in layers)
-    return next(one for one in layer if reach[one.pattern] == most)
+    return next(candidate for candidate in layer if reach[candidate.pattern] == most)

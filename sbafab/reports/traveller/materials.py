@@ -155,17 +155,17 @@ def _build_up(work: Work) -> Iterator[Item]:
     parts = {item.part: item for item in first.build_up}
     platen = size(*first.platen_mm)
 
-    def made(part: str, more: str = "") -> str:
+    def product(part: str, more: str = "") -> str:
         item = parts[part]
         return f"{item.material}, {millimetres(item.thickness_mm)}{more}, {platen}"
 
     holes = f"stepped holes from {work.fixture} and the table in bench.html"
     holes = holes if work.fixture else "no holes"
-    yield Item("Base plate", f"{made(BASE_PLATE)}; {holes}", "1", 1)
+    yield Item("Base plate", f"{product(BASE_PLATE)}; {holes}", "1", 1)
     has_tpe = any(film.material == FIRST[0] for film in work.films)
     turned = "; one of them for films that are turned over" if turns_over(work) else ""
     words = (
-        f"{made(RELEASE)}; {'TPE' if has_tpe else 'films'} must not stick to it at press "
+        f"{product(RELEASE)}; {'TPE' if has_tpe else 'films'} must not stick to it at press "
         f"temperature (our advice; the paper names none){turned}"
     )
     number = release_films(work)
@@ -174,7 +174,7 @@ def _build_up(work: Work) -> Iterator[Item]:
     sheets = pad_sheets(parts[PAD].thickness_mm)
     piled = f", a pile of {sheets} sheets" if sheets > 1 else ""
     words = (
-        f"{made(PAD, piled)}, for {first.temperature_c:g} °C in continuous use (our advice; the "
+        f"{product(PAD, piled)}, for {first.temperature_c:g} °C in continuous use (our advice; the "
         "paper names none)"
     )
     yield Item("Press pad", words, str(sheets), sheets)

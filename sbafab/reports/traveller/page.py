@@ -72,7 +72,7 @@ def context(work: Work) -> dict[str, Any]:
     """Return the values of one design for the templates."""
     design, laminate = work.design, work.laminate
     text = record_text(laminate.name, work.sha256)
-    others = _other_marks(work)
+    other_marks = _other_marks(work)
     # A drawing's notes concern its lay-up; other families' notes concern trimming.
     is_drawn = design.form.is_drawn
     notes = tuple(f"{note.rstrip('.')}." for note in laminate.notes)
@@ -101,9 +101,9 @@ def context(work: Work) -> dict[str, Any]:
         "lay_up_notes": notes if is_drawn else (),
         "turned": _turned(laminate),
         "bill": bill(work),
-        "others": others,
+        "others": other_marks,
         "other_films": [film.written for film in work.films if film.written != film.material],
-        "sheet_rows": sheet_rows(design, work.sheets, {design.name: "", **others}),
+        "sheet_rows": sheet_rows(design, work.sheets, {design.name: "", **other_marks}),
         "cuts": cut_list(work),
         "trim_notes": () if is_drawn else notes,
         "batch": _batch(work),

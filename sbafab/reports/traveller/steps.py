@@ -223,11 +223,11 @@ class PressPage:
     def _hand(self, layer: Layer) -> HandTask:
         """Return what the hand decides about a layer; a disc turned on its pin is unchanged."""
         laminate = self.work.laminate
-        held = [pin for pin in self.part.pins if pin in laminate.pins_holding(layer)]
-        if not held:
+        pins = [pin for pin in self.part.pins if pin in laminate.pins_holding(layer)]
+        if not pins:
             return "lay"
         for outline in (Region(piece.outers) for piece in layer.profile.pieces):
-            inside = [pin for pin in held if outline.contains(pin.centre)]
+            inside = [pin for pin in pins if outline.contains(pin.centre)]
             if len(inside) == 1 and not all(
                 isinstance(edge, Arc) and math.dist(edge.centre, inside[0].centre) <= SETTLED
                 for edge in outline.edges
@@ -343,8 +343,8 @@ def joint_pages(work: Work) -> list[SeamPage | FoldPage]:
 
 def _seam_page(work: Work, step: SeamStep, seam: Seam) -> SeamPage:
     laminate = work.laminate
-    held = [index for index in step.layers if index not in step.adds]
-    is_under = bool(held) and not step.from_below
+    layers_below = [index for index in step.layers if index not in step.adds]
+    is_under = bool(layers_below) and not step.from_below
     offset = work.design.seam_offsets.get(seam.tool)
     films = [laminate.layer(index) for index in step.layers]
     x, y = seam.path[0][0].start
@@ -354,10 +354,10 @@ def _seam_page(work: Work, step: SeamStep, seam: Seam) -> SeamPage:
         seam_path(seam),
         ((high_x - x if step.from_below else x - low_x), y - low_y),
         [
-            (laminate.layer(index), is_under and index < min(held))
+            (laminate.layer(index), is_under and index < min(layers_below))
             for index in sorted(step.adds, reverse=step.from_below)
         ],
-        max(held, default=0),
+        max(layers_below, default=0),
         offset,
         "" if offset is None else shift_words(seam.tool, offset),
         _seam_picture(films, step, seam),
