@@ -17,8 +17,6 @@ from sbafab.folders.artefacts import EVERYTHING
 from sbafab.folders.run import Conforming, Run, RunRequest, Simulated
 from sbafab.folders.run import generate as run
 from sbafab.folders.run import simulate as run_simulator
-from sbafab.importing.records import default_file, write_imported
-from sbafab.importing.sources import import_source
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
 from sbafab.process import Progress
 from sbafab.simulators.simulator import NAMES, SimulationRequest
@@ -32,6 +30,10 @@ def import_design(source: str | Path, out: str | Path | None = None) -> Design:
     each place that is not carried over. Raises DesignError if the source cannot be imported,
     OutputError if a file is in the way.
     """
+    # A tenth of the time that this module takes to load.
+    from sbafab.importing.records import default_file, write_imported
+    from sbafab.importing.sources import import_source
+
     path = Path(source)
     _, imported = import_source(path)
     file = default_file(imported) if out is None else Path(out)

@@ -26,8 +26,6 @@ from sbafab.errors import DesignError
 from sbafab.folders.checks import FindingEntry
 from sbafab.folders.order import JOB_SCHEMA
 from sbafab.folders.run import Run
-from sbafab.importing.records import default_file, write_imported
-from sbafab.importing.sources import import_source
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
 from sbafab.meshing.formats import conforming_endings
 from sbafab.pressing.cycles import batch_times, design_runs
@@ -147,6 +145,10 @@ def import_(source: Path, out: Path, to: Path | None, as_json: bool) -> None:
     ParchMint circuit (JSON), or a laminate of foldable_robotics or popupCAD. What is not carried
     over is named.
     """
+    # A tenth of the time that `generate` takes to load.
+    from sbafab.importing.records import default_file, write_imported
+    from sbafab.importing.sources import import_source
+
     name, imported = import_source(source)
     file = opt.design_file(to, out, default_file(imported).name)
     written = write_imported(imported, file, source.name)
