@@ -4,10 +4,12 @@ chambers in step, bending and workspace of parallel ones, and their order in a p
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -85,59 +87,20 @@ from sbafab.models.stack import Stack
 SAMPLES = 61
 FigureItems = Iterator[Figure | LeftOut]
 
-GEOMETRY = Model(ModelId.GEOMETRY, "of the cut files", "exact for what is cut")
-SCALED_HEIGHT = Model(
-    ModelId.SCALED_HEIGHT,
-    "Sec. 4.6: 17.5 mm for 15 balloons of d = 5, in proportion to d",
-    "measured, not predicted: one actuator of d = 5, at a pressure that is not given; as "
-    "in the paper, all of the height counts as stroke",
-)
-POWER = Model(
-    ModelId.POWER,
-    "Sec. 7",
-    "largest force times mean speed, as in the paper; the two never occur together. No lag of "
-    "valve and pump: the paper's 0.067 s of air make it a fifth of this",
-)
-CURVATURE = Model(
-    ModelId.CONSTANT_CURVATURE,
-    "from chamber lengths, each at its own stroke",
-    "upper bound: chambers are taken to lengthen freely, and films between them do not hold back; "
-    "the paper's largest is 81 +- 6 deg",
-)
-FOLDED_LOBES = Model(
-    ModelId.FOLDED_LOBES,
-    "our geometry; the paper reports 9.25",
-    "one figure to compare with: 9.91 at the nominal thickness, 8.61 at the 0.95 mm that the "
-    "paper measures, between which its 9.25 lies",
-)
-FILM_MASS = Model(
-    ModelId.FILM_MASS,
-    "",
-    "exact for the films, masks, tabs and ears included; without tubing, glue and fluid",
-)
-HALF_PERIMETER = Model(
-    ModelId.HALF_PERIMETER,
-    "a flat strip opened round, its PTFE beside the tube",
-    "cut at its narrowest; films do not stretch; glue not counted",
-)
+
+def _models() -> Iterator[tuple[ModelId, Model]]:
+    """Yield models with source and validity, from ``models.csv``."""
+    with Path(__file__).with_name("models.csv").open(encoding="utf-8", newline="") as opened:
+        for model, source, trust in list(csv.reader(opened))[1:]:
+            yield ModelId(model), Model(ModelId(model), source, trust)
+
+
+MODELS = dict(_models())
+GEOMETRY, CURVATURE = MODELS[ModelId.GEOMETRY], MODELS[ModelId.CONSTANT_CURVATURE]
 ROUND_THE_TUBE = {
-    Quantity.DEFLATED_DIAMETER: Model(
-        ModelId.TUBE_AND_FILMS,
-        "Sec. 2.1",
-        "the paper's 15.33 is the sum of tube and films as bought; the sheet is taken to lie close "
-        "to the tube",
-    ),
-    Quantity.REACHED_DIAMETER: Model(
-        ModelId.LENS,
-        "the largest volume of films that do not stretch",
-        "for what it must reach; for the paper's design 27.29, 2.5 % below its about 28",
-    ),
-    Quantity.INFLATED_DIAMETER: Model(
-        ModelId.CYLINDER,
-        "Sec. 2.1: 2 w / pi a balloon",
-        "upper end, for what it must not touch: a full cylinder, its ends not holding it back; "
-        "28.06 for the paper's design, which says about 28",
-    ),
+    Quantity.DEFLATED_DIAMETER: MODELS[ModelId.TUBE_AND_FILMS],
+    Quantity.REACHED_DIAMETER: MODELS[ModelId.LENS],
+    Quantity.INFLATED_DIAMETER: MODELS[ModelId.CYLINDER],
 }
 PAPER_SLOTS = Slots(width=10.0, run=8.5)
 """The paper's SBAs of 11.5 x 20 mm less a bond of 0.75 all round (Sec. 2.1)."""
@@ -358,12 +321,12 @@ def _folding(actuator: Actuator) -> Figure | LeftOut:
     factor = actuator.folded.factor if actuator.folded.molten else 1.0
     width = 2 * max(actuator.radii) + 2 * actuator.design.bond.width
     value = folded_diameter(width, actuator.thickness)
-    return Figure(quantity, value, FOLDED_LOBES.times("press_factor", factor))
+    return Figure(quantity, value, MODELS[ModelId.FOLDED_LOBES].times("press_factor", factor))
 
 
 def _mass(laminate: Laminate) -> Figure | LeftOut:
     try:
-        return Figure(Quantity.MASS, film_mass(laminate), FILM_MASS)
+        return Figure(Quantity.MASS, film_mass(laminate), MODELS[ModelId.FILM_MASS])
     except DesignError as error:
         return LeftOut("mass", str(error), (Quantity.MASS,))
 
@@ -375,8 +338,10 @@ def _tubes(actuator: Actuator) -> FigureItems:
     inlet = min(actuator.laminate.inlets, key=lambda inlet: inlet.width - inlet.tube_diameter)
     narrowest, tube = inlet.width - actuator.design.strip_loss, inlet.tube_diameter
     most = largest_tube(narrowest, actuator.design.films.ptfe.thickness)
-    yield Figure(Quantity.LARGEST_TUBE, most, HALF_PERIMETER)
-    yield Figure(Quantity.TUBE_ROOM, most - tube, HALF_PERIMETER, Conditions(tube=tube))
+    yield Figure(Quantity.LARGEST_TUBE, most, MODELS[ModelId.HALF_PERIMETER])
+    yield Figure(
+        Quantity.TUBE_ROOM, most - tube, MODELS[ModelId.HALF_PERIMETER], Conditions(tube=tube)
+    )
 
 
 def _burst(laminate: Laminate) -> Figure | LeftOut:
@@ -386,12 +351,9 @@ def _burst(laminate: Laminate) -> Figure | LeftOut:
         return LeftOut("burst pressure", NOT_BURST, (Quantity.BURST,))
     interval, missed = burst_uncertainty(estimate)
     pocket = "round pocket" if estimate.is_round else "pocket, taken for a long one,"
-    model = Model(
-        ModelId.FILM_STRESS,
-        f"Sec. 4: {paper.BURST}, pockets of d = 5",
-        f"of its widest {pocket} and thinnest film; less where bonds peel or seams give way first. "
-        "The interval has the paper's scatter, and what is assumed for other sizes and shapes",
-    )
+    model = MODELS[ModelId.FILM_STRESS]
+    source = model.source.format(burst=paper.BURST)
+    model = replace(model, source=source, trust=model.trust.format(pocket=pocket))
     flags = flags_at(missed)
     return Figure(Quantity.BURST, estimate.kpa, model, interval=interval, flags=flags)
 
@@ -407,7 +369,7 @@ def _strokes(actuator: Actuator, request: PredictionRequest) -> FigureItems:
         model, flags = Model(ModelId.LARGEST_VOLUME, first.name, first.trust), tuple[Flag, ...]()
         if actuator.radii:
             at = sizes_of(actuator.form, actuator.laminate)
-            model, flags = SCALED_HEIGHT, flags_at(farther(at, PAPER_3DOF, False))
+            model, flags = MODELS[ModelId.SCALED_HEIGHT], flags_at(farther(at, PAPER_3DOF, False))
         yield Figure(Quantity.REFERENCE_STROKE, stroke, model, flags=flags)
         yield Figure(Quantity.REFERENCE_HEIGHT, actuator.reference_height, model, flags=flags)
         for k in actuator.kinematics:
@@ -476,29 +438,19 @@ def _power(actuator: Actuator, request: PredictionRequest, mass_g: float | None)
     """
     first, form, flow = actuator.kinematics[0], actuator.form, request.flow_ml_min
     stroke, whole = actuator.reference_stroke, 0.0
-    over_flow = Model(
-        OVER_FLOW[first.model.id],
-        "Sec. 4.5, 7",
-        "a liquid at a steady flow into all chambers together, no lag of pump or tube: the paper's "
-        "water took 0.92 +- 0.08 s; a gas takes 10 % longer at 10 kPa, and valves much longer",
-    )
+    plain = MODELS[ModelId.VOLUME_OVER_FLOW]
+    over_flow = replace(plain, id=OVER_FLOW[first.model.id], source="Sec. 4.5, 7")
     if actuator.has_reference:
         whole = actuator.balloons * float(first.volume(stroke)) * form.stacks
         yield Figure(Quantity.TOTAL_VOLUME, whole, first.model)
         time = float(seconds(whole, flow))
         yield Figure(Quantity.REFERENCE_TIME, time, over_flow, Conditions(flow=flow))
-    plain = Model(ModelId.VOLUME_OVER_FLOW, "Sec. 7", over_flow.trust)
     for volume in request.volumes_ul:
         time = float(seconds(volume * actuator.balloons * form.stacks, flow))
         yield Figure(Quantity.VOLUME_TIME, time, plain, Conditions(volume=volume, flow=flow))
     if not actuator.has_reference:
         return
-    bound = Model(
-        P_V[first.model.id],
-        "Sec. 4.1",
-        "end pressure times volume: more than the integral of p dV that the paper means, which the "
-        "elastic balloon gives",
-    )
+    bound = replace(MODELS[ModelId.P_V_EQ_4], id=P_V[first.model.id])
     for pressure in request.pressures_kpa:
         # 1 kPa x 1 ul = 1 uJ.
         work = pressure * whole / 1000
@@ -509,7 +461,7 @@ def _power(actuator: Actuator, request: PredictionRequest, mass_g: float | None)
         highest = max(request.pressures_kpa)
         _, push = next(_pushes(actuator, request))
         watts = form.stacks / form.pushing * float(push(highest, 0.0)) * stroke / 1000 / time
-        model = POWER.times("contact_factor", request.factors.contact_factor)
+        model = MODELS[ModelId.POWER].times("contact_factor", request.factors.contact_factor)
         at = Conditions(kpa=highest, flow=paper.AIR_FLOW)
         yield Figure(Quantity.POWER_DENSITY, watts / (mass_g / 1000), model, at)
 
@@ -589,12 +541,8 @@ def _stiffness(actuator: Actuator) -> FigureItems:
     measured = paper.MODULUS_3DOF if actuator.form.is_parallel else paper.MODULUS_1DOF
     least, _ = second_moments(plate)
     yield Figure(Quantity.SECOND_MOMENT, least, GEOMETRY)
-    model = Model(
-        ModelId.CANTILEVER,
-        f"Sec. 4.4, E = {measured.value:g} kPa as measured there",
-        "order of magnitude: E is the paper's of its own actuators, not predicted, and its I is "
-        "not given",
-    )
+    model = MODELS[ModelId.CANTILEVER]
+    model = replace(model, source=model.source.format(modulus=measured.value))
     value = tip_stiffness(measured.value, least, actuator.reference_height)
     yield Figure(quantity, value, model)
 

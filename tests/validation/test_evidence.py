@@ -135,7 +135,7 @@ def test_a_wheel_holds_the_files() -> None:
     builder = pytest.importorskip("hatchling.builders.wheel").WheelBuilder(str(ROOT))
     packed = {included.distribution_path for included in builder.recurse_included_files()}
     assert {f"sbafab/validation/{name}.toml" for name in evidence_ids()} <= packed
-    tables = ("validation/quantities", "validation/paper_table", "models/priors")
+    tables = ("validation/quantities", "validation/paper_table", "models/priors", "models/models")
     assert {f"sbafab/{name}.csv" for name in (*tables, "models/paper_counterparts")} <= packed
     assert "sbafab/validation/paper_table.md.jinja" in packed
 
