@@ -315,12 +315,12 @@ def _descent(
         if limited is not None:
             move = limited(live, at, move, now)
         largest, value = np.abs(move).max((1, 2)), now.value
+        slope = (move * now.gradient).sum(-1)
         is_last = largest * largest < fine * before
         is_still = np.abs(now.gradient).max((1, 2)) < RESIDUAL * (1 + 1e-3 * now.push)
         if is_at_plate:
-            gain = -(move * now.gradient).sum((1, 2))
-            is_last &= (largest < PLATE_LAST_STEP) & (gain < PLATE_LAST_GAIN)
-            is_still |= gain < 1e-12 * (1 + np.abs(now.value[:, 0]))
+            is_last &= (largest < PLATE_LAST_STEP) & (slope[:, 0] > -PLATE_LAST_GAIN)
+            is_still |= slope[:, 0] > -1e-12 * (1 + np.abs(value[:, 0]))
         is_over = is_last | is_still | (largest <= enough)
         if is_over.any():
             is_stable = is_over.copy()
@@ -337,14 +337,17 @@ def _descent(
             if not goes.any():
                 break
             live, at, move = live[goes], at[goes], move[goes]
-            largest, value = largest[goes], value[goes]
+            largest, value, slope = largest[goes], value[goes], slope[goes]
         share = step_limit(move.reshape(*move.shape[:2], -1, 3), largest).min(-1)
         now = energies(live, at + share[..., None] * move)
         for _ in range(HALVINGS):
             is_far = ~(now.value <= value + 1e-11 * (1 + np.abs(value)))
             if not is_far.any():
                 break
-            share, far = np.where(is_far, share / 2, share), np.flatnonzero(is_far.any(1))
+            # To where the parabola through both energies and the first slope is least.
+            over = 2 * (now.value - value - share * slope)
+            less = np.clip(-share * slope / np.maximum(over, 1e-300), 0.1, 0.5)
+            share, far = np.where(is_far, less * share, share), np.flatnonzero(is_far.any(1))
             put(now, far, energies(live[far], (at + share[..., None] * move)[far]))
         before = largest * (share == 1).all(1)
         at = at + share[..., None] * move
