@@ -35,6 +35,8 @@ NEAR_FINE = 1e-6
 SOFT_PLATES = ((2e3, 6e4), (1e3, 1e4, 1e5), (1e4,))
 """Stiffness in mN/mm of an outer plate in the first solutions, for paths tried in turn."""
 MOST_STEPS, HALVINGS = 300, 14
+FEW_STEPS = 3
+"""Steps in which a start that is met all round comes to balance against a plate."""
 RESIDUAL = 1e-7
 """Tolerance of the residual, mN or mN mm."""
 PLATE_LAST_STEP, PLATE_LAST_GAIN = 3e-5, 1e-7
@@ -224,9 +226,10 @@ def free_equilibrium(springs: Springs, start: Array) -> Balance:
     """
 
     def energies(which: Any, at: Array) -> LocalEnergy:
-        return LocalEnergy(*springs.at(which).energy(at), np.zeros(len(at)))
+        some = springs if len(at) == len(start) else springs.at(which)
+        return LocalEnergy(*some.energy(at), np.zeros(len(at)))
 
-    return _descent(energies, start, start.shape)
+    return _descent(energies, start)
 
 
 def loaded_equilibrium(
@@ -242,7 +245,7 @@ def loaded_equilibrium(
         found = _loaded(springs, pitch, load, start, NEAR_FINE if is_near else FINE)
     else:
         start = start_below(springs, start, pitch, wall, load.stiffness)
-        found = Balance.of(start, is_found=False)
+        found = _loaded(springs, pitch, load, start, most=FEW_STEPS)
     for path in () if wall is None else SOFT_PLATES:
         rest = np.flatnonzero(~found.is_found)
         at = start[rest]
@@ -261,12 +264,13 @@ def _loaded(
     start: Array,
     fine: float = NEAR_FINE,
     enough: float = 0.0,
+    most: int = MOST_STEPS,
 ) -> Balance:
     """Return the ``_descent`` of n states under a load."""
 
     def energies(which: Any, at: Array) -> LocalEnergy:
-        levels = at.reshape(len(at), -1, 3)
-        now = loaded_energy(springs.at(which), pitch, load, levels)
+        some = springs if len(at) == len(start) else springs.at(which)
+        now = loaded_energy(some, pitch, load, at.reshape(len(at), -1, 3))
         matrix = with_diagonal_blocks(now.rest(), now.blocks)
         return LocalEnergy(now.value[:, None], now.gradient[:, None], matrix[:, None], now.push)
 
@@ -276,40 +280,43 @@ def _loaded(
         """
         for _ in range(RIM_ROUNDS):
             levels = (len(at), *start.shape[1:])
-            met = springs.at(which).meeting(at.reshape(levels), move.reshape(levels))
+            some = springs if len(at) == len(start) else springs.at(which)
+            met = some.meeting(at.reshape(levels), move.reshape(levels))
             if met is None:
                 break
-            some = np.flatnonzero(met[1].any((1, 2, 3)))
-            push, stiffer = (part[some] for part in met)
-            matrix = with_diagonal_blocks(now.matrix[some, 0], stiffer)
-            gradient = now.gradient[some, 0]
+            closing = np.flatnonzero(met[1].any((1, 2, 3)))
+            push, stiffer = (part[closing] for part in met)
+            matrix = with_diagonal_blocks(now.matrix[closing, 0], stiffer)
+            gradient = now.gradient[closing, 0]
             tried = newton_step(gradient + push.reshape(gradient.shape), matrix)
             is_downhill = (tried * gradient).sum(-1) < 0
-            move[some[is_downhill], 0] = tried[is_downhill]
+            move[closing[is_downhill], 0] = tried[is_downhill]
         return move
 
     begin = start.reshape(len(start), 1, 3 * start.shape[1])
-    return _descent(energies, begin, start.shape, fine, enough, load.wall is not None, limited)
+    is_at_plate = load.wall is not None
+    found = _descent(energies, begin, fine, enough, is_at_plate, limited, most)
+    return found._replace(freedoms=found.freedoms.reshape(start.shape))
 
 
 def _descent(
     energies: Energies,
     start: Array,
-    shape: tuple[int, ...],
     fine: float = FINE,
     enough: float = 0.0,
     is_at_plate: bool = False,
     limited: Callable[[Any, Array, Array, LocalEnergy], Array] | None = None,
+    most: int = MOST_STEPS,
 ) -> Balance:
-    """Return the equilibria downhill of freedoms (n, groups, size), in another shape, once their
+    """Return the equilibria downhill of freedoms (n, groups, size), once their
     errors are below ``fine`` or a step is no larger than ``enough``; steps may be ``limited``.
     """
-    found = Balance.of(start.reshape(shape), is_found=False)
+    found = Balance.of(start, is_found=False)
     if not len(start):
         return found
     live, at, now = np.arange(len(start)), start, energies(slice(None), start)
     before = np.full(len(at), fine)
-    for _ in range(MOST_STEPS):
+    for _ in range(most):
         is_firm = is_positive_definite(now.matrix) if is_at_plate else None
         move = newton_step(now.gradient, now.matrix, is_firm)
         if limited is not None:
@@ -330,7 +337,7 @@ def _descent(
             if is_at_plate and is_over.any():
                 pushes = pushes.copy()
                 pushes[is_over] = energies(live[is_over], end[is_over]).push
-            ends = Balance.of(end[is_over].reshape(-1, *shape[1:]), pushes[is_over])
+            ends = Balance.of(end[is_over], pushes[is_over])
             ends.is_stable[:] = is_stable[is_over]
             put(found, live[is_over], ends)
             goes = ~is_over
