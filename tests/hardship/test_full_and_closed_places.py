@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,6 +53,35 @@ def test_a_full_disk_whatever_is_being_written(suffix: str, runs: Runs, output: 
     assert output.leftovers() == set()
 
 
+@pytest.mark.parametrize("kilobytes", [40, 600])
+def test_a_small_full_file_system(kilobytes: int, runs: Runs, output: Output) -> None:
+    if shutil.which("mount") is None:
+        pytest.skip("mount is not installed")
+    small = output.folder.parent / "small"
+    small.mkdir()
+    options = f"size={kilobytes}k"
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(small)],
+        capture_output=True,
+        check=False,
+    )
+    if mounted.returncode != 0:
+        pytest.skip("file systems cannot be mounted here")
+    try:
+        ended = runs.run(["generate", "3dof-15mm", "-o", str(small)], output.folder)
+        assert_refused(ended, "no space left on device")
+        assert set(os.listdir(small)) <= {".3dof-15mm.lock"}
+    finally:
+        subprocess.run(["umount", str(small)], check=True)
+
+
+def test_a_read_only_parent(runs: Runs, output: Output) -> None:
+    output.folder.chmod(0o555)
+    ended = runs.run(output.arguments("0.75"), output.folder, WITHOUT_PRIVILEGES)
+    assert_refused(ended, "cannot be written", "ermission denied")
+    assert output.held() == "0.8"
+
+
 def test_a_read_only_output(runs: Runs, output: Output) -> None:
     output.run_folder.chmod(0o555)
     ended = runs.run(output.arguments("0.75"), output.folder, WITHOUT_PRIVILEGES)
@@ -72,6 +103,10 @@ def link_to_a_folder(place: Path) -> None:
     place.symlink_to("real")
 
 
+def link_to_itself(place: Path) -> None:
+    place.symlink_to(place)
+
+
 def file(place: Path) -> None:
     place.write_text("mine")
 
@@ -86,13 +121,20 @@ def folder_with_a_pipe_for_manifest(place: Path) -> None:
     os.mkfifo(place / "manifest.json")
 
 
+def folder_with_a_deep_manifest(place: Path) -> None:
+    place.mkdir()
+    (place / "manifest.json").write_text("[" * 100_000)
+
+
 PLACES = [
     (fifo, "is a file"),
     (dangling_link, "is a link"),
     (link_to_a_folder, "is a link"),
+    (link_to_itself, "is a link"),
     (file, "is a file"),
     (folder_of_others, "did not write"),
     (folder_with_a_pipe_for_manifest, "did not write"),
+    (folder_with_a_deep_manifest, "did not write"),
 ]
 
 
@@ -156,4 +198,18 @@ def test_of_two_runs_at_once_one_is_told_to_wait(runs: Runs, output: Output) -> 
     go.touch()
     assert runs.wait(first).code == 0
     assert output.held() == "0.75"
+    assert output.leftovers() == set()
+
+
+def test_runs_that_race_leave_one_whole_run(runs: Runs, output: Output) -> None:
+    started = [
+        runs.start(output.arguments(width), output.folder) for width in ("0.75", "0.8", "0.75")
+    ]
+    ended = [runs.wait(pid) for pid in started]
+    assert {run.code for run in ended} <= {0, 2}
+    assert 0 in {run.code for run in ended}
+    for run in ended:
+        if run.code == 2:
+            assert_refused(run, "another run is writing")
+    assert output.held() is not None
     assert output.leftovers() == set()

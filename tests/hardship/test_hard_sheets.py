@@ -67,15 +67,21 @@ PLACES: dict[str, Change] = {
     "empty": of_text(""),
     "truncated": lambda path: path.write_text(path.read_text()[:200]),
     "another's": of_text('{"key": "0", "nests": {}}'),
+    "no table": of_text("[1, 2]"),
     "deep": of_text("[" * 1_000_000),
     "bytes": lambda path: path.write_bytes(b"\xff\xfe\0"),
     "pipe": replaced(os.mkfifo),
+    "device": replaced(lambda path: path.symlink_to("/dev/zero")),
     "folder": replaced(Path.mkdir),
     "60 MB": replaced(lambda path: os.truncate(os.open(path, os.O_CREAT | os.O_RDWR), 60_000_000)),
     "overlapping": placed(heaped),
     "over the border": put_at(x=0.0),
     "a billion sheets": put_at(sheet=1_000_000_000),
+    "a gap in the sheets": put_at(sheet=7),
+    "far away": put_at(x=1e308, y=-1e308),
     "beyond all numbers": put_at(x=10**400),
+    "no number": put_at(x="a", y=None),
+    "five quarter turns": put_at(turn=5),
     "no such part": put_at(part=99),
     "a part lost": placed(lambda rows: rows.pop()),
 }
@@ -106,6 +112,8 @@ FILES: dict[str, tuple[Change, str]] = {
     "circles": (drawing(CIRCLE), "entities and points, where at most"),
     "lines": (drawing("  0\nLINE\n"), "entities and points, where at most"),
     "pipe": (replaced(os.mkfifo), "not a plain file"),
+    "device": (replaced(lambda path: path.symlink_to("/dev/zero")), "not a plain file"),
+    "link to itself": (replaced(lambda path: path.symlink_to(path)), "not a plain file"),
     "folder": (replaced(Path.mkdir), "not a plain file"),
 }
 
@@ -120,3 +128,23 @@ def test_bad_sheets_are_told_in_time(name: str, runs: Runs, output: Output) -> N
     assert [finding["verdict"] for finding in told] == ["fail"]
     assert "sheets/TPE_1.dxf" in told[0]["message"]
     assert says in told[0]["message"]
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (os.mkfifo, "not a plain file"),
+        (lambda path: path.symlink_to("/dev/zero"), "not a plain file"),
+        (lambda path: path.symlink_to(path), "cannot be read"),
+    ],
+    ids=["pipe", "device", "link to itself"],
+)
+def test_a_manifest_that_is_no_file_is_one_sentence(
+    make: Change, says: str, runs: Runs, output: Output
+) -> None:
+    replaced(make)(output.run_folder / "manifest.json")
+    ended = runs.run(["check", str(output.run_folder)], output.folder, BOUNDED)
+    assert ended.code == 2
+    assert ended.err.startswith("sbafab: ")
+    assert ended.err.count("\n") == 1
+    assert says in ended.err

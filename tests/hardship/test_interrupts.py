@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.hardship.starting import ANSWERING
+from tests.hardship.starting import ANSWERING, ignored_signals
 from tests.quick import few
 
 INTERRUPTS = int(os.environ.get("SBAFAB_KILLS", "4"))
@@ -63,6 +63,23 @@ def test_interrupted_at_random_imports(command: str, tmp_path: Path) -> None:
         ended = run(arguments, step, tmp_path)
         assert (ended.returncode, ended.stderr.count("\n")) == (130, 1), (step, ended.stderr)
         assert ended.stderr.startswith("sbafab: stopped")
+
+
+def test_started_where_ctrl_c_is_ignored_a_program_is_stopped_all_the_same(tmp_path: Path) -> None:
+    """As these tests are under ``nohup`` or in the background."""
+    with ignored_signals():
+        ended = run(COMMANDS["help"], 9, tmp_path)
+    assert ended.returncode == 130
+    assert ended.stderr.startswith("sbafab: stopped")
+
+
+def test_an_interrupt_that_is_ignored_stays_so(tmp_path: Path) -> None:
+    program = PROGRAM.format(step=9, number=int(signal.SIGINT), arguments=["--help"])
+    ignoring = f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n{program}"
+    ended = subprocess.run(
+        [sys.executable, "-c", ignoring], capture_output=True, text=True, cwd=tmp_path, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
 
 
 LOST = """

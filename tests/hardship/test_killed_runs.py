@@ -9,6 +9,8 @@ import os
 import random
 import shutil
 import signal
+import time
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import pytest
@@ -82,6 +84,53 @@ def test_killed_before_random_file_operations(runs: Runs, output: Output) -> Non
     assert output.leftovers() == set()
 
 
+def test_killed_at_random_moments(runs: Runs, output: Output) -> None:
+    began = time.perf_counter()
+    assert runs.run(output.arguments("0.75"), output.folder).code == 0
+    lasts = time.perf_counter() - began
+    dice = random.Random(20)
+    codes = []
+    for number in range(KILLS):
+        before = output.held()
+        assert before is not None
+        pid = runs.start(output.arguments(OTHER[before]), output.folder)
+        time.sleep(lasts * (number + dice.random()) / KILLS)
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+        ended = runs.wait(pid)
+        codes.append(ended.code)
+        assert output.held() in (before, OTHER[before]), f"kill {number}"
+        if ended.code == 0:
+            assert output.held() == OTHER[before]
+    assert -signal.SIGKILL in codes
+    last = output.held()
+    assert last is not None
+    assert runs.run(output.arguments(OTHER[last]), output.folder).code == 0
+    assert output.held() == OTHER[last]
+    assert output.leftovers() == set()
+
+
+@pytest.mark.parametrize(
+    ("place", "holds"), [("before exchange", "0.8"), ("after exchange", "0.75")]
+)
+def test_killed_on_either_side_of_the_exchange(
+    place: str, holds: str, runs: Runs, output: Output
+) -> None:
+    kill = f"os.kill(os.getpid(), {signal.SIGKILL:d})"
+    first, second = (kill, "real(a, b)") if place == "before exchange" else ("real(a, b)", kill)
+    before = (
+        "import os; from sbafab.folders import swap; real = swap._exchange\n"
+        f"swap._exchange = lambda a, b, os=os, real=real: ({first}, {second})"
+    )
+    ended = runs.run(output.arguments("0.75"), output.folder, before)
+    assert ended.code == -signal.SIGKILL
+    assert output.held() == holds
+    assert len(output.leftovers()) == 1
+    assert runs.run(output.arguments(OTHER[holds]), output.folder).code == 0
+    assert output.held() == OTHER[holds]
+    assert output.leftovers() == set()
+
+
 def test_killed_between_two_renames_the_old_folder_comes_back(
     runs: Runs, output: Output, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -114,3 +163,12 @@ def test_stopped_half_way_it_tidies_up(number: signal.Signals, runs: Runs, outpu
     assert "Traceback" not in ended.err
     assert output.held() == "0.8"
     assert output.leftovers() == set()
+
+
+def test_a_tidied_name_does_not_take_anothers_folder(output: Output) -> None:
+    """Of designs named 1dof-5mm and 1dof-5mm.b, neither removes what the other is writing."""
+    with replaced_folder(output.folder / "1dof-5mm.b") as theirs:
+        (theirs / "file").write_text("begun")
+        with pytest.raises(RuntimeError), replaced_folder(output.run_folder):
+            raise RuntimeError
+        assert (theirs / "file").read_text() == "begun"

@@ -56,7 +56,14 @@ def star(points: int) -> str:
 
 BOMBS: dict[str, tuple[Callable[[], str], str]] = {
     "lines.dxf": (lambda: dxf("0\nLINE\n" * (SIZE // 7)), "entities and settings"),
+    "inserts.dxf": (lambda: dxf("0\nINSERT\n" * (SIZE // 9)), "entities and settings"),
+    "unknown.dxf": (lambda: dxf("0\nX\n" * (SIZE // 4)), "entities and settings"),
     "nested.dxf": (nested_blocks, "explode blocks"),
+    "large.dxf": (lambda: " " * 2_000_001, "where at most 2,000,000"),
+    "far.dxf": (
+        lambda: dxf("  0\nLINE\n  8\n0\n 10\n1e300\n 20\n0\n 11\n1e301\n 21\n0\n"),
+        "has a coordinate of x 1e+300",
+    ),
     "vertices.dxf": (
         lambda: dxf("  0\nLWPOLYLINE\n  8\n0\n 70\n1\n" + "10\n1\n20\n2\n" * (SIZE // 10)),
         "outline",
@@ -65,10 +72,13 @@ BOMBS: dict[str, tuple[Callable[[], str], str]] = {
         lambda: dxf("  0\nSPLINE\n 70\n8\n 71\n3\n" + "40\n1\n" * (SIZE // 5)),
         "outline",
     ),
+    "zeros.dxf": (lambda: "0\n" * (SIZE // 2), "entities and settings"),
     "entities.svg": (laughs, "declares a DOCTYPE or entities"),
     "paths.svg": (lambda: svg('<path d="M0 0L1 1"/>' * (SIZE // 20)), "more than 2000 elements"),
+    "groups.svg": (lambda: svg("<g>" * 100_000 + "</g>" * 100_000), "more than 2000 elements"),
     "deep.svg": (lambda: svg("<g>" * 1900 + "</g>" * 1900), "no closed path"),
     "closings.svg": (lambda: svg(f'<path d="M0 0{"z" * SIZE}"/>'), "more than 5000 edges"),
+    "path.svg": (lambda: svg(f'<path d="M0 0{"L1 1" * (SIZE // 4)}"/>'), "more than 5000 edges"),
     "style.svg": (lambda: svg(f"<style>{'a{b:c}' * (SIZE // 6)}</style>"), "in a style sheet"),
     "turns.svg": (
         lambda: svg(f'<path transform="{"rotate(1)" * (SIZE // 9)}" d="M0 0L1 1"/>'),
