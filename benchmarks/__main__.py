@@ -15,7 +15,7 @@ from statistics import median
 from benchmarks.sections import RIVALS, Asked, sections
 from benchmarks.timing import ROOT, Row, Section, keep_to_one_core
 from benchmarks.versions import Compared, compared
-from sbafab.process import prepare
+from sbafab.runtime import prepare
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ import sbafab
 from benchmarks.processes import by_another_process
 from benchmarks.stacks import DESIGN, LOADS, MOST
 from sbafab.models.stack import Plate
-from sbafab.process import prepare
+from sbafab.runtime import prepare
 
 STATES = 1024
 STEPS, WARM = 60, 10

@@ -26,8 +26,8 @@ class Reached(NamedTuple):
 def measured(designs: int) -> Iterator[Reached]:
     """Builds and checks designs of other sizes and heights; seeded, so the same every time."""
     from sbafab.actuators import build, load_design
-    from sbafab.process import prepare
     from sbafab.rules.deck import run_deck
+    from sbafab.runtime import prepare
 
     prepare()
     draw = random.Random(1)

@@ -11,7 +11,7 @@ from functools import partial
 
 from benchmarks.decks import checked
 from benchmarks.timing import ROOT, environment
-from sbafab.process import prepare
+from sbafab.runtime import prepare
 
 
 def rate(template: str, processes: int, designs: int) -> float:

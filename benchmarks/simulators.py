@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import sbafab
-from sbafab.process import ignore_progress
+from sbafab.runtime import ignore_progress
 from sbafab.simulators.simulator import SimulationRequest
 
 DESIGN = "3dof-15mm"

@@ -26,7 +26,7 @@ def main() -> None:
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, stop_at_once)
         # Guarded: Ctrl-C while they are loaded ends the process as it does later.
-        from sbafab.process import prepare
+        from sbafab.runtime import prepare
 
         prepare()
         from sbafab.cli import main as run

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from sbafab.process import prepare
+from sbafab.runtime import prepare
 
 # Workers share the processors already: more threads are slower, and may change the order of sums.
 # numpy reads these when it is first imported, here and in the processes that tests start.

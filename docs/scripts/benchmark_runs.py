@@ -19,7 +19,7 @@ from benchmarks.timing import ROOT, Row, Section, keep_to_one_core
 from benchmarks.versions import Compared, compared
 from docs.scripts.measured import Record, keep, record, versions
 from docs.scripts.tables import Table
-from sbafab.process import prepare
+from sbafab.runtime import prepare
 
 COMMAND = "python -m docs.scripts.benchmark_runs --before FOLDER"
 AIMS = {

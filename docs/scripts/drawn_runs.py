@@ -27,7 +27,7 @@ from docs.scripts.measured import FOLDER, Record, keep, record
 from docs.scripts.tables import Table
 from sbafab.errors import OutputError
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
-from sbafab.process import Progress
+from sbafab.runtime import Progress
 from sbafab.simulators.calculix.deck import JOB, RING, DeckSettings, Procedure, deck_settings
 from sbafab.simulators.calculix.run import DIVERGED, SAME_TIME, deck_mesh, read_frd, simulate
 from sbafab.simulators.simulator import Result, SimulationRequest

@@ -14,7 +14,7 @@ from pathlib import Path
 import sbafab
 from docs.scripts.measured import Record, keep, record, texts, versions
 from docs.scripts.tables import Table
-from sbafab.process import ignore_progress
+from sbafab.runtime import ignore_progress
 from sbafab.simulators.mujoco.run import run
 from sbafab.simulators.simulator import Result, SimulationRequest
 

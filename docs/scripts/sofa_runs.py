@@ -21,8 +21,8 @@ import sbafab
 from docs.scripts.axisymmetric import MeridianSection, axisymmetric_strokes
 from docs.scripts.measured import Record, keep
 from docs.scripts.tables import Table
-from sbafab.process import ignore_progress
-from sbafab.simulators.coarse import Shell, round_stack
+from sbafab.runtime import ignore_progress
+from sbafab.simulators.shell_model import Shell, round_stack
 from sbafab.simulators.simulator import Result, SimulationRequest
 from sbafab.simulators.sofa import scenes as scene_files
 from sbafab.simulators.sofa.run import run

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from sbafab import plugins
-from sbafab.actuators.fits import Fits, refuse_unfit
+from sbafab.actuators.fitted_size import Fits, refuse_unfit
 from sbafab.design.files import (
     FITS,
     Change,

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from sbafab.actuators import Family
 from sbafab.actuators.ears import film_setback
-from sbafab.actuators.fits import Fits, fitted
+from sbafab.actuators.fitted_size import Fits, fitted
 from sbafab.actuators.stacking import (
     Footprint,
     RoundChamber,

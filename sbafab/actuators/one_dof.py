@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal, Self
 
 from sbafab.actuators import Family
-from sbafab.actuators.fits import Fits, fitted
+from sbafab.actuators.fitted_size import Fits, fitted
 from sbafab.actuators.stacking import (
     Footprint,
     RoundChamber,

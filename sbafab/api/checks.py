@@ -10,12 +10,12 @@ from sbafab.api.designs import Source, build, command, either_of, load
 from sbafab.assemblies.records import Assembly
 from sbafab.design.files import Change
 from sbafab.laminate.laminate import Laminate
-from sbafab.process import Progress
 from sbafab.reports.nets_svg import NetMap, net_map
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Findings
 from sbafab.rules.measures import Measures
 from sbafab.rules.nets import connectivity
+from sbafab.runtime import Progress
 
 
 @command

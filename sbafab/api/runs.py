@@ -9,7 +9,7 @@ from typing import Any
 
 from sbafab.api.designs import Source, command, either_of, load
 from sbafab.assemblies.records import Assembly
-from sbafab.cutting.properties import TRUE_ARCS, Curves, DxfProfile
+from sbafab.cutting.cut_settings import TRUE_ARCS, Curves, DxfProfile
 from sbafab.design.files import Change
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
@@ -18,7 +18,7 @@ from sbafab.folders.run import Conforming, Run, RunRequest, Simulated
 from sbafab.folders.run import generate as run
 from sbafab.folders.run import simulate as run_simulator
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
-from sbafab.process import Progress
+from sbafab.runtime import Progress
 from sbafab.simulators.simulator import NAMES, SimulationRequest
 
 

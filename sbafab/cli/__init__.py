@@ -13,7 +13,7 @@ from click.shell_completion import CompletionItem
 
 from sbafab import __version__
 from sbafab.cli.exit import BAD_INPUT, exit_plainly, prepared_streams, print_error
-from sbafab.process import prepare
+from sbafab.runtime import prepare
 
 GROUPS = {
     "Design": {

@@ -21,7 +21,7 @@ from sbafab.design.identity import cited
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, SbafabError
 from sbafab.folders.build import Build, refuse_undoable
-from sbafab.folders.checks import checks
+from sbafab.folders.checks_json import checks
 from sbafab.folders.order import make_order
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.formulas import size_phrases, sizes

@@ -25,7 +25,7 @@ from sbafab.design.laminate_file import LaminateDocument
 from sbafab.documents import Document, json_schema
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.folders.artefacts import PredictDocument
-from sbafab.folders.checks import Checks
+from sbafab.folders.checks_json import Checks
 from sbafab.folders.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.lab.inspection import InspectionDocument
 from sbafab.lab.records import HistoryDocument, RecordsDocument

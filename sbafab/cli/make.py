@@ -23,7 +23,7 @@ from sbafab.design.files import changed_keys
 from sbafab.design.records import Design
 from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
-from sbafab.folders.checks import FindingEntry
+from sbafab.folders.checks_json import FindingEntry
 from sbafab.folders.order import JOB_SCHEMA
 from sbafab.folders.run import Run
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry

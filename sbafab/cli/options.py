@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args, get_origin
 import click
 from click.shell_completion import CompletionItem
 
-from sbafab.cutting.properties import TRUE_ARCS, DxfProfile
+from sbafab.cutting.cut_settings import TRUE_ARCS, DxfProfile
 from sbafab.design.files import key_paths, template_summaries
 from sbafab.design.units import KILOPASCALS, MILLILITRES_PER_MINUTE, in_first_unit, share_of
 

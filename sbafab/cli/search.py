@@ -20,7 +20,7 @@ from sbafab.design.files import changed_keys, name_of, template_names
 from sbafab.errors import DesignError
 from sbafab.models.figures import FLAGS
 from sbafab.models.formulas import MOST_PRESSURE, is_near_burst
-from sbafab.process import Progress
+from sbafab.runtime import Progress
 from sbafab.search import compare as comparing
 from sbafab.search import sweep as sweeping
 from sbafab.search.find import (

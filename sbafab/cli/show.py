@@ -17,8 +17,8 @@ import click
 
 from sbafab import catalogue
 from sbafab.cli.exit import RULE_FAILED, print_error
-from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Finding, counted, decisive
+from sbafab.runtime import Progress, ignore_progress
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -15,7 +15,7 @@ from sbafab.api import runs as api
 from sbafab.cli import options as opt
 from sbafab.cli import show
 from sbafab.cli.exit import print_error
-from sbafab.folders.checks import checks
+from sbafab.folders.checks_json import checks
 from sbafab.folders.run import result_json
 from sbafab.simulators.simulator import CHOICES, NAMES, Result, SimulationRequest
 

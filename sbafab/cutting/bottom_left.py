@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.cutting.lattice import Lattice, lattice_of, lattices_of, most_copies
-from sbafab.cutting.nest import (
+from sbafab.cutting.placements import (
     TURNS,
     NestPart,
     Placement,

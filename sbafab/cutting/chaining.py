@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
-from sbafab.cutting.properties import CUT_INNER, CUT_OUTER
+from sbafab.cutting.cut_settings import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import LEAST_AREA, Contour, circle, tidy
 from sbafab.geometry.edges import (

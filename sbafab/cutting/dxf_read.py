@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
+from sbafab.cutting.cut_settings import COLOURS, CUT_INNER, CUT_OUTER, REFERENCE, SEAM
 from sbafab.cutting.dxf_write import skeleton
-from sbafab.cutting.properties import COLOURS, CUT_INNER, CUT_OUTER, REFERENCE, SEAM
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, edge_from_bulge, quarter_arcs

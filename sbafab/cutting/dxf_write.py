@@ -10,7 +10,7 @@ from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
-from sbafab.cutting.properties import (
+from sbafab.cutting.cut_settings import (
     COLOURS,
     CUT_INNER,
     CUT_OUTER,

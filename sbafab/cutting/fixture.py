@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from sbafab.cutting.cut_settings import CutSettings, fixture_properties
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.lettering import Stroke, strokes, width
-from sbafab.cutting.properties import CutSettings, fixture_properties
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import OutputError

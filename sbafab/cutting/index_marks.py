@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.cutting.lettering import Stroke, strokes, width
-from sbafab.cutting.nest import Nest
+from sbafab.cutting.placements import Nest
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 

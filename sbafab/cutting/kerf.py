@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sbafab.cutting.properties import CutSettings, kerf_text
+from sbafab.cutting.cut_settings import CutSettings, kerf_text
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.contour import Contour, run_chords, tidy
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line

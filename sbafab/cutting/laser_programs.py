@@ -23,9 +23,7 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 from sbafab.cutting.beam_paths import BeamCurve, BeamRun, LaserRun, run_difference
-from sbafab.cutting.dxf_read import drawn_entity
-from sbafab.cutting.dxf_write import number
-from sbafab.cutting.properties import (
+from sbafab.cutting.cut_settings import (
     COLOURS,
     CUT_INNER,
     CUT_OUTER,
@@ -35,6 +33,8 @@ from sbafab.cutting.properties import (
     CutSettings,
     Recipes,
 )
+from sbafab.cutting.dxf_read import drawn_entity
+from sbafab.cutting.dxf_write import number
 from sbafab.cutting.verify import TOLERANCE
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import circle

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property, reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from sbafab.cutting.nest import TURNS, Turn, placed
+from sbafab.cutting.placements import TURNS, Turn, placed
 from sbafab.geometry.contour import run_chords
 from sbafab.geometry.edges import Bounds, Point, unit
 from sbafab.geometry.lazy_numpy import np

@@ -13,9 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import dxf_text, seam_text
-from sbafab.cutting.properties import (
+from sbafab.cutting.cut_settings import (
     FOLDER,
     REFERENCE,
     SEAM,
@@ -23,6 +21,8 @@ from sbafab.cutting.properties import (
     file_properties,
     layer_path,
 )
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_write import dxf_text, seam_text
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.cutting.verify import TOLERANCE, deviation, verify_file
 from sbafab.errors import OutputError
@@ -31,7 +31,7 @@ from sbafab.geometry.offset import shifted
 from sbafab.geometry.region import Region
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Laminate
-from sbafab.process import Counted
+from sbafab.runtime import Counted
 
 
 def write_layer_files(

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from sbafab.cutting.nest import Nest, Stock
+from sbafab.cutting.placements import Nest, Stock
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to, line_circle, meeting_points
 from sbafab.geometry.region import Region, disc

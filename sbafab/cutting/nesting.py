@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sbafab.cutting.bottom_left import ROUNDING, bottom_left, sheet_section, takes_lattices
-from sbafab.cutting.nest import TURNS, Nest, NestPart, Placement, Stock
+from sbafab.cutting.placements import TURNS, Nest, NestPart, Placement, Stock
 from sbafab.errors import DesignError, TooLargeError
 from sbafab.laminate.films import Material, in_order
 

@@ -12,6 +12,7 @@ from textwrap import wrap
 from typing import Literal, NamedTuple
 
 from sbafab.cutting.beam_paths import beam_runs, contour_runs, drawn
+from sbafab.cutting.cut_settings import PLAIN, CutSettings, file_properties, kerf_suffix
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.index_marks import index_marks
 from sbafab.cutting.laser_programs import (
@@ -23,8 +24,7 @@ from sbafab.cutting.laser_programs import (
     verify_laser_file,
 )
 from sbafab.cutting.lettering import Stroke, strokes, width
-from sbafab.cutting.nest import Nest, Stock
-from sbafab.cutting.properties import PLAIN, CutSettings, file_properties, kerf_suffix
+from sbafab.cutting.placements import Nest, Stock
 from sbafab.cutting.sequence import cutting_minutes, cutting_sequence, travel
 from sbafab.cutting.verify import verify_file
 from sbafab.design.sections import Laser, Sheets
@@ -32,7 +32,7 @@ from sbafab.geometry.edges import Point, box_round
 from sbafab.geometry.region import Region
 from sbafab.geometry.spatial_index import boxes_meet, widened
 from sbafab.laminate.films import Material
-from sbafab.process import Counted
+from sbafab.runtime import Counted
 
 FOLDER = "sheets"
 

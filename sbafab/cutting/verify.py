@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
+from sbafab.cutting.cut_settings import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import DATUM_ARM, Surroundings
-from sbafab.cutting.properties import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Edge, Line, Point, box_round, distance_to

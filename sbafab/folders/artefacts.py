@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sbafab import plugins
+from sbafab.cutting.cut_settings import CutSettings
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.layer_files import write_layer_files, write_seam_files
-from sbafab.cutting.nest import Nest
 from sbafab.cutting.nesting import PLACES, as_dict
-from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.placements import Nest
 from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.design.files import kit_names
 from sbafab.design.identity import design_sha256, kit_of
@@ -30,7 +30,7 @@ from sbafab.design.laminate_file import laminate_json
 from sbafab.design.records import Design, design_toml
 from sbafab.errors import DesignError, OutputError
 from sbafab.folders.build import Build, hole_notes
-from sbafab.folders.checks import Checks, checks
+from sbafab.folders.checks_json import Checks, checks
 from sbafab.folders.manifest import as_json
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.mesh_files import MeshFile, write_meshes
@@ -39,7 +39,7 @@ from sbafab.models.calibrated import NONE, load_calibration, shipped_names
 from sbafab.models.figures import Prediction, PredictionDocument
 from sbafab.pressing.cycles import batch_entry
 from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json
-from sbafab.process import Progress
+from sbafab.runtime import Progress
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 from sbafab.simulators.simulator import (
     SimulateDocument,

@@ -9,6 +9,15 @@ from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from sbafab.cutting.chaining import check_clear
+from sbafab.cutting.cut_settings import (
+    CUT_INNER,
+    CUT_OUTER,
+    CutSettings,
+    file_properties,
+    kerf_of,
+    kerf_text,
+    layer_path,
+)
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.layer_files import (
     CENTRED,
@@ -19,15 +28,6 @@ from sbafab.cutting.layer_files import (
     seam_path,
     seam_properties,
     stated_width,
-)
-from sbafab.cutting.properties import (
-    CUT_INNER,
-    CUT_OUTER,
-    CutSettings,
-    file_properties,
-    kerf_of,
-    kerf_text,
-    layer_path,
 )
 from sbafab.cutting.verify import check_contours, check_datum, check_sequence
 from sbafab.errors import DesignError, GeometryError, OutputError

@@ -8,10 +8,10 @@ from functools import cached_property
 
 from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
+from sbafab.cutting.cut_settings import TRUE_ARCS, Curves, CutSettings, LeadIns, Recipes
 from sbafab.cutting.kerf import compensated_paths
-from sbafab.cutting.nest import TURNS, NestPart, Stock, parts_of
 from sbafab.cutting.nesting import refuse_unfit
-from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings, LeadIns, Recipes
+from sbafab.cutting.placements import TURNS, NestPart, Stock, parts_of
 from sbafab.design.films import Sheet, material, recipes_for
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
@@ -23,10 +23,10 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.pressing import dowels
 from sbafab.pressing.cycles import Runs, design_runs
 from sbafab.pressing.schedule import Schedule, plate_holes, schedule
-from sbafab.process import Progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import CHECKED_AGAINST, lowered
+from sbafab.runtime import Progress
 from sbafab.version import GENERATOR
 
 

@@ -21,9 +21,9 @@ from pydantic import TypeAdapter
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import DESIGN_FILE, load_assembly
+from sbafab.cutting.cut_settings import FOLDER as LAYERS
+from sbafab.cutting.cut_settings import curves_of
 from sbafab.cutting.laser_programs import ENDING
-from sbafab.cutting.properties import FOLDER as LAYERS
-from sbafab.cutting.properties import curves_of
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.folders.artefacts import (
@@ -76,13 +76,13 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.figures import PredictionRequest
 from sbafab.models.prediction import predict
-from sbafab.process import ignore_progress
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.measures import Measures
 from sbafab.rules.nets import NAME as NETS
 from sbafab.rules.nets import NETLIST, netlist_findings
 from sbafab.rules.rule import Rule
+from sbafab.runtime import ignore_progress
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 from sbafab.version import GENERATOR
 

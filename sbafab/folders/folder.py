@@ -12,7 +12,7 @@ from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
 from sbafab.assemblies.records import Cup
 from sbafab.assemblies.shapes import colours, cup_mould, linear, placed_surface
-from sbafab.cutting.nest import Nest
+from sbafab.cutting.placements import Nest
 from sbafab.cutting.sheets import SheetFile
 from sbafab.errors import DefectError
 from sbafab.folders.artefacts import (
@@ -27,11 +27,11 @@ from sbafab.folders.artefacts import (
     write_nested_sheets,
     write_text,
 )
-from sbafab.folders.checks import checks
+from sbafab.folders.checks_json import checks
 from sbafab.folders.manifest import as_json, file_hashes, job_manifest, manifest
 from sbafab.folders.order import SCHEMA, Order
 from sbafab.meshing.formats import Node, write_scene, write_stl
-from sbafab.process import Progress
+from sbafab.runtime import Progress
 
 SOLID = "mesh/assembled.glb"
 PICTURE = "preview/assembled.png"

@@ -13,9 +13,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, ConfigDict, Field, ValidationError
 
+from sbafab.cutting.cut_settings import CutSettings, curves_text, layer_path
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.layer_files import seam_path
-from sbafab.cutting.properties import CutSettings, curves_text, layer_path
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.identity import citation, design_sha256
 from sbafab.design.records import Design

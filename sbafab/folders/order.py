@@ -14,17 +14,17 @@ from typing import Any, Final, Literal
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.records import Assembly
-from sbafab.cutting.nest import Nest, NestPart
+from sbafab.cutting.cut_settings import TRUE_ARCS, Curves, CutSettings
 from sbafab.cutting.nest_check import check_nest
 from sbafab.cutting.nesting import PLACES, from_dict, nest
-from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings
+from sbafab.cutting.placements import Nest, NestPart
 from sbafab.design.records import Design
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.errors import DefectError, DesignError, GeometryError, OutputError
 from sbafab.folders.build import Build, make_build, stocks
-from sbafab.process import Progress, ignore_progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding
+from sbafab.runtime import Progress, ignore_progress
 
 SCHEMA: Final = "sbafab/manifest@1"
 JOB_SCHEMA: Final = "sbafab/job@1"

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sbafab.assemblies.records import Assembly
-from sbafab.cutting.properties import TRUE_ARCS, Curves
+from sbafab.cutting.cut_settings import TRUE_ARCS, Curves
 from sbafab.design.records import Design
 from sbafab.errors import OccupiedError, OutputError
 from sbafab.folders.artefacts import EVERYTHING, PICTURES, RunPart, tops_of
@@ -32,8 +32,8 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.markup import table_html
 from sbafab.models.figures import Prediction
 from sbafab.pressing.schedule import Schedule
-from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Finding, Findings
+from sbafab.runtime import Progress, ignore_progress
 from sbafab.simulators.simulator import (
     Result,
     SimulateDocument,

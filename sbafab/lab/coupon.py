@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.cutting.beam_paths import contour_runs, drawn
+from sbafab.cutting.cut_settings import kerf_properties
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.laser_programs import svg_text
 from sbafab.cutting.lettering import Stroke, strokes
-from sbafab.cutting.properties import kerf_properties
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import DesignError

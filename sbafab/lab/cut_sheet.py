@@ -9,7 +9,7 @@ from pathlib import Path
 import shapely
 
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.nest import TURNS
+from sbafab.cutting.placements import TURNS
 from sbafab.errors import DesignError, OutputError
 from sbafab.folders.as_cut import path_in_folder
 from sbafab.folders.manifest import JobManifest, Manifest, read_design_index, read_index

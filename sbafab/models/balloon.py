@@ -40,7 +40,7 @@ from sbafab.models.film_elements import (
     strain,
 )
 from sbafab.models.least_energy import Descent, NoEquilibrium, equilibrium
-from sbafab.process import one_blas_thread
+from sbafab.runtime import one_blas_thread
 
 FILM_ELEMENTS = 24
 RIM_ELEMENTS = 5

@@ -24,7 +24,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes, distinct, inflate
 from sbafab.models.film_elements import Array
 from sbafab.models.rippled import compressed_shapes, least_free_states, with_waves
-from sbafab.process import one_blas_thread
+from sbafab.runtime import one_blas_thread
 
 DEGREE = 5
 PRESSURE_SPANS, HEIGHT_SPANS = 12, 12

@@ -32,7 +32,7 @@ from sbafab.models.stack_balance import (
     step_limit,
 )
 from sbafab.models.stack_loads import Load
-from sbafab.process import one_blas_thread
+from sbafab.runtime import one_blas_thread
 
 if TYPE_CHECKING:
     from sbafab.models.stack import Stack

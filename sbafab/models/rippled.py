@@ -21,7 +21,7 @@ from sbafab.models.balloon import Balloon, Shapes, inflate, ripples_at
 from sbafab.models.film_elements import Array
 from sbafab.models.least_energy import NoEquilibrium, equilibrium
 from sbafab.models.rim_correction import EDGE, PLACES, UP, R, Waves, Waving, Z
-from sbafab.process import one_blas_thread
+from sbafab.runtime import one_blas_thread
 
 WIDE = 4.0
 """Pocket radius in ring widths above which films fall in step with the rim: strokes of narrower

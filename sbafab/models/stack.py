@@ -58,7 +58,7 @@ from sbafab.models.stack_loads import (
     plate_chain,
     vector_of,
 )
-from sbafab.process import one_blas_thread
+from sbafab.runtime import one_blas_thread
 
 __all__ = ["MOST_PRESSURE", "Motion", "Plate", "Pose", "Stack", "StackBatch", "stack"]
 

@@ -29,16 +29,7 @@ from sbafab.laminate.lay_up import (
     pressed_layers,
     stack_count,
 )
-from sbafab.pressing import build_up
-from sbafab.pressing.build_up import (
-    BASE_PLATE,
-    LAMINATE,
-    PAD,
-    RELEASE,
-    UNDERLAY,
-    BuildUpPart,
-    StackShape,
-)
+from sbafab.pressing import press_force
 from sbafab.pressing.dowels import (
     PinHole,
     PinSetting,
@@ -48,6 +39,15 @@ from sbafab.pressing.dowels import (
     settings_by_step,
 )
 from sbafab.pressing.plate_heating import Heating, HeatPoint, heating
+from sbafab.pressing.press_force import (
+    BASE_PLATE,
+    LAMINATE,
+    PAD,
+    RELEASE,
+    UNDERLAY,
+    BuildUpPart,
+    StackShape,
+)
 
 
 def joined_words(words: Sequence[str]) -> str:
@@ -310,11 +310,11 @@ def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,))
     refuse_temperature(laminate, press)
     parts = press_steps(laminate)
     under, *smaller = (
-        [build_up.footprint(laminate, part.layers, count) for part in parts]
+        [press_force.footprint(laminate, part.layers, count) for part in parts]
         for count in dict.fromkeys(together)
     )
     stacks = [*under, *chain.from_iterable(smaller)]
-    pad = build_up.pad_thickness(press, stacks)
+    pad = press_force.pad_thickness(press, stacks)
     pins = pins_by_step(laminate, design)
     plate = plate_thickness(press.plate_thickness, pins)
     warming = heating(laminate, press)
@@ -364,7 +364,7 @@ def pins_by_step(laminate: Laminate, design: Design) -> list[tuple[PinSetting, .
     """Return the pins of every press step. Raises DesignError if pins or plate do not fit."""
     press, registration = design.press, design.registration
     parts = press_steps(laminate)
-    heights = [build_up.footprint(laminate, part.layers).height for part in parts]
+    heights = [press_force.footprint(laminate, part.layers).height for part in parts]
     return settings_by_step(
         [
             (
@@ -405,7 +405,7 @@ class _Setting(NamedTuple):
 
 def _step(laminate: Laminate, part: LayUpStep, press: Press, setting: _Setting, after: str) -> Step:
     count = stack_count(laminate, part.layers)
-    estimate = build_up.pressures(press, setting.pad, setting.under)
+    estimate = press_force.pressures(press, setting.pad, setting.under)
     title = STEPS[part.name][count > 1]
     if part.name == "flash_bottom" and len(part.layers) > 2:
         title = f"Bottom balloon{'s' * (count > 1)}, {layers_in_words(part.layers)}"
@@ -430,7 +430,7 @@ def _step(laminate: Laminate, part: LayUpStep, press: Press, setting: _Setting, 
         edge_kpa=estimate.edge,
         bond_kpa=estimate.bond,
         plate_kpa=estimate.plate,
-        pressure_basis=build_up.pressure_basis(press, setting.pad, setting.under, estimate)
+        pressure_basis=press_force.pressure_basis(press, setting.pad, setting.under, estimate)
         + _round_pins(press, setting),
         build_up=tuple(_items(press, setting, _size(laminate, part))),
         pin_settings=setting.pins,
@@ -452,7 +452,7 @@ def _round_pins(press: Press, setting: _Setting) -> str:
     out = max((pin.stands_mm + pin.tolerance_mm - beneath for pin in setting.pins), default=0.0)
     if not out:
         return ""
-    free = build_up.unpressed(press, out)
+    free = press_force.unpressed(press, out)
     return f"; up to {free:.1f} mm round a pin none"
 
 
@@ -606,10 +606,10 @@ def refuse_temperature(laminate: Laminate, press: Press) -> None:
                 f"{above.film.material}, which both stay solid in the press and do not bond; give "
                 f"the {roles} another film in [layup]"
             )
-    if press.temperature_c > build_up.PAD_LIMIT_C:
+    if press.temperature_c > press_force.PAD_LIMIT_C:
         raise DesignError(
             f"press.temperature_c = {press.temperature_c:g} is more than the press pad of "
-            f"{press.pad_material} stands, {build_up.PAD_LIMIT_C:g} C; lower it"
+            f"{press.pad_material} stands, {press_force.PAD_LIMIT_C:g} C; lower it"
         )
 
 
@@ -672,10 +672,13 @@ def _cautions(
     if laminate.middle_first and parts[0].name == "flash_middle":
         yield Caution(MIDDLE_FIRST)
     pads = (
-        item.thickness_mm for step in steps for item in step.build_up if item.part == build_up.PAD
+        item.thickness_mm
+        for step in steps
+        for item in step.build_up
+        if item.part == press_force.PAD
     )
     pad = next(pads, 0.0)
-    if (pile := build_up.pad_sheets(pad)) > 1:
+    if (pile := press_force.pad_sheets(pad)) > 1:
         yield Caution(
             f"the press pad is a pile of {pile} sheets, {pad:g} mm high together, which may "
             "slide aside: hold it in a frame, and see whether the press opens so far"

@@ -14,12 +14,12 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.plugins import Plugins
-from sbafab.process import Progress
 from sbafab.rules.finding import Finding, marked
 from sbafab.rules.limits import lowered
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Rule
 from sbafab.rules.sentences import Explanation, explained
+from sbafab.runtime import Progress
 
 OWN = {name: f"sbafab.rules.{name.replace('-', '_')}:RULE" for name in catalogue.names("rules")}
 

@@ -28,8 +28,8 @@ from sbafab.geometry.width import Width
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Interface, Laminate, Pin
 from sbafab.rules.boundary import END_ROOM, STEEP, Facing, Reach
-from sbafab.rules.freedoms import Freedom, Freedoms, Part, seam_part
 from sbafab.rules.limits import TOLERANCE, holds
+from sbafab.rules.placement_errors import Freedom, Freedoms, Part, seam_part
 from sbafab.rules.seam_overlaps import Overlap
 
 if TYPE_CHECKING:

@@ -16,7 +16,6 @@ from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.laminate.lay_up import press_steps
 from sbafab.rules.boundary import Facing, Reach, edges_along, facing_films, outward_reach
 from sbafab.rules.finding import Place
-from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
 from sbafab.rules.margins import (
     SHARP,
     MarginGroup,
@@ -25,6 +24,7 @@ from sbafab.rules.margins import (
     margins_of,
     narrow_places,
 )
+from sbafab.rules.placement_errors import Freedoms, Laid, freedoms, lay_up
 from sbafab.rules.seam_overlaps import SeamEnds, seam_ends
 from sbafab.rules.sentences import Clause, say
 

@@ -17,10 +17,10 @@ from sbafab.geometry.edges import Point
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict, judged
-from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import holds, least_passing
 from sbafab.rules.margins import MarginKind, Margins, bonding_seams
 from sbafab.rules.measures import DistinctInterface, Measures, interface_name, place_in
+from sbafab.rules.placement_errors import Freedom
 from sbafab.rules.rule import Rule
 from sbafab.rules.seam_overlaps import EdgeBond
 from sbafab.rules.sentences import Clause, explained, say

@@ -18,10 +18,10 @@ from sbafab.design.sections import Registration
 from sbafab.geometry.lazy_numpy import np
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict, judged
-from sbafab.rules.freedoms import Freedom, Freedoms
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.margins import Margins, seated
 from sbafab.rules.measures import Measures
+from sbafab.rules.placement_errors import Freedom, Freedoms
 from sbafab.rules.rule import Rule
 from sbafab.rules.sentences import Clause, explained, say
 

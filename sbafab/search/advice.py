@@ -16,9 +16,9 @@ from sbafab.actuators import build
 from sbafab.design.records import REGISTRATIONS, Design
 from sbafab.errors import DesignError
 from sbafab.laminate.base_plate import PlateMachine
-from sbafab.process import Progress, ignore_progress
 from sbafab.rules.deck import run_deck
 from sbafab.rules.registration_yield import SEED, Share, simulate
+from sbafab.runtime import Progress, ignore_progress
 
 STEP = 0.01
 """mm: bond and overhang are advised in whole steps."""

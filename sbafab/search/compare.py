@@ -32,9 +32,9 @@ from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import MOST_PRESSURE, stack
-from sbafab.process import Progress, ignore_progress
 from sbafab.reports.inflated_picture import WHY, PictureRequest, pictures_at_one_scale
 from sbafab.reports.solid_png import solid_png
+from sbafab.runtime import Progress, ignore_progress
 from sbafab.search import advice
 from sbafab.search.advice import YieldDesign, value_of
 from sbafab.search.sweep_report import CSV, JOURNAL, PageSection, page_html

@@ -28,8 +28,8 @@ from sbafab.models.balloons import balloons_of, has_balloons
 from sbafab.models.figures import FLAGS, Flag, FlagList
 from sbafab.models.intervals import uncertainty_of
 from sbafab.models.paper import Counterpart, CounterpartEntry
-from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Place
+from sbafab.runtime import Progress, ignore_progress
 from sbafab.search.quantities import (
     AT_PRESSURE,
     NAMES,

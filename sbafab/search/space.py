@@ -25,8 +25,8 @@ from sbafab.errors import BeyondError, DesignError, GeometryError
 from sbafab.folders.build import Build, refuse_undoable
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.stack import MOST_PRESSURE
-from sbafab.process import Progress
 from sbafab.rules.deck import run_deck
+from sbafab.runtime import Progress
 from sbafab.search.quantities import (
     CLOSE,
     Goal,

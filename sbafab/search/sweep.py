@@ -23,7 +23,7 @@ from sbafab.folders.swap import MANIFEST
 from sbafab.markup import data_frame
 from sbafab.models.formulas import refuse_pressure, usual_pressures
 from sbafab.models.intervals import factors_of
-from sbafab.process import Progress, ignore_progress
+from sbafab.runtime import Progress, ignore_progress
 from sbafab.search.sweep_report import (
     CSV,
     JOURNAL,

@@ -34,9 +34,9 @@ from sbafab.models.figures import PredictionRequest
 from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
 from sbafab.plugins import FAMILIES, RULES, installed
-from sbafab.process import prepare, processors
 from sbafab.rules.deck import AT_MOST
 from sbafab.rules.finding import Finding, Place, Verdict
+from sbafab.runtime import prepare, processors
 from sbafab.search.vary import key_values
 
 SweepOutcome = Literal["passes", "fails", "refused", "crashed", "too long"]

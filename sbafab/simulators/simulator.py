@@ -25,8 +25,8 @@ from sbafab.errors import DesignError, OutputError, VoidError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.plugins import Plugins
-from sbafab.process import Progress
-from sbafab.simulators.coarse import Shell, enclosed, pocket_radii, why_not_round
+from sbafab.runtime import Progress
+from sbafab.simulators.shell_model import Shell, enclosed, pocket_radii, why_not_round
 
 SIMULATORS = Plugins(
     plugins.SIMULATORS,

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from sbafab import api
-from sbafab.folders.checks import FindingEntry
+from sbafab.folders.checks_json import FindingEntry
 
 if TYPE_CHECKING:
     from sbafab.assemblies.build import Assembled, PlacedPart

@@ -20,7 +20,7 @@ from typing import Any
 
 from sbafab import api
 from sbafab.errors import SbafabError
-from sbafab.process import processors
+from sbafab.runtime import processors
 
 END = b""
 """The last message of a job."""

@@ -18,7 +18,7 @@ from sbafab.models.calibrated import GROUPS, SHARE, UNKNOWNS, ModelCalibration, 
 from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
 from sbafab.models.intervals import sizes_of
-from sbafab.process import Progress
+from sbafab.runtime import Progress
 from sbafab.validation.evidence import QUANTITIES, Evidence, MeasuredCurve
 from sbafab.validation.model_values import ModelledActuator, ModelValues, NoModel, model_values
 from sbafab.validation.posterior import (

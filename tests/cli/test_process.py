@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from sbafab.process import YOUNG
+from sbafab.runtime import YOUNG
 
 KEYS = ("OPENBLAS_NUM_THREADS", "PYDANTIC_DISABLE_PLUGINS")
 PROGRAM = """
@@ -46,7 +46,7 @@ def test_a_caller_with_arguments_of_its_own_keeps_its_process() -> None:
 
 SOLVES = """
 import numpy as np, threadpoolctl, sbafab
-from sbafab.process import one_blas_thread
+from sbafab.runtime import one_blas_thread
 
 def threads():
     return [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]

@@ -9,8 +9,8 @@ import pytest
 import shapely
 
 from sbafab.cutting.beam_paths import BeamRun, beam_runs
+from sbafab.cutting.cut_settings import CUT_INNER, CUT_OUTER, LeadIns
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, LeadIns
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Edge, Point

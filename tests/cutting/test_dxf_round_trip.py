@@ -9,10 +9,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from sbafab.cutting.cut_settings import DxfProfile
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
-from sbafab.cutting.properties import DxfProfile
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.contour import in_reading_order
 from sbafab.geometry.offset import shrink

@@ -10,9 +10,9 @@ import ezdxf
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.cutting.cut_settings import Curves, CutSettings
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.fixture import PATH, fixture, plate_corner, write_fixture
-from sbafab.cutting.properties import Curves, CutSettings
 
 SETTINGS = CutSettings("test", "0" * 64)
 PLATEN = (152.4, 152.4)

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from sbafab.cutting.cut_settings import kerf_of, kerf_properties, kerf_suffix
 from sbafab.cutting.kerf import compensate, in_chords
-from sbafab.cutting.properties import kerf_of, kerf_properties, kerf_suffix
 from sbafab.cutting.verify import check_contours
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.edges import Line

@@ -15,6 +15,7 @@ import shapely
 import svgelements
 
 from sbafab.cutting.beam_paths import beam_runs, contour_runs, drawn
+from sbafab.cutting.cut_settings import PLAIN, LeadIns
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.laser_programs import (
     PROGRAMS,
@@ -23,7 +24,6 @@ from sbafab.cutting.laser_programs import (
     read_laser_file,
     verify_laser_file,
 )
-from sbafab.cutting.properties import PLAIN, LeadIns
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region, disc, stadium

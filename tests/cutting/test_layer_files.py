@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from sbafab.cutting import layer_files
+from sbafab.cutting.cut_settings import CutSettings
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.layer_files import write_layer_files
-from sbafab.cutting.properties import CutSettings
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.process import Counted
+from sbafab.runtime import Counted
 
 SETTINGS = CutSettings("two-plates", "ab" * 32)
 CALIBRATED = CutSettings(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from sbafab.cutting.nest import NestPart, Stock
 from sbafab.cutting.nesting import nest
+from sbafab.cutting.placements import NestPart, Stock
 from sbafab.errors import DesignError
 from sbafab.geometry.region import disc, rectangle
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.cutting.nest import parts_of
+from sbafab.cutting.placements import parts_of
 
 
 @pytest.mark.parametrize(("copies", "template"), [(1, "3dof-15mm"), (4, "radial-15mm")])

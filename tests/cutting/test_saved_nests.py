@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from sbafab.cutting.nest import NestPart, Stock
 from sbafab.cutting.nesting import as_dict, from_dict, nest
+from sbafab.cutting.placements import NestPart, Stock
 from sbafab.geometry.region import disc, rectangle
 
 PARTS = (

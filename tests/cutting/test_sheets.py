@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 import shapely
 
+from sbafab.cutting.cut_settings import CutSettings
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.nest import Nest, NestPart, Stock
 from sbafab.cutting.nesting import nest
-from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.placements import Nest, NestPart, Stock
 from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.design.sections import Laser, Sheets
 from sbafab.geometry.region import disc

@@ -5,8 +5,8 @@ from __future__ import annotations
 import ezdxf
 import pytest
 
+from sbafab.cutting.cut_settings import COLOURS
 from sbafab.cutting.dxf_write import SKELETON, skeleton_text
-from sbafab.cutting.properties import COLOURS
 
 
 @pytest.mark.skipif(ezdxf.version < (1, 4), reason="older ezdxf writes more tags")

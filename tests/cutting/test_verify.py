@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from sbafab.cutting.cut_settings import DxfProfile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.layer_files import path_difference
-from sbafab.cutting.properties import DxfProfile
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import OutputError

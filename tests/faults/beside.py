@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
+from sbafab.cutting.cut_settings import ENGRAVE
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.properties import ENGRAVE
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.cutting.properties import Curves, DxfProfile
+from sbafab.cutting.cut_settings import Curves, DxfProfile
 from sbafab.design.sections import rule_names
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import RunRequest, generate

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from sbafab.actuators import load_design
+from sbafab.cutting.cut_settings import ENGRAVE
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
-from sbafab.cutting.properties import ENGRAVE
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
 from sbafab.folders.check import check_folder

@@ -12,8 +12,8 @@ import shapely
 from shapely import LinearRing, Polygon
 
 from sbafab.actuators import build, load_design
+from sbafab.cutting.cut_settings import Curves
 from sbafab.cutting.kerf import in_chords
-from sbafab.cutting.properties import Curves
 from sbafab.errors import DesignError
 from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.region import disc, rectangle

@@ -10,7 +10,7 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.assemblies.files import load
 from sbafab.assemblies.records import Assembly
-from sbafab.cutting.properties import Curves
+from sbafab.cutting.cut_settings import Curves
 from sbafab.errors import OutputError
 from sbafab.folders.artefacts import RunPart
 from sbafab.folders.check import check_folder

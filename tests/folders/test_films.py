@@ -20,8 +20,8 @@ from sbafab.folders.run import Run, RunRequest, generate
 from sbafab.pressing.schedule import schedule
 from sbafab.rules.deck import has_failed
 from sbafab.simulators.calculix.deck import deck_settings
-from sbafab.simulators.coarse import coarse_shell, round_stack, why_not_round
 from sbafab.simulators.mujoco.run import model_text
+from sbafab.simulators.shell_model import coarse_shell, round_stack, why_not_round
 from sbafab.simulators.sofa.run import why_not
 
 FILMS = """

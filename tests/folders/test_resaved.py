@@ -19,7 +19,7 @@ from ezdxf.addons import r12export
 from ezdxf.document import Drawing
 
 from sbafab.actuators import load_design
-from sbafab.cutting.properties import Curves, DxfProfile
+from sbafab.cutting.cut_settings import Curves, DxfProfile
 from sbafab.design.sections import rule_names
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import RunRequest, generate

@@ -18,7 +18,7 @@ from sbafab.cutting.bottom_left import bottom_left
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.layer_files import write_layer_files
-from sbafab.cutting.nest import NestPart, Placement, Stock
+from sbafab.cutting.placements import NestPart, Placement, Stock
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import DefectError, OutputError
 from sbafab.folders import artefacts

@@ -11,8 +11,8 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.errors import GeometryError, SbafabError
-from sbafab.geometry.edges import Line
 from sbafab.folders import build as builds
+from sbafab.geometry.edges import Line
 from tests.hardship.starting import WITHOUT_PRIVILEGES
 from tests.hunt.oracle import laid_over
 

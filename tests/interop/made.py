@@ -9,7 +9,7 @@ import shapely
 from pyogrio import raw
 
 from sbafab.actuators import load_design
-from sbafab.cutting.properties import Curves, DxfProfile
+from sbafab.cutting.cut_settings import Curves, DxfProfile
 from sbafab.folders.run import Run, RunRequest, generate
 from sbafab.laminate.films import Material
 

@@ -10,9 +10,9 @@ import ezdxf
 import pytest
 from ezdxf.document import Drawing
 
+from sbafab.cutting.cut_settings import DxfProfile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
-from sbafab.cutting.properties import DxfProfile
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.region import Region, disc, strip, union
 

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from pyogrio import raw
 
 from sbafab.actuators import build, load_design
+from sbafab.cutting.cut_settings import DxfProfile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
-from sbafab.cutting.properties import DxfProfile
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.offset import fillet
 from sbafab.geometry.region import Region, disc, stadium, strip, union

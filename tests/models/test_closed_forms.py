@@ -20,7 +20,7 @@ from sbafab.models.closed_forms import (
 )
 from sbafab.models.formulas import force
 from sbafab.models.pneumatics import seconds
-from sbafab.simulators.coarse import Meridian
+from sbafab.simulators.shell_model import Meridian
 
 AXES = [(4.25 * math.cos(t), 4.25 * math.sin(t)) for t in np.radians([0, 120, 240])]
 POCKETS = [eq_4(3.0), eqs_1_to_3(3.0), eqs_1_to_3(0.7), lens(10.0, 8.5), lens(10.0, 0.0)]

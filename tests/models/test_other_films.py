@@ -12,7 +12,7 @@ from sbafab.models.figures import Prediction, PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.models.stack import stack
 from sbafab.simulators.calculix.deck import deck_settings
-from sbafab.simulators.coarse import coarse_shell, round_stack
+from sbafab.simulators.shell_model import coarse_shell, round_stack
 
 TPU = ("films.tpe.product=TPU 85A", "films.tpe.thickness=0.05")
 KNOWN = (*TPU, "films.tpe.modulus=20", "films.tpe.poisson=0.45")

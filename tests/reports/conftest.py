@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from sbafab.cutting.nest import Nest, NestPart, Placement, Stock, Turn
+from sbafab.cutting.placements import Nest, NestPart, Placement, Stock, Turn
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate

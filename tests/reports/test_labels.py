@@ -10,7 +10,7 @@ import pytest
 import shapely
 from lxml import html as lxml_html
 
-from sbafab.cutting.nest import Nest
+from sbafab.cutting.placements import Nest
 from sbafab.cutting.sheets import SheetFile
 from sbafab.reports.traveller.pictures import sheet_map
 from tests.reports.pages import built

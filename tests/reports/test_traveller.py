@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from lxml import html as lxml_html
 
-from sbafab.cutting.properties import COLOURS, CUT_SEQUENCE, REFERENCE
+from sbafab.cutting.cut_settings import COLOURS, CUT_SEQUENCE, REFERENCE
 from sbafab.design.sections import Acceptance
 from sbafab.lab.recording import entries_of
 from sbafab.reports.traveller import formatting

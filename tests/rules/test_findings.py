@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import pytest
 
 import sbafab
-from sbafab.folders.checks import FindingEntry
+from sbafab.folders.checks_json import FindingEntry
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, disc, rectangle, strip
 from sbafab.laminate.joints import Port

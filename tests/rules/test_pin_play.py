@@ -8,10 +8,10 @@ import pytest
 
 from sbafab.geometry.edges import Point
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules.freedoms import Freedom, Laid, Part, freedoms
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.measures import Measures
 from sbafab.rules.pin_fit import check
+from sbafab.rules.placement_errors import Freedom, Laid, Part, freedoms
 from tests.designs import PAPER
 
 Good = Callable[..., Laminate]

@@ -17,8 +17,8 @@ from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding
-from sbafab.rules.freedoms import Part
 from sbafab.rules.measures import Measures
+from sbafab.rules.placement_errors import Part
 from sbafab.rules.registration_worst_case import check, least_remaining
 from tests.designs import PAPER, errors
 

@@ -10,7 +10,7 @@ from sbafab.actuators import build, load_design
 from sbafab.cli import main
 from sbafab.design.records import Design
 from sbafab.folders.build import make_build
-from sbafab.folders.checks import AdviceEntry
+from sbafab.folders.checks_json import AdviceEntry
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.registration_yield import simulate

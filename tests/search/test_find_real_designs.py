@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import sbafab
 from sbafab.cli import app
 from sbafab.design.records import Free
-from sbafab.process import ignore_progress
+from sbafab.runtime import ignore_progress
 from sbafab.search.quantities import read_all
 from sbafab.search.space import FindRequest, SearchSpace, evaluated
 

@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 import sbafab
-from sbafab.simulators.coarse import (
+from sbafab.simulators.shell_model import (
     Meridian,
     Shell,
     Triangles,

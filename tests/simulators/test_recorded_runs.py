@@ -15,8 +15,8 @@ import pytest
 import sbafab
 from sbafab.errors import OutputError, VoidError
 from sbafab.laminate.laminate import Laminate
-from sbafab.process import ignore_progress
-from sbafab.simulators.coarse import nearly_flat
+from sbafab.runtime import ignore_progress
+from sbafab.simulators.shell_model import nearly_flat
 from sbafab.simulators.simulator import (
     Result,
     SimulationRequest,

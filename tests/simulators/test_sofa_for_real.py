@@ -11,7 +11,7 @@ import pytest
 import sbafab
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.process import ignore_progress
+from sbafab.runtime import ignore_progress
 from sbafab.simulators.simulator import Result, SimulationRequest
 from sbafab.simulators.sofa import scenes
 from sbafab.simulators.sofa.run import run

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.simulators.coarse import round_stack
+from sbafab.simulators.shell_model import round_stack
 from sbafab.simulators.simulator import SimulationRequest
 from sbafab.simulators.sofa.run import export
 from sbafab.simulators.sofa.scenes import (

@@ -10,8 +10,8 @@ from typing import NamedTuple
 from sbafab.design.identity import adhesive_for, tube_name
 from sbafab.laminate.films import FIRST, Film
 from sbafab.laminate.laminate import Layer
-from sbafab.pressing.build_up import BASE_PLATE, PAD, RELEASE, UNDERLAY, pad_sheets
 from sbafab.pressing.dowels import pin_holes
+from sbafab.pressing.press_force import BASE_PLATE, PAD, RELEASE, UNDERLAY, pad_sheets
 from sbafab.pressing.schedule import Step, joined_words
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.prints import PAPER, leaves, tray_sheets

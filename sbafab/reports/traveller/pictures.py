@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sbafab.cutting.fixture import shown
-from sbafab.cutting.nest import Placement
+from sbafab.cutting.placements import Placement
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.geometry.cache import cached

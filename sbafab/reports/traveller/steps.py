@@ -24,10 +24,10 @@ from sbafab.laminate.lay_up import (
     press_steps,
     stack_count,
 )
-from sbafab.pressing.build_up import PAD
 from sbafab.pressing.cycles import cycle_name
 from sbafab.pressing.dowels import PinSetting
 from sbafab.pressing.plate_heating import PATIENCE
+from sbafab.pressing.press_force import PAD
 from sbafab.pressing.schedule import FoldStep, SeamStep, Step
 from sbafab.reports import drawing as draw
 from sbafab.reports.prints import guides

@@ -12,8 +12,8 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.design.identity import cure_hours
 from sbafab.folders.build import Build
 from sbafab.laminate.films import Film
-from sbafab.pressing.build_up import BASE_PLATE
 from sbafab.pressing.plate_heating import START, cool_minutes, warm_minutes
+from sbafab.pressing.press_force import BASE_PLATE
 from sbafab.pressing.schedule import HANDLING_MINUTES
 from sbafab.reports.prints import NAME as UNDERLAY
 from sbafab.reports.prints import guides

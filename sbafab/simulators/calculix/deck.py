@@ -17,8 +17,8 @@ from sbafab.laminate.films import PAPER_TPE, Film, density_of, in_order
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.meshing.formats import write_inp
-from sbafab.simulators.coarse import elastic_of
 from sbafab.simulators.model_files import rendered, write_files
+from sbafab.simulators.shell_model import elastic_of
 from sbafab.simulators.simulator import LARGEST_VACUUM, SimulationRequest, chamber_pressures
 
 Procedure = Literal["dynamic", "static"]

@@ -24,9 +24,9 @@ from sbafab.meshing.conforming.layup import MeshSettings, Symmetry, flat, images
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.meshing.formats import write_fields
 from sbafab.meshing.surface import Surface
-from sbafab.process import Progress
 from sbafab.reports.canvas import AMBIENT, draw_length_bar, rasterize, view_of
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
+from sbafab.runtime import Progress
 from sbafab.simulators.calculix.deck import (
     JOB,
     DeckSettings,

@@ -16,8 +16,9 @@ import numpy as np
 
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.process import Progress
-from sbafab.simulators.coarse import (
+from sbafab.runtime import Progress
+from sbafab.simulators.model_files import model_file, write_files
+from sbafab.simulators.shell_model import (
     FILMS,
     RoundStack,
     Shell,
@@ -28,7 +29,6 @@ from sbafab.simulators.coarse import (
     round_stack,
     why_not_round,
 )
-from sbafab.simulators.model_files import model_file, write_files
 from sbafab.simulators.simulator import (
     DEFAULT_PRESSURE,
     NODES_FILE,

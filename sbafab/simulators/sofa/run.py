@@ -7,8 +7,8 @@ from pathlib import Path
 
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.process import Progress
-from sbafab.simulators.coarse import elastic_of, why_not_round
+from sbafab.runtime import Progress
+from sbafab.simulators.shell_model import elastic_of, why_not_round
 from sbafab.simulators.simulator import (
     DEFAULT_PRESSURE,
     PERIOD,

@@ -20,7 +20,8 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.element_mesh import shell_mesh, thin
 from sbafab.meshing.conforming.layup import Layup, MeshSettings, flat, layup, narrowest_ring
 from sbafab.meshing.conforming.mesh import Mesh, volumes
-from sbafab.simulators.coarse import (
+from sbafab.simulators.model_files import model_file, write_files
+from sbafab.simulators.shell_model import (
     FilmGroup,
     Meridian,
     RoundStack,
@@ -36,7 +37,6 @@ from sbafab.simulators.coarse import (
     standing,
     why_not_round,
 )
-from sbafab.simulators.model_files import model_file, write_files
 from sbafab.simulators.simulator import NODES_FILE, PERIOD, RAMP, RecordedFilms, refuse_unknown
 
 # Stacks of round pockets use the coarse shell, others the conforming mesh.
