@@ -249,7 +249,7 @@ def inflate(
     return _shapes(films, loads, motion, y)
 
 
-def _shapes(films: Films, loads: Sequence[BalloonLoad], motion: FilmMotion, y: Array) -> Shapes:
+def _shapes(films: FilmPair, loads: Sequence[BalloonLoad], motion: FilmMotion, y: Array) -> Shapes:
     """Return the shapes at freedoms (freedoms, rows); one film stands for two."""
     height = volume = force = np.zeros(y.shape[1])
     energy, both = motion.twist @ y**2 / 2, 2 / len(films)
@@ -345,7 +345,7 @@ def total_energy(balloon: Balloon, load: BalloonLoad, x: Array) -> TotalEnergy:
     return TotalEnergy(energy, by_place, band, eased.curves, pressed.sum(-1))
 
 
-Films = tuple["Balloon", ...]
+FilmPair = tuple["Balloon", ...]
 """One film, mirrored by an equal one, or two films bonded at one rim."""
 
 
@@ -369,7 +369,7 @@ class FilmMotion(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _motion(films: Films, is_free: bool) -> FilmMotion:
+def _motion(films: FilmPair, is_free: bool) -> FilmMotion:
     """Return the motion of films by their own freedoms, coordinate by coordinate, then the rim's:
     its radii and, of two films, its tilt and its height. A free balloon's rim stays in its plane:
     its overall height is fixed.
@@ -413,7 +413,7 @@ class FilmEnergy:
     ``least_energy.Potential``.
     """
 
-    def __init__(self, films: Films, loads: Sequence[BalloonLoad], motion: FilmMotion) -> None:
+    def __init__(self, films: FilmPair, loads: Sequence[BalloonLoad], motion: FilmMotion) -> None:
         self.films, self.loads, self.motion = films, loads, motion
         self.scale, self.close = tolerances(films[0], loads[0])
 

@@ -241,7 +241,7 @@ class Search:
         plates; a plate's contact forces are additional unknowns.
         """
         points = 0 if self._wall is None else len(self._wall.local)
-        run = Run(places, x, at, np.full((len(x), points), np.nan))
+        run = SearchRun(places, x, at, np.full((len(x), points), np.nan))
         for stiffness in soft:
             assert self.load is not None
             run, _ = self._newton(run, self.load._replace(stiffness=stiffness))
@@ -257,13 +257,13 @@ class Search:
                 put(found, unstable, self.equilibria(run.x[unstable], run.at[unstable]))
         return found
 
-    def _newton(self, run: Run, load: Load | None) -> tuple[Run, Balance]:
+    def _newton(self, run: SearchRun, load: Load | None) -> tuple[SearchRun, Balance]:
         """Return the states after a small step, or the last one, and their balance."""
         is_soft = load is not None and load.stiffness < WALL_STIFFNESS
         most, enough = (STEPS, LAST_STEP) if self._wall is None else (PLATE_STEPS, CLOSE_CONTACT)
         if is_soft:
             most, enough = SOFT_STEPS, ROUGH_CONTACT
-        end, live = Run(*(part.copy() for part in run)), np.arange(len(run.x))
+        end, live = SearchRun(*(part.copy() for part in run)), np.arange(len(run.x))
         balance = Balance.of(run.at, is_found=False)
         before, is_close = np.zeros_like(run.x), np.zeros(len(live), dtype=bool)
         for number in range(most + 1):
@@ -289,17 +289,17 @@ class Search:
             pushes = run.forces
             if now.touch is not None:
                 pushes = now.touch.resists(now.touch.deep + share[:, None] * deeper)
-            run, before = Run(run.places, np.clip(x, 0.0, self.most), at, pushes), ahead
+            run, before = SearchRun(run.places, np.clip(x, 0.0, self.most), at, pushes), ahead
             largest = np.maximum(np.abs(move).max((1, 2)), np.abs(ahead).max(1))
             is_close, goes = largest < enough, ~is_over & np.isfinite(largest)
             if not goes.any():
                 break
             if not goes.all():
-                run = Run(*(part[goes] for part in run))
+                run = SearchRun(*(part[goes] for part in run))
                 live, before, is_close = live[goes], before[goes], is_close[goes]
         return end, balance
 
-    def _step(self, run: Run, now: Tangent) -> tuple[Array, Array, Array]:
+    def _step(self, run: SearchRun, now: Tangent) -> tuple[Array, Array, Array]:
         """Return the steps of freedoms (n, rows, 3) and of asinh(p / P0) (n, chambers) to the
         linearised equilibria, and by how many mm a plate's points are then deeper (n, points).
 
@@ -345,7 +345,7 @@ class Search:
         columns = np.concatenate([columns, -back], axis=1)
         return (moves @ columns[..., None]).reshape(run.at.shape), ahead, deeper
 
-    def _ahead(self, run: Run, tip: Array, tops: Array) -> Array:
+    def _ahead(self, run: SearchRun, tip: Array, tops: Array) -> Array:
         """Return the steps of asinh(p / P0) (n, chambers) from the turns and moves of the top (n,
         6, 1 + chambers) to equilibrium and by each pressure.
         """
@@ -472,7 +472,7 @@ def _contact_top(touch: PlateContact, is_in: NDArray[np.bool_]) -> tuple[Array, 
     return (lines * stiff[:, None]) @ touch.lines, (lines @ (stiff * touch.deep)[..., None])[..., 0]
 
 
-class Run(NamedTuple):
+class SearchRun(NamedTuple):
     """Places (n, 3), asinh(p / P0) (n, chambers), freedoms (n, rows, 3) and contact forces (n,
     points) in mN, NaN where a plate's stiffness makes them.
     """
