@@ -322,7 +322,7 @@ def _descent(
         if limited is not None:
             move = limited(live, at, move, now)
         largest, value = np.abs(move).max((1, 2)), now.value
-        slope = (move * now.gradient).sum(-1)
+        slope = (move * now.gradient).sum(-1) if is_at_plate else value
         is_last = largest * largest < fine * before
         is_still = np.abs(now.gradient).max((1, 2)) < RESIDUAL * (1 + 1e-3 * now.push)
         if is_at_plate:
@@ -351,9 +351,11 @@ def _descent(
             is_far = ~(now.value <= value + 1e-11 * (1 + np.abs(value)))
             if not is_far.any():
                 break
-            # To where the parabola through both energies and the first slope is least.
-            over = 2 * (now.value - value - share * slope)
-            less = np.clip(-share * slope / np.maximum(over, 1e-300), 0.1, 0.5)
+            less: Any = 0.5
+            if is_at_plate:
+                # To where the parabola through both energies and the first slope is least.
+                over = 2 * (now.value - value - share * slope)
+                less = np.clip(-share * slope / np.maximum(over, 1e-300), 0.1, 0.5)
             share, far = np.where(is_far, less * share, share), np.flatnonzero(is_far.any(1))
             put(now, far, energies(live[far], (at + share[..., None] * move)[far]))
         before = largest * (share == 1).all(1)
