@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 import shapely
 
+from sbafab.cutting import sheets as module
 from sbafab.cutting.cut_settings import CutSettings
 from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.nesting import nest
-from sbafab.cutting.placements import Nest, NestPart, Stock
+from sbafab.cutting.placements import Nest, NestPart, Placement, Stock
 from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.design.sections import Laser, Sheets
+from sbafab.errors import OutputError
 from sbafab.geometry.region import disc
 
 SETTINGS = CutSettings("demo", "cd" * 32, generator="sbafab 1.2.3")
@@ -109,3 +113,33 @@ def test_a_roll_is_cut_off_one_border_past_its_parts(tmp_path: Path) -> None:
     assert found.layers.index("CUT_SHEET") > max(
         i for i, layer in enumerate(found.layers) if layer == "CUT_OUTER"
     )
+
+
+def framed(*told: Any) -> str:
+    return dxf_text(*told[:3], told[3]._replace(frame=(61.0, 80.0)))
+
+
+def engraved(*_: object) -> tuple[tuple[tuple[float, float], ...], ...]:
+    return (((0.0, 11.0), (60.0, 11.0)), ((7.0, 11.0), (8.0, 11.0)))
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "said"),
+    [
+        ("dxf_text", framed, "REFERENCE"),
+        ("_sheet_label", engraved, r"engraving at .* lies in a part"),
+    ],
+)
+def test_a_sheet_that_does_not_read_back_as_meant_is_not_let_through(
+    name: str, wrong: object, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, name, wrong)
+    with pytest.raises(OutputError, match=said):
+        write_sheets([ring_nest(1)], tmp_path, SETTINGS, LASER, PLAIN)
+
+
+def test_parts_that_overlap_are_not_let_through(tmp_path: Path) -> None:
+    part = NestPart("demo", "P01", 1, "TPE", RING, 2)
+    places = (Placement(0, 0, 0, (11.0, 11.0)), Placement(0, 0, 0, (12.0, 11.0)))
+    with pytest.raises(OutputError, match="touch or cross"):
+        write_sheets([Nest("TPE", STOCK, (part,), places)], tmp_path, SETTINGS, LASER, PLAIN)

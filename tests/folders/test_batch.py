@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from lxml import html as lxml_html
 
 from sbafab.actuators import load_design
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.sequence import cutting_sequence
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import Run, RunRequest, generate
+from sbafab.geometry.region import Region
 from sbafab.rules.deck import has_failed
+from tests.folders.doctoring import Doctor
 
 COPIES = 5
 
@@ -76,3 +84,51 @@ def test_the_bill_counts_what_the_batch_takes(run: Run) -> None:
         # 6 x 6 in.
         area = len(files) * 0.1524**2
         assert float(bill[f"{material} film"]["area_m2"]) == pytest.approx(area, abs=5e-5)
+
+
+Change = Callable[[Doctor], object]
+
+
+def redrawn_plate(holes_left_out: int = 0, notes_left_out: int = 0, depth: str = "2.") -> Change:
+    """The plate without its last holes or notes, or with another depth in its properties."""
+
+    def change(doctor: Doctor) -> None:
+        path = doctor.folder / doctor.manifest["fixture"]
+        found = read_profile(path)
+        lost = found.region.holes[len(found.region.holes) - holes_left_out :]
+        region = Region(tuple(c for c in found.region.contours if c not in lost))
+        # After the datum cross come the letters that tell the shop of its holes.
+        notes = [[edges[0].start, *(e.end for e in edges)] for _, edges in found.strokes[2:]]
+        holes = found.properties["HOLES"].replace("2.", depth)
+        text = dxf_text(
+            cutting_sequence(region),
+            {**found.properties, "HOLES": holes},
+            notes=notes[: len(notes) - notes_left_out],
+        )
+        path.write_text(text, newline="\n")
+
+    return change
+
+
+def claimed(**batch: object) -> Change:
+    return lambda doctor: doctor.set_manifest(lambda m: m["batch"].update(batch))
+
+
+@pytest.mark.parametrize(
+    ("change", "rules"),
+    [
+        (redrawn_plate(), set()),
+        (redrawn_plate(holes_left_out=1), {"as-designed"}),
+        (redrawn_plate(notes_left_out=1), {"as-designed"}),
+        (redrawn_plate(depth="4."), {"as-designed"}),
+        (claimed(cycles=[4]), {"manifest-claims"}),
+        (claimed(places=[{"x": x, "y": 0} for x in (0, 17, 34)]), {"manifest-claims"}),
+    ],
+)
+def test_a_plate_or_cycles_that_leave_something_out_fail(
+    change: Change, rules: set[str], run: Run, tmp_path: Path
+) -> None:
+    doctor = Doctor(Path(shutil.copytree(run.folder, tmp_path / "run")))
+    change(doctor)
+    doctor.rehash()
+    assert {f.rule for f in check_folder(doctor.folder) if f.verdict == "fail"} == rules

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from filelock import FileLock
 
 from sbafab.errors import OutputError
+from sbafab.folders import swap
 from sbafab.folders.order import SCHEMA
 from sbafab.folders.swap import replaced_folder
 
@@ -26,7 +29,12 @@ def leftovers(folder: Path) -> list[str]:
     return [name for name in os.listdir(folder) if name.endswith(".part")]
 
 
-def test_a_new_folder_takes_the_place_of_the_old(tmp_path: Path) -> None:
+@pytest.mark.parametrize("exchanges", [True, False])
+def test_a_new_folder_takes_the_place_of_the_old(
+    exchanges: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not exchanges:
+        monkeypatch.setattr(swap, "_exchange", lambda a, b: False)
     target = tmp_path / "a" / "run"
     for text in ("one", "two"):
         with replaced_folder(target) as folder:
@@ -99,6 +107,11 @@ def test_links_files_and_running_twice_are_refused(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="is a file"), replaced_folder(tmp_path / "file"):
         pass
     with (
+        pytest.raises(OutputError, match="file is a file, not a folder"),
+        replaced_folder(tmp_path / "file" / "run"),
+    ):
+        pass
+    with (
         FileLock(tmp_path / ".run.lock"),
         pytest.raises(OutputError, match="another run"),
         replaced_folder(tmp_path / "run"),
@@ -111,3 +124,26 @@ def test_an_error_of_the_program_is_none_of_the_disk(tmp_path: Path) -> None:
         raise ValueError("a defect")
     with replaced_folder(tmp_path / "run"):
         pass
+
+
+KILLED = """
+import os, sys; from pathlib import Path
+from sbafab.folders.swap import replaced_folder
+with replaced_folder(Path(sys.argv[1])) as folder:
+    (folder / "manifest.json").write_text("half")
+    os.kill(os.getpid(), 9)
+"""
+
+
+def test_a_killed_run_leaves_the_old_folder_whole(tmp_path: Path) -> None:
+    target = tmp_path / "run"
+    with replaced_folder(target) as folder:
+        write_run(folder, "one")
+    killed = subprocess.run([sys.executable, "-c", KILLED, str(target)], check=False)
+    assert killed.returncode == -9
+    assert text_in(target) == "one"
+    assert len(leftovers(tmp_path)) == 1
+    with replaced_folder(target) as folder:
+        write_run(folder, "two")
+    assert text_in(target) == "two"
+    assert leftovers(tmp_path) == []

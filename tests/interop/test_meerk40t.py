@@ -7,23 +7,24 @@ import os
 import re
 import subprocess
 import sys
+from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 import shapely
 
 from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
-from sbafab.cutting.cut_settings import CUT_INNER, CUT_OUTER, ENGRAVE, LeadIns
+from sbafab.cutting.cut_settings import CUT_INNER, CUT_OUTER, ENGRAVE, PTFE_WARNING, LeadIns
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.laser_programs import LaserSheet, laser_text
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.design.films import Recipe
-from tests.interop.made import LENGTH, WIDTH, Sheet
+from tests.interop.made import EXACT, LENGTH, WIDTH, Sheet, outline_bounds
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.skipif(find_spec("meerk40t") is None, reason="MeerK40t is not installed")
 
 AROUND = Surroundings(engraved=(((2.0, 2.0), (30.0, 2.0), (30.0, 5.0)),), frame=(WIDTH, LENGTH))
 HELD = LeadIns(lead_in=0.3, overcut=0.3, tab_width=0.4, tabs=2, clearance=0.1)
@@ -85,7 +86,7 @@ def meerk40t(folder: Path, *lines: str) -> None:
     )
 
 
-@pytest.mark.skipif(find_spec("meerk40t") is None, reason="MeerK40t is not installed")
+@pytest.mark.long
 def test_meerk40t_writes_gcode_of_what_the_project_cuts(
     sheets: dict[str, Sheet], tmp_path: Path
 ) -> None:
@@ -126,3 +127,83 @@ def test_meerk40t_writes_gcode_of_what_the_project_cuts(
 def line(run: LaserRun) -> shapely.LineString:
     points = [run.edges[0].start, *(e.at(k / 48) for e in run.edges for k in range(1, 49))]
     return shapely.LineString(points)
+
+
+class Node:
+    """A node of the tree that MeerK40t's reader fills."""
+
+    def __init__(self, **told: Any) -> None:
+        self.told = told
+        self.children: list[Node] = []
+
+    def add(self, **told: Any) -> Node:
+        self.children.append(Node(**told))
+        return self.children[-1]
+
+    def add_reference(self, node: Node) -> None:
+        self.children.append(node)
+
+    def remove_all_children(self) -> None:
+        self.children.clear()
+
+    def focus(self) -> None:
+        pass
+
+
+class Elements:
+    """As much of MeerK40t's elements as its reader asks for."""
+
+    def __init__(self) -> None:
+        self.node_lock = nullcontext()
+        self.op_branch, self.elem_branch = Node(), Node()
+        self.note = ""
+
+
+def shape_of(node: Node) -> shapely.Polygon:
+    """What the node's line encloses, in mm, curves as MeerK40t itself breaks them up."""
+    from meerk40t.core.geomstr import Geomstr
+    from meerk40t.core.units import UNITS_PER_MM
+
+    told = node.told
+    if told["type"] == "elem ellipse":
+        geometry = Geomstr.ellipse(told["rx"], told["ry"], told["cx"], told["cy"])
+        geometry.transform(told["matrix"])
+    else:
+        geometry = told["geometry"]
+    points = geometry.as_interpolated_points(interpolate=100)
+    return shapely.Polygon(
+        [(p.real / UNITS_PER_MM, p.imag / UNITS_PER_MM) for p in points if p is not None]
+    )
+
+
+@pytest.mark.usefixtures("fine_arcs")
+def test_meerk40t_cuts_what_the_sheet_says_in_its_order_with_no_power(sheet: Sheet) -> None:
+    from meerk40t.extra.lbrn import LbrnLoader
+
+    cut_file = sheet.files["bulges"]
+    read = Elements()
+    assert LbrnLoader.load(None, read, str(cut_file.with_suffix(".lbrn2")))
+    layers = {op.told["label"].partition(":")[0]: op for op in read.op_branch.children}
+    assert list(layers) == ["ENGRAVE", "CUT_INNER", "CUT_OUTER", "REFERENCE"]
+    for name, op in layers.items():
+        says = "not cut" if name == "REFERENCE" else "set power and speed"
+        assert op.told == {**op.told, "type": "op cut", "power": 0, "label": f"{name}: {says}"}
+
+    shapes = {name: [shape_of(node) for node in layers[name].children] for name in list(layers)[1:]}
+    areas = {name: sorted(shape.area for shape in own) for name, own in shapes.items()}
+    assert areas["CUT_OUTER"] == pytest.approx(sheet.outers, rel=EXACT)
+    assert areas["CUT_INNER"] == pytest.approx(sheet.holes, rel=EXACT)
+    assert areas["REFERENCE"] == pytest.approx([WIDTH * LENGTH])
+    # Numbers, not looks: MeerK40t counts y downwards, as a project does that says MirrorY.
+    bounds = shapely.total_bounds(shapes["CUT_OUTER"])
+    assert bounds == pytest.approx(outline_bounds(cut_file), abs=0.001)
+
+    # The tree holds the shapes as the file does: all holes before any outline, the frame last.
+    [file] = read.elem_branch.children
+    layer_of = {id(node): name for name, op in layers.items() for node in op.children}
+    seen = [layer_of[id(node)] for node in file.children]
+    assert seen == sorted(seen, key=list(layers).index)
+
+    assert read.note.startswith("Powers are 0: set power and speed of each layer")
+    assert "KERF_STATE: uncalibrated" in read.note
+    assert (PTFE_WARNING in read.note) == (cut_file.name == "PTFE_1.dxf")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import random
 import sqlite3
 import subprocess
 import sys
@@ -202,3 +203,30 @@ def test_a_file_that_may_only_be_read_still_reports(tmp_path: Path) -> None:
     assert count == "1"
     assert "may only be read; nothing was recorded" in old
     assert "cannot be opened; see that its folder exists" in new
+
+
+def test_a_file_damaged_anywhere_is_one_sentence_or_whole(lab: Lab) -> None:
+    """A page that is lost, bytes that flip, an end that is missing."""
+    for n in range(12):
+        lab.add(SHA, build(), [result(f"A{n}", "pass", note="n\u00f6te")])
+    whole = lab.path.read_bytes()
+    dice = random.Random(35)
+    refused = 0
+    for number in range(150):
+        content = bytearray(whole)
+        place = dice.randrange(len(content))
+        if number % 3 == 0:
+            content[place : place + 4] = b"\xff\xfe\x80\xc0"
+        elif number % 3 == 1:
+            content = content[:place]
+        else:
+            for _ in range(16):
+                content[dice.randrange(len(content))] = dice.randrange(256)
+        lab.path.write_bytes(content)
+        try:
+            records = lab.contents().records
+        except OutputError:
+            refused += 1
+        else:
+            assert len(records) in ((0, 12) if not content else (12,))
+    assert refused > 50
