@@ -197,11 +197,13 @@ class _Waste:
         """Return True if a lead-in to a contour keeps off everything."""
         reach = self._clearance
         box = widened(lead.bounds, reach)
-        own = set(contour.edges)
+        own_edges = set(contour.edges)
         near = [*self._region.index.touching(box)]
-        others = [edge for edge in near if edge not in own]
-        others += self._others.touching(box)
-        others += [other for other in self._leads if boxes_meet(other.bounds, box)]
+        other_edges = [edge for edge in near if edge not in own_edges]
+        other_edges += self._others.touching(box)
+        other_edges += [
+            lead_there for lead_there in self._leads if boxes_meet(lead_there.bounds, box)
+        ]
         width, length = self._frame or (math.inf, math.inf)
         is_inside = self._frame is None or (
             min(box[:2]) >= 0 and box[2] <= width and box[3] <= length
@@ -209,19 +211,19 @@ class _Waste:
         return (
             is_inside
             and all(distance_to(lead, (x, y)) >= d / 2 + reach for x, y, d in self._pins)
-            and self._leaves(lead, [edge for edge in near if edge in own])
-            and all(edge_distance(lead, edge).value >= reach for edge in others)
+            and self._leaves(lead, [edge for edge in near if edge in own_edges])
+            and all(edge_distance(lead, edge).value >= reach for edge in other_edges)
         )
 
-    def _leaves(self, lead: Line, own: Sequence[Edge]) -> bool:
+    def _leaves(self, lead: Line, own_edges: Sequence[Edge]) -> bool:
         """Return True if a lead-in comes to its contour at its end alone."""
         for depth in DEPTHS:
             p = lead.at(1 - depth)
             least = min(SHARE * depth * lead.length, self._clearance)
-            if any(distance_to(edge, p) < least for edge in own):
+            if any(distance_to(edge, p) < least for edge in own_edges):
                 return False
         return all(
-            math.dist(p, lead.end) <= 1e-5 for edge in own for p in meeting_points(lead, edge)
+            math.dist(p, lead.end) <= 1e-5 for edge in own_edges for p in meeting_points(lead, edge)
         )
 
 

@@ -226,11 +226,11 @@ class _Filler:
                 laid = sorted(self._clear_lattices(self.grid.shapes[shape]), key=most_copies)
                 alone = next(lattice for lattice in laid if not lattice.is_pair)
                 # Of equal ones the first, which rows are.
-                for kind, other in zip(
+                for kind, paired in zip(
                     kinds, (alone, self._arrangement(shape), laid[0]), strict=True
                 ):
-                    has_more = len(other.places) > len(alone.places)
-                    kind[shape] = other if has_more else alone
+                    has_more = len(paired.places) > len(alone.places)
+                    kind[shape] = paired if has_more else alone
         return [kind for number, kind in enumerate(kinds) if kind not in kinds[:number]]
 
     def _clear_lattices(self, shape: Region) -> Iterator[Lattice]:
@@ -280,8 +280,8 @@ class _Filler:
     ) -> list[Cells]:
         """Return the free places of forms after one of them is put at a place."""
         left = [np.copy(places) for places in maps]
-        for other, places in zip(forms, left, strict=True):
-            strike(places, self.grid.clear(form, other), other, place)
+        for form_there, places in zip(forms, left, strict=True):
+            strike(places, self.grid.clear(form, form_there), form_there, place)
         return left
 
     def filled(self, way: _Way) -> _Filled:

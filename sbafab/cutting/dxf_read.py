@@ -316,14 +316,14 @@ def _refuse_uncut(drawn: Sequence[DrawnEntity]) -> None:
 def _read_back(drawn: Sequence[DrawnEntity], properties: Mapping[str, str], units: str) -> ReadBack:
     cut = {layer: _contours(drawn, layer) for layer in (CUT_INNER, CUT_OUTER)}
     check_clear([*cut[CUT_INNER], *cut[CUT_OUTER]])
-    others = [entity for entity in drawn if entity.layer not in cut]
+    strokes = [entity for entity in drawn if entity.layer not in cut]
     return ReadBack(
         region=nested_region(cut[CUT_INNER], cut[CUT_OUTER]),
         properties=dict(properties),
         units=units,
         layers=tuple(entity.layer for entity in drawn),
-        other=tuple(entity.kind for entity in others),
-        strokes=tuple((entity.layer, tuple(entity.edges)) for entity in others),
+        other=tuple(entity.kind for entity in strokes),
+        strokes=tuple((entity.layer, tuple(entity.edges)) for entity in strokes),
     )
 
 

@@ -134,15 +134,15 @@ def _document(
 
 def _with_seam_layer(text: str, handle: int) -> str:
     """Return a document with the layer SEAM, a copy of the engraving layer before it."""
-    found = re.search(
+    engraving = re.search(
         rf"  0\nLAYER\n  5\n\w+\n(?:(?!  0\n).*\n)*?  2\n{ENGRAVE}\n(?:(?!  0\n).*\n)*", text
     )
-    if found is None:
+    if engraving is None:
         raise ValueError("skeleton.dxf has no layer for engraving: regenerate it.")
-    record = re.sub(r"(?<=LAYER\n  5\n)\w+", f"{handle:X}", found[0])
+    record = re.sub(r"(?<=LAYER\n  5\n)\w+", f"{handle:X}", engraving[0])
     record = record.replace(f"  2\n{ENGRAVE}\n", f"  2\n{SEAM}\n")
     record = record.replace(f" 62\n{COLOURS[ENGRAVE]}\n", f" 62\n{SEAM_COLOUR}\n")
-    return text[: found.end()] + record + text[found.end() :]
+    return text[: engraving.end()] + record + text[engraving.end() :]
 
 
 def _cuts(contours: Iterable[Contour], profile: DxfProfile) -> Iterator[_Entity]:

@@ -69,7 +69,7 @@ def index_marks(nest: Nest, sheet: int) -> tuple[IndexMark, ...]:
         for place in near[np.argsort(away[near], kind="stable")]:
             box = boxes[place]
             around = tree.query(box, predicate="dwithin", distance=away[place] + 0.1)
-            if {*around} == {number} and not any(box.dwithin(other, clear) for other in taken):
+            if {*around} == {number} and not any(box.dwithin(mark, clear) for mark in taken):
                 x, y = map(float, corners[place])
                 taken.append(box)
                 marks.append(IndexMark(text, (x, y), strokes(text, (x, y), HEIGHT)))

@@ -543,17 +543,17 @@ def read_laser_file(path: Path, program: str) -> LaserReading:
 def verify_laser_file(path: Path, program: str, sheet: LaserSheet) -> None:
     """Compare the file at ``path`` with a sheet. Raises OutputError with the first deviation."""
     row, read = PROGRAMS[program], read_laser_file(path, program)
-    wanted = row.drawn(sheet)
-    difference = _settings_difference(read.settings, row.settings(wanted))
-    difference = difference or run_difference(read.runs, wanted.runs)
+    sheet_drawn = row.drawn(sheet)
+    difference = _settings_difference(read.settings, row.settings(sheet_drawn))
+    difference = difference or run_difference(read.runs, sheet_drawn.runs)
     if difference:
         raise OutputError(f"{path.name}: {difference}; regenerate it")
 
 
-def _settings_difference(read: Settings, wanted: Settings) -> str:
-    if list(read) != list(wanted):
+def _settings_difference(read: Settings, expected: Settings) -> str:
+    if list(read) != list(expected):
         return "its layers are others, or in another order"
-    for layer, values in wanted.items():
+    for layer, values in expected.items():
         for name in dict.fromkeys((*values, *read[layer])):
             actual, value = read[layer].get(name), values.get(name)
             if actual != value:
@@ -567,8 +567,8 @@ def rdworks_difference(path: Path, expected: Path) -> str:
     Raises OutputError if the file cannot be read.
     """
     read, runs = (read_laser_file(file, "rdworks").runs for file in (path, expected))
-    wanted = [
+    expected_runs = [
         LaserRun(layer, tuple(edge for edge in curves if isinstance(edge, Line | Arc)), False)
         for layer, curves in runs
     ]
-    return run_difference(read, wanted)
+    return run_difference(read, expected_runs)

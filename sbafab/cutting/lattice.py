@@ -318,8 +318,8 @@ class _Rows:
         number = 0
         while True:
             row = rows[number % len(rows)]
-            for other, other_right, other_up in below[-3:]:
-                up = max(up, other_up + self.climb(other, row, right - other_right))
+            for row_below, other_right, other_up in below[-3:]:
+                up = max(up, other_up + self.climb(row_below, row, right - other_right))
             in_row = list(self._in_row(row, (right, up), box))
             if not in_row:
                 return copies

@@ -68,8 +68,8 @@ def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: flo
         for x, y, diameter in stock.pins
     ]
     for pair in close_pairs([region.bounds for _, region in entries], stock.spacing):
-        (first, one), (second, other) = (entries[number] for number in sorted(pair))
-        gap = least_distance(one, other, stock.spacing)
+        (first, part), (second, part_there) = (entries[number] for number in sorted(pair))
+        gap = least_distance(part, part_there, stock.spacing)
         if min(pair) < len(regions) and gap.value < stock.spacing - slack:
             (x, y), value = gap.place, gap.value
             how = f"are {value:.4f} mm apart" if value > 0 else "overlap"

@@ -133,8 +133,8 @@ def parts_of(
         for number, piece in enumerate(paths[pattern].pieces, start=1):
             low_x, low_y, _, _ = piece.bounds
             by_form.setdefault(piece.moved(-low_x, -low_y), []).append((number, piece))
-        for alike in by_form.values():
-            (number, piece), count = alike[0], len(alike) * layers_cut
+        for equal in by_form.values():
+            (number, piece), count = equal[0], len(equal) * layers_cut
             material = layers[0].film.material
             parts.append(NestPart(laminate.name, pattern, number, material, piece, count))
     return tuple(parts)

@@ -126,9 +126,9 @@ def _write_sheet(
     around = Surroundings(engraved, partings, size)
     parts = (nest.parts[placement.part] for placement in placements)
     counts = sorted(Counter((part.design, part.pattern) for part in parts).items())
-    said = ", ".join(f"{count} x {design} {pattern}" for (design, pattern), count in counts)
+    counted = ", ".join(f"{count} x {design} {pattern}" for (design, pattern), count in counts)
     number = f"sheet {sheet + 1} of {nest.sheets}"
-    properties = file_properties(settings, material, number, said)
+    properties = file_properties(settings, material, number, counted)
     stem = f"{material}_{sheet + 1}{kerf_suffix(settings.kerf_width(material))}"
     path = folder / FOLDER / f"{stem}.dxf"
     data = dxf_text(contours, properties, settings.curves.profile, around).encode()

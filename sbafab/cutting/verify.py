@@ -171,17 +171,17 @@ def _same_edge(a: Edge, b: Edge, room: float) -> bool:
 
 
 def deviation(
-    edges: Sequence[Edge], others: Sequence[Edge], tolerance: float
+    edges: Sequence[Edge], expected: Sequence[Edge], tolerance: float
 ) -> tuple[float, Point]:
     """Return the largest distance in mm of edges from others, and where.
 
     It is measured from places along every edge: thirds of a line, eighths of an arc.
     """
-    index = EdgeIndex(others)
+    index = EdgeIndex(expected)
     worst = 0.0, edges[0].start
     for edge in edges:
         count = 3 if isinstance(edge, Line) else 8
         for p in (edge.at(i / count) for i in range(count + 1)):
-            near = [*index.touching(widened((*p, *p), tolerance))] or others
-            worst = max(worst, (min(distance_to(other, p) for other in near), p))
+            near = [*index.touching(widened((*p, *p), tolerance))] or expected
+            worst = max(worst, (min(distance_to(edge_there, p) for edge_there in near), p))
     return worst

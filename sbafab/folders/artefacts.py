@@ -348,8 +348,8 @@ def _tray_pdf(folder: DesignFolder) -> bytes | None:
     # Only a batch, or a design that asks for it, has a tray plan.
     from sbafab.reports.prints import tray_pdf
 
-    build, asked = folder.build, folder.design.order.tray
-    if not (build.cycles.copies > 1 if asked is None else asked):
+    build, has_tray = folder.build, folder.design.order.tray
+    if not (build.cycles.copies > 1 if has_tray is None else has_tray):
         return None
     return tray_pdf(build.laminate, build.cycles, build.sha256, folder.design.order.batch)
 
@@ -505,8 +505,8 @@ _OWN: tuple[Artefact, ...] = (
 @cache
 def artefacts() -> tuple[Artefact, ...]:
     """Return all files of a design's folder but its index, those of other packages last."""
-    own = [row.path for row in _OWN]
-    return _OWN + plugins.added(plugins.ARTEFACTS, "output file", Artefact, own)
+    own_paths = [row.path for row in _OWN]
+    return _OWN + plugins.added(plugins.ARTEFACTS, "output file", Artefact, own_paths)
 
 
 PAGES = tuple(row.path for row in _OWN if row.is_page)

@@ -101,7 +101,7 @@ def read_layers(
     problems: list[Problem] = []
     bare: list[LayerFile] = []
     misstated: dict[str, list[int]] = {}
-    own = {c.marks: c for layer in expected.layers for c in layer.profile.contours}
+    contours_designed = {c.marks: c for layer in expected.layers for c in layer.profile.contours}
     for layer, designed in zip(expected.layers, build.laminate.layers, strict=True):
         cut, material = expected.layer(expected.cut_with(layer)), layer.film.material
         name = layer_path(cut.name, build.settings.kerf_width(material))
@@ -112,7 +112,7 @@ def read_layers(
             if key not in parts:
                 beam = build.paths[designed.pattern]
                 part = read_part(folder / name, properties, layer.profile, beam)
-                parts[key] = _snapped(part, own.values()) if part.departure else part
+                parts[key] = _snapped(part, contours_designed.values()) if part.departure else part
         except OutputError as error:
             reason = str(error).removeprefix(f"{PurePosixPath(name).name}: ")
             message = f"layer {layer.index} ({name}): {reason}"
@@ -169,17 +169,24 @@ def property_differences(actual: Mapping[str, str], expected: Mapping[str, str])
 def _snapped(part: CutPart, designed: Iterable[Contour]) -> CutPart:
     """Return a part with contours that agree with one of the ``designed`` replaced by it."""
     contours = (
-        next((one for one in designed if _agree(contour, one)), contour)
+        next(
+            (
+                contour_designed
+                for contour_designed in designed
+                if _agree(contour, contour_designed)
+            ),
+            contour,
+        )
         for contour in part.region.contours
     )
     return replace(part, region=Region(tuple(contours)))
 
 
-def _agree(contour: Contour, other: Contour) -> bool:
-    bounds = zip(contour.bounds, other.bounds, strict=True)
-    if contour.is_hole != other.is_hole or any(abs(a - b) > AGREEMENT for a, b in bounds):
+def _agree(contour: Contour, designed: Contour) -> bool:
+    bounds = zip(contour.bounds, designed.bounds, strict=True)
+    if contour.is_hole != designed.is_hole or any(abs(a - b) > AGREEMENT for a, b in bounds):
         return False
-    return not departure(Region((contour,)), Region((other,)), AGREEMENT)
+    return not departure(Region((contour,)), Region((designed,)), AGREEMENT)
 
 
 def departure(path: Region, expected: Region, tolerance: float = TOLERANCE) -> str:

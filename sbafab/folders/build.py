@@ -160,7 +160,7 @@ def recipes(design: Design) -> dict[Material, Recipes]:
         name: recipes_for(laser.recipe or (), film, laser.machine)
         for name, film in used_films(design).items()
     }
-    return {name: found for name, found in by_film.items() if found}
+    return {name: film_recipes for name, film_recipes in by_film.items() if film_recipes}
 
 
 def hole_notes(design: Design, laminate: Laminate) -> tuple[str, ...]:
@@ -188,8 +188,10 @@ def stocks(design: Design) -> dict[Material, Stock]:
 def _sheets(design: Design) -> dict[Material, tuple[str, Sheet]]:
     """The sheet of every film, by material, and the table that describes it."""
     sheets = {"TPE": ("sheets.tpe", design.sheets.tpe), "PTFE": ("sheets.ptfe", design.sheets.ptfe)}
-    others = design.films.by_name.items()
-    return sheets | {material(name): (f"films.{name}.sheet", film.sheet) for name, film in others}
+    named_films = design.films.by_name.items()
+    return sheets | {
+        material(name): (f"films.{name}.sheet", film.sheet) for name, film in named_films
+    }
 
 
 USUAL_TABS = 3
@@ -197,13 +199,13 @@ USUAL_TABS = 3
 
 def lead_ins(design: Design) -> dict[Material, LeadIns]:
     """Return lead-ins, overcuts and tabs of the films that have any."""
-    kerfs, found = design.kerf_widths, {}
+    kerfs, lead_ins_by_film = design.kerf_widths, {}
     for name, (key, sheet) in _sheets(design).items():
         if sheet.lead_in is sheet.overcut is sheet.tab_width is None:
             continue
         kerf = kerfs.get(name)
         width = max(widths(kerf)) if kerf is not None else 0.0
-        found[name] = LeadIns(
+        lead_ins_by_film[name] = LeadIns(
             lead_in=sheet.lead_in or 0.0,
             overcut=sheet.overcut or 0.0,
             tab_width=sheet.tab_width or 0.0,
@@ -213,4 +215,4 @@ def lead_ins(design: Design) -> dict[Material, LeadIns]:
             clearance=2 * (width or design.laser.unknown_kerf),
             key=key,
         )
-    return found
+    return lead_ins_by_film

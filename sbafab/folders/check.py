@@ -340,11 +340,11 @@ def _remade_problems(folder: Path, index: Manifest | JobManifest, order: Order) 
     with TemporaryDirectory() as name:
         fresh = Path(name)
         try:
-            made = _remake(folder, index, order, is_of_job, fresh)
+            remade = _remake(folder, index, order, is_of_job, fresh)
             problems += _foreign_problems(index, file_names(fresh), is_of_job)
             problems += _compared(folder, fresh, index.files, index.generator)
             if index.generator == GENERATOR:
-                problems += _index_problems(folder, made, is_of_job)
+                problems += _index_problems(folder, remade, is_of_job)
                 problems += _prediction_problems(folder, index, order.builds[0], fresh)
         except DESIGN_ERRORS as error:
             message = f"{folder.name} could not be made again to be compared: {error}"
@@ -416,25 +416,25 @@ def _compared(folder: Path, fresh: Path, listed: Collection[str], generator: str
     problems: list[Problem] = []
     bare: list[str] = []
     for name in file_names(fresh):
-        path, found = fresh / name, folder / name
+        path, actual = fresh / name, folder / name
         is_layer = path.parent.name == LAYERS and path.suffix == ".dxf"
         if name == MANIFEST or is_layer or not _is_compared(name, generator):
             continue
         rule = DESIGNED
-        if name not in listed or not os.path.lexists(found):
+        if name not in listed or not os.path.lexists(actual):
             difference = f"{name} is missing"
-        elif not found.is_file():
+        elif not actual.is_file():
             rule, difference = INTEGRITY, f"{name}: not a plain file"
-        elif cmp(found, path, shallow=False):
+        elif cmp(actual, path, shallow=False):
             continue
         elif name.endswith(f"/{MANIFEST}"):
-            rule, difference = CLAIMS, _index_difference(found, _read_json(path), {"files"})
+            rule, difference = CLAIMS, _index_difference(actual, _read_json(path), {"files"})
             difference = difference and f"{name}: {difference}"
-        elif unsound := unreadable(found):
+        elif unsound := unreadable(actual):
             rule, difference = INTEGRITY, f"{name}: {unsound}"
         else:
-            difference = file_difference(found, path, name)
-            bare += [name] if has_lost_properties(found) else []
+            difference = file_difference(actual, path, name)
+            bare += [name] if has_lost_properties(actual) else []
         if difference:
             problems.append(Problem(rule, f"{difference}; regenerate the folder"))
     if bare:
@@ -504,14 +504,14 @@ def _prediction_problems(
     if "predict.json" not in index.files:
         return []
     try:
-        said = _read_json(folder / "predict.json")["asked"]
-        factors = None if said["calibration"] else said
-        asked = TypeAdapter(PredictionRequest).validate_python({**said, "calibration": factors})
+        stated = _read_json(folder / "predict.json")["asked"]
+        factors = None if stated["calibration"] else stated
+        request = TypeAdapter(PredictionRequest).validate_python({**stated, "calibration": factors})
         written = fresh / "prediction"
         written.mkdir()
-        wanted: frozenset[RunPart] = frozenset(("predict",))
-        again = DesignFolder(build, wanted, (), written, ignore_progress)
-        again.prediction = predict(build.design, asked)
+        parts: frozenset[RunPart] = frozenset(("predict",))
+        again = DesignFolder(build, parts, (), written, ignore_progress)
+        again.prediction = predict(build.design, request)
         write_artefacts(again, [row for row in artefacts() if row.part == "predict"])
     except (ValueError, LookupError, TypeError, OSError):
         message = "predict.json does not say what was asked for; regenerate the folder"

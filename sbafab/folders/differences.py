@@ -71,10 +71,10 @@ class Problem:
 
 def findings_of(rule: str, problems: Sequence[Problem], passed: str) -> list[Finding]:
     """Return the findings of a rule: at most MAX_SHOWN problems in full, or one that passes."""
-    own = [problem for problem in problems if problem.rule == rule]
-    if not any(problem.verdict == "fail" for problem in own):
-        own.append(Problem(rule, passed, verdict="pass"))
-    shown, rest = own[:MAX_SHOWN], own[MAX_SHOWN:]
+    of_rule = [problem for problem in problems if problem.rule == rule]
+    if not any(problem.verdict == "fail" for problem in of_rule):
+        of_rule.append(Problem(rule, passed, verdict="pass"))
+    shown, rest = of_rule[:MAX_SHOWN], of_rule[MAX_SHOWN:]
     if rest:
         layers = tuple(dict.fromkeys(index for problem in rest for index in problem.layers))
         has_failed = any(problem.verdict == "fail" for problem in rest)
@@ -307,11 +307,11 @@ def _drawing_difference(actual: Path, expected: Path) -> str:
     missing = [(layer, _points(edges)) for layer, edges in designed.strokes]
     for layer, edges in drawing.strokes:
         points = _points(edges)
-        found = next((s for s in missing if s[0] == layer and _are_same(points, s[1])), None)
-        if found is None:
+        stroke = next((s for s in missing if s[0] == layer and _are_same(points, s[1])), None)
+        if stroke is None:
             x, y = points[0]
             return f"the stroke on {layer} at x {x:.3f}, y {y:.3f} should not be there"
-        missing.remove(found)
+        missing.remove(stroke)
     for layer, ((x, y), *_) in missing:
         return f"the stroke on {layer} at x {x:.3f}, y {y:.3f} is missing"
     return ""
@@ -321,11 +321,11 @@ def _points(edges: Sequence[Edge]) -> list[Point]:
     return [edges[0].start, *(edge.end for edge in edges)]
 
 
-def _are_same(points: Sequence[Point], others: Sequence[Point]) -> bool:
+def _are_same(points: Sequence[Point], points_there: Sequence[Point]) -> bool:
     """Return True if two strokes agree within the tolerance, in either direction."""
-    return len(points) == len(others) and any(
+    return len(points) == len(points_there) and any(
         all(math.dist(p, q) <= TOLERANCE for p, q in zip(points, run, strict=True))
-        for run in (others, others[::-1])
+        for run in (points_there, points_there[::-1])
     )
 
 
@@ -350,10 +350,10 @@ def mesh_difference(actual: Path, expected: Path) -> str:
 
     Points, enclosed volume, area and watertightness are compared; triangles may differ.
     """
-    found, designed = bodies(actual), bodies(expected)
-    if len(found) != len(designed):
-        return f"it holds {len(found)} bodies, not {len(designed)}"
-    return next(filter(None, map(_body_difference, found, designed)), "")
+    actual_bodies, designed = bodies(actual), bodies(expected)
+    if len(actual_bodies) != len(designed):
+        return f"it holds {len(actual_bodies)} bodies, not {len(designed)}"
+    return next(filter(None, map(_body_difference, actual_bodies, designed)), "")
 
 
 def bodies(path: Path) -> list[MeshBody]:
@@ -380,18 +380,18 @@ def bodies(path: Path) -> list[MeshBody]:
     return read
 
 
-def _body_difference(found: MeshBody, designed: MeshBody) -> str:
-    (surface, metadata), (expected, expected_metadata) = found, designed
+def _body_difference(body: MeshBody, designed: MeshBody) -> str:
+    (surface, metadata), (expected, expected_metadata) = body, designed
     if metadata != expected_metadata:
         return "names, materials or scales of its bodies are others"
     defect = _unsound(surface)
     if defect:
         return defect
-    for points, others, fault in (
+    for points, points_there, fault in (
         (surface.points, expected.points, "too many"),
         (expected.points, surface.points, "missing"),
     ):
-        point = _unmatched_point(points, others)
+        point = _unmatched_point(points, points_there)
         if point is not None:
             x, y, z = point
             return f"the point at x {x:.3f}, y {y:.3f}, z {z:.3f} is {fault}"

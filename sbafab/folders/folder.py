@@ -166,8 +166,8 @@ def _write_assembly(
     page = findings_html(order.name, sha256, order.builds, order.between or ())
     write_text(path / FINDINGS, page)
     designs = [build.design for build in order.builds]
-    found = checks(order.findings, "design", order.name, designs)
-    write_text(path / "checks.json", as_json(found))
+    document = checks(order.findings, "design", order.name, designs)
+    write_text(path / "checks.json", as_json(document))
     write_text(path / DESIGN_FILE, assembly_toml(assembled))
     return {
         "family": assembled.assembly.family,

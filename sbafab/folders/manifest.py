@@ -410,12 +410,12 @@ def _film_use(sheets: Sequence[SheetFile]) -> dict[Material, dict[str, float]]:
     """Return number and area of sheets, share of the parts and waste in mm2, by material."""
     use: dict[Material, dict[str, float]] = {}
     for material in dict.fromkeys(sheet.material for sheet in sheets):
-        own = [sheet for sheet in sheets if sheet.material == material]
-        area = sum(sheet.width * sheet.length for sheet in own)
-        parts = sum(sheet.parts_area for sheet in own)
+        of_material = [sheet for sheet in sheets if sheet.material == material]
+        area = sum(sheet.width * sheet.length for sheet in of_material)
+        parts = sum(sheet.parts_area for sheet in of_material)
         waste, density = area - parts, parts / area
         use[material] = {
-            "sheets": len(own),
+            "sheets": len(of_material),
             "sheet_area": area,
             "waste": waste,
             "density": density,

@@ -110,9 +110,9 @@ class Value:
         """The 95 % interval, in the unit of the value."""
         return self.value - self.half_width, self.value + self.half_width
 
-    def differs_from(self, other: float) -> bool:
+    def differs_from(self, value: float) -> bool:
         """Return True if the interval does not hold ``other``."""
-        return abs(self.value - other) > self.half_width
+        return abs(self.value - value) > self.half_width
 
 
 @dataclass(frozen=True)

@@ -169,9 +169,9 @@ def crossings(
     outside = _passing(share, 0.5, offsets, expected)
     width = _passing(share, 0.1587, offsets, outside) - _passing(share, 0.8413, offsets, outside)
     outside[~is_seen] = np.nan
-    known = width[is_seen & np.isfinite(width)]
+    widths = width[is_seen & np.isfinite(width)]
     # Smoothing is only across the edge, which does not move a curved edge.
-    blur = float(np.median(known)) / 2 if len(known) else 0.0
+    blur = float(np.median(widths)) / 2 if len(widths) else 0.0
     blur = math.sqrt(max(blur**2 - (SMOOTH * step) ** 2, 0.0))
     return outside + blur**2 / 2 * samples.curvatures, blur
 
@@ -419,13 +419,13 @@ def _pin(picture: ScanPicture, fit: EdgeFit, pin: tuple[float, float, float]) ->
     samples = samples_of([disc((x, y), diameter / 2)], False)
     for _ in range(3):
         outside, _ = crossings(picture, fit.warp, samples, SEARCH)
-        known = np.isfinite(outside)
-        if known.mean() < 0.8:
+        is_measured = np.isfinite(outside)
+        if is_measured.mean() < 0.8:
             raise DesignError(
                 f"the pin at x {x:g}, y {y:g} mm is not seen; give --dpi or --bar, or a picture "
                 "with all pins"
             )
-        columns = np.column_stack([samples.normals[known], np.ones(known.sum())])
-        shift = np.linalg.lstsq(columns, outside[known], rcond=None)[0][:2]
+        columns = np.column_stack([samples.normals[is_measured], np.ones(is_measured.sum())])
+        shift = np.linalg.lstsq(columns, outside[is_measured], rcond=None)[0][:2]
         samples = replace(samples, points=samples.points + shift)
     return np.asarray(samples.points.mean(axis=0))

@@ -156,8 +156,8 @@ class _Judge:
         if self._is_sound(number) and not (blob and self._strange_holes(place, blob)):
             return self._sound(number, place)
         # A blob that covers another place's middle is more than one piece.
-        others = [_middle(p.region) for p in self.sheet.places if p is not place]
-        if blob is None or any(_holds(blob, middle) for middle in others):
+        middles = [_middle(p.region) for p in self.sheet.places if p is not place]
+        if blob is None or any(_holds(blob, middle) for middle in middles):
             return self._crowded(place)
         return self._identified(place, blob)
 
@@ -411,9 +411,9 @@ def _holes(piece: Region, least: float = SMALLEST) -> list[Complexes]:
     return [polyline(hole, 0.2) @ (1, 1j) for hole in piece.holes if -hole.area > least]
 
 
-def _apart(middles: Sequence[complex], others: Sequence[complex]) -> list[complex]:
+def _apart(middles: Sequence[complex], there: Sequence[complex]) -> list[complex]:
     """Return the middles of holes that are far from all others."""
-    return [m for m in middles if all(abs(m - other) > HOLE_PLACE for other in others)]
+    return [m for m in middles if all(abs(m - middle) > HOLE_PLACE for middle in there)]
 
 
 def _centroid(polygon: shapely.Polygon) -> complex:

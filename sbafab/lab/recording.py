@@ -60,8 +60,8 @@ def record(
         for row in rows
     ]
     sha256 = recorded_sha256(built)
-    known = lab.contents().builds.get(sha256) if lab.path.exists() else None
-    build = promised(built) if known is None or known.generator != GENERATOR else None
+    recorded = lab.contents().builds.get(sha256) if lab.path.exists() else None
+    build = promised(built) if recorded is None or recorded.generator != GENERATOR else None
     return lab.add(sha256, build, rows, is_again)
 
 

@@ -253,15 +253,15 @@ class _Finder:
         step = max(1, len(pairs) // ANCHORS)
         return [(min(pair), max(pair)) for pair in pairs[::step][:ANCHORS] if len(pair) == 2]
 
-    def _poses_of(self, first: int, other: int) -> Iterator[_Pose]:
+    def _poses_of(self, first: int, second: int) -> Iterator[_Pose]:
         """Yield the similarities that map two contours to two outlines of matching areas."""
-        across = self.places[other] - self.places[first]
+        across = self.places[second] - self.places[first]
         apart = self.seen[None, :] - self.seen[:, None]
         stretch = np.abs(apart) / abs(across)
         fits = (self.seen_film == self.is_film[first])[:, None] & (stretch > 0)
-        fits &= (self.seen_film == self.is_film[other])[None, :]
+        fits &= (self.seen_film == self.is_film[second])[None, :]
         with np.errstate(divide="ignore", invalid="ignore"):
-            for areas, contour in ((self.seen_areas[:, None], first), (self.seen_areas, other)):
+            for areas, contour in ((self.seen_areas[:, None], first), (self.seen_areas, second)):
                 fits &= np.abs(areas / self.areas[contour] / stretch**2 - 1) < self.same_area
         if self.scale is not None:
             fits &= np.abs(stretch / self.scale - 1) < SAME_SCALE
@@ -301,8 +301,10 @@ class _Finder:
         points = np.column_stack([self.places.real, self.places.imag])
         matches = self._matches(self.reach, pose(self.places), abs(pose.scale_turn))
         for reach in (self.reach, self.reach, 0.5 * self.reach, max(0.4, 0.25 * self.reach)):
-            known, seen = matches >= 0, self.seen[matches[matches >= 0]]
-            base = self._fitted(points[known], np.column_stack([seen.real, seen.imag]))
+            is_matched, places_seen = matches >= 0, self.seen[matches[matches >= 0]]
+            base = self._fitted(
+                points[is_matched], np.column_stack([places_seen.real, places_seen.imag])
+            )
             warp = warp if base is None else replace(warp, base=base)
             matches = self._matches(reach, warp(points) @ (1, 1j), warp.pixels_per_mm)
         return Location(

@@ -305,7 +305,7 @@ def compare(
         each.append(ComparedDesign(source, checked, margins(checked.findings), figures))
     a, b = each
     keys = _paired(key_values(a.design), key_values(b.design))
-    pairs = _paired(*({(f.quantity, f.at): f for f in one.figures} for one in each))
+    pairs = _paired(*({(f.quantity, f.at): f for f in comparison.figures} for comparison in each))
     return DesignComparison(
         (a, b),
         tuple(KeyDifference(k, two) for k, two in keys if k != "name" and two[0] != two[1]),
@@ -521,7 +521,7 @@ def reach_yield(
 
     Keys in ``fixed`` do not change. Raises DesignError for a share that is not between 0 and 1.
     """
-    found = advice.reach_yield(design, target, fixed, progress)
-    if found.design is None or not found.changes:
-        return ReachedYield(found, None)
-    return ReachedYield(found, compare(design, found.design, DESIGNS, progress=progress))
+    outcome = advice.reach_yield(design, target, fixed, progress)
+    if outcome.design is None or not outcome.changes:
+        return ReachedYield(outcome, None)
+    return ReachedYield(outcome, compare(design, outcome.design, DESIGNS, progress=progress))

@@ -122,7 +122,7 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
             f"no design could be made: {nearest.refused} ({count} of the {len(refused)} tried)"
         )
     front, count = pareto_front(space, best) if best.holds else ([], 0)
-    found = FoundDesign(
+    outcome = FoundDesign(
         request,
         best,
         tuple(bindings(space, point, best)),
@@ -133,23 +133,23 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
         request.tries <= len(space.trials) < space.size,
         space.free,
     )
-    return found if best.laminate is None else _with_trust(found, best.laminate)
+    return outcome if best.laminate is None else _with_trust(outcome, best.laminate)
 
 
-def _with_trust(found: FoundDesign, laminate: Laminate) -> FoundDesign:
+def _with_trust(outcome: FoundDesign, laminate: Laminate) -> FoundDesign:
     """Return the result with intervals, flags and measured values of its best design."""
-    request = found.request
-    subject = request.subject(request.design.with_(dict(found.best.values)), laminate)
+    request = outcome.request
+    subject = request.subject(request.design.with_(dict(outcome.best.values)), laminate)
     for quantity in request.quantities:
         label = quantity.label
         if flags := subject.flags(quantity):
-            found.flags[label] = flags
+            outcome.flags[label] = flags
         if (counterpart := subject.counterpart(quantity)) is not None:
-            found.measured[label] = counterpart
+            outcome.measured[label] = counterpart
         with suppress(DesignError):
             if (interval := subject.interval(quantity)) is not None:
-                found.intervals[label] = interval
-    return found
+                outcome.intervals[label] = interval
+    return outcome
 
 
 # The free keys of a request, and what no search could answer.
@@ -502,9 +502,9 @@ class FindDocument(Document, schema="sbafab/find@1"):
     on_front: int
 
 
-def find_document(found: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
+def find_document(outcome: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
     """Return the content of ``find --json``; ``bound`` is null without ``sure``."""
-    best = found.best
+    best = outcome.best
     rows = [
         RequirementEntry.read(
             row,
@@ -513,14 +513,14 @@ def find_document(found: FoundDesign, origin: str, target: Path) -> dict[str, An
             bound=best.judged(row) if row.quantity.label in best.intervals else None,
             holds=best.meets(row),
         )
-        for row in found.request.requirements
+        for row in outcome.request.requirements
     ]
     return FindDocument.of(
-        found,
-        file=str(target) if found.holds else None,
+        outcome,
+        file=str(target) if outcome.holds else None,
         started_from=origin,
         requirements=rows,
-        measured={name: row.entry() for name, row in found.measured.items()},
+        measured={name: row.entry() for name, row in outcome.measured.items()},
     )
 
 
@@ -537,17 +537,17 @@ def refuse_existing(target: Path) -> None:
 
 
 def found_toml(
-    source: str | Path, assignments: Sequence[str], name: str, found: FoundDesign, target: Path
+    source: str | Path, assignments: Sequence[str], name: str, outcome: FoundDesign, target: Path
 ) -> str:
     """Return the text of the design file ``target`` of a result, with its figures as comments."""
-    request, best = found.request, found.best
+    request, best = outcome.request, outcome.best
     changes: list[Change] = [*assignments, dict(best.values), {"name": name}]
     data = override(read_toml(design_path(source)), changes)
     data = override(data, [_paths_beside(target, data, request.design)])
     first = {key: value for key, value in data.items() if not isinstance(value, dict)}
 
     def interval(subject: Requirement | Goal) -> str:
-        ends = found.interval_text(subject)
+        ends = outcome.interval_text(subject)
         return f"; 90 % interval {ends}" if ends else ""
 
     head = [f"Found by sbafab find, from {Path(source).name}: {format_keys(best.values)}."]
@@ -557,8 +557,8 @@ def found_toml(
     goal = request.goal
     value = shown_value(goal.quantity, best.value(goal))
     head.append(f"{goal.quantity.label} = {value} (the goal{interval(goal)})")
-    head += [f"{name}: {measured.sentence()}" for name, measured in found.measured.items()]
-    head += [f"{name}: {FLAGS[flag]}" for name, flags in found.flags.items() for flag in flags]
+    head += [f"{name}: {measured.sentence()}" for name, measured in outcome.measured.items()]
+    head += [f"{name}: {FLAGS[flag]}" for name, flags in outcome.flags.items() for flag in flags]
     comments = "".join(f"# {line}".rstrip() + "\n" for line in head)
     return f"{comments}\n{tomli_w.dumps(first | data)}"
 

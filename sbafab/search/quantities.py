@@ -558,8 +558,8 @@ class Subject:
         return {self.factors: self}
 
     def _at(self, factors: Factors) -> Subject:
-        other = Subject(self.design, self.laminate, factors, self, self.most_kpa)
-        return self._others.setdefault(factors, other)
+        subject = Subject(self.design, self.laminate, factors, self, self.most_kpa)
+        return self._others.setdefault(factors, subject)
 
     def interval(
         self, quantity: RequestedQuantity, share: float = SHARE

@@ -112,11 +112,13 @@ class Table:
         """Return the column of the first figure of a quantity, at conditions that match ``at``, by
         the model to design with: the calibrated one, else the first.
         """
-        found = [c for c, of in self.figures.items() if of.quantity is quantity and of.at.meet(at)]
-        if not found:
+        columns = [
+            c for c, of in self.figures.items() if of.quantity is quantity and of.at.meet(at)
+        ]
+        if not columns:
             return None
-        here = self.figures[found[0]].at
-        same = [column for column in found if self.figures[column].at == here]
+        here = self.figures[columns[0]].at
+        same = [column for column in columns if self.figures[column].at == here]
         if not self.is_calibrated:
             return same[0]
         return min(same, key=lambda column: self.figures[column].model not in CALIBRATED_MODELS)
@@ -470,17 +472,17 @@ def _values_text(swept: Varied) -> str:
 
 def _objectives(table: Table) -> list[Objective]:
     """Size and mass, the first predicted stroke and force, and the yield."""
-    wanted = [(table.first(quantity, ANYWHERE), False) for quantity in INTRODUCTION]
+    wanted_columns = [(table.first(quantity, ANYWHERE), False) for quantity in INTRODUCTION]
     stroke = table.first(Quantity.FREE_STROKE, ANYWHERE)
-    wanted.append((stroke or table.first(Quantity.REFERENCE_STROKE, ANYWHERE), True))
+    wanted_columns.append((stroke or table.first(Quantity.REFERENCE_STROKE, ANYWHERE), True))
     flat = Conditions(share=0.0)
     if table.pressures_kpa:
         flat = flat._replace(kpa=max(table.pressures_kpa, key=abs))
     force = table.first(Quantity.BLOCKED_FORCE, flat) or table.first(Quantity.FORCE_BOUND, ANYWHERE)
-    wanted.append((force, True))
+    wanted_columns.append((force, True))
     objectives = [
         Objective(name, name.replace("[", "in ").replace("]", ""), more)
-        for name, more in wanted
+        for name, more in wanted_columns
         if name in table.columns
     ]
     return [*objectives, GOOD_BUILDS] if YIELD[0] in table.columns else objectives
