@@ -121,19 +121,19 @@ class NamedShape(Section):
 
     @model_validator(mode="after")
     def _is_one_shape(self) -> Self:
-        given = [key for key in type(self).model_fields if getattr(self, key) is not None]
-        kinds = [key for key in given if key in NEEDS]
+        keys = [key for key in type(self).model_fields if getattr(self, key) is not None]
+        kinds = [key for key in keys if key in NEEDS]
         if len(kinds) != 1:
             how = f"has {' and '.join(kinds)}" if kinds else "has none of its keys"
             raise ValueError(f"{how}; a shape is one of {', '.join(NEEDS)}")
         (kind,) = kinds
-        missing = [key for key in NEEDS[kind] if key not in given]
+        missing = [key for key in NEEDS[kind] if key not in keys]
         if missing:
             raise ValueError(f"is a {kind} without {missing[0]}; add it")
-        ways = [key for key in PATTERNS if key in given]
+        ways = [key for key in PATTERNS if key in keys]
         if kind == "pattern" and len(ways) != 1:
             raise ValueError("is a pattern, which has either round or step; give one of the two")
-        for key in given:
+        for key in keys:
             allowed = (kind, *NEEDS[kind], *PLACING, *FURTHER.get(kind, ()))
             if key not in allowed:
                 raise ValueError(f"is a {kind}, which has no {key}; remove it")

@@ -59,8 +59,8 @@ def nets_of(source: Source, *changes: Change, **tables: Any) -> NetMap:
     """
     design = load(source, *changes, **tables)
     laminate = build(design)
-    found = connectivity(laminate, design, faults=bool(laminate.nets))
-    return net_map(laminate, found)
+    voids = connectivity(laminate, design, faults=bool(laminate.nets))
+    return net_map(laminate, voids)
 
 
 def check_folder(folder: str | Path, nets: str | Path | None = None) -> Findings:

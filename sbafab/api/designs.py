@@ -142,20 +142,20 @@ def schema_keys(
 def _tables(rule: JsonSchema, schema: JsonSchema) -> Iterator[tuple[str, JsonSchema]]:
     """Yield the tables that a key may hold, each with what stands between their keys and it."""
     for choice in (rule, *rule.get("anyOf", ())):
-        found = _resolved(choice, schema)
-        if isinstance(more := found.get("additionalProperties"), dict):
+        resolved = _resolved(choice, schema)
+        if isinstance(more := resolved.get("additionalProperties"), dict):
             yield from ((f".{NAMED}", table) for _, table in _tables(more, schema))
-        if "items" in found:
-            yield from ((ROW, table) for _, table in _tables(found["items"], schema))
-        if found.get("properties"):
-            yield "", found
+        if "items" in resolved:
+            yield from ((ROW, table) for _, table in _tables(resolved["items"], schema))
+        if resolved.get("properties"):
+            yield "", resolved
 
 
 def _resolved(rule: JsonSchema, schema: JsonSchema) -> JsonSchema:
-    found: JsonSchema = rule
+    resolved: JsonSchema = rule
     if "$ref" in rule:
-        found = schema["$defs"][rule["$ref"].rpartition("/")[2]]
-    return found
+        resolved = schema["$defs"][rule["$ref"].rpartition("/")[2]]
+    return resolved
 
 
 @overload

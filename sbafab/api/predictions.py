@@ -125,8 +125,12 @@ def stack(
     shear (paper, Sec. 4.4).
     """
     design = load(source, *changes, **tables)
-    own = {"press_factor": press_factor, "pocket_loss": pocket_loss, "modulus_mpa": modulus_mpa}
-    return stack_of(design, most_pressure=most_pressure, factors=factors_of(design, own))
+    overrides = {
+        "press_factor": press_factor,
+        "pocket_loss": pocket_loss,
+        "modulus_mpa": modulus_mpa,
+    }
+    return stack_of(design, most_pressure=most_pressure, factors=factors_of(design, overrides))
 
 
 def motion(

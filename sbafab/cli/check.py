@@ -98,9 +98,9 @@ def _check_design(
     advice, has_target = None, isinstance(source, Design) and source.rules.target_yield is not None
     with show.progress(as_json) as progress:
         if target_yield is not None:
-            wanted = (*assignments, f"rules.target_yield={target_yield}")
-            advice = advise(load_design(name, wanted), target_yield, progress)
-            source = load_design(name, wanted, waivers)
+            with_target = (*assignments, f"rules.target_yield={target_yield}")
+            advice = advise(load_design(name, with_target), target_yield, progress)
+            source = load_design(name, with_target, waivers)
         order = make_order(source, progress=progress)
     if not order.failed:
         refuse_undoable(order.builds)

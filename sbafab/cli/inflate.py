@@ -175,15 +175,15 @@ def picture(
     _refuse_unused(path.suffix.lower())
     pixels = width or (480 if path.suffix.lower() in MOVING else PictureRequest.width)
     view |= {"width": pixels, "height": pixels * 4 // 5}
-    wanted = PictureRequest(pressures or {"": 5.0}, volumes or None, **view)
+    picture = PictureRequest(pressures or {"": 5.0}, volumes or None, **view)
     if is_inflated:
-        _draw_inflated(loaded, wanted, path)
+        _draw_inflated(loaded, picture, path)
         return
     opt.refuse_options(
         f"is for inflated actuators, and {WHY}: {loaded.name} is drawn flat; leave it out",
         *("pressures", "volumes", "elevation", "azimuth"),
     )
-    write_flat_picture(build(loaded), path, wanted.width, wanted.height)
+    write_flat_picture(build(loaded), path, picture.width, picture.height)
     show.verdict(f"{loaded.name} drawn flat, since {WHY}. Written to {path}", path)
 
 
@@ -197,14 +197,14 @@ def _refuse_unused(suffix: str) -> None:
         opt.refuse_options(reason, "elevation", "azimuth", "width")
 
 
-def _draw_inflated(design: Design, wanted: PictureRequest, path: Path) -> None:
-    laminate, pressures = build(design), [*wanted.pressures_kpa.values()]
+def _draw_inflated(design: Design, picture: PictureRequest, path: Path) -> None:
+    laminate, pressures = build(design), [*picture.pressures_kpa.values()]
     refuse_pressure(pressures)
     refuse_beyond_burst(laminate, max(pressures))
     most = max(MOST_PRESSURE, *pressures)
     with show.progress(False) as progress:
         inflated = stack(design, laminate, most, factors_of(design), model_form(design))
-        pose = write_picture(laminate, inflated, wanted, path, partial(progress, "frames"))
+        pose = write_picture(laminate, inflated, picture, path, partial(progress, "frames"))
     discs = near_discs(design)
     if discs is not None:
         show.wrapped(

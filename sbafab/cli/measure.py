@@ -273,9 +273,9 @@ def inspect(
     """
     if find_spec("skimage") is None or find_spec("scipy") is None:
         raise DesignError('sbafab inspect needs scikit-image: pip install "sbafab[scan]"')
-    cut, seen = read_cut_sheet(folder, sheet), read_picture(picture)
-    scale = _reference(seen, photo, **reference)
-    inspection = inspect_picture(seen, cut, scale, photo, paper == "dark")
+    cut, photographed = read_cut_sheet(folder, sheet), read_picture(picture)
+    scale = _reference(photographed, photo, **reference)
+    inspection = inspect_picture(photographed, cut, scale, photo, paper == "dark")
     paths = _write_inspection(inspection, out)
     if as_json:
         show.document({**InspectionDocument.of(inspection), "files": [str(path) for path in paths]})

@@ -98,13 +98,13 @@ def predict(
         _predict_assembly(design, request, pressures[0] if pressures else 10.0, load_g)
         return
     _refuse_for_design(design)
-    wanted = PredictionRequest(
+    conditions = PredictionRequest(
         pressures or usual_pressures(design.form), flow_ml_min, volumes, overrides=factors
     )
     rows: Sequence[SensitivityRow] = ()
     with show.progress(request.as_json) as progress:
         progress("predicting", 0, 1)
-        prediction = predicted(design, wanted)
+        prediction = predicted(design, conditions)
         write = RunRequest(design, request.out, ("predict",), prediction=prediction)
         try:
             run = generate(write, progress)
@@ -115,7 +115,7 @@ def predict(
             raise
         if sensitivity:
             progress("sensitivity", 0, 1)
-            rows = sensitivity_table(design, wanted.pressures_kpa[0])
+            rows = sensitivity_table(design, conditions.pressures_kpa[0])
     failed = show.failed_rules(run.findings)
     if request.as_json:
         more = {"sensitivity": [asdict(row) for row in rows]} if sensitivity else {}
@@ -125,7 +125,7 @@ def predict(
         show.phrases("size", size_phrases(design, run.laminate, prediction.asked.factors))
         print_prediction(prediction, verbose)
         if rows:
-            _print_sensitivity(rows, wanted.pressures_kpa[0])
+            _print_sensitivity(rows, conditions.pressures_kpa[0])
         if not run.failed:
             details = "" if verbose else " Details: -v"
             show.verdict(

@@ -141,8 +141,8 @@ def record(lab: Path, assignments: tuple[str, ...], as_json: bool, **values: Any
         count = recording.write_history(_matches(store, values), values["export"])
         show.verdict(f"{values['export']}: {show.several(count, 'device')}")
     elif task == "find":
-        found = _matches(store, values)
-        _print_rows([*found.entries, *found.records], store, as_json, "found in")
+        matches = _matches(store, values)
+        _print_rows([*matches.entries, *matches.records], store, as_json, "found in")
     elif task == "correct":
         _print_rows([_correct(store, values)], store, as_json, "added to")
     else:

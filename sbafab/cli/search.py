@@ -254,14 +254,14 @@ def _print_quantities(result: FoundDesign) -> None:
     for row in request.requirements:
         value = figure_text(request, best, row) + ("" if is_sure else _interval_text(result, row))
         missed = "" if best.meets(row) else ": MISSED"
-        told = f"{row.quantity.label} {value}; {row.bound}{missed}"
-        lines.setdefault(row.quantity.label, []).append(told)
+        line = f"{row.quantity.label} {value}; {row.bound}{missed}"
+        lines.setdefault(row.quantity.label, []).append(line)
     label = goal.label if result.holds else goal.quantity.label
     value = shown_value(goal.quantity, best.value(goal)) + _interval_text(result, goal)
     lines.setdefault(goal.quantity.label, []).append(f"{label}: {value}")
     for name, told_of in lines.items():
-        for told in told_of:
-            show.line(f"  {told}")
+        for line in told_of:
+            show.line(f"  {line}")
         for flag in result.flags.get(name, ()):
             show.wrapped(f"({FLAGS[flag]})", indent="    ")
         if name in result.measured:
@@ -350,10 +350,10 @@ def sweep(
     that was stopped.
     """
     design = load_design(*request.source)
-    wanted = SweepRequest(design, varied_keys(varied), pressures_kpa=pressures, **settings)
+    sweep_request = SweepRequest(design, varied_keys(varied), pressures_kpa=pressures, **settings)
     try:
         with show.progress(request.as_json) as progress:
-            swept = sweeping.sweep(wanted, request.out, progress)
+            swept = sweeping.sweep(sweep_request, request.out, progress)
     except SweepStopped as stop:
         print_error(
             f"{stop.measured} of {stop.designs} designs are computed; run the same command again "
@@ -368,7 +368,7 @@ def sweep(
             f"The tables leave out {swept.no_longer_asked} designs of an earlier sweep; its "
             "command restores them from the journal"
         )
-    if not wanted.all_columns:
+    if not sweep_request.all_columns:
         show.line(
             "columns: varied, requested and binding; --all-columns writes all without computing "
             "again"

@@ -136,13 +136,14 @@ def notes_of(builds: Iterable[Build]) -> list[str]:
 
     A note of all of them stands without names.
     """
-    told: dict[str, list[str]] = {}
+    designs_of_note: dict[str, list[str]] = {}
     designs = [(each.design.name, dict.fromkeys(each.laminate.notes)) for each in builds]
     for name, notes in designs:
         for note in notes:
-            told.setdefault(note, []).append(name)
+            designs_of_note.setdefault(note, []).append(name)
     return [
-        note if len(of) == len(designs) else f"{', '.join(of)}: {note}" for note, of in told.items()
+        note if len(of) == len(designs) else f"{', '.join(of)}: {note}"
+        for note, of in designs_of_note.items()
     ]
 
 

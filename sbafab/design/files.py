@@ -63,11 +63,11 @@ def listed(values: Iterable[object]) -> str:
     return ", ".join(f'"{value}"' for value in values)
 
 
-def hint(name: str, known: Iterable[str]) -> str:
+def hint(name: str, names: Iterable[str]) -> str:
     """Return the known name that is most like another one as a question, or all of them."""
-    known = list(known)
-    near = difflib.get_close_matches(name, known, 1)
-    return f"did you mean {near[0]}?" if near else f"there are {listed(known)}"
+    names = list(names)
+    near = difflib.get_close_matches(name, names, 1)
+    return f"did you mean {near[0]}?" if near else f"there are {listed(names)}"
 
 
 def shown(value: object) -> str:
@@ -188,8 +188,8 @@ def _unknown_key(
     is_used = getattr(record, "uses", bool)
     paths = [path for path in key_paths(record) if is_used(path)]
     table = ".".join(where[:-1])
-    own = next(_tables_at(record, where[:-1]), None)
-    siblings = [f"{table}.{key}".lstrip(".") for key in _keys(own)] if own else []
+    record_at = next(_tables_at(record, where[:-1]), None)
+    siblings = [f"{table}.{key}".lstrip(".") for key in _keys(record_at)] if record_at else []
     # A key without its table; otherwise a misspelt key.
     near = _nearest(field, paths, 1.0) or _nearest(where[-1], siblings, 0.6)
     # A truncated key belongs to its own table, not to a similar key of another.

@@ -284,13 +284,13 @@ def _drawn(root: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, str
 def _is_displayed(element: ElementTree.Element) -> bool:
     """Return True if the element is drawn. Raises DesignError for anything that may change that."""
     name = local(element)
-    own = {key: value for key, value in element.attrib.items() if not key.startswith("{")}
-    style = own.get("style", "").split(";")
+    values = {key: value for key, value in element.attrib.items() if not key.startswith("{")}
+    style = values.get("style", "").split(";")
     parts = [part.partition(":") for part in style if part.strip(WHITE)]
     styles = {key.strip(WHITE): value.strip(WHITE) for key, _, value in parts}
     attributes = {
         key: value.strip(WHITE)
-        for key, value in own.items()
+        for key, value in values.items()
         if key not in ATTRIBUTES[name] and not _NAMES.fullmatch(key)
     }
     if {**attributes, **styles}.get("display") == "none":
@@ -309,14 +309,14 @@ def _keep_layer(root: ElementTree.Element, layer: str) -> None:
         names = (group.get(LABEL) or group.get("id") for group in groups)
         raise nothing_on(layer, filter(None, names))
     holder_of = {child: element for element in root.iter() for child in element}
-    kept = {*named}
+    named_holders = {*named}
     holders = [*named]
     for holder in holders:
         if holder in holder_of:
             holders.append(holder_of[holder])
-    kept.update(holders)
+    named_holders.update(holders)
     for holder in {*holders}.difference(named):
-        for child in [child for child in holder if child not in kept]:
+        for child in [child for child in holder if child not in named_holders]:
             holder.remove(child)
 
 

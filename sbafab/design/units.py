@@ -49,8 +49,8 @@ def in_first_unit(text: str, units: Mapping[str, float]) -> float | None:
 
 def share_of(text: str) -> float | None:
     """Return the share of a text such as 0.95 or 95%; None for other text."""
-    found = in_first_unit(text, {"": 1.0, "%": 0.01})
-    return None if found is None else round(found, 12)
+    number = in_first_unit(text, {"": 1.0, "%": 0.01})
+    return None if number is None else round(number, 12)
 
 
 def millimetres(value: object) -> float:

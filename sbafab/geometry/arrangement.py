@@ -180,7 +180,7 @@ def _share(
         partners[j].append(i)
     new = {i: points for i, points in enumerate(cuts) if points}
     # Edges of a grid of channels run along hundreds of others.
-    known = {i: set(points) for i, points in new.items()}
+    points_on = {i: set(points) for i, points in new.items()}
     while new:
         shared: dict[int, list[Point]] = defaultdict(list)
         for i, points in new.items():
@@ -189,8 +189,8 @@ def _share(
                 for p in points:
                     if not (low_x <= p[0] <= high_x and low_y <= p[1] <= high_y):
                         continue
-                    if p not in known[j] and distance_to(edges[j], p) < tolerance:
-                        known[j].add(p)
+                    if p not in points_on[j] and distance_to(edges[j], p) < tolerance:
+                        points_on[j].add(p)
                         cuts[j].append(p)
                         shared[j].append(p)
         new = shared

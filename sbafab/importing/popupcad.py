@@ -67,25 +67,30 @@ def _records(path: Path, text: str) -> Any:
     yaml = yaml_of(path)
     loader: Any = type("Loader", (getattr(yaml, "CSafeLoader", yaml.SafeLoader),), {})
 
-    def record(made: Any, suffix: str, node: Any) -> Iterator[CadRecord]:
+    def record(loader_of_tag: Any, suffix: str, node: Any) -> Iterator[CadRecord]:
         entry = CadRecord(suffix.rsplit(".", 1)[-1])
         yield entry
         if isinstance(node, yaml.MappingNode):
-            entry.values.update(made.construct_mapping(node))
+            entry.values.update(loader_of_tag.construct_mapping(node))
         elif isinstance(node, yaml.SequenceNode):
-            entry.items.extend(made.construct_sequence(node))
+            entry.items.extend(loader_of_tag.construct_sequence(node))
 
-    def items(made: Any, node: Any) -> tuple[Any, ...]:
-        return tuple(made.construct_sequence(node, deep=True))
+    def items(loader_of_tag: Any, node: Any) -> tuple[Any, ...]:
+        return tuple(loader_of_tag.construct_sequence(node, deep=True))
 
     loader.add_multi_constructor(PYTHON, record)
     loader.add_constructor(f"{PYTHON}tuple", items)
-    loader.add_constructor(f"{PYTHON}unicode", lambda made, node: made.construct_scalar(node))
-    loader.add_constructor(f"{PYTHON}long", lambda made, node: made.construct_yaml_int(node))
+    loader.add_constructor(
+        f"{PYTHON}unicode", lambda loader_of_tag, node: loader_of_tag.construct_scalar(node)
+    )
+    loader.add_constructor(
+        f"{PYTHON}long", lambda loader_of_tag, node: loader_of_tag.construct_yaml_int(node)
+    )
     for vertex in VERTICES:
         for form in ("", "_1"):
             loader.add_constructor(
-                f"!{vertex}{form}", lambda made, node, kind=vertex + form: record(made, kind, node)
+                f"!{vertex}{form}",
+                lambda loader_of_tag, node, kind=vertex + form: record(loader_of_tag, kind, node),
             )
     return loaded(path, text, loader, "popupCAD")
 
@@ -129,15 +134,15 @@ def _joined(flats: Iterable[Flat]) -> Flat:
 
 def _within(flat: Flat, region: Region, inside: bool = True) -> Flat:
     """The lines, cut, and points that are in a region, or outside it."""
-    kept = []
+    pieces = []
     for line in flat.lines:
         stops = {p for edge in region.edges for p in meeting_points(line, edge)}
         ends = sorted({line.start, line.end, *stops}, key=line.parameter)
         for piece in (Line(start, end) for start, end in pairwise(ends)):
             if piece.length > SAME and region.contains(piece.at(0.5)) == inside:
-                kept.append(piece)
+                pieces.append(piece)
     points = tuple(point for point in flat.points if region.contains(point) == inside)
-    return Flat(Region(), tuple(kept), points)
+    return Flat(Region(), tuple(pieces), points)
 
 
 def _combined(function: str, a: Flat, b: Flat) -> Flat:

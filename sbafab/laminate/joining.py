@@ -240,8 +240,12 @@ class _Search:
             next((piece for piece in pieces if any(o.winding(place) for o in piece.outers)), None)
             for place in places
         ]
-        held = {id(piece): piece for piece in inner if piece is not None}.values()
-        return Region(tuple(c for piece in held for c in piece.contours)) if held else bare
+        pieces_inside = {id(piece): piece for piece in inner if piece is not None}.values()
+        return (
+            Region(tuple(c for piece in pieces_inside for c in piece.contours))
+            if pieces_inside
+            else bare
+        )
 
     def _welded_by_mistake(
         self, seam: Seam, task: _Task, gaps: Sequence[Interface]
@@ -265,12 +269,16 @@ class _Search:
         """Return True if the heat of a seam bonds the faces of another interface."""
         if not self.laminate.bonds:
             return True
-        other = self.laminate.bond_of(gap.below, gap.above, seam.tool)
+        bond_there = self.laminate.bond_of(gap.below, gap.above, seam.tool)
         below, above = self.laminate.layer(seam.below), self.laminate.layer(seam.above)
         bond = self.laminate.bond_of(below, above, seam.tool)
-        if other is None or bond is None or None in (other.temperature_c, bond.temperature_c):
-            return other is not None
-        return (bond.temperature_c or 0.0) >= (other.temperature_c or 0.0)
+        if (
+            bond_there is None
+            or bond is None
+            or None in (bond_there.temperature_c, bond.temperature_c)
+        ):
+            return bond_there is not None
+        return (bond.temperature_c or 0.0) >= (bond_there.temperature_c or 0.0)
 
     # The steps of an order.
 

@@ -201,8 +201,8 @@ class Laminate:
             key = *(layer.pattern for layer in (below, *masks, above)), pressed, seams
             if key not in regions:
                 profiles = [mask.profile for mask in masks]
-                found = interface_regions(below.profile, above.profile, profiles)
-                regions[key] = found if pressed else _seamed(found, seams)
+                regions_between = interface_regions(below.profile, above.profile, profiles)
+                regions[key] = regions_between if pressed else _seamed(regions_between, seams)
             roles = [layer.role for layer in (below, *masks, above)]
             kind: InterfaceKind = "bond"
             if masks or not pressed:
@@ -347,7 +347,7 @@ class Laminate:
         rows = [(layers[0], _numbers(layers)) for layers in groups]
         table = table_html(
             ("pattern", "film", "role", "layers, bottom to top"),
-            [(one.pattern, one.film.material, one.role, numbers) for one, numbers in rows],
+            [(layer.pattern, layer.film.material, layer.role, numbers) for layer, numbers in rows],
         )
         return _plan(title, [layers[0] for layers in groups], 0.45) + table
 

@@ -211,9 +211,9 @@ def folded_height(laminate: Laminate, factor: float, product: str) -> FoldedHeig
     if that is empty; 1 if not stated.
     """
     melts = [layer.film for layer in pressed_layers(laminate) if layer.film.melts]
-    known = [film for film in melts if product in ("", film.product)]
-    molten = sum(film.thickness for film in known)
-    unknown = () if factor == 1 else dict.fromkeys(film for film in melts if film not in known)
+    melting = [film for film in melts if product in ("", film.product)]
+    molten = sum(film.thickness for film in melting)
+    unknown = () if factor == 1 else dict.fromkeys(film for film in melts if film not in melting)
     return FoldedHeight(laminate.thickness - molten, molten, factor, tuple(unknown))
 
 

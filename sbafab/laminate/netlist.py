@@ -166,7 +166,7 @@ def parchmint_nets(document: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     labels = dict(parchmint_labels(document))
     titles, components = _titles(document), document.get("components", ())
     spots_of = [_spots(row, titles) for row in components]
-    known = {spot for spots in spots_of for spot in spots}
+    spots_here = {spot for spots in spots_of for spot in spots}
     near: dict[Spot, Spot] = {}
     for row, spots in zip(components, spots_of, strict=True):
         if str(row.get("entity", "")).upper() == VIA:
@@ -175,7 +175,7 @@ def parchmint_nets(document: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
         spots = [(row.get("layer", ""), end["component"]) for end in (row["source"], *row["sinks"])]
         for spot in spots if not components else ():
             labels.setdefault(spot, _free_name(spot[1], labels.values()))
-        _join(near, [spot for spot in spots if spot in known or not components])
+        _join(near, [spot for spot in spots if spot in spots_here or not components])
     groups: dict[Spot, list[str]] = {}
     for spot, label in labels.items():
         groups.setdefault(_root(near, spot), []).append(label)

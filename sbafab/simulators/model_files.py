@@ -44,9 +44,9 @@ def rendered(template: Path, **values: object) -> str:
 
 @cache
 def _environment(folder: Path) -> Environment:
-    made = environment(folder)
-    made.filters |= {"numbers": numbers, "shown": lambda value, digits: f"{value:.{digits}g}"}
-    return made
+    templates = environment(folder)
+    templates.filters |= {"numbers": numbers, "shown": lambda value, digits: f"{value:.{digits}g}"}
+    return templates
 
 
 def numbers(values: ArrayLike) -> str:

@@ -123,12 +123,12 @@ def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends
     for point, error in enumerate(relative_errors(curve).tolist()):
         ends: list[Ends] = []
         for phrase in (name for name, values in median.series.items() if values[point] is not None):
-            found = {of: values.get(phrase, unreached)[point] for of, values in series.items()}
-            known = {of: value for of, value in found.items() if value is not None}
-            if len(known) < len(found):
+            answered = {of: values.get(phrase, unreached)[point] for of, values in series.items()}
+            reached = {of: value for of, value in answered.items() if value is not None}
+            if len(reached) < len(answered):
                 ends = []
                 break
-            wide = uncertainty.interval_of(group, known.__getitem__, term=term_of(curve))
+            wide = uncertainty.interval_of(group, reached.__getitem__, term=term_of(curve))
             ends.append(widened(*wide, error))
         intervals.append((min(a for a, _ in ends), max(b for _, b in ends)) if ends else None)
     return intervals

@@ -190,8 +190,8 @@ class ModelledActuator:
 
         Raises DesignError for one chamber.
         """
-        given = self.curve.setup.chambers
-        counts = list(range(1, self.stack.chambers)) if given is None else [given]
+        stated = self.curve.setup.chambers
+        counts = list(range(1, self.stack.chambers)) if stated is None else [stated]
         if not counts:
             raise DesignError("one chamber does not bend")
         return {chamber_count(count) if len(counts) > 1 else "": count for count in counts}
@@ -267,12 +267,12 @@ def _blocked_states(of: ModelledActuator) -> Series:
     Raises DesignError if none is named.
     """
     curve = of.curve
-    for name, given in (
+    for name, stated in (
         ("stroke_mm", curve.setup.stroke_mm),
         ("height_share", curve.setup.height_share),
     ):
-        if curve.x_name == name or (given is not None and curve.x_name != "height_share"):
-            values = curve.x if curve.x_name == name else (given or 0.0,) * len(curve.y)
+        if curve.x_name == name or (stated is not None and curve.x_name != "height_share"):
+            values = curve.x if curve.x_name == name else (stated or 0.0,) * len(curve.y)
             return _shares(of, values) if name == "height_share" else {"": values}
     raise DesignError("the set-up names no height at which the tip is held")
 
@@ -304,8 +304,8 @@ def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> Series:
 
 def _bent_forces(of: ModelledActuator) -> NamedSeries:
     curve, counts = of.curve, of.chambers_that_bend
-    given = curve.setup.bend_deg or 0.0
-    angles = curve.x if curve.x_name == "bend_deg" else (given,) * len(curve.y)
+    stated = curve.setup.bend_deg or 0.0
+    angles = curve.x if curve.x_name == "bend_deg" else (stated,) * len(curve.y)
     pairs = list(zip(angles, _pressures(curve), strict=True))
     return of.stack_model, {
         phrase: tuple(_bent_force(of, count, *pair) for pair in pairs)
@@ -369,18 +369,18 @@ def _pose_with(of: ModelledActuator, chambers: int, volume: float) -> Pose | Non
     None if that takes more than the stack's greatest pressure.
     """
 
-    def held(pose: Pose) -> float:
+    def volume_of(pose: Pose) -> float:
         return float(pose.volumes[:chambers].sum())
 
-    wanted = volume + held(of.free_pose(chambers, 0.0))
+    target = volume + volume_of(of.free_pose(chambers, 0.0))
     low, high = 0.0, min(of.stack.most_pressure, MOST_PRESSURE)
     pose = of.free_pose(chambers, high)
-    if held(pose) < wanted:
+    if volume_of(pose) < target:
         return None
     for _ in range(40):
         middle = (low + high) / 2
         pose = of.free_pose(chambers, middle)
-        low, high = (middle, high) if held(pose) < wanted else (low, middle)
+        low, high = (middle, high) if volume_of(pose) < target else (low, middle)
     return pose
 
 
@@ -404,9 +404,10 @@ def _strokes_by_volume(balloon: Balloon, volumes: tuple[float, ...]) -> tuple[Mo
     top = FIRST_KPA
     while top < MOST_FREE_KPA and _filling(balloon, top)[0][-1] < max(volumes):
         top = min(2 * top, MOST_FREE_KPA)
-    held, heights = _filling(balloon, top)
+    volumes_held, heights = _filling(balloon, top)
     return tuple(
-        None if volume > held[-1] else float(np.interp(volume, held, heights)) for volume in volumes
+        None if volume > volumes_held[-1] else float(np.interp(volume, volumes_held, heights))
+        for volume in volumes
     )
 
 

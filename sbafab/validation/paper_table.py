@@ -149,8 +149,8 @@ class PaperTable:
         figure = values[template] if template and not key else None
         if key:
             at = FigureKey.read(key)
-            found = self.predictions[template]
-            figure = found.value(at.quantity.key, at.model, **at.at.as_dict())
+            prediction = self.predictions[template]
+            figure = prediction.value(at.quantity.key, at.model, **at.at.as_dict())
         why = cells["why"].format_map(values)
         return Row(cells["section"], cells["figure"], measured, figure, cells["model"], why)
 
@@ -287,9 +287,12 @@ def _computed(predictions: Mapping[str, Prediction]) -> dict[str, float]:
     for kpa in (1, 10):
         values[f"held_{kpa}"] = ten.value("balloon_volume", kpa=kpa)
     for name, template in (("1dof", "1dof-5mm"), ("3dof", "3dof-15mm")):
-        found = predictions[template]
-        tip, height = found.value("shut_stiffness", kpa=10), found.value("free_height", kpa=10)
-        values[f"modulus_{name}"] = modulus(tip, 1.0, height, found.value("second_moment"))
+        prediction = predictions[template]
+        tip, height = (
+            prediction.value("shut_stiffness", kpa=10),
+            prediction.value("free_height", kpa=10),
+        )
+        values[f"modulus_{name}"] = modulus(tip, 1.0, height, prediction.value("second_moment"))
     return values | dict(_of_stack(stack(design)))
 
 

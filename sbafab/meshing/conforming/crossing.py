@@ -60,12 +60,12 @@ def crossing(stack: Layup, forms: Sequence[FormedFilm]) -> Crossing | None:
     """Return the deepest crossing of two films; None if all are apart or touch."""
     films = [_Film(stack, k, form) for k, form in enumerate(forms)]
     plane = _Plane(stack)
-    found = [each for pair in pairwise(films) for each in _between(plane, *pair)]
+    crossings = [each for pair in pairwise(films) for each in _between(plane, *pair)]
     # Films farther apart matter only if neighbours are in order.
-    if not found:
+    if not crossings:
         far = ((lower, upper) for k, lower in enumerate(films) for upper in films[k + 2 :])
-        found = [each for pair in far for each in _between(plane, *pair)]
-    return max(found, key=lambda each: each.depth, default=None)
+        crossings = [each for pair in far for each in _between(plane, *pair)]
+    return max(crossings, key=lambda each: each.depth, default=None)
 
 
 class _Film:

@@ -271,7 +271,7 @@ def faces_of_tetrahedra(
 ) -> NumberArray:
     """Prism faces (k, 2) as the faces of the three tetrahedra of each prism that lie in them."""
     wedge_corners = [[0, 1, 2], [12, 13, 14], [0, 1, 13, 12], [1, 2, 14, 13], [2, 0, 12, 14]]
-    found = []
+    rows_of_faces = []
     for number, local in enumerate(wedge_corners):
         owners = faces[faces[:, 1] == number, 0]
         nodes = prisms[owners][:, None, None, local]
@@ -279,8 +279,8 @@ def faces_of_tetrahedra(
         for face, of_tetra in enumerate(FACES["tetra10"]):
             corners = tetrahedra[cells][:, :, list(of_tetra[:3]), None]
             chosen = cells[(corners == nodes).any(axis=3).all(axis=2)]
-            found.append(np.column_stack([chosen, np.full_like(chosen, face)]))
-    rows = np.concatenate(found)
+            rows_of_faces.append(np.column_stack([chosen, np.full_like(chosen, face)]))
+    rows = np.concatenate(rows_of_faces)
     return rows[np.lexsort((rows[:, 1], rows[:, 0]))]
 
 

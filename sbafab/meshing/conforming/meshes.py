@@ -190,8 +190,8 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
         for row in mesh_formats():
             if row.elements:
                 file = f"mesh/{kind}.{row.ending}"
-                made = MeshFile(file, kind, None, fill, size, len(mesh.cells))
-                yield made, partial(row.elements, mesh)
+                file_entry = MeshFile(file, kind, None, fill, size, len(mesh.cells))
+                yield file_entry, partial(row.elements, mesh)
     mesh = meshes.volume
     # Films that lie on each other enclose nothing: the surface would have no inside.
     air = [chamber for chamber in mesh.cavities if meshes.holds_air(chamber)]
@@ -202,11 +202,11 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
         stem = kind if chamber is None else f"{kind}_{chamber}_conforming"
         for row in mesh_formats():
             file = f"mesh/{stem}.{row.ending}"
-            made = MeshFile(file, kind, chamber, fill, surface.volume, len(surface.faces))
+            file_entry = MeshFile(file, kind, chamber, fill, surface.volume, len(surface.faces))
             if row.cavity and chamber is not None:
-                yield made, partial(row.cavity, mesh, chamber)
+                yield file_entry, partial(row.cavity, mesh, chamber)
             elif row.surface:
-                yield made, partial(row.surface, surface)
+                yield file_entry, partial(row.surface, surface)
 
 
 # Size and quality of a mesh.

@@ -401,13 +401,13 @@ def scenes_of(
     scenes: dict[str, Scene] = {}
 
     def add(name: SceneName, file: str, dt: float, values: Mapping[str, object]) -> None:
-        shell, told = values["shell"], values.get("volumes", pressures)
+        shell, loads = values["shell"], values.get("volumes", pressures)
         assert isinstance(shell, Shell)
-        assert isinstance(told, dict)
+        assert isinstance(loads, dict)
         # The films of a beam bear nothing.
         bearing = replace(shell, membranes=(), cavities={}) if name == "beam" else shell
         kpa = pressures if name != "volume" else {}
-        films = RecordedFilms(laminate, bearing, shell.tip, kpa, told.values())
+        films = RecordedFilms(laminate, bearing, shell.tip, kpa, loads.values())
         scenes[name] = Scene(name, file, dt, films, {**values, "pressures": pressures})
 
     stack = None if why_not_round(laminate) else round_stack(laminate)
