@@ -53,6 +53,15 @@ def test_a_key_of_the_form_goes_into_the_text_with_its_comment(seen: Watched) ->
     )
 
 
+def test_the_text_goes_into_the_form(seen: Watched) -> None:
+    seen.page.get_by_role("tab", name="TOML").click()
+    area = seen.page.get_by_role("textbox", name="Design file, TOML")
+    area.fill(DESIGN.replace("balloons = 15", "balloons = 4"))
+    seen.until("studio.laminate.balloons === 4")
+    seen.page.get_by_role("tab", name="Form").click()
+    assert seen.page.get_by_label("stack.balloons", exact=True).input_value() == "4"
+
+
 def test_an_error_stands_at_its_field_in_the_command_line_s_words(
     seen: Watched, folder: Path
 ) -> None:
@@ -74,6 +83,23 @@ def test_an_error_stands_at_its_field_in_the_command_line_s_words(
     seen.page.keyboard.press("Control+z")
     seen.ready()
     assert seen.page.locator(".row.bad").count() == 0
+
+
+def test_every_key_has_a_field_with_its_meaning(seen: Watched) -> None:
+    keys = {field["key"] for field in seen.say("studio.families.lobed")}
+    named = set(seen.say("[...document.querySelectorAll('#form [name]')].map(e => e.name)"))
+    assert keys - named == {"rules.waive"}  # a group of boxes
+    assert seen.page.locator("[role=group][aria-label='rules.waive']").count() == 1
+    seen.page.get_by_label("bond.width, mm").focus()
+    help_text = seen.page.locator("#help").inner_text()
+    assert "Width of every bonded ring" in help_text
+    assert "Default 0.75" in help_text
+
+
+def test_another_family_keeps_what_both_know(seen: Watched) -> None:
+    seen.page.get_by_role("button", name="One stack").click()
+    seen.until("studio.laminate.family === '1dof'")
+    assert seen.say("studio.laminate.balloons") == 15
 
 
 def test_a_file_changed_on_disk_is_loaded_and_saved_only_when_asked(
@@ -112,6 +138,39 @@ def test_layers_are_drawn_with_true_arcs_and_sizes(seen: Watched) -> None:
     assert colours(drawn) > 6
     seen.page.get_by_role("button", name="P04 separator mask").click()
     assert share_changed(drawn, picture(seen, "#view-layers .surface")) > 0.05
+
+
+def test_zoom_stays_when_the_design_changes(seen: Watched) -> None:
+    seen.page.get_by_role("tab", name="Layers").click()
+    stage = seen.page.locator("#view-layers .surface")
+    stage.focus()
+    for _ in range(4):
+        seen.page.keyboard.press("+")
+    before = stage.locator("g[transform]").get_attribute("transform")
+    seen.say("studio.edit([['lumen.diameter', '2.4']])")
+    seen.until("studio.laminate.lumen === 2.4")
+    assert stage.locator("g[transform]").get_attribute("transform") == before
+
+
+def test_hovering_names_layer_role_and_width(seen: Watched) -> None:
+    box = seen.page.locator("#lower canvas").bounding_box()
+    assert box is not None
+    place = seen.page.evaluate(
+        """() => { const canvas = document.querySelector('#lower canvas');
+        const pen = canvas.getContext('2d');
+        const k = canvas.width / canvas.clientWidth, row = Math.round(canvas.height / 2);
+        for (let y = row; y < canvas.height; y++) {
+          const data = pen.getImageData(0, y, canvas.width, 1).data;
+          for (let x = 200; x < canvas.width; x++) {
+            const red = data[4 * x] - 0xa9, blue = data[4 * x + 2] - 0xea;
+            if (data[4 * x + 3] && Math.abs(red) < 3 && Math.abs(blue) < 3)
+              return [x / k + 4, y / k]; } } }"""
+    )
+    seen.page.mouse.move(box["x"] + place[0], box["y"] + place[1])
+    told = seen.page.locator("#hover").inner_text()
+    assert "TPE" in told
+    assert "balloon" in told
+    assert "mm wide here" in told
 
 
 def test_the_solid_comes_apart_is_cut_and_picked(seen: Watched) -> None:

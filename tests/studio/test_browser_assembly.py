@@ -103,6 +103,21 @@ def test_the_solid_comes_apart_and_is_cut_and_a_finding_picks_its_parts(brace: W
     assert [words[:3] for words in pressed] == ["arm", "vac"]
 
 
+def test_an_error_stands_at_the_part_it_is_about(brace: Watched) -> None:
+    field = brace.page.get_by_label("parts.arm.turn, °")
+    field.fill("500")
+    field.press("Enter")
+    alert = brace.page.locator(".row.bad .why")
+    alert.wait_for()
+    assert "parts.arm.turn" in alert.inner_text()
+    assert field.get_attribute("aria-invalid") == "true"
+    mark = brace.page.locator("#view-parts.stale.bad .stale-mark")
+    assert mark.inner_text() == "Last good design"
+    brace.page.keyboard.press("Control+z")
+    current(brace)
+    assert brace.page.locator(".row.bad").count() == 0
+
+
 def test_a_part_is_opened_saved_and_put_back(
     brace: Watched, served_brace: tuple[str, Path]
 ) -> None:

@@ -78,6 +78,14 @@ def test_the_tip_is_pulled_by_hand(seen: Watched) -> None:
     seen.until("studio.motion.pose.bend < 0.1")
 
 
+def test_a_design_out_of_the_model_s_range_says_so_on_the_spot(seen: Watched) -> None:
+    seen.page.get_by_role("tab", name="Motion").click()
+    # A pose of the design before that comes late is not drawn.
+    seen.say("studio.motion.stack = null, studio.motion.arrived({}), 0")
+    seen.page.evaluate("text => studio.open(text)", api.template("radial-15mm"))
+    seen.until("document.querySelector('#view-motion .trust.beyond')?.textContent.length > 20")
+
+
 # 4. Rules live.
 
 
@@ -95,6 +103,28 @@ def test_what_is_not_current_is_marked_until_it_is(seen: Watched) -> None:
     theirs = api.check(api.loads(DESIGN.replace("diameter = 5 ", "diameter = 5.5 ")))
     ours = seen.say("studio.findings.map(f => [f.rule, f.verdict, f.measured])")
     assert ours == [[f.rule, f.verdict, f.measured] for f in theirs]
+
+
+def test_a_drag_shows_states_on_its_way_and_ends_with_the_last(seen: Watched) -> None:
+    shown = seen.page.evaluate(
+        """async () => { const seen = new Set();
+        studio.on('laminate', () => seen.add(studio.laminate.bounds[2]));
+        for (let i = 0; i < 30; i++) {
+          studio.edit([['chamber.diameter', String(5 + i / 10)]]);
+          await new Promise(r => setTimeout(r, 60)); }
+        return seen.size; }"""
+    )
+    assert shown >= 1
+    seen.ready()
+    assert seen.say("studio.values.chamber.diameter") == 7.9
+
+
+def test_a_rule_that_fails_stands_first(seen: Watched) -> None:
+    seen.say("studio.edit([['bond.width', '0.5']])")
+    seen.ready()
+    first = seen.page.locator(".finding").first
+    assert first.get_attribute("data-verdict") == "fail"
+    assert "bond-width: fail" in (first.get_attribute("aria-label") or "")
 
 
 # 5. Make it.
@@ -164,6 +194,14 @@ def test_a_link_holds_the_design(seen: Watched, chrome: Any, link: str) -> None:
             assert "balloons = 7" in content.decode()
 
 
+def test_unsaved_work_survives_a_reload(seen: Watched) -> None:
+    seen.say("studio.edit([['stack.balloons', '9']])")
+    seen.until("studio.laminate.balloons === 9")
+    seen.page.reload()
+    seen.until("window.studio?.laminate?.balloons === 9")
+    assert seen.say("studio.unsaved") is True
+
+
 # Feel.
 
 
@@ -215,6 +253,15 @@ def test_the_gallery_opens_only_where_no_design_is_given(
         watched.close()
 
 
+def test_a_wrong_token_is_told_plainly(chrome: Any, link: str) -> None:
+    watched = Watched(chrome, link.partition("#")[0] + "#token=wrong")
+    watched.page.get_by_role("alert").wait_for()
+    assert (
+        "open the one that sbafab studio printed" in watched.page.get_by_role("alert").inner_text()
+    )
+    watched.close()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_phone_width(chrome: Any, link: str, scheme: str) -> None:
     watched = Watched(
@@ -262,3 +309,19 @@ def test_everything_is_named_and_reached_by_keyboard(seen: Watched) -> None:
     snapshot = json.dumps(seen.page.locator("body").aria_snapshot())
     for part in ("tablist", "Findings", "Rules"):
         assert part in snapshot
+
+
+def test_templates_are_pictures(seen: Watched) -> None:
+    seen.page.get_by_role("button", name="sbafab", exact=True).click()
+    for name in api.templates():
+        image = seen.page.locator(f"img[src='templates/{name}.webp']")
+        image.wait_for()
+        seen.until(
+            f"document.querySelector(\"img[src='templates/{name}.webp']\").naturalWidth === 320"
+        )
+    seen.page.locator(".gallery button", has_text="1dof-10mm").click()
+    seen.until("studio.laminate.name === '1dof-10mm'")
+    seen.page.get_by_role("button", name="sbafab", exact=True).click()
+    seen.page.locator(".gallery button", has_text="brace").click()
+    seen.until("studio.family === 'assembly' && !studio.stale.rules")
+    assert seen.say("studio.findings.length") > 10

@@ -118,6 +118,23 @@ def test_a_dragged_point_snaps_to_the_grid_and_an_edge_becomes_an_arc(sketch: Sk
     assert "# Bonds of 1 mm beside pocket and strip" in text
 
 
+def test_points_snap_to_points_edges_and_angles_of_what_stays(sketch: Sketch) -> None:
+    page = sketch.page
+    page.get_by_label("Shape", exact=True).select_option("strip")
+    # The corner of the tab, which the strip does not move.
+    sketch.drag((0, 24.5), (2.2, 23.9))
+    assert sketch.settled()["strip"]["slot"] == [[0, 10], [2, 24]]
+    page.get_by_label("Shape", exact=True).select_option("pocket")
+    page.get_by_label("Points", exact=True).uncheck()
+    page.get_by_label("Grid", exact=True).uncheck()
+    # Straight above the point before, though the hand is not.
+    sketch.drag((20, 15), (20.2, 12.34))
+    x, y = sketch.settled()["pocket"]["polygon"][2]
+    assert x == 20
+    assert y == pytest.approx(12.34, abs=0.2)
+    assert y != round(y, 1)
+
+
 def test_points_are_typed_added_and_deleted_by_keys(sketch: Sketch) -> None:
     page = sketch.page
     sketch.type("Point 3, x, mm", "18.25")
@@ -181,6 +198,20 @@ def test_a_new_shape_is_clicked_saved_and_found_wanting(sketch: Sketch) -> None:
     assert page.locator("#view-draw .finding-place[data-rule=bond-width]").count() == 0
 
 
+def test_a_crossing_is_shown_at_its_place_and_undone(sketch: Sketch) -> None:
+    sketch.seen.ready()
+    sketch.drag((20, 15), (-25, 5))
+    alert = sketch.page.locator("#view-draw .draw-why")
+    alert.wait_for()
+    assert "shapes.pocket.polygon crosses or touches itself" in alert.inner_text()
+    assert sketch.page.locator("#view-draw .error-place").count() == 1
+    assert sketch.page.locator("#view-draw .stale-mark").inner_text() == "Last good design"
+    sketch.page.keyboard.press("Control+z")
+    sketch.seen.ready()
+    assert not alert.is_visible()
+    assert sketch.seen.say("studio.text") == POUCH
+
+
 def test_circles_have_a_diameter_and_any_outline_goes_on_as_points(sketch: Sketch) -> None:
     page = sketch.page
     page.get_by_role("button", name="New shape").click()
@@ -202,6 +233,14 @@ def test_circles_have_a_diameter_and_any_outline_goes_on_as_points(sketch: Sketc
     sketch.seen.ready()
     after = sketch.seen.say("studio.laminate.patterns[studio.layer(1).pattern].area")
     assert after == pytest.approx(before, abs=1e-4)
+
+
+def test_a_selected_number_stays_selected_when_the_table_is_drawn_again(sketch: Sketch) -> None:
+    field = sketch.page.get_by_label("Point 1, x, mm", exact=True)
+    field.select_text()
+    sketch.page.evaluate("studio.drawing.fill()")
+    sketch.page.keyboard.type("-21")
+    assert field.input_value() == "-21"
 
 
 def test_edges_of_the_sketch_are_those_of_closed_formulas(sketch: Sketch) -> None:
@@ -226,6 +265,13 @@ def test_edges_of_the_sketch_are_those_of_closed_formulas(sketch: Sketch) -> Non
         }"""
     )
     assert worst < 1e-6
+
+
+def test_a_design_without_shapes_has_no_such_view(sketch: Sketch) -> None:
+    sketch.page.evaluate("text => studio.open(text)", api.template("1dof-5mm"))
+    sketch.seen.until("studio.laminate?.name === '1dof-5mm'")
+    assert not sketch.page.get_by_role("tab", name="Draw").is_visible()
+    assert sketch.page.locator("#tab-layers").get_attribute("aria-selected") == "true"
 
 
 def test_a_shape_gets_another_name_everywhere(sketch: Sketch) -> None:
@@ -300,3 +346,29 @@ def test_points_of_seams_and_folds_and_ports_are_dragged_and_undone(sketch: Sket
     (moved, level), _ = sketch.table()["folds"][0]["line"]
     assert level == pytest.approx(v, abs=1e-6)
     assert moved == pytest.approx(u - 3.37, abs=0.2)
+
+
+def test_shift_takes_a_seams_point_that_lies_on_a_shapes(sketch: Sketch) -> None:
+    sketch.page.evaluate("text => studio.open(text)", api.template("folded"))
+    sketch.seen.until("studio.laminate?.name === 'folded'")
+    before = sketch.table()
+    place = tuple(before["seams"][0]["path"][1])
+    assert list(place) in before["shapes"]["middle"]["polygon"]
+    sketch.drag(place, (-17, 10), "Shift")
+    after = sketch.table()
+    assert (after["seams"][0]["path"][1], after["shapes"]) == ([-17, 10], before["shapes"])
+    sketch.drag(place, (-17.5, 11))
+    assert [-17.5, 11] in sketch.table()["shapes"]["middle"]["polygon"]
+
+
+def test_an_arc_of_a_seam_keeps_its_bulge_when_its_point_is_dragged(sketch: Sketch) -> None:
+    text = api.template("folded")
+    path = tomllib.loads(text)["seams"][0]["path"]
+    bent = f"[[{path[0][0]}, {path[0][1]}, 0.25], [{path[1][0]}, {path[1][1]}]]"
+    key = "seams.0.path"
+    sketch.page.evaluate("text => studio.open(text)", text)
+    sketch.seen.until("studio.laminate?.name === 'folded'")
+    sketch.page.evaluate("([key, value]) => studio.edit([[key, value]])", [key, bent])
+    sketch.seen.until("studio.values.seams[0].path[0][2] === 0.25")
+    sketch.drag(tuple(path[0]), (path[0][0] + 1, path[0][1]))
+    assert sketch.table()["seams"][0]["path"][0] == [path[0][0] + 1, path[0][1], 0.25]

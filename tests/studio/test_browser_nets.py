@@ -151,6 +151,17 @@ def test_a_short_is_striped_marked_and_led_to_from_the_rules(nets: Watched) -> N
     assert box["y"] < spot["y"] < box["y"] + box["height"]
 
 
+def test_an_open_is_named_where_the_hole_is_missing(nets: Watched) -> None:
+    opened(nets, ROUTED.replace('["film", "via-a", "via-b"]', '["film", "via-a"]'))
+    faults = nets.say("studio.nets.faults")
+    assert "open" in {fault["kind"] for fault in faults}
+    assert all(fault["nets"] in ([], ["b"]) for fault in faults)
+    line = nets.page.locator(".faults .finding[data-kind=open]").first
+    assert "Open: b" in line.inner_text()
+    line.click()
+    assert nets.page.locator("#view-nets .fault-place[data-kind=open]").count() >= 1
+
+
 def test_a_design_without_nets_shows_its_chambers(nets: Watched) -> None:
     opened(nets, api.template("3dof-15mm"))
     names = nets.say("Object.keys(studio.nets.colours)")

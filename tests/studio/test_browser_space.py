@@ -30,6 +30,34 @@ def colour(name: str) -> list[int]:
     return list(bytes.fromhex(code[1]))
 
 
+VOLUME = """({solid}) => { const {points: p, faces: f} = solid; let volume = 0, flat = 0;
+    const at = (i) => [p[3 * f[i]], p[3 * f[i] + 1], p[3 * f[i] + 2]];
+    for (let i = 0; i < f.length; i += 3) { const [a, b, c] = [at(i), at(i + 1), at(i + 2)];
+      volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6;
+      if (a[2] === 1 && b[2] === 1 && c[2] === 1)
+        flat += Math.abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2; }
+    return [volume, flat]; }"""
+
+
+def test_a_prism_holds_the_area_of_its_film(seen: Watched) -> None:
+    """Its faces enclose the area times 1 mm, and none of its top lies over another."""
+    designs = (api.loads(api.template(name)) for name in api.templates())
+    laminates = [api.build(design) for design in designs if design.family != "assembly"]
+    assert len(laminates) > 8
+    for laminate in laminates:
+        for pattern, layers in laminate.patterns.items():
+            region = layers[0].profile
+            contours = [[n for v in contour.vertices for n in v] for contour in region.contours]
+            volume, top = seen.page.evaluate(
+                f"""shape => Promise.all([import('/meshes.js'), import('/shapes.js')]).then(
+                ([{{prism}}, {{polygons}}]) => ({VOLUME})(prism(polygons(shape, 1e-5))))""",
+                contours,
+            )
+            where = (laminate.name, pattern)
+            assert (volume, top) == pytest.approx((region.area, region.area), rel=2e-4), where
+
+
 def shown(seen: Watched) -> Image.Image:
     """The picture of the solid, one dot a pixel, after its last frame."""
     seen.page.wait_for_timeout(700)

@@ -113,6 +113,12 @@ def test_a_name_too_long_for_a_file_is_one_sentence(client: Client, letters: str
     assert saved.status_code == 200
 
 
+def test_a_link_out_of_the_folder_is_not_followed(client: Client, studio: Studio) -> None:
+    (studio.folder / "link.toml").symlink_to(studio.folder.parent / "secret.toml")
+    assert client.get("/api/file/link.toml", headers=HEADERS).status_code == 422
+    assert "link.toml" not in client.get("/api/start", headers=HEADERS).json()["files"]
+
+
 def test_a_file_changed_meanwhile_is_not_saved_over(client: Client, studio: Studio) -> None:
     seen = client.get("/api/file/own.toml", headers=HEADERS).json()["sha"]
     (studio.folder / "own.toml").write_text("# theirs", encoding="utf-8")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 from sbafab import api
 from sbafab.design.sections import rule_names
 from sbafab.errors import DesignError
+from sbafab.models import balloon_map
 from sbafab.studio import jobs
 from sbafab.studio.app import design_in
 from sbafab.studio.editing import edited
@@ -38,6 +40,14 @@ def test_the_answers_come_in_the_order_a_person_waits_for_them(tmp_path: Path) -
     assert [(f["rule"], f["measured"], f["message"]) for f in found] == [
         (f.rule, f.measured, f.message) for f in theirs
     ]
+
+
+def test_a_shape_that_the_page_has_is_not_sent_again(tmp_path: Path) -> None:
+    first = seen(job(tmp_path, SMALL))
+    assert first["shapes"]
+    again = seen({**job(tmp_path, SMALL), "has": list(first["shapes"])})
+    assert again["shapes"] == {}
+    assert again["patterns"] == first["patterns"]
 
 
 def test_named_shapes_are_sent_with_their_arcs_even_where_one_fails(tmp_path: Path) -> None:
@@ -81,6 +91,31 @@ def test_a_row_of_a_list_is_edited_in_place() -> None:
 def seen(asked: dict[str, Any]) -> dict[str, Any]:
     """The laminate that a job answers."""
     return next(a for a in JOBS["live"](asked, lambda: None) if a["kind"] == "laminate")
+
+
+def test_the_prediction_is_that_of_the_command(tmp_path: Path) -> None:
+    told = {answer["kind"]: answer for answer in answers(job(tmp_path, SMALL))}
+    theirs = api.predict(api.loads(SMALL), quick=True).as_dict()
+    assert told["prediction"]["figures"] == theirs["figures"]
+    # What an assembly does takes seconds; it is asked for when the hand rests.
+    aperture = JOBS["live"](job(tmp_path, api.template("aperture")), lambda: None)
+    told = {answer["kind"]: answer for answer in islice(aperture, 4)}
+    assert told["prediction"]["quick"]
+    assert told["prediction"]["figures"] == []
+
+
+@pytest.mark.long
+def test_what_to_design_with_stays_when_the_elastic_stack_s_figures_come(tmp_path: Path) -> None:
+    text = edited(api.template("3dof-15mm"), [("stack.balloons", "2")])
+    shown = JOBS["live"](job(tmp_path, text), lambda: None)
+    quick = next(answer for answer in shown if answer["kind"] == "prediction")
+    (full,) = answers({**job(tmp_path, text), "do": "elastic"})
+    own = {key(figure): figure["design_with"] for figure in full["figures"]}
+    assert {
+        key(figure): figure["design_with"] for figure in quick["figures"]
+    }.items() <= own.items()
+    # The upper bound is hidden from the start.
+    assert not own["bending", "maximum lateral tip displacement", "constant curvature"]
 
 
 def key(figure: dict[str, Any]) -> tuple[str, str, str]:
@@ -189,6 +224,11 @@ def test_an_edit_that_is_no_toml_gets_one_sentence(text: str, value: str) -> Non
         edited(text, [("a", value)])
 
 
+def test_a_table_is_not_written_into_a_value() -> None:
+    with pytest.raises(DesignError, match="a value, not a table"):
+        edited("bond = 3", [("bond.width", "1")])
+
+
 def test_a_link_holds_a_design() -> None:
     text = api.template("3dof-15mm")
     link = f"http://127.0.0.1:8417/#design={packed(text)}"
@@ -203,6 +243,24 @@ def test_a_link_holds_a_design() -> None:
     ):
         with pytest.raises(DesignError, match="holds no design"):
             design_in(broken)
+
+
+@pytest.mark.long
+def test_poses_are_the_stack_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = api.template("1dof-5mm")
+    asked: dict[str, Any] = {"do": "motion", "pose": {"pressures": [20.0], "plate": 3.0}}
+    (pose,) = answers({**job(tmp_path, text), **asked})
+    theirs = api.stack(api.loads(text)).pose((20.0,), plate=3.0)
+    assert pose["force"] == pytest.approx(theirs.force, rel=1e-4)
+    assert pose["height"] == pytest.approx(theirs.height, abs=1e-3)
+    asked["pose"]["curves"] = True
+    pose, curves = answers({**job(tmp_path, text), **asked})
+    assert curves["holds"]
+    monkeypatch.setattr(balloon_map, "MOST_ERROR", 1e-9)
+    pose, curves = answers({**job(tmp_path, text), **asked})
+    assert not curves["holds"]
+    with pytest.raises(DesignError, match="pressures must be 1 finite"):
+        answers({**job(tmp_path, text), "do": "motion", "pose": {"pressures": [1, 2]}})
 
 
 @pytest.mark.long

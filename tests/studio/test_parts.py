@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import tomllib
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -116,6 +117,26 @@ def test_an_error_stands_at_the_part_s_field(
     with pytest.raises(DesignError) as ours:
         seen(tmp_path, text)
     assert refusal(str(ours.value))["field"] == field
+
+
+def test_a_part_is_taken_out_and_another_put_in(tmp_path: Path) -> None:
+    text = edited(BASE, [("parts.cup.kind", '"cup"'), ("parts.cup.on", '"plate"')])
+    text = edited(text, [("parts.cup.at", '"bottom"'), ("parts.arm.offset", None)])
+    answer = seen(tmp_path, text)
+    assert [part["name"] for part in answer["parts"]["parts"]] == ["plate", "arm", "cup"]
+    assert answer["assembly"]["values"]["parts"]["cup"]["diameter"] == 8
+    gone = seen(tmp_path, edited(text, [("parts.cup", None)]))
+    assert [part["name"] for part in gone["parts"]["parts"]] == ["plate", "arm"]
+
+
+def test_a_key_of_a_part_s_design_is_set_beside_those_that_are() -> None:
+    text = edited(BASE, [("parts.arm.set.chamber.diameter", "6"), ("parts.arm.turn", "90")])
+    arm = tomllib.loads(text)["parts"]["arm"]
+    assert arm["set"] == {"stack": {"balloons": 1}, "chamber": {"diameter": 6}}
+    assert arm["turn"] == 90
+    assert [line for line in BASE.splitlines() if line not in text.splitlines()] == []
+    plain = edited(BASE.replace("set.stack.balloons = 1\n", ""), [("parts.arm.set.name", '"a"')])
+    assert tomllib.loads(plain)["parts"]["arm"]["set"] == {"name": "a"}
 
 
 def test_findings_of_an_assembly_name_their_design(tmp_path: Path) -> None:

@@ -163,6 +163,16 @@ def test_a_fifo_in_the_folder_stops_nothing(link: str, folder: Path) -> None:
         (folder / "f.svg").unlink()
 
 
+def test_a_file_too_long_for_a_design_is_not_read(link: str, folder: Path) -> None:
+    (folder / "long.toml").write_bytes(b"#" * 2_000_001)
+    try:
+        answer = asked(link, "/api/file/long.toml")
+        assert answer.status == 422
+        assert "a design file holds at most 2,000,000" in json.loads(answer.body)["message"]
+    finally:
+        (folder / "long.toml").unlink()
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
 @pytest.mark.parametrize("number", few([signal.SIGINT, signal.SIGTERM], 1))
 def test_the_end_of_the_studio_speaks_of_nothing_else(tmp_path: Path, number: int) -> None:

@@ -91,6 +91,29 @@ def test_work_without_a_step_is_stopped_when_a_newer_wish_comes(tmp_path: Path) 
     assert not same
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="no process is held here")
+def test_a_process_that_hangs_holds_its_own_tab_alone(tmp_path: Path) -> None:
+    async def both() -> tuple[list[str], list[str], list[str]]:
+        pool, begun = WorkerPool(60, 2, warm=False, patience=0.01), asyncio.Event()
+        try:
+            hung = pool.ask(("hung", "live"), job(tmp_path, edited(TEXT, LONG)))
+            first = asyncio.create_task(heard(hung, begun))
+            await begun.wait()
+            assert pool.workers[0].process.pid is not None
+            os.kill(pool.workers[0].process.pid, signal.SIGSTOP)
+            other = pool.ask(("other", "live"), job(tmp_path, edited(TEXT, SHORT)))
+            second = await heard(other, asyncio.Event())
+            assert not first.done()
+            newer = pool.ask(("hung", "live"), job(tmp_path, edited(TEXT, SHORT)))
+            return await first, second, await heard(newer, asyncio.Event())
+        finally:
+            pool.stop()
+
+    first, second, third = asyncio.run(both())
+    assert first[-1] == "superseded"
+    assert second[-1] == third[-1] == "checked"
+
+
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no process is killed here")
 def test_a_killed_process_is_a_message_and_work_goes_on(tmp_path: Path) -> None:
     async def both() -> tuple[list[str], list[str]]:

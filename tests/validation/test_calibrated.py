@@ -89,6 +89,16 @@ def test_none_leaves_the_film_as_bought() -> None:
     assert factors_of(design) == Factors()
 
 
+def test_an_interval_by_a_closed_form(paper: ModelCalibration) -> None:
+    """A value in proportion to the modulus ratio has its variance and the discrepancy's."""
+    value, (low, high) = Uncertainty(paper, {}).interval_of(
+        "force", lambda factors: 3 * factors.modulus_ratio
+    )
+    assert value == pytest.approx(3 * paper.values["modulus_ratio"])
+    spread = math.sqrt(paper.covariance[0][0] + paper.discrepancy["force"] ** 2)
+    assert math.log(high / low) == pytest.approx(2 * 1.6448536 * spread)
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [

@@ -16,8 +16,10 @@ import pytest
 from click.testing import CliRunner
 
 import sbafab
+from docs.scripts.gallery import figures_of
 from sbafab.cli import app
 from sbafab.models import paper
+from sbafab.models.calibrated import load_calibration
 from sbafab.models.figures import Figure, Prediction
 from sbafab.models.formulas import modulus
 from sbafab.models.paper import (
@@ -247,6 +249,31 @@ def test_predict_prints_them_below_their_figures(
     assert asides == len(list(_far_off(predictions["3dof-15mm"])))
 
 
+def test_calibrated_predictions_print_them_with_the_calibrated_values(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, out, _ = run_predict(["3dof-15mm", "-v", "-o", str(tmp_path)], capsys)
+    text = _joined(out)
+    for angle in (60, 90):
+        # The value of the figure is that of the sentence: design and actuator are the same.
+        sentence = re.search(
+            rf"bent by {angle} deg, on its 3-DoF; this model gives it ([\d.]+) with 2 chambers",
+            text,
+        )
+        assert sentence
+        written = json.loads((tmp_path / "3dof-15mm" / "predict.json").read_text(encoding="utf-8"))
+        name = f"force at 100 kPa in 2 chambers, bent by {angle} deg"
+        (figure,) = (each for each in written["figures"] if each["name"] == name)
+        assert float(sentence[1]) == pytest.approx(figure["value"], rel=2e-3)
+    # Near once calibrated: height and bend, whose sentences are gone.
+    assert "17.5 mm of full height" not in text.partition("Eqs. 1-3")[0]
+    calibration = load_calibration("paper")
+    assert calibration is not None
+    pressed = 29 * 0.025 + 30 * 0.038 * calibration.values["press_factor"]
+    assert f"folded height {pressed:.3f} mm\n" in out
+    assert "0.95 mm of deflated height" not in text
+
+
 def test_find_prints_and_writes_them(tmp_path: Path) -> None:
     asked = ["find", "3dof-15mm", "--min", "stroke@10kPa=20", "--min", "bend@10kPa=100"]
     asked += ["--min", "force@4mm@50kPa=1", "--max", "height=3"]
@@ -270,6 +297,25 @@ def test_find_prints_and_writes_them(tmp_path: Path) -> None:
     assert set(told["measured"]) == {"stroke@10kPa", "bend@10kPa", "force@4mm@50kPa", "height"}
 
 
+def test_find_leaves_out_what_is_near_once_calibrated(tmp_path: Path) -> None:
+    asked = ["find", "3dof-15mm", "--min", "bend@10kPa=50", "--max", "height=3"]
+    asked += ["--set", "stack.balloons=15", "--free", "chamber.diameter=5:5:1"]
+    ended = CliRunner().invoke(app, [*asked, "--to", str(tmp_path / "tip.toml")])
+    assert ended.exit_code == 0, ended.output
+    assert "the paper measured" not in ended.output
+    assert "the paper measured" not in (tmp_path / "tip.toml").read_text(encoding="utf-8")
+
+
+def test_the_gallery_s_cards_show_them() -> None:
+    design = sbafab.load("3dof-15mm", UNCALIBRATED)
+    card = list(figures_of(sbafab.predict(design), design))
+    for begins, measured in (("flat 1.8", "0.95 mm"), ("bend at 10 kPa", "81 +- 6 deg")):
+        (line,) = [one for one in card if one.startswith(begins)]
+        assert f"(the paper measured {measured}" in line
+    # The upper bound, 141 degrees, is no longer a key figure.
+    assert not any("140" in one.partition("(")[0] or "141" in one for one in card)
+
+
 def test_the_studio_s_answers_hold_them(calibrated: dict[str, Prediction], tmp_path: Path) -> None:
     (answer,) = elastic(job(tmp_path, sbafab.template("3dof-15mm")), lambda: None)
     told = {figure["name"] for figure in answer["figures"] if figure["measured"]}
@@ -278,6 +324,13 @@ def test_the_studio_s_answers_hold_them(calibrated: dict[str, Prediction], tmp_p
     moving = stack_model("3dof-15mm", sbafab.stack("3dof-15mm", UNCALIBRATED))["measured"]
     assert "17.5 mm" in moving["height"]
     assert "81 +- 6 deg" in moving["bend"]
+
+
+@pytest.mark.long
+def test_assemblies_leave_out_what_is_near_once_calibrated() -> None:
+    found = sbafab.predict_assembly("standing")
+    told = {figure.name for figure in found.figures if figure.measured}
+    assert told == {"sag of the tip, 1.2 g across it"}
 
 
 @pytest.mark.long

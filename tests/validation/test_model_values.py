@@ -91,6 +91,26 @@ def test_sizes_of_the_paper_follow_from_its_films() -> None:
     assert values(paper.curve("radial-inflated"))[""] == pytest.approx([inflated], rel=1e-4)
 
 
+def test_a_press_factor_counts() -> None:
+    flat = load_evidence("paper").curve("flat-height")
+    # Of the films; the masks between them keep their thickness.
+    half = 29 * 0.025 + 30 * 0.038 / 2
+    assert values(flat, Factors(press_factor=0.5))[""] == pytest.approx([half])
+
+
+def test_a_flat_force_is_nearly_pressure_times_pocket() -> None:
+    held = curve(
+        "force_n",
+        "pressure_kpa",
+        (50.0, 100.0),
+        setup=Setup(tip="held", stroke_mm=0.0),
+    )
+    pocket = math.pi * 2.5**2
+    for pressure, force in zip(held.x, values(held)[""], strict=True):
+        assert force is not None
+        assert 0.9 * pressure * pocket / 1000 < force <= pressure * pocket / 1000
+
+
 def test_shares_of_the_height_have_five_readings_and_strokes_have_none(three: Stack) -> None:
     shares = load_evidence("paper").curve("force-3dof")
     series = values(shares)
@@ -150,6 +170,16 @@ def test_times_are_volume_over_flow_without_a_tube(three: Stack) -> None:
     # Of air at 4 kPa the same volume holds 1 + 4 / 101.325 as much at the atmosphere; and the flat
     # balloons hold a little.
     assert air == pytest.approx(water * (1 + 4 / 101.325), rel=5e-3)
+
+
+def test_work_is_the_integral_of_pressure_over_volume() -> None:
+    single = sbafab.stack("1dof-5mm", "models.calibration=none")
+    pressures = [0.001, *(k / 50 for k in range(1, 51))]
+    volumes = [float(single.pose((p,)).volumes.sum()) for p in pressures]
+    pairs = list(zip(pressures, volumes, strict=True))
+    steps = [((p + q) / 2, w - v) for (p, v), (q, w) in zip(pairs, pairs[1:], strict=False)]
+    (work,) = values(curve("energy_mj", "pressure_kpa", (1.0,)))[""]
+    assert work == pytest.approx(sum(p * v for p, v in steps) / 1000, rel=0.06)
 
 
 @pytest.mark.parametrize(
@@ -221,6 +251,13 @@ def test_a_source_that_ships_says_what_could_not_be_had(
     assert "230 kPa" in out
     assert "Not had: Only the abstract" in out
     assert "0 of 1 values" in out
+
+
+def test_no_such_source_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(["reproduce", "papr"], capsys)
+    assert (code, out) == (2, "")
+    assert "did you mean paper?" in err
+    assert err.count("\n") == 1
 
 
 # A lab's records.

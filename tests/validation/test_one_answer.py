@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
 
 import sbafab
+from docs.scripts.gallery import FIGURES, figures_of, numbers_of
 from sbafab.assemblies.files import load
 from sbafab.design.files import template_names
 from sbafab.design.records import Design
@@ -106,6 +108,24 @@ def test_find_has_the_figure_of_predict(case: Case, prediction: Prediction) -> N
     assert value == _near(_figure(prediction, case.figure))
 
 
+@pytest.mark.parametrize(
+    ("name", "quantities"),
+    [
+        ("radial-15mm", {f"{size}_diameter" for size in ("deflated", "reached", "inflated")}),
+        # Its films stay solid in the press: no press factor.
+        ("folded", {"height"}),
+    ],
+)
+def test_find_has_the_sizes_of_predict(name: str, quantities: set[str]) -> None:
+    design = sbafab.load(name)
+    subject = Subject(design, sbafab.build(design))
+    figures = {one.name: one.value for one in sbafab.predict(name).figures}
+    for quantity in quantities:
+        figure = "folded height" if quantity == "height" else quantity.replace("_", " ")
+        value = subject.value(read_quantity(quantity))
+        assert value == pytest.approx(figures[figure], rel=1e-12)
+
+
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_measured_curves_have_it_beside_them(case: Case, prediction: Prediction) -> None:
     answer = model_values(case.curve, factors_of(sbafab.load(NAME)))
@@ -115,6 +135,17 @@ def test_measured_curves_have_it_beside_them(case: Case, prediction: Prediction)
     assert answer.series == {"": (_near(figure),)}
     # Without the factors it is another figure.
     assert model_values(case.curve) != answer
+
+
+def test_a_height_is_the_stroke_above_the_flat_one(prediction: Prediction) -> None:
+    of = CASES["stroke"].curve.model_copy(update={"quantity": "height_mm"})
+    answer = model_values(of, factors_of(sbafab.load(NAME)))
+    assert isinstance(answer, ModelValues)
+    height = _figure(prediction, "free height at 10 kPa")
+    assert answer.series == {"": (_near(height),)}
+    flat = next(one for one in prediction.figures if one.name == "folded height")
+    stroke = _figure(prediction, CASES["stroke"].figure)
+    assert height.value == pytest.approx(flat.value + stroke.value, rel=1e-12)
 
 
 def test_the_studio_and_json_have_it_with_its_interval(
@@ -141,6 +172,26 @@ def test_the_studio_moves_the_same_stack(prediction: Prediction, tmp_path: Path)
     assert pose["bend"] == pytest.approx(bend, rel=1e-3)
     stack = sbafab.stack(NAME)
     assert stack.pose((10.0, 0.0, 0.0)).bend == pytest.approx(bend, rel=ONE_ANSWER)
+
+
+def test_the_gallery_shows_it_with_its_interval(prediction: Prediction) -> None:
+    """To the decimals of a card, and with the decimals of its interval."""
+    shown = {words: (value, aside) for words, value, aside in numbers_of(prediction)}
+    known = {one.name: one for one in prediction.figures if not one.other}
+    held = 0
+    for name, words, digits in FIGURES:
+        figure = known.get(name)
+        if words not in shown or figure is None or figure.interval is None:
+            continue
+        held += 1
+        numbers = [float(number) for number in re.findall(r"[\d.]+", shown[words][0])]
+        expected = (figure.value, *figure.interval)
+        assert numbers == pytest.approx(expected, abs=0.5 * 10.0**-digits * (1 + 1e-9))
+    assert held == 2
+    card = list(figures_of(prediction, sbafab.load(NAME)))
+    for name, words, digits in FIGURES:
+        if name in known:
+            assert any(line.startswith(f"{words} {known[name].value:.{digits}f} ") for line in card)
 
 
 DESIGNS = [name for name in template_names() if isinstance(load(name), Design)]
