@@ -6,6 +6,7 @@ import ast
 import inspect
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -186,6 +187,27 @@ def modules_outside_the_families() -> list[Path]:
     package = [p for p in sorted(TOP.rglob("*.py")) if "actuators" not in p.relative_to(TOP).parts]
     beside = [TOP.parent / "docs", TOP.parent / "benchmarks"]
     return [*package, *(path for folder in beside for path in sorted(folder.rglob("*.py")))]
+
+
+def test_no_page_of_the_studio_names_a_family() -> None:
+    names = "|".join(map(re.escape, FAMILIES))
+    # In quotes, as the key of an object, as an attribute, or as a design file would write it.
+    named = re.compile(
+        rf"""(["'`\\])({names})\1|[{{,]\s*({names})\s*:|(families|cards)\.({names})\b"""
+        rf"""|family\W+({names})\b"""
+    )
+    static = TOP / "studio" / "static"
+    pages = [p for p in static.rglob("*") if p.suffix in {".js", ".html", ".css"}]
+    assert len(pages) > 30
+    lines = [
+        f"{path.name}:{number}: {line.strip()[:80]}"
+        for path in pages
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if named.search(line)
+    ]
+    assert lines == []
+    for line in ('family === "lobed"', "x = {radial: 1}", "families.drawn", 'family = \\"1dof\\"'):
+        assert named.search(line), line
 
 
 def test_no_room_but_actuators_asks_a_familys_name() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import math
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -13,6 +16,8 @@ import shapely
 
 import sbafab
 from sbafab.errors import DesignError, OutputError
+from sbafab.rules.finding import Finding, Findings, Place
+from tests.importing.test_parchmint import circuit
 
 SMALL = {"stack.balloons": 2, "rules": {"yield_builds": 100}}
 
@@ -35,6 +40,46 @@ def test_numbers_of_numpy_are_numbers(number: type[np.number[Any]]) -> None:
     assert sbafab.resolved(few.with_(sizes)) == sbafab.resolved(plain)
     with pytest.raises(DesignError, match=r"stack.balloons = 2.5 must be a whole number"):
         few.with_({"stack.balloons": np.float64(2.5)})
+
+
+def test_options_of_numpy_are_plain_numbers(tmp_path: Path) -> None:
+    options = {"flow_ml_min": np.float32(30), "volumes_ul": np.int64(5), "press_factor": 0.5}
+    found = sbafab.predict("1dof-5mm", SMALL, quick=True, **options)  # type: ignore[arg-type]
+    assert json.loads(json.dumps(found.as_dict()))["asked"]["flow_ml_min"] == 30
+    wish = {"simulator": "sofa", "export": True, "pressure": np.float64(3.0)}
+    for name, pressure in (("a", np.float64(3)), ("b", 3.0)):
+        wish |= {"pressure": pressure, "out": tmp_path / name}
+        sbafab.simulate("1dof-5mm", SMALL, **wish)  # type: ignore[arg-type]
+    scenes = [sorted((tmp_path / name).rglob("*.scn")) for name in ("a", "b")]
+    assert scenes[0]
+    for one, other in zip(*scenes, strict=True):
+        assert one.read_bytes() == other.read_bytes()
+
+
+def test_with_keeps_the_rest_and_checks_like_a_design_file() -> None:
+    design = sbafab.load("1dof-5mm", inlet={"tube_outer_diameter": 0.8})
+    wide = design.with_(bond={"width": 0.9})
+    assert (wide.bond.width, wide.inlet.tube_outer_diameter) == (0.9, 0.8)
+    assert wide.inlet.width is None, "what follows from the tube stays open"
+    assert wide.folder == design.folder
+    with pytest.raises(DesignError, match=r"stack\.baloons .* did you mean stack\.balloons"):
+        design.with_(stack={"baloons": 3})
+    with pytest.raises(DesignError, match=r"family = 'lobed' must be '1dof'"):
+        design.with_(family="lobed")
+
+
+def test_a_drawing_that_a_change_names_lies_where_the_user_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "o.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm" viewBox="0 0 9 9">'
+        '<circle r="3"/></svg>'
+    )
+    monkeypatch.chdir(tmp_path)
+    design = sbafab.load("1dof-5mm").with_(chamber={"outline": "o.svg"})
+    assert design.drawing == tmp_path / "o.svg"
+    mask = sbafab.build(design).layer(6).profile
+    assert mask.area == pytest.approx(math.pi * (3**2 - 0.52**2), rel=1e-6)
 
 
 def test_regions_are_shapely_geometries_within_the_chord_error() -> None:
@@ -69,6 +114,20 @@ def test_solid_and_meshes_are_objects_of_other_libraries(tmp_path: Path) -> None
     assert (block.type, len(block)) == ("triangle6", len(run.conforming.shell.cells))
 
 
+def test_a_volume_mesh_is_a_grid_of_pyvista(tmp_path: Path) -> None:
+    pytest.importorskip("pyvista", reason="PyVista is not installed")
+    laminate = sbafab.build("1dof-5mm", SMALL)
+    films = sum(layer.profile.area * layer.film.thickness for layer in laminate.tpe_layers)
+    run = sbafab.mesh("1dof-5mm", SMALL, h=0.7, formats=("inp",), out=tmp_path)
+    assert run.conforming is not None
+    volume = run.conforming.volume
+    grid = volume.pyvista()
+    assert grid.n_cells == len(volume.cells)
+    # Without gaps films lie on each other, and the volume is that of the films alone.
+    assert abs(grid.compute_cell_sizes()["Volume"].sum()) == pytest.approx(films, rel=2e-3)
+    assert set(grid.point_data) == {name for name in volume.node_sets if "bond_" not in name}
+
+
 def test_findings_and_figures_are_rows() -> None:
     findings = sbafab.check("1dof-5mm", SMALL)
     table = findings.frame()
@@ -84,6 +143,13 @@ def test_findings_and_figures_are_rows() -> None:
     assert {"name", "value", "unit", "model"} <= set(figures.columns)
 
 
+def test_a_measured_value_is_shown_as_what_it_is_compared_as() -> None:
+    found = Finding("bond-width", "pass", 0.75, 0.7499999999, "mm", Place(), "")
+    assert (found.measured, Findings((found,)).rows[0]["measured"]) == (0.75, 0.75)
+    short = Finding("bond-width", "fail", 0.75, 0.748, "mm", Place(), "")
+    assert short.measured == 0.748
+
+
 def test_a_figure_is_asked_for_by_quantity_and_model() -> None:
     found = sbafab.predict("1dof-5mm")
     # The first model, Eq. 4, is the one to design with.
@@ -95,6 +161,16 @@ def test_a_figure_is_asked_for_by_quantity_and_model() -> None:
         found.value("largest_volume", "lens")
     with pytest.raises(DesignError, match="not one figure: it is not predicted"):
         found.value("pull")
+
+
+def test_one_pressure_is_a_number_or_a_list_and_no_text() -> None:
+    one, several = (
+        sbafab.predict("1dof-5mm", pressures_kpa=pressures, quick=True)
+        for pressures in (np.float64(5), [5])
+    )
+    assert one.rows == several.rows
+    with pytest.raises(DesignError, match="pressures_kpa = 'high' must be a number or a list"):
+        sbafab.predict("1dof-5mm", pressures_kpa="high", quick=True)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -138,6 +214,26 @@ def test_simulate_exports_a_deck_and_refuses_what_is_no_key(tmp_path: Path) -> N
         sbafab.simulate("1dof-5mm", presure=3.0, **wish)
 
 
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        ({"simulator": "ccx"}, 'simulator = "ccx" must be one of calculix, sofa, mujoco'),
+        ({"simulator": "sofa", "scene": "film"}, 'scene = "film" must be one of shell, frames'),
+        ({"simulator": "calculix", "symmetry": "third"}, 'symmetry = "third" must be one of full'),
+        ({"simulator": "calculix", "procedure": "slow"}, "must be one of dynamic, static"),
+        ({"simulator": "calculix", "pressure": "6 kPa"}, "pressure = '6 kPa' must be a number"),
+        ({"simulator": "mujoco", "minutes": 0}, "minutes = 0 must be a finite number above 0"),
+        ({"simulator": "sofa", "h": 0.3}, "h is for calculix; leave it out with sofa"),
+    ],
+)
+def test_simulate_names_what_a_setting_may_be(
+    tmp_path: Path, wish: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(DesignError, match=re.escape(words)):
+        sbafab.simulate("1dof-5mm", stack={"balloons": 2}, out=tmp_path / "out", **wish)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_notebooks_show_tables_and_pictures(tmp_path: Path) -> None:
     design = sbafab.load("1dof-5mm", SMALL)
     laminate = sbafab.build(design)
@@ -170,3 +266,15 @@ def test_a_laminate_is_imported_as_a_design(tmp_path: Path) -> None:
         sbafab.import_design(source, tmp_path / "again.toml")
     with pytest.raises(DesignError, match="does not exist"):
         sbafab.import_design(tmp_path / "none")
+
+
+def test_what_an_import_leaves_out_is_warned_of(tmp_path: Path) -> None:
+    path = tmp_path / "circuit.json"
+    path.write_text(json.dumps(circuit()), encoding="utf-8")
+    with warnings.catch_warnings(record=True) as remarks:
+        warnings.simplefilter("always")
+        design = sbafab.import_design(path, tmp_path / "valves.toml")
+    assert "layer electrodes: holds no channels; it is not imported" in [
+        str(item.message) for item in remarks
+    ]
+    assert design.family == "drawn"

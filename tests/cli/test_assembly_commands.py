@@ -32,3 +32,10 @@ def test_generate_says_what_it_made_and_exits_1_on_a_failed_check(run: Run) -> N
     assert code == 1
     assert "failed: seat. No cut files were written" in out
     assert "--waive seat" in out
+
+
+def test_new_writes_an_assembly_to_start_from(run: Run) -> None:
+    assert run("new standing robot.toml")[0] == 0
+    code, out, _ = run("check robot.toml --json")
+    assert code == 0
+    assert json.loads(out)["source"] == "design"

@@ -67,6 +67,11 @@ def test_a_failed_rule_is_exit_1_and_names_the_waiver(run: Run) -> None:
     assert Path("out/1dof-5mm/layers").is_dir()
 
 
+def test_waivers_of_the_file_and_of_the_command_add_up(run: Run) -> None:
+    waived = ("--set", 'rules.waive=["bond-width"]', "--waive", "tube-fit")
+    assert run("check 1dof-5mm --set bond.width=0.72", *waived)[0] == 0
+
+
 def test_check_prints_json(run: Run) -> None:
     code, out, _ = run("check 3dof-15mm --json")
     assert code == 0

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -69,6 +72,35 @@ def test_limits_say_whether_they_are_the_least_or_the_most(
     assert {sense for (_, verdict), sense in senses.items() if verdict == "pass"} == {False, True}
 
 
+def test_shares_say_what_they_are_of(run: Run) -> None:
+    few = ["1dof-5mm", "--set", "stack.balloons=1", "--set", "rules.yield_builds=100"]
+    few += ["--set", "registration.method=ears"]
+    _, out, _ = run("check", *few)
+    assert re.search(r"^pin-fit +pass +[\d.]+% stretch  <= 30% stretch$", out, re.MULTILINE)
+    assert re.search(r"^registration-yield +pass +[\d.]+% hold +no target$", out, re.MULTILINE)
+    _, out, _ = run("check", *few, "--set", "rules.target_yield=0.5")
+    assert re.search(r"^registration-yield +pass +[\d.]+% hold +>= 50% hold$", out, re.MULTILINE)
+
+
+def test_the_module_is_the_command() -> None:
+    """Where pip's folder of scripts is not on the path, as on many a Windows machine."""
+    ended = subprocess.run(
+        [sys.executable, "-m", "sbafab", "check", "1dof-6mm"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 2
+    assert ended.stderr.startswith("sbafab: '1dof-6mm' is neither a template nor a design file")
+
+
+def test_a_file_without_its_ending_is_guessed(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "colon.toml").write_text('family = "1dof"\n')
+    code, _, err = run("generate", "colon")
+    assert code == 2
+    assert err.endswith("did you mean colon.toml?\n")
+
+
 def test_every_rule_and_check_is_explained(run: Run) -> None:
     assert set(EXPLAINED) > {*CHECKS, "file-integrity", "manifest-claims", "as-designed"}
     code, out, _ = run("explain", "mask-overhang")
@@ -113,6 +145,18 @@ def test_shells_complete_templates_keys_and_rules() -> None:
     assert methods == [f"registration.method={name}" for name in ("channel-pin", "ears")]
 
 
+def test_a_shell_gets_its_script() -> None:
+    script = subprocess.run(
+        [sys.executable, "-c", "from sbafab.entry import main; main()"],
+        env={"_SBAFAB_COMPLETE": "zsh_source", "PATH": "/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=Path(__file__).parents[2],
+    )
+    assert "compdef" in script.stdout
+
+
 def test_watching_looks_again_at_what_changed_only(tmp_path: Path) -> None:
     design = tmp_path / "mine.toml"
     design.write_text("a = 1\n")
@@ -126,6 +170,31 @@ def test_watching_looks_again_at_what_changed_only(tmp_path: Path) -> None:
 
     watch_source(once, design, polls=3)
     assert seen == ["a = 1\n", "a = 22\n"]
+
+
+def test_known_keys_are_those_that_a_file_may_hold(tmp_path: Path, run: Run) -> None:
+    kit = tmp_path / "mine.toml"
+    kit.write_text('schema = "sbafab/kit@1"\nname = "mine"\nversion = "1"\nfoo = "bar"\n')
+    code, _, err = run("check", "1dof-5mm", "--set", f"kit={kit}")
+    assert code == 2
+    known = err.partition("known here: ")[2].strip().split(", ")
+    assert "schema" in known
+    assert "schema_name" not in known
+
+
+def test_mesh_formats_are_called_as_they_are_written() -> None:
+    """The version of Gmsh's format, wherever it is named, is the one in the files' first lines."""
+    root = Path(__file__).parents[2]
+    writer = (root / "sbafab/meshing/formats.py").read_text(encoding="utf-8")
+    version = re.findall(r"MeshFormat.n(\d\.\d)", writer)[0]
+    places = [*root.glob("docs/*.md"), *root.glob("docs/scripts/*.py"), root / "README.md"]
+    named = [
+        found
+        for place in places
+        for found in re.findall(r"(?:MSH|Gmsh) (\d\.\d)", place.read_text(encoding="utf-8"))
+    ]
+    assert named
+    assert set(named) == {version}
 
 
 QUICK = ["--set", "stack.balloons=2", "--set", "rules.yield_builds=100"]

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from PIL import Image, ImageDraw
 
 from sbafab.cli import main
 from tests.cli.conftest import Run
@@ -55,6 +56,20 @@ def test_a_missing_piece_ends_in_code_1(coupon: Path, tmp_path: Path, run: Run) 
     assert code == 1
     assert "is missing" in out
     assert out.rstrip().endswith("coupon: 3 of 4 pieces as drawn")
+
+
+def test_a_bar_tells_the_scale(coupon: Path, tmp_path: Path, run: Run) -> None:
+    """The scan is 400 dpi, and the bar beside the frames is 30 mm, drawn as 400.8 dpi would."""
+    pixels = render(coupon / "coupon/coupon.dxf", Camera(dpi=400, margin=12))
+    image = Image.fromarray(pixels)
+    length = 30 * 400.8 / 25.4
+    ImageDraw.Draw(image).rectangle((100, 40, 100 + round(length) - 1, 80), fill=190)
+    image.save(tmp_path / "bar.png")
+    arguments = ["inspect", str(coupon / "coupon/coupon.dxf"), str(tmp_path / "bar.png")]
+    code, out, _ = run(*arguments, "--bar", "30", "-o", str(tmp_path), "--json")
+    assert code == 0
+    expected = 30 / (round(length) * 25.4 / 400)
+    assert json.loads(out)["scale"]["x"] == pytest.approx(expected, abs=4e-4)
 
 
 @pytest.mark.parametrize(

@@ -75,6 +75,20 @@ def test_a_kerf_that_may_be_none_is_not_pasted_bare(tmp_path: Path, run: Run) ->
     assert pasted(out) == {"kerf_tpe": 0.06}
 
 
+def test_a_constant_reading_error_is_told_and_corrected_for(table: Path, run: Run) -> None:
+    """A calliper that reads 0.03 mm too much, which is no reason to change the laser."""
+    kerf = {"x": 0.12, "y": 0.1}
+    filled(table, lambda n, axis, is_window: n + kerf[axis] * (1 if is_window else -1) + 0.03)
+    code, out, _ = run("kerf", str(table), *FINE, "--instrument", "calliper")
+    assert code == 0
+    assert "the calliper reads 0.0300 mm too much" in out
+    assert "warning" not in out
+    assert "laser" not in out[: out.index("[laser]")]
+    assert "the jaws of a calliper compress thin film" in out
+    assert pasted(out) == {"kerf_tpe": [0.12, 0.1]}
+    assert "jaws" not in run("kerf", str(table), *FINE, "--instrument", "scanner")[1]
+
+
 def test_what_spoils_a_kerf_is_a_warning(table: Path, run: Run) -> None:
     kerf = {"x": 0.12, "y": 0.1}
     filled(table, lambda n, axis, is_window: 0.997 * n + kerf[axis] * (1 if is_window else -1))
@@ -88,3 +102,29 @@ def test_what_spoils_a_kerf_is_a_warning(table: Path, run: Run) -> None:
     says = "a constant reading error cannot be separated from the kerf"
     assert f"warning: {says}" in out
     assert f"# warning: {says}" in out[out.index("[laser]") :]
+
+
+def test_a_calibrated_folder_checks_as_built(tmp_path: Path, run: Run) -> None:
+    settings = ["stack.balloons=2", "laser.kerf_tpe=0.12", "laser.kerf_ptfe=[0.1,0.08]"]
+    arguments = [part for setting in settings for part in ("--set", setting)]
+    code, _, _ = run("cut", "1dof-5mm", *arguments, "-o", str(tmp_path))
+    assert code == 0
+    folder = tmp_path / "1dof-5mm"
+    names = sorted(path.name for path in (folder / "layers").iterdir())
+    assert names[:2] == ["001_TPE_base_kerf0.12.dxf", "002_PTFE_chamber-mask_kerf0.1x0.08.dxf"]
+    kerf = json.loads((folder / "manifest.json").read_text())["kerf"]
+    assert kerf["TPE"] == {"state": "compensated", "width": 0.12}
+    assert kerf["PTFE"] == {"state": "compensated", "width": [0.1, 0.08]}
+    code, out, _ = run("check", "-v", str(folder))
+    assert code == 0
+    assert "hashes and manifest match the files" in " ".join(out.split())
+
+
+def test_a_kerf_that_takes_a_bore_is_told_with_its_place(tmp_path: Path, run: Run) -> None:
+    narrow = ["--set", "bore.diameter=1", "--set", "bore.pin_diameter=0.96"]
+    kerf = ["--set", "laser.kerf_ptfe=[0.5,1.0]"]
+    code, out, _ = run("cut", "1dof-5mm", *narrow, *kerf, "-o", str(tmp_path))
+    assert code == 1
+    said = " ".join(out.split())
+    assert "has a hole that vanishes at x 0.000, y 0.000" in said
+    assert "kerf of 0.5 x 1 mm" in said

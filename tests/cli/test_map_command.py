@@ -114,3 +114,41 @@ def test_models_of_robots_are_files_of_xml(tmp_path: Path, run: Run) -> None:
         assert ET.parse(path).getroot().tag == root
     assert "for 10, 0, 0 kPa" in (tmp_path / "stack.xml").read_text()
     assert "for 10, 10, 10 kPa" in (tmp_path / "even.xml").read_text()
+
+
+@pytest.mark.long
+def test_reproduce_writes_every_figure_with_the_papers_error_bars(tmp_path: Path, run: Run) -> None:
+    code, out, _ = run("reproduce", "-o", str(tmp_path), "--json")
+    assert code == 0
+    folder = tmp_path / "reproduction"
+    hold("reproduction", json.loads(out))
+    rows = json.loads(out)["rows"]
+    assert rows == json.loads((folder / "reproduction.json").read_text())["rows"]
+    # One question, one answer: the calibrated values are those that predict gives by default.
+    calibrated = json.loads(out)["calibrated"]
+    assert (calibrated["held_out"]["points"], calibrated["held_out"]["inside"]) == (29, 28)
+    curves = {curve["curve"]: curve["points"] for curve in calibrated["curves"]}
+    _, out, _ = run("predict", "3dof-15mm", "--pressure", "100", "--json", "-o", str(tmp_path))
+    told = {
+        figure["name"]: figure["value"]
+        for figure in json.loads(out)["figures"]
+        if figure["model"].startswith(("elastic stack", "sum of the films"))
+    }
+    (flat,) = curves["flat-height"]
+    assert flat["model"] == pytest.approx([told["folded height"]] * 2, rel=1e-6)
+    held = curves["force-3dof"][0]
+    assert held["model"] == pytest.approx([told["blocked force at 100 kPa, flat"]] * 2, rel=1e-3)
+    for point, angle in zip(curves["force-bent"], (30, 60, 90), strict=True):
+        forces = [
+            told[f"force at 100 kPa in {chambers}, bent by {angle} deg"]
+            for chambers in ("one chamber", "2 chambers")
+        ]
+        assert point["model"] == pytest.approx(sorted(forces), rel=1e-3)
+    for points in curves.values():
+        for point in points:
+            low, high = point["interval"]
+            assert point["within"] is (low <= point["measured"] <= high)
+            assert low <= point["model"][0] <= point["model"][1] <= high
+    assert len(list(folder.glob("figure-*.svg"))) == 7
+    assert "1.48 +- 0.04 N" in (folder / "reproduction.md").read_text(encoding="utf-8")
+    assert "paper: 3-DoF, 100 kPa" in (folder / "figure-8a-force-3dof.svg").read_text()

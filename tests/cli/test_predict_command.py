@@ -64,6 +64,28 @@ def _table_reads_well(out: str) -> None:
     assert sum("force at 10 kPa, flat" in line for line in lines[:others]) == 1
 
 
+def test_json_is_what_is_written(run: Run) -> None:
+    code, out, _ = run("predict 1dof-5mm --json --pressure 50")
+    assert code == 0
+    printed = json.loads(out)
+    folder = Path(printed.pop("folder"))
+    assert printed.pop("failed") == []
+    assert printed == json.loads((folder / "predict.json").read_text(encoding="utf-8"))
+    assert printed["asked"]["pressures_kpa"] == [50]
+
+
+def test_twice_the_same_bytes_and_a_later_run_keeps_them(run: Run) -> None:
+    for out in "ab":
+        run(f"predict 1dof-5mm -o {out}")
+    a, b = (
+        {p.relative_to(out).as_posix(): p.read_bytes() for p in Path(out).rglob("*") if p.is_file()}
+        for out in "ab"
+    )
+    assert a == b
+    kept = generate(RunRequest(sbafab.load("1dof-5mm"), Path("a"), ("press",)))
+    assert {"predict.json", "predict/force.svg", "press.json"} <= set(kept.manifest["files"])
+
+
 def test_a_prediction_goes_beside_another_designs_folder_and_says_so(run: Run) -> None:
     wide = sbafab.load("1dof-5mm", "stack.balloons=1", "chamber.diameter=6")
     folder = generate(RunRequest(wide, Path("out"), ("cut",))).folder

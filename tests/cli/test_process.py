@@ -101,3 +101,16 @@ print(*threads())
 """
     )
     assert lines == ["(1,)", "8"]
+
+
+def test_threads_come_back_when_the_last_of_overlapping_solves_ends() -> None:
+    code = """
+threadpoolctl.threadpool_limits(8)
+one_blas_thread.__enter__()
+one_blas_thread.__enter__()
+one_blas_thread.__exit__()
+print(*threads())
+one_blas_thread.__exit__()
+print(*threads())
+"""
+    assert printed(code) == ["1", "8"]

@@ -38,6 +38,17 @@ def test_time_left_is_that_of_the_pace_so_far() -> None:
     assert text("trial 3", 0, 0, 11.0, 50.0) == "trial 3, 1 min 01 s elapsed"
 
 
+def test_a_stage_begins_where_less_is_done_or_the_total_is_another() -> None:
+    clock = Clock()
+    stages = Stages(clock)
+    assert stages.report("bond-width", 0, 16)
+    clock.now += 4
+    assert not stages.report("mask-overhang", 1, 16)
+    assert stages.text.endswith("15 per minute, 4 s elapsed, about 1 min 00 s left")
+    assert stages.report("sheets", 0, 3)
+    assert stages.text == "sheets: 0 of 3, 4 s elapsed"
+
+
 def test_plain_lines_come_now_and_then_and_verbose_ones_at_every_stage() -> None:
     for verbose, wanted in ((False, [5, 15, 25]), (True, [0, *range(1, 10), *range(10, 30)])):
         clock = Clock()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 import pytest
 
-from sbafab.cli.options import FLOW, PRESSURE, VOLUME, MeasuredQuantity
+from sbafab.cli.options import FLOW, PRESSURE, VOLUME, MeasuredQuantity, OfChamber, by_chamber
 
 
 @pytest.mark.parametrize(
@@ -30,3 +30,17 @@ def test_units(quantity: MeasuredQuantity, written: str, value: float) -> None:
 def test_anything_else_is_refused_with_the_units(written: str) -> None:
     with pytest.raises(click.BadParameter, match="the units are kPa, Pa, MPa, mbar, bar, psi"):
         PRESSURE.convert(written, None, None)
+
+
+def test_a_chamber_is_named_where_not_all_are_meant() -> None:
+    context = click.Context(click.Command("any"))
+    option = click.Option(["--volume"], multiple=True)
+    one, every = OfChamber(VOLUME), OfChamber(VOLUME, all_chambers=True)
+    assert one.convert("chamber1 = 5 ul", option, context) == ("chamber1", 5)
+    assert every.convert("5ul", option, context) == ("", 5)
+    for written in ("5ul", "=5ul"):
+        with pytest.raises(click.BadParameter, match="chamber1=5"):
+            one.convert(written, option, context)
+    assert by_chamber(context, option, (("a", 1.0), ("b", 2.0))) == {"a": 1.0, "b": 2.0}
+    with pytest.raises(click.BadParameter, match="given once"):
+        by_chamber(context, option, (("a", 1.0), ("a", 2.0)))

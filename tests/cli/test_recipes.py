@@ -54,3 +54,29 @@ def test_a_recipe_of_the_kit_is_in_the_project_of_its_film(run: Run) -> None:
     code, _, err = run("check", *few)
     assert code == 2
     assert "two recipes to cut Stretchlon 200 of 0.038 mm on K40; keep one" in err
+
+
+def test_a_faulty_recipe_of_a_kit_is_named(run: Run) -> None:
+    assert run("new", "kit", "lab.toml")[0] == 0
+    whole = {
+        "film": '"Stretchlon 200"',
+        "thickness_mm": "0.038",
+        "machine": '"K40"',
+        "power_percent": "30",
+        "speed_mm_s": "20",
+        "source": '"grid"',
+    }
+    plain = Path("lab.toml").read_text()
+    for key, value, says in (
+        ("power_percent", "120", "power_percent"),
+        ("speed_mm_s", "0", "speed_mm_s"),
+        ("source", '" "', "has no source"),
+        ("date", '"May"', "date"),
+        ("kerf_mm", "3", "kerf_mm"),
+        ("pasess", "2", "pasess"),
+    ):
+        table = "\n".join(f"{name} = {said}" for name, said in {**whole, key: value}.items())
+        Path("lab.toml").write_text(f"{plain}\n[[laser.recipe]]\n{table}\n")
+        code, _, err = run("check", "1dof-5mm", "--set", "kit=lab.toml")
+        assert code == 2, err
+        assert says in err

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import socket
+import sqlite3
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,29 @@ def test_what_was_mended_is_recorded_again(run: Run) -> None:
     assert row.split()[-1] == "1"
 
 
+def test_a_folder_is_recorded_as_the_design_that_it_was_built_from(
+    run: Run,
+) -> None:
+    arguments = ["press", "1dof-5mm", "--set", "stack.balloons=2", "--set", "name=two"]
+    assert run(*arguments)[0] == 0
+    _, out, _ = run("record", "out/two", "--serial", "1", "--leak", "pass", "--json")
+    [record] = json.loads(out)["records"]
+    manifest = json.loads(Path("out/two/manifest.json").read_text())
+    assert record["design_sha256"] == manifest["design_sha256"]
+
+
+def test_a_file_of_another_program_is_one_sentence(run: Run) -> None:
+    with sqlite3.connect("lab.sqlite") as rows:
+        rows.execute("CREATE TABLE photos (id)")
+    rows.close()
+    code, _, err = run("record", "--report")
+    assert code == 2
+    assert err == (
+        "sbafab: lab.sqlite is a database of another program; name the lab's file with --lab\n"
+    )
+    assert run("record", "--find", "A1", "--serial", "B")[0] == 2
+
+
 def test_history_is_recorded_corrected_and_exported(run: Run) -> None:
     lines = ["--entry", "item=TPE lot=L7 expires=2026-01-31 date=2026-05-04", "--entry"]
     arguments = ["record", "1dof-5mm", "--serial", "A1, A2", *lines, "step=1 temperature_c=134,5"]
@@ -113,3 +137,9 @@ def test_history_is_recorded_corrected_and_exported(run: Run) -> None:
     assert Path("a.csv").read_text().count("\n") == 4
     _, out, err = run("record", "--find", "Z9")
     assert "no record goes with 'Z9'" in err
+
+
+def test_the_share_of_success_is_drawn(run: Run) -> None:
+    assert run("record", "1dof-5mm", "--serial", "A1", "--leak", "pass")[0] == 0
+    assert run("record", "--chart", "rate.svg")[:2] == (0, "rate.svg\n")
+    assert Path("rate.svg").read_text().startswith("<?xml")

@@ -6,6 +6,8 @@ import json
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from sbafab.actuators import load_design
 from sbafab.design.records import design_toml
 from tests.cli.conftest import Run
@@ -26,6 +28,15 @@ def test_a_missed_target_fails_and_is_advised_on(run: Run) -> None:
     assert "failed: registration-yield. It must not be cut" in out
 
 
+def test_a_reached_target_passes(run: Run) -> None:
+    ears = "--set registration.method=ears"
+    code, out, _ = run(f"check {SMALL} {ears} --target-yield 0.5 --json")
+    assert code == 0
+    advice = json.loads(out)["advice"]
+    # The rules' own limits are enough.
+    assert (advice["bond_width"], advice["mask_overhang"]) == (0.75, 0.5)
+
+
 def test_the_folder_holds_the_changed_design(run: Run) -> None:
     code, out, _ = run(f"generate {SMALL} {ROUGH} --target-yield 95% --json")
     assert code == 0
@@ -39,6 +50,16 @@ def test_the_folder_holds_the_changed_design(run: Run) -> None:
     assert written["rules"]["target_yield"] == 0.95
     # The folder can be made again from its own design.
     assert design_toml(load_design(design)) == design.read_text(encoding="utf-8")
+
+
+@pytest.mark.long
+def test_what_was_changed_is_printed_with_its_cost(run: Run) -> None:
+    code, out, _ = run(f"generate {SMALL} {ROUGH} --target-yield 0.9")
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    assert code == 0
+    assert "registration.method channel-pin ears" in lines
+    assert any(line.startswith("outline diameter, mm 6.5 6.5") for line in lines)
+    assert "Changed for a yield of 0.9: registration.method = ears;" in " ".join(lines)
 
 
 def test_what_is_not_reached_writes_nothing(run: Run) -> None:

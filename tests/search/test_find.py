@@ -23,7 +23,7 @@ from sbafab.models.calibrated import UNKNOWNS
 from sbafab.models.figures import Factors
 from sbafab.models.intervals import calibration_of
 from sbafab.search import space as module
-from sbafab.search.find import FoundDesign, find, free_keys
+from sbafab.search.find import FoundDesign, RangeEnd, find, free_keys
 from sbafab.search.quantities import QUANTITIES, read_all, read_quantity
 from sbafab.search.space import FindRequest, Trial, figure_text, free_of, read_free
 
@@ -188,6 +188,22 @@ def test_what_equals_the_best_is_told_by_its_mass(monkeypatch: pytest.MonkeyPatc
     )
     assert found.best.values == {"stack.balloons": 4}
     assert [one.values["stack.balloons"] for one in found.front] == [4, 9]
+
+
+@pytest.mark.parametrize(
+    ("low", "above", "wider"), [(7, True, (7, 8)), (7, False, (6, 7)), (1, False, (0, 1))]
+)
+def test_a_wider_range_is_never_the_same(low: int, above: bool, wider: tuple[int, int]) -> None:
+    assert RangeEnd("stack.balloons", low, low, low, 1, above).wider == wider
+
+
+def test_the_same_search_finds_the_same() -> None:
+    free = (Free("chamber.diameter", 2.3, 3.0, 0.1),)
+    asked: dict[str, Any] = {"most": {"width": 14}, "best": "chamber.diameter", "free": free}
+    first, second = (sbafab.find("1dof-5mm", **asked) for _ in range(2))
+    assert first.best == second.best
+    # The smallest pocket that a bore of 1.04 and a bond round it leave.
+    assert first.best.values["chamber.diameter"] == 2.6
 
 
 # Real designs.
@@ -358,6 +374,16 @@ def test_a_requirement_beyond_a_range_that_widens_moves_it() -> None:
         limits = [f"chamber.diameter={least}"], [f"chamber.diameter={most}"]
         free = free_keys(_request(*limits, free=None))[0]
         assert (free.low, free.high) == ends
+
+
+def test_tabs_in_the_way_are_named(tmp_path: Path) -> None:
+    """Two tabs of 5 mm, or three, leave nothing within 10."""
+    asked = ("--max", "overall_diameter=10", "--tries", "4")
+    ended = run(*asked, to=tmp_path / "found.toml")
+    assert ended.exit_code == 1
+    assert ended.stderr.startswith("note: overall_diameter counts the inlet tabs; use outline_diam")
+    freed = run(*asked, "--free", "inlet.tab_length=3:5:1", to=tmp_path / "found.toml")
+    assert "inlet tabs" not in freed.output
 
 
 def test_keys_are_freed_and_fixed_by_name() -> None:

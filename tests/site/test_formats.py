@@ -69,6 +69,23 @@ def test_what_is_printed_of_rules_and_templates_is_of_its_schema(
     jsonschema.validate(json.loads(run(["new", "--json"], capsys)), schema_of("templates"))
 
 
+def test_what_is_printed_of_a_measured_coupon_is_of_its_schema(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    sizes = [(4.9, 5.1), (9.9, 10.1), (19.9, 20.1)]
+    rows = [
+        f"{nominal} {kind},{axis},{nominal},{measured}"
+        for nominal, pair in zip((5, 10, 20), sizes, strict=True)
+        for kind, measured in zip(("outer", "window"), pair, strict=True)
+        for axis in "xy"
+    ]
+    table = tmp_path / "coupon.csv"
+    table.write_text("\n".join(["feature,axis,nominal_mm,measured_mm", *rows]))
+    found = json.loads(run(["kerf", str(table), "--json"], capsys))
+    hold("kerf", found)
+    assert found["all"]["kerf"]["value"] == pytest.approx(0.1)
+
+
 def test_what_is_predicted_of_an_assembly_is_of_its_schema() -> None:
     from sbafab.reports.assembly_prediction import (
         SCHEMA,

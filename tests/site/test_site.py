@@ -10,6 +10,7 @@ import pytest
 
 import sbafab
 from docs.scripts import reference_cli, reference_keys
+from docs.scripts.offline import complaints
 from docs.scripts.rule_pictures import OTHERS, pair
 from sbafab.cli import COMMANDS
 from sbafab.cli.explain import design_keys
@@ -51,6 +52,26 @@ def test_links_between_the_pages_of_the_source_lead_somewhere() -> None:
         if not (page.parent / path).exists()
     ]
     assert lost == []
+
+
+def test_no_page_takes_the_name_of_one_that_sphinx_writes() -> None:
+    own = {"search", "genindex", "modindex", "py-modindex"}
+    assert not own & {page.stem for page in (ROOT / "docs").glob("*.md")}
+
+
+def test_a_site_that_asks_another_host_or_leads_nowhere_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text(
+        '<p id="x"></p><a href="b.html#y">b</a><a href="https://example.org">away</a>'
+        '<a href="c.html">c</a><script src="https://example.org/x.js"></script>'
+    )
+    (tmp_path / "b.html").write_text('<a href="a.html#x">a</a>')
+    (tmp_path / "a.css").write_text("p { background: url(//example.org/x.png) }")
+    assert list(complaints(tmp_path)) == [
+        "a.html loads https://example.org/x.js from another host",
+        "a.html leads to b.html#y: no 'y' in it",
+        "a.html leads to c.html: no such file",
+        "a.css loads from another host",
+    ]
 
 
 @pytest.mark.long

@@ -38,3 +38,15 @@ def test_a_tutorial_works_as_written(page: Path, tmp_path: Path) -> None:
     desk = tmp_path / "desk"
     desk.mkdir()
     assert follow(page, desk, environment(tmp_path)) > 0
+
+
+def test_a_tutorial_that_says_something_else_fails(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("```sh\necho one two\n```\n\n```output\none\ntwo\n```\n")
+    assert follow(page, tmp_path, dict(os.environ)) == 1
+    page.write_text("```sh\necho one two\n```\n\n```output\ntwo\none\n```\n")
+    with pytest.raises(AssertionError, match="'one' is not printed"):
+        follow(page, tmp_path, dict(os.environ))
+    page.write_text("```sh\nfalse\n```\n")
+    with pytest.raises(AssertionError):
+        follow(page, tmp_path, dict(os.environ))
