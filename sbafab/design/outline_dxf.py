@@ -211,7 +211,10 @@ def _ellipse(entity: Any, factor: float) -> Read:
 def _light_polyline(entity: Any, factor: float) -> Read:
     points = zip(entity.vertices_in_wcs(), entity.get_points("b"), strict=True)
     return _through(
-        [(*point, bulge) for point, (bulge,) in points], _side(entity), factor, entity.closed
+        [(*point, float(bulge)) for point, (bulge,) in points],
+        _side(entity),
+        factor,
+        entity.closed,
     )
 
 

@@ -12,7 +12,7 @@ import sbafab
 from sbafab.actuators import load_design
 from sbafab.design.files import templates_folder
 from sbafab.design.films import Films
-from sbafab.design.identity import OTHER_TUBE, citation, design_sha256, tube_name
+from sbafab.design.identity import OTHER_TUBE, citation, cure_hours, design_sha256, tube_name
 from sbafab.design.kits import read_kit, write_kit
 from sbafab.design.records import Design, design_toml, dotted
 from sbafab.design.sections import Acceptance, Laser, Press, Registration, Rules, Sheets
@@ -188,3 +188,22 @@ def test_a_film_keeps_its_numbers_when_read_back(tmp_path: Path) -> None:
     assert design_sha256(load_design(path)) == design_sha256(design)
     plain = load_design("1dof-5mm", [*changes[:2], "films.tpe.modulus=26"])
     assert design_sha256(plain) != design_sha256(design)
+
+
+def test_a_kit_is_never_written_over(tmp_path: Path) -> None:
+    path = write_kit(tmp_path / "our-lab.toml")
+    assert read_kit(path).name == "our-lab"
+    with pytest.raises(DesignError, match="exists"):
+        write_kit(path)
+
+
+def test_the_time_of_curing_is_that_of_the_kits_adhesive(lab: Path) -> None:
+    hours = 'cure_hours = { value = 6, source = "its package" }'
+    lab.write_text(lab.read_text().replace('use = "a small drop', f'{hours}\nuse = "a small drop'))
+    for changes, cure in (
+        ([], None),
+        ([f"kit={lab}"], 6),
+        ([f"kit={lab}", "order.cure_hours=2"], 2),
+    ):
+        design = load_design("1dof-5mm", changes)
+        assert cure_hours(design) == cure

@@ -12,6 +12,7 @@ import pytest
 import shapely
 
 from sbafab.design.outline import read_outline, understood
+from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc, Line
 from sbafab.geometry.region import Region, disc, stadium
 from tests.design.drawing import PAGE, dxf, svg
@@ -56,6 +57,8 @@ def test_a_slot_is_read_exactly_however_it_is_drawn(tmp_path: Path, name: str) -
     assert region.contours[0].area > 0
     kinds = [type(edge) for edge in region.edges]
     assert (kinds.count(Line), kinds.count(Arc)) == (2, 4)
+    # No number of numpy: what is not plain is not written into laminate.json.
+    assert {type(edge.ccw) for edge in region.edges if isinstance(edge, Arc)} == {bool}
     for edge, after in zip(region.edges, (*region.edges[1:], region.edges[0]), strict=True):
         assert edge.end == after.start
 
@@ -179,3 +182,21 @@ def test_an_outline_drawn_elsewhere_is_centred_on_its_centroid(
     outline = understood(dxf(tmp_path, lambda m: m.add_circle(centre, 2)))
     assert outline.region.bounds == pytest.approx((-2, -2, 2, 2), abs=1e-6)
     assert outline.description.endswith("centred on its centroid")
+
+
+@pytest.mark.parametrize(
+    ("unit", "said"),
+    [
+        (0, "6.000 x 6.000 mm, read at 1 mm a unit, for the file names no unit"),
+        (1, "152.400"),
+        (4, "6.000 x 6.000 mm, drawn in mm"),
+        (5, "60.000 x 60.000 mm, drawn in cm"),
+    ],
+)
+def test_the_size_that_is_understood_is_said(tmp_path: Path, unit: int, said: str) -> None:
+    path = dxf(tmp_path, lambda m: m.add_circle((0, 0), 3), unit)
+    if unit == 1:
+        with pytest.raises(DesignError, match=r"measures 152\.4 x 152\.4 mm"):
+            understood(path)
+    else:
+        assert understood(path).description.startswith(f"drawn outline: {said}")

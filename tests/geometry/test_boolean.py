@@ -17,10 +17,11 @@ from sbafab.geometry.arrangement import (
     PointPool,
     by_owner,
     overlaid,
+    split_edges,
 )
 from sbafab.geometry.boolean import FAR, alone
 from sbafab.geometry.contour import circle
-from sbafab.geometry.edges import SAME, Line, Point, left_normal
+from sbafab.geometry.edges import EPSILON, SAME, Arc, Line, Point, distance_to, left_normal
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union
 from tests.hunt.oracle import laid_over
 
@@ -176,3 +177,35 @@ def test_pooled_points_hang_together_by_short_steps(
     shuffler.shuffle(points)
     pool = PointPool(points)
     assert {p: pool.snapped(p) for p in points} == {p: min(g) for g in expected for p in g}
+
+
+def test_arcs_stay_arcs() -> None:
+    both = disc(AXIS, 2) | disc((2, 0), 2)
+    # Two arcs of 240 degrees, each in three parts of a quarter turn at most.
+    assert [type(edge) for edge in both.edges] == [Arc] * 6
+    assert all(abs(edge.bulge) <= math.tan(math.pi / 8) + 1e-12 for edge in both.edges)
+    half = disc(AXIS, 2) - rectangle((0, -3), (3, 3))
+    assert sorted(type(edge).__name__ for edge in half.edges) == ["Arc", "Arc", "Line"]
+
+
+def test_an_open_chain_is_refused() -> None:
+    with pytest.raises(GeometryError, match="change a size"):
+        laid_over([Line(AXIS, (1.0, 0.0)), Line((1.0, 0.0), (1.0, 1.0))])
+
+
+@pytest.mark.parametrize("left", [-18.1424, math.nextafter(-18.1424, -20.0)])
+def test_a_line_that_touches_a_circle_from_the_left_is_outside_of_it(left: float) -> None:
+    """By rounding the circle reaches farther left than the line that it only touches."""
+    (x, y), radius = (-11.807, -18.859), 6.3354
+    assert x - radius < -18.1424
+    around = rectangle((left, y - radius), (x + radius, y + radius))
+    edges = [*disc((x, y), radius).turned(45, (x, y)).edges, *around.edges]
+    assert laid_over(edges, 1).area == pytest.approx(math.pi * radius**2)
+
+
+def test_an_arc_that_starts_beside_its_circle_meets_what_crosses_it_there() -> None:
+    """Taken as a part of its circle it misses the line by 2.5 nm; from end to end, by 1 nm."""
+    bent = Arc((0.0, -3.5e-6), (-1.0, 1.0), (0.0, 1.0), 1.0, False)
+    touched = Line((-1e-4, -2.5e-6), (-1e-4, -1.0))
+    assert distance_to(bent, touched.start) > EPSILON
+    assert [len(parts) for parts in split_edges([bent, touched])[0]] == [2, 1]

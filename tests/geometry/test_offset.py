@@ -9,7 +9,7 @@ import pytest
 
 from sbafab.geometry.edges import Arc, edge_from_bulge
 from sbafab.geometry.offset import dragged, fillet, grow, shrink, swept
-from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, union
 
 CONVEX = [
     disc((1, 2), 3.25),
@@ -117,3 +117,38 @@ def test_a_region_covers_on_its_way_all_sums_of_points(seed: int) -> None:
         if covered.contains(p) != any(map(shape.contains, copies)):
             # Between two copies, or on the edge.
             assert min(map(shape.distance_to_edge, copies)) < way.length / 400
+
+
+def test_shrinking_past_the_inner_radius_leaves_nothing() -> None:
+    assert shrink(disc((0, 0), 1), 1.1).is_empty
+    assert shrink(disc((0, 0), 1), 1.0).is_empty
+    assert shrink(rectangle((0, 0), (9, 2)), 1.0).is_empty
+    assert shrink(stadium((0, 0), 2, 9), 1.0).is_empty
+    assert shrink(disc((0, 0), 3) - disc((0, 0), 1), 1.0).is_empty
+
+
+def test_growing_closes_holes_it_reaches_across() -> None:
+    plate = rectangle((-5, -5), (5, 5))
+    for radius in (0.3, 0.5):
+        assert grow(plate - disc((1, 1), radius), 0.5) == grow(plate, 0.5)
+
+
+def test_gaps_of_exactly_twice_the_distance_close() -> None:
+    pair = rectangle((0, 0), (2, 4)) | rectangle((3, 0), (5, 4))
+    grown = grow(pair, 0.5)
+    assert len(grown.pieces) == 1
+    # Two notches remain above and below the seam, between the corner arcs.
+    assert grown.area == pytest.approx(6 * 5 - 4 * FULL_CORNER / 4 - 4 * FULL_CORNER / 4)
+    apart = grow(pair, 0.499)
+    assert len(apart.pieces) == 2
+    slot = rectangle((0, 0), (9, 4)) - rectangle((4, 1), (5, 4))
+    assert grow(slot, 0.5).area == pytest.approx(10 * 5 - FULL_CORNER - 2 * FULL_CORNER / 4)
+
+
+def test_necks_of_exactly_twice_the_distance_part() -> None:
+    bell = union([rectangle((0, 0), (4, 4)), rectangle((4, 1.5), (8, 2.5))])
+    bell |= rectangle((8, 0), (12, 4))
+    assert len(shrink(bell, 0.5).pieces) == 2
+    # Each half runs out in a cusp between the two quarter circles of the neck's corners.
+    assert shrink(bell, 0.5).area == pytest.approx(2 * (9 + 0.5 - math.pi / 8))
+    assert len(shrink(bell, 0.49).pieces) == 1

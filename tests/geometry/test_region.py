@@ -17,11 +17,14 @@ from sbafab.geometry.contour import (
     Contour,
     circle,
     facets,
+    in_reading_order,
+    nanometres,
 )
 from sbafab.geometry.edges import Arc, Line, Point
 from sbafab.geometry.offset import fillet
 from sbafab.geometry.region import (
     Region,
+    centroid,
     difference,
     disc,
     path_data,
@@ -195,3 +198,47 @@ def test_a_hair_makes_another_key_and_few_results_are_kept() -> None:
     assert len(calls) == 3 + MOST + 1 + 1
     cut, cutter = rectangle((0.0, 0.0), (7.0, 3.0)), disc((0.0, 0.0), 2.25)
     assert difference(cut, cutter) is difference(cut.moved(0, 0), cutter)
+
+
+def test_shapes_a_hair_apart_are_equal_wherever_their_numbers_round_to() -> None:
+    """Coordinates half way between two nanometres: a hair decides what they round to."""
+    for x in (0.0000005, 1.2345675, -3.0000015):
+        for shape in (disc((x, 0), 2), rectangle((x, 0), (3, 2)), stadium((x, x), 2, 5)):
+            assert len({shape, shape.moved(1e-11, -1e-11), shape.moved(-1e-11, 1e-11)}) == 1
+    shape = stadium((0, 0), 2, 5) - disc((0, 1), 0.5)
+    assert shape == shape.moved(1e-6, 1e-6)
+    assert shape != shape.moved(1e-5, 0)
+    assert shape != stadium((0, 0), 2, 5) - disc((0, 1), 0.50001)
+    assert rectangle((0, 0), (2, 2)) != disc((1, 1), 1)
+
+
+def test_contours_are_read_in_one_order_whatever_differs_by_less_than_a_nanometre() -> None:
+    values = (0.0, 1.2e-6, -1.2e-6, 1.7e-6, -1.7e-6, 12.345678)
+    assert [nanometres(x) for x in values] == [0, 1, -1, 2, -2, 12_345_678]
+    hair = 3e-7
+    left, lower = rectangle((-2.0, -1.0), (-1.0, 1.0)), rectangle((1.0, -3.0), (2.0, -2.0))
+    upper = rectangle((1.0 - hair, 2.0), (2.0, 3.0))
+    hole = circle((0.0, 0.0), 0.25).reversed()
+    expected = (left.contours[0], lower.contours[0], upper.contours[0], hole)
+    for order in itertools.permutations(expected):
+        assert in_reading_order(order) == expected
+
+
+HALF = disc((3.0, -1.0), 2.0) & rectangle((3.0, -5.0), (9.0, 5.0))
+
+
+def test_centres_of_area() -> None:
+    assert centroid(HALF) == pytest.approx((3.0 + 4 * 2.0 / (3 * math.pi), -1.0), abs=1e-9)
+    for region in (HALF, PLATE - disc((1.5, 0.5), 1.0), disc((0, 0), 1) | disc((7, 3), 2)):
+        centre = region.shapely(1e-6).centroid
+        assert centroid(region) == pytest.approx((centre.x, centre.y), abs=1e-5)
+
+
+@pytest.mark.parametrize("sagitta", [0.1, 0.01, 0.0005])
+def test_flattened_arcs_stay_within_the_sagitta(sagitta: float) -> None:
+    ((outer, hole),) = RING.polygons(sagitta)
+    for ring, centre, radius in ((outer, (0.0, 0.0), 3.0), (hole, (0.5, 0.0), 1.0)):
+        for a, b in itertools.pairwise([*ring, ring[0]]):
+            middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
+            assert math.dist(a, centre) == pytest.approx(radius)
+            assert radius - math.dist(middle, centre) <= sagitta * (1 + 1e-9)

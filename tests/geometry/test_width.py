@@ -191,3 +191,29 @@ def test_slack_says_how_much_wider_a_place_may_be() -> None:
         assert len(ends) == len(pairs)
     # Both ends of the narrowest webs.
     assert {1.5, 4.0} <= {round(pair.middle[1], 6) for pair in facing_pairs(FRAME, 0.1)}
+
+
+def test_the_place_is_where_the_ring_is_thinnest() -> None:
+    width = least_width(disc(AXIS, 3) - disc((0.6, 0.8), 1.5))
+    assert width is not None
+    assert width.middle == pytest.approx((2.75 * 0.6, 2.75 * 0.8), abs=EXACT)
+
+
+def test_the_least_width_of_a_finely_drawn_ring_is_found_among_far_and_near_edges() -> None:
+    """Two polygons of 180 sides about one centre are nearest where their flats lie side by side."""
+
+    def ring(radius: float) -> Region:
+        return polygon(
+            [
+                (radius * math.cos(k * math.pi / 90), radius * math.sin(k * math.pi / 90))
+                for k in range(180)
+            ]
+        )
+
+    width = least_width(ring(6.0) - ring(5.0), 15.0)
+    gap = least_gap(ring(6.0) - ring(5.0), 15.0)
+    flat = math.cos(math.pi / 180)
+    assert width is not None
+    assert width.value == pytest.approx(flat, abs=EXACT)
+    assert gap is not None
+    assert gap.value == pytest.approx(10.0 * flat, abs=EXACT)

@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 
 from sbafab.actuators import build, load_design
 from sbafab.design.files import template_names
@@ -128,11 +128,22 @@ def test_a_laminate_alone_comes_back_exactly(name: str, tmp_path: Path) -> None:
     read_back(build(load_design(source, changes)), tmp_path)
 
 
+def comes_back(draft: Draft) -> None:
+    with TemporaryDirectory() as name:
+        read_back(build(load_design(draft.write(Path(name)))), Path(name))
+
+
 @share(2, 2)
 @given(valid())
 def test_a_random_laminate_comes_back_exactly(draft: Draft) -> None:
-    with TemporaryDirectory() as name:
-        read_back(build(load_design(draft.write(Path(name)))), Path(name))
+    comes_back(draft)
+
+
+@pytest.mark.long
+@settings(max_examples=100)
+@given(valid())
+def test_100_random_laminates_come_back_exactly(draft: Draft) -> None:
+    comes_back(draft)
 
 
 def test_a_kit_comes_along(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
@@ -66,3 +67,10 @@ def test_notebooks_get_a_scale_and_a_legend(laminate: Laminate) -> None:
     assert float(width) == pytest.approx(5 * 80 / (1.06 * longer), rel=1e-4)
     assert "5 mm</span>" in page
     assert "TPE, Stretchlon 200, 0.038 mm" in page
+
+
+def test_a_name_with_markup_is_escaped(laminate: Laminate) -> None:
+    named = replace(laminate, name="<b> & co")
+    title = drawing(named).find(f"{SVG}title")
+    assert title is not None
+    assert str(title.text).startswith("<b> & co: 7 layers")

@@ -12,7 +12,7 @@ import trimesh
 
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import MeshSettings
-from sbafab.meshing.conforming.mesh import volumes
+from sbafab.meshing.conforming.mesh import FACES, volumes
 from sbafab.meshing.conforming.meshes import (
     ConformingMeshes,
     conforming_meshes,
@@ -179,3 +179,16 @@ def test_only_the_formats_asked_for_are_written(two_balloons: Laminate, tmp_path
         "mesh/cavity_A_conforming.ply",
     ]
     assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+
+
+def test_faces_of_every_element_look_out() -> None:
+    corners = {
+        "wedge15": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)],
+        "tetra10": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
+    }
+    for kind, places in corners.items():
+        points = np.array(places, dtype=float)
+        for local in FACES[kind]:  # type: ignore[index]
+            face = points[[node for node in local if node < len(points)]]
+            normal = np.cross(face[1] - face[0], face[2] - face[0])
+            assert normal @ (face.mean(axis=0) - points.mean(axis=0)) > 0

@@ -133,3 +133,9 @@ def test_parts_add_up_to_the_whole(symmetry: str, copies: int) -> None:
     inlets = [name for name in meshes.volume.node_sets if name.startswith("inlet")]
     assert len(inlets) == {"half": 2, "sector": 1}[symmetry]
     assert any(symmetry in note.lower() or "lobe" in note for note in meshes.volume.notes)
+
+
+def test_ears_have_no_quarter() -> None:
+    laminate = build("1dof-5mm", "stack.balloons=1", "registration.method=ears")
+    with pytest.raises(DesignError, match="symmetry quarter is not this laminate's"):
+        conforming_meshes(laminate, MeshSettings(symmetry="quarter"))

@@ -146,3 +146,11 @@ def test_without_netgen_the_extra_is_named(
     monkeypatch.setitem(sys.modules, "netgen.geom2d", None)
     with pytest.raises(DesignError, match=r'need Netgen; install it with: pip install "sbafab'):
         conforming_meshes(two_balloons, MeshSettings(h=0.5))
+
+
+def test_tetrahedra_fill_the_same_space(two_balloons: Laminate, meshes: ConformingMeshes) -> None:
+    tets = conforming_meshes(two_balloons, MeshSettings(h=0.5, element="tet")).volume
+    assert tets.cells.shape == (3 * len(meshes.volume.cells), 10)
+    for name in meshes.volume.cell_sets:
+        assert held(tets, name) == pytest.approx(held(meshes.volume, name), rel=1e-9)
+    assert len(tets.face_sets["cavity_A"]) > 0

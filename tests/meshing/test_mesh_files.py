@@ -2,6 +2,9 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +13,7 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.mesh_files import write_meshes
-from sbafab.meshing.solid import MASKLESS_GAP, solid
+from sbafab.meshing.solid import MASKLESS_GAP, cavity_slabs, solid, solid_slabs
 
 
 @pytest.fixture(scope="module")
@@ -108,3 +111,35 @@ def test_the_cavity_of_welded_balloons_lies_within_their_seams(tmp_path: Path) -
     gaps = 22.5 * 18.5 + 2.1 * (30 - 9.25) + 4.5**2 + 16.5 * 14.5
     expected = gaps * MASKLESS_GAP + 2 * math.pi * 0.1
     assert meshes[-1].volume_mm3 == pytest.approx(expected, rel=5e-4)
+
+
+TEMPLATES = ["1dof-5mm", "radial-15mm"]
+
+
+@pytest.mark.parametrize("template", TEMPLATES)
+def test_volumes_are_the_sums_of_area_times_thickness(template: str, tmp_path: Path) -> None:
+    laminate = build(load_design(template))
+    meshes, _ = write_meshes(laminate, tmp_path)
+    expected = [sum(slab.volume for slab in solid_slabs(laminate))] * 3
+    for chamber in laminate.chambers:
+        expected.append(sum(slab.volume for slab in cavity_slabs(laminate, chamber)))
+    flat = [mesh.volume_mm3 for mesh in meshes if "wrapped" not in mesh.file]
+    assert flat == pytest.approx(expected, rel=5e-4)
+
+
+def test_same_bytes_again_under_another_hash_seed_and_time_zone(
+    lobed: Laminate, tmp_path: Path
+) -> None:
+    here, there = tmp_path / "here", tmp_path / "there"
+    write_meshes(lobed, here)
+    script = (
+        "import sys; from pathlib import Path\n"
+        "from sbafab.actuators import build, load_design\n"
+        "from sbafab.meshing.mesh_files import write_meshes\n"
+        "laminate = build(load_design('3dof-15mm', ['stack.balloons=3']))\n"
+        "write_meshes(laminate, Path(sys.argv[1]))\n"
+    )
+    environment = {**os.environ, "PYTHONHASHSEED": "4711", "TZ": "Asia/Tokyo"}
+    root = Path(__file__).parents[2]
+    subprocess.run([sys.executable, "-c", script, there], check=True, env=environment, cwd=root)
+    assert digests(here) == digests(there)

@@ -112,3 +112,10 @@ def test_balloons_that_meet_or_lie_in_their_sheet_are_refused() -> None:
     sunk = [form._replace(base=form.base - [0, 0, 0.1 * (k > 0)]) for k, form in enumerate(forms)]
     with pytest.raises(DesignError, match=r"film 3 would pass through its sheet by 0\.100 mm"):
         round_tube(stack, sunk)
+
+
+def test_flat_is_flat() -> None:
+    small = build("radial-15mm", "chamber.count=1", "tube.outer_diameter=4")
+    meshes = conforming_meshes(small, MeshSettings(h=0.75, wrapped=False))
+    assert meshes.volume.points[:, 2].max() == pytest.approx(3 * 0.038)
+    assert meshes.volume.rest is None

@@ -132,3 +132,14 @@ def test_chambers_without_pocket_or_channel_are_named(
     astray = replace(two_balloons, chambers=(Chamber("B", ((20.0, 0.0),)),))
     with pytest.raises(OutputError, match=r"Chamber B has no pocket at x 20\.000, y 0\.000"):
         cavity(astray, astray.chambers[0])
+
+
+def test_air_and_film_share_no_room(two_balloons: Laminate) -> None:
+    films = solid_slabs(two_balloons)
+    air = cavity_slabs(two_balloons, two_balloons.chambers[0])
+    together = fuse([*films, *air], 0.002)
+    volume = sum(slab.volume for slab in films + air)
+    assert together.volume == pytest.approx(volume, rel=1e-4)
+    # Where they meet they meet face to face, so nothing but the outside is left.
+    assert len(open_edges(together)) == 0
+    assert euler(together) == 2

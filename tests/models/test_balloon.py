@@ -87,3 +87,12 @@ def test_a_plate_that_is_not_reached_does_not_push() -> None:
 def test_loads_of_nothing_are_refused(pressure: float, height: float | None) -> None:
     with pytest.raises(DesignError, match="above 0 kPa"):
         inflate(TPE, pressure, height)
+
+
+def test_force_is_what_the_air_gains_on_the_way() -> None:
+    """The work of the air is that of the plates and what the films store (virtual work)."""
+    ring = replace(TPE, neck=1.25, bore=0.5, wrinkles=False)
+    heights = np.array([0.6, 0.602])
+    found = inflate(ring, 10.0, heights)
+    gained = 10.0 * np.diff(found.volume) - np.diff(found.energy)
+    assert gained == pytest.approx(found.force.mean() * np.diff(found.height), rel=0.01)

@@ -255,3 +255,8 @@ def test_figures_say_that_balloons_stand_where_a_map_does_not_hold(
     assert not any(OUTSIDE in trust for trust in trusts())
     monkeypatch.setattr(map_module, "MOST_ERROR", 1e-9)
     assert all(trust.count(OUTSIDE) == 1 for trust in trusts())
+
+
+def test_a_map_ends_where_its_pressure_does() -> None:
+    with pytest.raises(DesignError, match="give 0 to 110 kPa"):
+        balloon_map(SIZES["d = 5"], 110.0).volume(111.0, 1.0)

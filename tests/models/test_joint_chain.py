@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -110,3 +111,9 @@ def test_masses_are_the_films(robot: ET.Element) -> None:
     masses = [float(mass.get("value")) for mass in robot.iter("mass")]
     assert len(masses) == 25
     assert sum(masses) == pytest.approx(film_mass(sbafab.build(*LOBED)) / 1000)
+
+
+def test_a_film_without_density_has_no_masses(lobed: Stack) -> None:
+    text = map_text("light", replace(lobed, weight=None), "urdf")
+    assert "Masses: not known" in text
+    assert not list(ET.fromstring(text).iter("inertial"))

@@ -118,3 +118,13 @@ def test_a_step_that_cannot_be_is_refused(
     for wrong in ({"length": 0.0}, {"diameter": 1e300}, {"dead_volume": -1.0}, {"delay": math.nan}):
         with pytest.raises(DesignError, match=f"line {next(iter(wrong))} = .* must be from"):
             Line(**wrong)
+
+
+def test_small_steps_and_large_ones_agree(three: Stack) -> None:
+    ends = []
+    for count in (8, 32):
+        motion = three.motion(line=Line(WATER))
+        for _ in range(count):
+            motion.step(0.8 / count, pressures=(8, 8, 8))
+        ends.append(motion.pose.height)
+    assert ends[0] == pytest.approx(ends[1], rel=0.02)

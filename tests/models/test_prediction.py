@@ -444,3 +444,29 @@ def test_the_share_of_work_that_is_lost_is_the_calibration_s(three: Prediction) 
     spread = math.hypot(math.sqrt(calibration.covariance[5][5]), *missed)
     assert math.log(lost.interval[1] / lost.value) == pytest.approx(1.6448536 * spread)
     assert all(figure.quantity is not Quantity.LOST_WORK for figure in three.figures)
+
+
+def test_3dof_bends_by_the_difference_of_its_chambers(three: Prediction) -> None:
+    # A plane over axes at 4.25 mm, one side 17.5 long and the others flat.
+    angle = (17.5 - 1.865) / (1.5 * 4.25)
+    found = three.value("reference_bend", chambers=1)
+    assert found == pytest.approx(math.degrees(angle))
+    assert three.value("reference_bend", chambers=2) == pytest.approx(found)
+
+
+def test_the_stack_says_what_the_paper_measured_where_it_does(three: Prediction) -> None:
+    # Sec. 4.5: 0.92 +- 0.08 s of water to 10 kPa; Sec. 4.6: 17.5 mm. With tubes of 150 mm, ours.
+    water = three.value("water_time", kpa=10, flow=35)
+    assert water == pytest.approx(0.92, abs=0.08)
+    height = three.value("water_height", kpa=10)
+    assert height == pytest.approx(17.5, rel=0.05)
+
+
+def test_calibration_by_pocket_and_modulus_is_named() -> None:
+    found = sbafab.predict("1dof-5mm", "models.calibration=none", pocket_loss=0.3, modulus_mpa=20.0)
+    models = {figure.model.name for figure in found.figures if "elastic" in figure.model.name}
+    assert models
+    assert all("pocket loss 0.3 mm, E = 20 MPa" in name for name in models)
+    plain = sbafab.predict("1dof-5mm", "models.calibration=none")
+    assert found.value("free_stroke", kpa=10) < plain.value("free_stroke", kpa=10)
+    assert found.value("reference_stroke") == plain.value("reference_stroke")

@@ -49,3 +49,10 @@ def test_the_command_prints_the_table(tmp_path: Path) -> None:
     document = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
     hold("predict", document)
     assert [row["key"] for row in document["sensitivity"]] == list(KEYS)
+
+
+def test_a_row_a_key_and_strokes_in_proportion_to_the_balloons(
+    rows: dict[str, tuple[float, float | None]],
+) -> None:
+    assert tuple(rows) == KEYS
+    assert rows["stack.balloons"][0] == pytest.approx(1.0, abs=1e-6)

@@ -313,3 +313,27 @@ def test_a_plate_that_is_hardly_met_is_met_from_any_start(three: Stack) -> None:
         assert pose.tip[:2] == pytest.approx([0.0, 0.0], abs=1e-4)
         assert pose.stable
         assert (pose.force > 0) == (rim > 12.0)
+
+
+def test_a_map_is_the_balloon_that_it_was_made_from(three: Stack) -> None:
+    """At places that no balloon of the map was computed at, and where films are slack."""
+    balloon = three.maps[0]
+    p, h = np.array([0.7, 3.3, 8.1, 47.0]), np.array([0.33, 0.81, 1.6, 0.52])
+    found = inflate(balloon.balloon, p, h, tied=True)
+    assert balloon.force(p, h) == pytest.approx(found.force, rel=0.025, abs=1.0)
+    assert balloon.volume(p, h) == pytest.approx(found.volume, rel=0.01)
+    p, h = (g.ravel() for g in np.meshgrid([0.005, 0.02, 0.05, 0.2], [0.01, 0.02, 0.05, 0.1, 0.4]))
+    found = inflate(balloon.balloon, p, h, tied=True)
+    assert balloon.volume(p, h) == pytest.approx(found.volume, rel=0.07)
+    assert balloon.force(p, h) == pytest.approx(found.force, rel=0.02, abs=0.05)
+    assert balloon.volume([0.0, 0.1, 10.0], np.zeros(3)) == pytest.approx(0.0, abs=0.05)
+
+
+def test_following_a_path_ends_where_a_fresh_start_does(three: Stack) -> None:
+    load = {"tip_load": (0.0, 0.005, -0.005), "gravity": True}
+    followed = three.pose((6, 3, 1), **load)  # type: ignore[arg-type]
+    for share in np.linspace(0, 1, 11):
+        followed = three.pose((6 - share, 3 + share, 1), near=followed, **load)  # type: ignore[arg-type]
+    fresh = three.pose((5, 4, 1), **load)  # type: ignore[arg-type]
+    assert followed.tip == pytest.approx(fresh.tip, abs=1e-4)
+    assert followed.volumes == pytest.approx(fresh.volumes, rel=1e-5)

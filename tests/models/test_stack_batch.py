@@ -11,6 +11,7 @@ import pytest
 import sbafab
 from sbafab.errors import DesignError
 from sbafab.models import motion as motions
+from sbafab.models.pneumatics import AIR, WATER, Line
 from sbafab.models.stack import Plate, Stack, StackBatch
 
 
@@ -126,3 +127,37 @@ def test_what_is_no_batch_is_refused(three: Stack) -> None:
     with pytest.raises(DesignError, match="count = 0"):
         batch.motion(0)
     assert batch.poses(np.zeros((0, 3))).tips.shape == (0, 3)
+
+
+@pytest.mark.parametrize("line", [Line(AIR, delay=0.03), Line(WATER)])
+def test_motions_are_the_single_ones(
+    three: Stack, line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(motions, "TOLERANCE", 1e-7)
+    numbers = np.random.default_rng(3)
+    moving = StackBatch(three).motion(3, line)
+    singles = [three.motion(line=line) for _ in range(3)]
+    for number in range(6):
+        valves = numbers.uniform(0.0, 10.0, (3, 3)) * (number < 4)
+        moving.step(0.02, valves)
+        for single, row in zip(singles, valves.tolist(), strict=True):
+            single.step(0.02, pressures=row)
+        assert moving.tips == pytest.approx(np.array([s.pose.tip for s in singles]), abs=2e-5)
+        pressures = np.array([single.pressures for single in singles])
+        assert moving.pressures == pytest.approx(pressures, rel=2e-5, abs=1e-6)
+    assert moving.times == pytest.approx(0.12)
+    volumes = np.array([single.pose.volumes for single in singles])
+    assert moving.poses.volumes == pytest.approx(volumes, abs=0.01)
+
+
+@pytest.mark.parametrize("line", [Line(AIR), Line(WATER)])
+def test_flows_of_many_are_those_of_one(line: Line) -> None:
+    sources, chambers = np.meshgrid([0.0, 1e-3, 0.5, 10.0, 60.0], [0.0, 2e-3, 0.6, 10.0, 50.0])
+    flows, rates = line.flows(sources, chambers)
+    step = 1e-7
+    for at in np.ndindex(sources.shape):
+        source, chamber = float(sources[at]), float(chambers[at])
+        assert flows[at] == pytest.approx(line.flow(source, chamber), rel=1e-9)
+        if source != chamber:
+            ends = line.flow(source, chamber + step), line.flow(source, chamber - step)
+            assert rates[at] == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-3)
