@@ -169,8 +169,10 @@ def refuse_stretched(longer: float) -> None:
 
 SAMPLES = 21
 ANGLES = (30.0, 60.0, 90.0)
-NO_FURTHER = 1e-7
-"""Relative tolerance of the pressure of a bend."""
+LEAST_PRESSURE, NO_FURTHER = 0.01, 1e-7
+"""Lowest pressure of a bend in kPa, and the relative tolerance of its pressure."""
+NEARBY = 2.0
+"""Largest ratio of a bend's pressure to that of another stack which guides the search."""
 PROBE_FORCE = 1e-5
 """Lateral force in N on the tip with which its stiffness is probed."""
 SOURCE = "membrane of revolution between plates, the film's modulus"
@@ -253,20 +255,23 @@ def moved_stack(
 
 PosedItem = tuple[Figure | LeftOut, Pose | None]
 """A figure with the pose that it is taken from."""
+Guides = dict[Conditions, tuple[Pose, Pose]]
+"""Bent poses, and those pressed further, by conditions: starts for those of other stacks."""
 
 
 def stack_figures(
     actuator: Actuator,
     request: PredictionRequest,
     stack: Stack,
+    guides: Guides,
     checks_films: bool = True,
     checks_maps: bool = False,
 ) -> Iterator[Figure | LeftOut]:
     """Yield forces, bending, times and stiffness of the stack. With ``checks_films`` figures with
     films stretched too far are left out; with ``checks_maps`` figures are flagged if their balloons
-    are outside the valid range of a map.
+    are outside the valid range of a map. Poses that ``guides`` lack are added.
     """
-    rows = list(_posed_figures(actuator, request, stack, checks_films))
+    rows = list(_posed_figures(actuator, request, stack, guides, checks_films))
     poses = list({id(pose): pose for _, pose in rows if pose and checks_maps}.values())
     outside = {id(pose) for pose, holds in zip(poses, stack.hold(poses), strict=True) if not holds}
     for item, pose in rows:
@@ -278,12 +283,16 @@ def stack_figures(
 
 
 def _posed_figures(
-    actuator: Actuator, request: PredictionRequest, stack: Stack, checks_films: bool
+    actuator: Actuator,
+    request: PredictionRequest,
+    stack: Stack,
+    guides: Guides,
+    checks_films: bool,
 ) -> Iterator[PosedItem]:
     yield from _forces(actuator, request, stack, checks_films)
     if actuator.form.is_parallel:
         yield from _bends(request, stack)
-        yield from _bent_forces(request, stack)
+        yield from _bent_forces(request, stack, guides)
     yield from _times(request, stack)
     yield from _stiffness(request, stack)
 
@@ -357,14 +366,16 @@ def _bends(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
             yield Figure(quantity, value, model, at), pose
 
 
-def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
+def pose_bent_by(
+    stack: Stack, chambers: int, angle: float, low: float = LEAST_PRESSURE, high: float = math.inf
+) -> Pose | None:
     """Return the pose bent by an angle in degrees with some chambers pressurised and the others
-    empty; None if no pressure gives it.
+    empty; None if no pressure from ``low`` to ``high`` (kPa) gives it.
 
     Bisection until both ends have poses, then false position by the pressure's logarithm, with the
     end that stays halved (Illinois).
     """
-    low, high = 0.01, stack.most_pressure
+    high = min(high, stack.most_pressure)
     below = above = math.nan
     pose, before = None, 0.0
     while high > low * (1 + NO_FURTHER):
@@ -387,7 +398,7 @@ def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
     return None
 
 
-def _bent_forces(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
+def _bent_forces(request: PredictionRequest, stack: Stack, guides: Guides) -> Iterator[PosedItem]:
     """Yield forces on a plate square to the bent tip, its chambers pressurised further."""
     if not request.pressures_kpa:
         return
@@ -397,17 +408,23 @@ def _bent_forces(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem
         for angle in ANGLES:
             quantity = Quantity.BENT_FORCE
             at = Conditions(kpa=pressure, chambers=chambers, angle=angle)
-            pose = pose_bent_by(stack, chambers, angle)
+            pose, guide = None, guides.get(at)
+            if guide is not None:
+                usual = guide[0].pressures[0]
+                pose = pose_bent_by(stack, chambers, angle, usual / NEARBY, usual * NEARBY)
+            pose = pose or pose_bent_by(stack, chambers, angle)
             if pose is None or pose.pressures[0] > pressure:
                 reason = "it does not bend so far"
                 yield LeftOut(quantity.named(at), reason, (quantity,)), None
                 continue
             plate = Plate(_three(pose.tip), _three(pose.frames[1][-1][:, 2]))
             try:
-                pressed = stack.pose(_pressures(stack, chambers, pressure), plate=plate, near=pose)
+                start = pose if guide is None else guide[1]
+                pressed = stack.pose(_pressures(stack, chambers, pressure), plate=plate, near=start)
             except DesignError as error:
                 yield LeftOut(quantity.named(at), str(error), (quantity,)), None
                 continue
+            guides.setdefault(at, (pose, pressed))
             yield Figure(quantity, pressed.force, model, at), pressed
 
 

@@ -141,16 +141,18 @@ def predict(
         return None if quick else elastic.elastic_stack(actuator, request)
 
     together = stack_of(subject)
-    items = _figures(subject, request, together, checks_maps=checks_maps)
+    guides: elastic.Guides = {}
+    items = _figures(subject, request, together, guides, checks_maps=checks_maps)
     if uncertainty is not None:
-        items = uncertainty.bounded(items, partial(_moved_figures, subject, request, together))
+        moved = partial(_moved_figures, subject, request, together, guides)
+        items = uncertainty.bounded(items, moved)
     relations = () if quick else tuple(_relations(subject, request, _solved(together)))
     if discs is not None:
         ends = []
         for diameter in (discs.inner, discs.outer):
             end = actuator_of(design, flat, asked.factors, discs.form(design, diameter))
             is_same = diameter == discs.equal
-            ends.append(items if is_same else _figures(end, request, stack_of(end)))
+            ends.append(items if is_same else _figures(end, request, stack_of(end), guides))
         items = list(bounded(items, ends, discs))
         relations = tuple(relation_by_disc(relation, discs) for relation in relations)
     items = [*(_flagged(item, flat) for item in items), *past]
@@ -221,6 +223,7 @@ def _moved_figures(
     actuator: Actuator,
     request: PredictionRequest,
     together: Stack | LeftOut | None,
+    guides: elastic.Guides,
     factors: Factors,
 ) -> list[Figure | LeftOut]:
     """Return the figures of an actuator at other factors."""
@@ -230,7 +233,7 @@ def _moved_figures(
     if isinstance(together, Stack):
         other = elastic.moved_stack(together, actuator.laminate, request.factors, factors)
         other = other or elastic.elastic_stack(subject, moved)
-    return _figures(subject, moved, other, checks_films=False)
+    return _figures(subject, moved, other, guides, checks_films=False)
 
 
 def _solved(together: Stack | LeftOut | None) -> Stack | None:
@@ -241,6 +244,7 @@ def _figures(
     actuator: Actuator,
     request: PredictionRequest,
     together: Stack | LeftOut | None,
+    guides: elastic.Guides,
     checks_films: bool = True,
     checks_maps: bool = False,
 ) -> list[Figure | LeftOut]:
@@ -249,7 +253,9 @@ def _figures(
     if isinstance(together, LeftOut):
         items.append(together)
     elif together is not None:
-        items += elastic.stack_figures(actuator, request, together, checks_films, checks_maps)
+        items += elastic.stack_figures(
+            actuator, request, together, guides, checks_films, checks_maps
+        )
     order = {group: place for place, group in enumerate(GROUPS)}
     return sorted(
         items, key=lambda item: order[item.group] if isinstance(item, Figure) else len(GROUPS)
