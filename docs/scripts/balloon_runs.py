@@ -24,7 +24,7 @@ from sbafab.actuators import load_design
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
-from sbafab.models.rippled import free_shapes, resolves_waves, rippled
+from sbafab.models.rippled_balloon import free_shapes, resolves_waves, rippled
 from sbafab.simulators.calculix.deck import deck_settings
 from sbafab.simulators.calculix.run import simulate
 

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes, distinct, inflate
 from sbafab.models.film_elements import Array
-from sbafab.models.rippled import compressed_shapes, least_free_states, with_waves
+from sbafab.models.rippled_balloon import compressed_shapes, least_free_states, with_waves
 from sbafab.runtime import one_blas_thread
 
 DEGREE = 5

@@ -34,7 +34,7 @@ from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
 from sbafab.models.pocket_models import Actuator
 from sbafab.models.quantity import Conditions, ModelId, Quantity, chamber_count
-from sbafab.models.rippled import compressed_shapes, free_shapes
+from sbafab.models.rippled_balloon import compressed_shapes, free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
 from sbafab.models.stack_balance import BatchPoses
 

@@ -33,10 +33,10 @@ from sbafab.models.balloons import balloons_of
 from sbafab.models.derivatives import Derivatives, derivatives
 from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
+from sbafab.models.inverse_kinematics import P0, Search
 from sbafab.models.motion import BatchMotion, Motion
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.models.pneumatics import Line
-from sbafab.models.reach import P0, Search
 from sbafab.models.stack_balance import (
     CHUNK,
     LOADED_CHUNK,

@@ -37,7 +37,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from sbafab import api
 from sbafab.errors import DesignError, OutputError, SbafabError, Stopped
-from sbafab.studio import forms, places
+from sbafab.studio import design_files, forms
 from sbafab.studio.workers import BusyError, WaitingJob, WorkerPool
 
 ADDRESS = "127.0.0.1"
@@ -209,7 +209,7 @@ def _studio(request: Request) -> Studio:
 
 
 async def _refused(_: Request, error: Exception) -> Response:
-    status = 409 if isinstance(error, places.ChangedError) else 422
+    status = 409 if isinstance(error, design_files.ChangedError) else 422
     return JSONResponse({"kind": "error", "message": str(error)}, status)
 
 
@@ -229,27 +229,29 @@ async def template(request: Request) -> Response:
 
 
 async def opened_file(request: Request) -> Response:
-    path = places.design_file(_studio(request).folder, request.path_params["name"])
-    text, sha = places.read(path)
+    path = design_files.design_file(_studio(request).folder, request.path_params["name"])
+    text, sha = design_files.read(path)
     return JSONResponse({"text": text, "sha": sha})
 
 
 async def save(request: Request) -> Response:
     table = await _request_table(request)
-    path = places.design_file(_studio(request).folder, str(table.get("name", "")))
+    path = design_files.design_file(_studio(request).folder, str(table.get("name", "")))
     expected = table.get("seen")
-    sha = places.save(path, str(table.get("text", "")), None if expected is None else str(expected))
+    sha = design_files.save(
+        path, str(table.get("text", "")), None if expected is None else str(expected)
+    )
     return JSONResponse({"sha": sha})
 
 
 async def watch(request: Request) -> Response:
     """Sends a line whenever the file's content changes, until the page disconnects."""
-    path = places.design_file(_studio(request).folder, request.path_params["name"])
+    path = design_files.design_file(_studio(request).folder, request.path_params["name"])
 
     async def changes() -> AsyncIterator[bytes]:
         last: str | None = None
         while not await request.is_disconnected():
-            now = places.state(path)
+            now = design_files.state(path)
             yield b"\n" if now == last else json.dumps({"sha": now}).encode() + b"\n"
             last = now
             await asyncio.sleep(LOOK_EVERY)
@@ -296,7 +298,7 @@ def _remember(studio: Studio, key: str, folder: Path) -> None:
 
 async def made_file(request: Request) -> Response:
     folder = _studio(request).made.get(request.path_params["key"])
-    path = places.file_in(folder, request.path_params["path"]) if folder else None
+    path = design_files.file_in(folder, request.path_params["path"]) if folder else None
     return FileResponse(path) if path else Response(status_code=404)
 
 
@@ -304,7 +306,7 @@ async def made_zip(request: Request) -> Response:
     folder = _studio(request).made.get(request.path_params["key"])
     if folder is None:
         return Response(status_code=404)
-    content = await asyncio.to_thread(places.zipped, folder)
+    content = await asyncio.to_thread(design_files.zipped, folder)
     headers = {"content-disposition": f'attachment; filename="{folder.name}.zip"'}
     return Response(content, media_type="application/zip", headers=headers)
 
@@ -342,7 +344,7 @@ async def record_choices(request: Request) -> Response:
     """The designs that may be recorded, and the lab's file."""
     folder = _studio(request).folder
     lab = str(_lab_file(folder))
-    designs = {"files": places.listed(folder), "templates": api.templates()}
+    designs = {"files": design_files.listed(folder), "templates": api.templates()}
     return JSONResponse({**designs, "lab": lab})
 
 
@@ -403,8 +405,8 @@ def _recorded_design(folder: Path, request: Mapping[str, Any]) -> str | Path:
     name = str(request.get("design", ""))
     if name in api.templates():
         return name
-    path = places.design_file(folder, name)
-    places.named_files(places.read(path)[0], folder)
+    path = design_files.design_file(folder, name)
+    design_files.named_files(design_files.read(path)[0], folder)
     return path
 
 
@@ -448,7 +450,7 @@ def opened(source: str | None) -> tuple[Path, dict[str, str]]:
             f"{', '.join(api.templates())}"
         )
     folder = path.resolve().parent
-    return folder, {"opened": places.design_file(folder, path.name).name}
+    return folder, {"opened": design_files.design_file(folder, path.name).name}
 
 
 def listening(port: int | None, address: str = ADDRESS) -> socket.socket:

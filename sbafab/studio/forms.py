@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field, ValidationError
 from sbafab import __version__, api
 from sbafab.api.designs import NAMED, ROW, JsonSchema, family_tables, schema_keys
 from sbafab.errors import SbafabError
-from sbafab.studio import places
+from sbafab.studio import design_files
 
 PLACING = ("on", "at", "angle", "turn", "along", "offset", "glue", "note")
 """Keys of a part's position; its form ends with them."""
@@ -179,7 +179,7 @@ def started(folder: Path) -> dict[str, Any]:
     return {
         "version": __version__,
         "folder": str(folder),
-        "files": places.listed(folder),
+        "files": design_files.listed(folder),
         "templates": api.templates(),
         "summaries": summaries(),
         "families": families(schema),

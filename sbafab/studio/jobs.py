@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab import api
 from sbafab.errors import DesignError, SbafabError
-from sbafab.studio import places
+from sbafab.studio import design_files
 from sbafab.studio.editing import MOST_EDITS, edited
 from sbafab.studio.forms import keys
 from sbafab.studio.model import (
@@ -193,7 +193,7 @@ class _Source(NamedTuple):
 def _source(text: str, job: StudioJob) -> _Source:
     """Raises DesignError for a file outside the folder."""
     folder = Path(job["folder"])
-    return _Source(text, folder / job["path"], places.named_files(text, folder))
+    return _Source(text, folder / job["path"], design_files.named_files(text, folder))
 
 
 @lru_cache(maxsize=4)

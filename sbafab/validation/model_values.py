@@ -29,7 +29,7 @@ from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line
 from sbafab.models.pocket_models import Actuator, actuator
 from sbafab.models.prediction import plate_of, predict
 from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count
-from sbafab.models.rippled import free_shapes
+from sbafab.models.rippled_balloon import free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack
 from sbafab.validation.evidence import QUANTITIES, MeasuredCurve
 

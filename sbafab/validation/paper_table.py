@@ -32,7 +32,7 @@ from sbafab.models.formulas import modulus
 from sbafab.models.pneumatics import AIR, Line, seconds
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import FigureKey, ModelId
-from sbafab.models.rippled import free_shapes
+from sbafab.models.rippled_balloon import free_shapes
 from sbafab.models.stack import Stack, stack
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.charts import relation_svg

@@ -25,7 +25,7 @@ from sbafab.models.balloon_map import (
     map_range,
 )
 from sbafab.models.elastic import OUTSIDE
-from sbafab.models.rippled import compressed_shapes, free_shapes, least_free_states
+from sbafab.models.rippled_balloon import compressed_shapes, free_shapes, least_free_states
 from tests.quick import few
 from tests.shared import shared
 

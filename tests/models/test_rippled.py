@@ -16,7 +16,7 @@ from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import balloon_map
 from sbafab.models.film_elements import Elements, air_volume, bending, membrane
 from sbafab.models.rim_correction import EDGE, OVERTONES, PLACES, UP, R, Waves, Waving, Z, first_of
-from sbafab.models.rippled import (
+from sbafab.models.rippled_balloon import (
     compressed_shapes,
     free_shapes,
     least_free_states,

@@ -11,7 +11,7 @@ ROOT = Path(sbafab.__file__).parent
 STATES = {
     "geometry/edges.py": {"Arc", "Line"},
     "models/motion.py": {"Motion", "BatchMotion"},
-    "models/reach.py": {"Nearest"},
+    "models/inverse_kinematics.py": {"Nearest"},
     "folders/artefacts.py": {"DesignFolder"},
     "rules/voids.py": {"VoidGraph"},
     "studio/app.py": {"Studio"},

@@ -11,7 +11,7 @@ import pytest
 from sbafab import api
 from sbafab.actuators import FAMILIES
 from sbafab.studio.app import Studio, app
-from sbafab.studio.places import zipped
+from sbafab.studio.design_files import zipped
 from tests.studio.asking import Client
 
 TOKEN = "right-token"
