@@ -177,15 +177,19 @@ def test_one_pressure_is_a_number_or_a_list_and_no_text() -> None:
     ("function", "keyword", "near"),
     [
         ("predict", "pressure_kpa", "pressures_kpa"),
+        ("predict", "volume_ul", "volumes_ul"),
         ("stack", "modulus", "modulus_mpa"),
+        ("mesh", "format", "formats"),
         ("simulate", "presure", "pressure"),
         ("find", "trials", "tries"),
+        ("sweep", "sample", "samples"),
+        ("generate", "outs", "out"),
     ],
 )
 def test_a_misspelt_argument_is_told_from_a_table_of_the_design(
     function: str, keyword: str, near: str
 ) -> None:
-    wanted = {"simulator": "sofa"} if function == "simulate" else {}
+    wanted = {"simulate": {"simulator": "sofa"}, "sweep": {"vary": []}}.get(function, {})
     said = f"{keyword} is neither an argument of {function} nor a table .* did you mean {near}?"
     with pytest.raises(DesignError, match=said):
         getattr(sbafab, function)("1dof-5mm", **{keyword: 5}, **wanted)

@@ -120,3 +120,9 @@ def members_without_words(path: str) -> Iterator[str]:
         said, returned = described(plain), str(plain.__annotations__.get("return", ""))
         if not said or (NUMBER.search(returned) and not UNIT.search(said)):
             yield f"{name} -> {returned}: {said}"
+
+
+def test_a_number_without_its_unit_is_told() -> None:
+    assert says_unit("h", "The side ``h`` in mm.")
+    assert says_unit("pressures_kpa", "")
+    assert not says_unit("h", "The side ``h`` of triangles. Lengths are mm.")

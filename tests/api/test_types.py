@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal, assert_type, get_args, get_overloads, get_type_hints
+from pathlib import Path
+from typing import Literal, assert_type, cast, get_args, get_overloads, get_type_hints
 
 import pytest
 
@@ -22,6 +23,13 @@ def test_a_template_has_the_keys_of_its_family() -> None:
     assert assert_type(sbafab.load("pouch"), DrawnDesign).layers
     lobed = sbafab.load("3dof-15mm", "stack.balloons=6")
     assert assert_type(sbafab.load(lobed, stack={"balloons": 5}), LobedDesign).stack.balloons == 5
+
+
+def test_a_file_has_them_by_a_cast(tmp_path: Path) -> None:
+    path = tmp_path / "my.toml"
+    path.write_text(sbafab.template("3dof-15mm"), encoding="utf-8")
+    design = assert_type(sbafab.load(path), sbafab.Design)
+    assert cast(LobedDesign, design).chamber.count == 3
 
 
 def test_every_template_of_a_family_is_named() -> None:

@@ -18,19 +18,48 @@ check nosuch | is neither a template nor a design file
 check 3dof-15mm --set bond.widht=1 | did you mean bond.width
 check 3dof-15mm --set bond.width=-1 | bond.width = -1
 check 1dof-5mm --waive registration | did you mean registration-yield or registration-nominal
+check 1dof-5mm --waive bond | --waive 'bond': no rule has that name; did you mean bond-width
 check 1dof-5mm --waive zzz | it may be bond-width, mask-overhang
 check 1dof-5mm --target-yield 1 | must be a share above 0 and below 1
+check 1dof-5mm --target-yield 120% | must be a share above 0 and below 1
+check 1dof-5mm --target-yield "0.9 mm" | must be a share above 0 and below 1
 check brace --target-yield 0.9 | check its parts' designs one by one
+check brace --set parts.arm.on=tubs | did you mean tube?
+check brace --set parts.arm.at=top | "start", "end", "outside"
+check brace --set parts.arm.design=nosuch | parts.arm: 'nosuch' is neither
 check 1dof-5mm --set order.copies=900 | sheets.tpe.most allows 20
+generate brace --set parts.tube.kind=pipe | parts.tube.kind = 'pipe'
+generate brace --set parts.tube.on=cup | no tube can be fixed on a cup
+generate brace --waive seats | --waive 'seats': no rule has that name; did you mean seat
+generate brace --set parts=1 | add [parts.NAME]
+generate brace --set parts.arm.set.laser.kerf_tpe=0.1 | laser differs
 generate brace --decks | decks are of one design, and brace is an assembly
 generate brace --target-yield 0.9 | generate its parts' designs one by one
+generate standing --copies 0 | order.copies = 0
 generate 3dof-15mm --set name=../x | name = '../x'
 generate 1dof-5mm --copies 1e3 | '1e3' is not a valid integer; see sbafab generate --help
 generate 1dof-5mm --chord-error 0.01 | goes with --dxf-profile chords
 predict 1dof-5mm --set models.calibration=lab.toml | sbafab calibrate writes one
+press brace | is an assembly of several designs
+mesh brace | is an assembly of several designs
+cut brace | is an assembly of several designs
+picture brace | is an assembly of several designs
+simulate brace --with sofa | is an assembly of several designs
 nest brace 1dof-5mm | is an assembly of several designs
+compare brace 1dof-5mm | is an assembly
+cut 1dof-5mm --set bore.diameter=9 | bore
+cut 1dof-5mm --copies 900 --set sheets.tpe.most=1 | sheets.tpe.most
+cut 1dof-5mm --set sheets.ptfe.border=80 | border
+cut 1dof-5mm --set sheets.tpe.spacing=0 | sheets.tpe.spacing = 0
+cut 1dof-5mm --set sheets.tpe.spacing=90 --set sheets.tpe.most=3 | sheets.tpe
+cut 1dof-5mm --set sheets.tpe.pins=[[1,2]] | sheets.tpe.pins
+cut 1dof-5mm --set laser.kerf_tpe=2 | laser.kerf_tpe = 2
+cut 1dof-5mm --set laser.kerf_tpe=[0.1,0.08] --dxf-profile chords | write bulges or arcs
+cut 1dof-5mm --set bore.diameter=1 --waive film-limits --set laser.kerf_tpe=1 | kerf
 press 1dof-5mm --set press.temperature_c=110 | temperature
+mesh 1dof-5mm --h 5 | h
 mesh 1dof-5mm --h 0 | must be a length above 0 mm
+mesh 1dof-5mm --fill 30 | ul
 mesh 1dof-5mm --fill nosuch=3 | nosuch
 mesh 1dof-5mm --fill 3 --fill chamber1=3 | one volume for all, or one for each chamber
 mesh 3dof-15mm --symmetry quarter | quarter
@@ -39,19 +68,29 @@ nest 1dof-5mm --name a/b | a/b
 new nosuch | nosuch
 frobnicate | 'frobnicate' is not a command; see sbafab --help
 gen 3dof-15mm | did you mean generate? See sbafab --help
+chekc 3dof-15mm | did you mean check?
+pre 3dof-15mm | did you mean press or predict?
 check | Missing argument 'DESIGN|FOLDER'; see sbafab check --help
 check x --bogus | No such option
 kerf x.csv --resolution nan | must be a finite number
 kerf nosuch.csv | nosuch.csv
 explain mask-overhag | did you mean mask-overhang?
 predict 1dof-5mm --volume 17 | give 0 to 16.94 ul a balloon
+predict 1dof-5mm --volume nan | the units are ul, ml, mm3
+predict 1dof-5mm --volume "0.02 ml" | give 0 to 16.94 ul a balloon
 predict 1dof-5mm --pressure "11 bar" | give 0 to 1000 kPa
+predict 1dof-5mm --pressure "4 atm" | '4 atm' must be a pressure such as
 predict 1dof-5mm --pressure -20 | a vacuum does nothing
 predict 1dof-5mm --flow 0 | must be from 1e-06 to 1e+06 ml/min
+predict 1dof-5mm --flow inf | must be a flow such as
+predict 1dof-5mm --flow 1e999 | must be a finite flow
 predict 1dof-5mm --load 5 | --load is for an assembly, and 1dof-5mm is one actuator
 predict 1dof-5mm --press-factor 2 | at most 1
 predict 1dof-5mm --contact-factor -1 | must be above 0
 predict brace --flow 30 | --flow is for one actuator, and brace is an assembly
+predict brace --volume 5 | --volume is for one actuator
+predict brace --modulus 3 | --modulus is for one actuator
+predict brace --press-factor 0.5 | --press-factor is for one actuator
 predict brace --waive seat | --waive is for written files
 predict brace -o x | --out is for written files
 predict brace --pressure 5 --pressure 6 | an assembly is predicted at one pressure
@@ -59,31 +98,57 @@ predict radial-15mm --modulus 3 | --modulus is for elastic balloons, round pocke
 predict {OVAL} --volume 5 | --volume is for pockets that are round or oblong
 map 1dof-5mm --to a.py --pressures 5 | is for a MuJoCo model
 map 1dof-5mm --to a.xml --pressures 5,5 | has 2 of 1 pressures
+map 1dof-5mm --to a.xml --pressures x | must be a pressure such as
+map 1dof-5mm --to a.xml --pressures 200 | give 0 to 110 kPa
 map radial-15mm | no round pockets
 map 1dof-5mm --to map.txt | must end with .csv, .json, .py, .urdf, .xml
 map 1dof-5mm --pressure 400 | 400 kPa is past the estimated burst pressure, 367 kPa
+map 1dof-5mm --pressure 0 | give more than 0 kPa
 map 1dof-5mm --pocket-loss 2 | a pocket loss of 2 mm leaves 0.5
+map 1dof-5mm --modulus 0 | from 0.1 to 10000 MPa
 calibrate nosuch | neither evidence that ships
 calibrate --name paper | which stands for another one
+calibrate --name none | which stands for another one
 calibrate --name "my lab" | use letters, digits
 calibrate textile-array | no curve can be fitted to (force-8mm:
 find 1dof-5mm --max mass=1 --to tip.txt | tip.txt must end in .toml
 find 1dof-5mm --max mass=1 --to tip.toml -o out | --out names a folder and --to a file
 find 1dof-5mm --min strok=5 | did you mean stroke?
 find 1dof-5mm --min stroke=5 --max stroke=4 | contradict each other
+find 1dof-5mm --min inflated_diameter=5 --max inflated_diameter=4 | contradict each other
+find 1dof-5mm --max mass=nan | must be a number
 find 1dof-5mm --min bend=90 | 1dof-5mm does not bend
+find 1dof-5mm --max time=1 --flow "35 l" | must be a flow
 find 1dof-5mm --sure 0.4 | must be above 0.5 and below 1
+find 1dof-5mm --sure 90 | must be a share from 0 to 1
+find 1dof-5mm --min reference_stroke=5 --sure 0.9 | ask for stroke@10kPa
 find 1dof-5mm --set models.calibration=none --sure 0.9 | needs a calibration
+find 1dof-5mm --max mass=-1 | must be at least 0
+find 1dof-5mm --min yield=95 | a share from 0 to 1
+find 1dof-5mm --min stroke@50=5 | '50' has no unit; write 50kPa
+find 1dof-5mm --min force@1mm@5kPa@6kPa=1 | names two pressures
+find 1dof-5mm --min chamber.diamter=5 | did you mean chamber.diameter?
 find 1dof-5mm --min lumen=3 | 1dof-5mm has no lumen
+find 1dof-5mm --min inlet.tab_length=6 | --free inlet.tab_length=LOW:HIGH:STEP
+find 1dof-5mm --max deflated_diameter=3 | only radial designs
 find 1dof-5mm --free chamber.diameter=6:3:1 | --free 'chamber.diameter=6:3:1' stops below
+find 1dof-5mm --free registration.method=ears,glue | 'glue' must be 'channel-pin' or 'ears'
+find 1dof-5mm --min registration.method=3 | is a word, 'channel-pin', and has no least or most
 record | give the DESIGN that was built, --find or --report
 record 1dof-5mm | a result needs its serial
 record 1dof-5mm --serial A1 | A1 has no result; give leak
 record 1dof-5mm --report | DESIGN does not go with --report
+record --chart a.svg --serial A1 | --serial does not go with --chart
+record --report --leak pass | --leak does not go with --report
+record 1dof-5mm --serial A1 --withdraw | --withdraw does not go with DESIGN
+record 1dof-5mm --table x.csv --leak pass | --leak does not go with --table
 record 1dof-5mm --table x.csv | x.csv cannot be read
 record --correct 1 | give the correct result
+record --correct 1 --again | --again does not go with --correct
 record --correct x1 --leak pass | neither a record such as 3 nor an entry such as e3
 record --correct e1 | give an --entry
+record --correct e1 --entry note=x --leak pass | give an --entry
+record --correct 1 --leak pass --entry note=x | give the correct result
 record --chart a.svg | lab.sqlite is not a file of records
 record 1dof-5mm --serial A1 --entry step | must be fields such as step=1
 record 1dof-5mm --serial A1 --entry "note='x" | a quotation mark without
@@ -91,6 +156,8 @@ record 1dof-5mm --entry note=x | an entry needs its serial
 record 1dof-5mm --history x.doc | ends in none of .csv, .toml, .json
 record 1dof-5mm --serial A1 --leak pass --again | no attempt came before this
 record --correct 1 --leak fail | lab.sqlite does not exist
+record nosuch --serial A1 --leak pass | nosuch
+record 1dof-5mm --serial A1 --burst "3 N" | must be a pressure
 record 1dof-5mm --serial A1 --force nan | force_n = nan must be a finite
 record 1dof-5mm --serial A1 --leak pass --lab no/lab.db | cannot be opened
 """

@@ -21,6 +21,7 @@ from sbafab.cli.explain import design_keys
 from sbafab.cli.show import limit_text
 from sbafab.design.files import key_paths
 from sbafab.design.sections import rule_names
+from sbafab.models.figures import FLAGS
 from sbafab.rules.deck import EXPLAINED
 from sbafab.rules.finding import Finding, Place
 from tests.cli.conftest import Run
@@ -110,6 +111,17 @@ def test_every_rule_and_check_is_explained(run: Run) -> None:
     assert [line.split()[0] for line in out.splitlines()] == list(EXPLAINED)
     known = {key for record in (*records().values(), Assembly) for key in key_paths(record)}
     assert {key for one in EXPLAINED.values() for key in one.keys} - known == set()
+
+
+def test_flags_and_factors_are_explained_in_two_sentences(
+    run: Run,
+) -> None:
+    for term in (*FLAGS, "calibration", "press-factor", "press_factor"):
+        code, out, _ = run("explain", term, "--json")
+        assert code == 0
+        assert len(re.findall(r"\.(?: |$)", json.loads(out)["meaning"])) == 2, term
+    _, out, _ = run("explain", "calibration")
+    assert "models.calibration" in out
 
 
 def test_every_key_and_quantity_is_explained(run: Run) -> None:

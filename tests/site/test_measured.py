@@ -211,6 +211,14 @@ def test_the_readme_s_seconds_are_the_record_s() -> None:
         assert float(stated[1]) == pytest.approx(float(measured_s), rel=0.05)
 
 
+def test_a_statistic_is_called_by_its_name() -> None:
+    for name in ("plates", "decks", "processes", "poses", "commands", "versions"):
+        assert statistic(TABLES[name]) in {"median", "least"}, name
+    readme = " ".join(TEXTS[ROOT / "README.md"].split())
+    of = statistic(TABLES["versions"])
+    assert re.search(rf"{of} (?:processor )?time of several rounds", readme)
+
+
 def test_factors_on_the_page_are_the_record_s() -> None:
     """Medians of one run: the other programs' seconds by ours, one process's by that of two."""
     page = " ".join((ROOT / "docs" / "testing.md").read_text(encoding="utf-8").split())

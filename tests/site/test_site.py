@@ -120,3 +120,16 @@ def test_a_text_cites_the_paper_once(files: list[Path]) -> None:
     before = text[: text.index(TITLE)][-150:]
     places = [before.index(f" {name}") for name in NAMES.split()]
     assert places == sorted(places)
+
+
+def test_the_citation_file_cites_the_paper_once() -> None:
+    # Read as lines: YAML would take a package for this one file.
+    program, paper = (ROOT / "CITATION.cff").read_text(encoding="utf-8").split("references:\n")
+    assert "cite it, and the paper" in program
+    assert paper.count("- type: article") == 1
+    doi, journal = "10.1002/aisy.202200085", "Advanced Intelligent Systems"
+    for key, value in (("title", TITLE), ("journal", journal), ("doi", doi), ("year", "2022")):
+        assert re.findall(rf"^    {key}: (.*)$", paper, re.MULTILINE) == [value]
+    assert re.findall(r"^        family-names: (.*)$", paper, re.MULTILINE) == NAMES.split()
+    given = re.findall(r"^      - given-names: \S", paper, re.MULTILINE)
+    assert len(given) == len(NAMES.split())

@@ -258,6 +258,9 @@ def test_each_quantity_is_predicted_once_and_other_models_unfold(seen: Watched) 
     panel.get_by_text(f"Other models of the same ({len(others)})").click()
     names.nth(len(first)).wait_for()
     assert shown() == first + others
+    measured = [figure["measured"]["sentence"] for figure in figures if figure["measured"]]
+    assert measured
+    assert all(sentence in panel.inner_text() for sentence in measured)
     # It stays open when the figures change.
     seen.say("studio.edit([['bond.width', '0.8']])")
     seen.ready()

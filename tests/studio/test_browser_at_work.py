@@ -78,6 +78,13 @@ def test_the_tip_is_pulled_by_hand(seen: Watched) -> None:
     seen.until("studio.motion.pose.bend < 0.1")
 
 
+def test_what_the_paper_measured_stands_beside_a_pose(seen: Watched) -> None:
+    seen.page.get_by_role("tab", name="Motion").click()
+    text = DESIGN + '\n[models]\ncalibration = "none"\n'
+    seen.page.evaluate("text => studio.open(text)", text)
+    seen.until("document.querySelector('#view-motion').innerText.includes('17.5 mm')")
+
+
 def test_a_design_out_of_the_model_s_range_says_so_on_the_spot(seen: Watched) -> None:
     seen.page.get_by_role("tab", name="Motion").click()
     # A pose of the design before that comes late is not drawn.
