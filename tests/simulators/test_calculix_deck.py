@@ -12,7 +12,7 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
 from sbafab.meshing.conforming.mesh import Mesh
-from sbafab.simulators.calculix.deck import DeckSettings, started, write_deck
+from sbafab.simulators.calculix.deck import DeckSettings, deck_settings, started, write_deck
 from sbafab.simulators.calculix.run import deck_mesh
 
 pytest.importorskip("netgen")
@@ -196,3 +196,10 @@ def test_abaqus_is_told_the_same_but_for_outputs_and_files_are_the_same_twice(
     # Abaqus's result file knows no TIME POINTS; its output database does.
     assert "FILE" not in outputs
     assert outputs.endswith("*END STEP\n")
+
+
+def test_settings_of_a_design_take_its_density() -> None:
+    laminate = build(load_design("1dof-5mm", ("films.tpe.density=1000",)))
+    settings = deck_settings(laminate)
+    assert settings.film == pytest.approx((10, 0.2, 1e-9))
+    assert settings.pressures == {"chamber1": 6.0}

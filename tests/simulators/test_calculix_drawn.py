@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from docs.scripts.drawn_runs import DECKS
+from docs.scripts.measured import record
 from sbafab.actuators import build, load_design
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.meshing.conforming.mesh import Mesh
@@ -19,6 +21,7 @@ from sbafab.simulators.calculix.run import (
     Frame,
     deck_mesh,
     films_meet,
+    find_ccx,
     history,
     read_frd,
     run_ccx,
@@ -160,3 +163,38 @@ def deck_of(template: str) -> tuple[Mesh, DeckSettings]:
     laminate = build(load_design(template))
     mesh = deck_mesh(laminate, MeshSettings(h=case.h, symmetry=case.symmetry))
     return mesh, deck_settings(laminate, SimulationRequest(LOW * case.pressure), "static")
+
+
+def test_the_array_rose_as_two_clamped_plates() -> None:
+    """2 p a^4 / 64 D of 8 mm pouches, D of 0.2 mm at 300 MPa; the strips give a little."""
+    rise = float(record("drawn_decks").tables["decks"].cell("array", "thicker by, mm"))
+    stiffness = 300 * 0.2**3 / (12 * (1 - 0.3**2))
+    pressure = DECKS["array"].pressure / 1000
+    assert rise == pytest.approx(2 * pressure * 4**4 / (64 * stiffness), rel=0.12)
+
+
+def test_inertia_is_little_where_a_working_pressure_was_reached() -> None:
+    table = record("drawn_decks_furthest").tables["decks"]
+    reached = [row for row in table.rows if row[-1] == "reached"]
+    assert reached
+    for name, *_ in reached:
+        assert float(table.cell(name, "kinetic energy, %")) < 1
+
+
+@pytest.mark.long
+@needs_ccx
+@pytest.mark.parametrize("template", sorted(DECKS.keys() - {*RUN, "vacuum"}))
+def test_ccx_reads_the_deck_of_every_other_drawn_template(template: str, tmp_path: Path) -> None:
+    """As far as the matrix of the flat films."""
+    mesh, settings = deck_of(template)
+    write_deck(started(mesh, settings), settings, tmp_path)
+    deck = tmp_path / "actuator.inp"
+    text, steps = re.subn(r"\*STATIC\n.*\n", "*NO ANALYSIS\n", deck.read_text("ascii"))
+    assert steps == 1
+    deck.write_text(text, "ascii")
+    # Without an analysis it ends with a code of its own, whatever it has read.
+    ended = subprocess.run(
+        [find_ccx(), "-i", "actuator"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert "*ERROR" not in ended.stdout
+    assert "stiffness/mass contributions" in ended.stdout

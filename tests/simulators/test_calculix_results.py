@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -23,6 +25,7 @@ from sbafab.simulators.calculix.run import (
     deformed_png,
     history,
     history_csv,
+    history_svg,
     read_frd,
     write_deformed,
 )
@@ -190,3 +193,19 @@ def test_picture_shows_the_stress_by_colour(monkeypatch: pytest.MonkeyPatch) -> 
     # Dark blue where there is none, yellow where it is highest (shaded a little).
     assert ((red < 80) & (green < 20) & (blue > 60)).any()
     assert ((red > 180) & (green > 170) & (blue < 50)).any()
+
+
+def test_plot_draws_every_state_and_names_its_axes() -> None:
+    _, _, (start, end) = states_of("quarter")
+    pressures = {"left": 6.0, "right & up": 3.0}
+    volumes = {"left": 19.0, "right & up": 9.0}
+    states = [
+        replace(start, pressures=dict.fromkeys(pressures, 0.0), volumes=volumes),
+        replace(end, pressures=pressures, volumes=volumes),
+    ]
+    root = ET.fromstring(history_svg("a < b", states))
+    texts = ["".join(text.itertext()) for text in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert {"a < b", "stroke, mm", "volume, ul", "stress, MPa", "left", "right & up"} <= set(texts)
+    assert texts.count("pressure in left, kPa") == 3
+    curves = [g.get("id", "") for g in root.iter("{http://www.w3.org/2000/svg}g")]
+    assert {"curve1.1", "curve2.1", "curve2.2", "curve3.1"} <= set(curves)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from docs.scripts.axisymmetric import axisymmetric_strokes
 from sbafab.actuators import build, load_design
 from sbafab.cli import app
 from sbafab.errors import OutputError, VoidError
@@ -194,3 +195,18 @@ def test_what_ended_a_run(
     reached, stopped = run_ccx(tmp_path, "job", 0.5 if reason == "None" else 1.0, 30.0)
     assert reached == 0.5
     assert reason in str(stopped)
+
+
+@needs_ccx
+def test_a_run_that_diverges() -> None:
+    # A film as soft as this thins faster than its curvature grows: it bursts.
+    with pytest.raises(OutputError, match="kPa: its iterations no longer converge"):
+        axisymmetric_strokes([6.0, 3000.0])
+
+
+def test_a_run_that_takes_too_long_is_stopped(tmp_path: Path, stand_in: StandIn) -> None:
+    stand_in("ccx", f"{HALF_WAY}\nimport time\ntime.sleep(600)")
+    told: list[float] = []
+    ending = run_ccx(tmp_path, "job", 1.0, 1.5, told.append)
+    assert ending == (0.5, ("time", "it was stopped after 0.025 minutes"))
+    assert told[-1] == 0.5

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
 import sbafab
+from sbafab.errors import DesignError
 from sbafab.simulators.shell_model import (
     Meridian,
     Shell,
@@ -21,6 +23,7 @@ from sbafab.simulators.shell_model import (
     holding,
     round_stack,
     standing,
+    why_not_round,
 )
 
 LOBED = "3dof-15mm"
@@ -146,3 +149,24 @@ def test_the_meridian_keeps_its_length_and_volume(neck: float, length: float, sl
     assert meridian.volume == pytest.approx(both, rel=1e-6)
     place = int(np.searchsorted(np.cumsum(np.hypot(np.diff(x), np.diff(y))), 0.4 * length))
     assert meridian.point(0.4 * length) == pytest.approx((x[place], y[place]), abs=1e-3)
+
+
+def test_mass_and_stiffness_are_those_of_the_film() -> None:
+    """Of one balloon: two films of the plate's area; chords lose a few per cent of it."""
+    one = mesh_of("1dof-5mm", "stack.balloons=1")
+    plate = math.pi * 3.25**2 * 0.038 * 1122e-9
+    assert one.mass == pytest.approx(2 * plate * 4 * math.sin(math.tau / 8) / math.pi, rel=1e-6)
+    thick = mesh_of("1dof-5mm", "films.tpe.thickness=0.05")
+    assert [group.stiffness for group in thick.membranes] == pytest.approx([500, 1000])
+    bending = {group.name: group.stiffness for group in thick.bending}
+    single = 10_000 * 0.05**3 / 12 / 0.96
+    assert bending["bend_lower"] == pytest.approx(single)
+    assert bending["bend_web"] == pytest.approx(8 * single)
+
+
+def test_unsuited_designs_are_refused_with_the_reason(square: Path) -> None:
+    drawn = sbafab.build("1dof-5mm", "stack.balloons=2", f"chamber.outline={square}")
+    with pytest.raises(DesignError, match=r"x 0\.000, y 0\.000 is drawn otherwise"):
+        round_stack(drawn)
+    assert "lie on a sheet" in (why_not_round(sbafab.build("radial-15mm")) or "")
+    assert why_not_round(sbafab.build("1dof-5mm")) is None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from functools import cache
@@ -16,7 +18,7 @@ import sbafab
 from sbafab.errors import OutputError
 from sbafab.runtime import ignore_progress
 from sbafab.simulators.mujoco import run as of_mujoco
-from sbafab.simulators.mujoco.run import export, inflate, run, shell_of
+from sbafab.simulators.mujoco.run import export, inflate, run, shell_of, why_not
 from sbafab.simulators.shell_model import round_stack
 from sbafab.simulators.simulator import Result, SimulationRequest
 from tests.quick import few
@@ -171,3 +173,46 @@ def test_without_a_fitting_mujoco_the_extra_is_named(
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(OutputError, match=r'pip install "sbafab\[mujoco\]"'):
         run(*ask)
+
+
+def test_a_name_with_two_hyphens_is_no_end_of_a_comment(tmp_path: Path) -> None:
+    path = written(tmp_path, *BALLOON, "name=a--b")
+    assert mujoco.MjModel.from_xml_path(str(path)).nflex == 3
+
+
+def test_the_script_says_the_same(tmp_path: Path) -> None:
+    written(tmp_path, *BALLOON, pressure=6)
+    command = [sys.executable, "inflate.py", "--seconds=3"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    words = done.stdout.splitlines()[-1].split()
+    assert words[:3] == ["3.00", "s", "tip"]
+    found = inflated((6.0,), BALLOON, 8, 3)
+    assert float(words[5]) == pytest.approx(found.last.stroke, abs=2e-3)
+    assert float(words[-2]) == pytest.approx(found.volumes["chamber1"], abs=2e-2)
+
+
+def test_it_is_one_of_the_simulators(tmp_path: Path) -> None:
+    laminate = sbafab.build(*BALLOON)
+    assert why_not(laminate) is None
+    assert "lie on a sheet" in (why_not(sbafab.build("radial-15mm")) or "")
+    found = run(laminate, SimulationRequest(6.0, seconds=2.0), tmp_path, ignore_progress)
+    assert {file.name for file in tmp_path.iterdir()} == {
+        "actuator.xml",
+        "actuator.json",
+        "inflate.py",
+    }
+    rows = {name: value for name, value, _ in found.rows}
+    assert rows["air chamber1"] == found.volumes["chamber1"]
+    json.dumps(found.as_dict())
+
+
+def test_a_balloon_holds_less_than_a_mylar_balloon_that_stretches() -> None:
+    """1.2185 l^3 = 19.04 ul at l = 2.5, if it folds freely; films of 6 kPa stretch by some 3 %."""
+    (volume,) = inflated((6.0,), BALLOON, 16, 3).volumes.values()
+    assert 0.6 * 19.04 < volume < 19.04 * 1.03**3
+
+
+def test_a_stack_rises_more_than_a_balloon() -> None:
+    one = inflated((6.0,), BALLOON, 8, 3).last.stroke
+    stack = inflated((6.0,), ("1dof-5mm", "stack.balloons=3"), 8, 3)
+    assert 2 * one < stack.last.stroke < 4 * one

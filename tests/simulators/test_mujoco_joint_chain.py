@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import sbafab
+from sbafab.models.joint_chain import JOINTS, joint_values, urdf_text
 from sbafab.models.stack import Stack
 from sbafab.simulators.mujoco.mjcf import ACCURACY, chain_text, length_of
 
@@ -91,3 +93,26 @@ def test_where_balloons_are_flat_there_are_no_controls(stacks: dict[str, Stack])
     text = chain_text("flat", stacks["1dof-5mm"], (0.0,))
     assert "there are no controls" in text
     assert mujoco.MjModel.from_xml_string(text).nu == 0
+
+
+def test_a_film_without_density_has_a_mass_that_stands_in(stacks: dict[str, Stack]) -> None:
+    stack = replace(stacks["1dof-5mm"], weight=None)
+    text = chain_text("light", stack, (10.0,))
+    assert "a film has no density" in text
+    model = mujoco.MjModel.from_xml_string(text)
+    assert float(model.body_mass.sum()) == pytest.approx(6e-5)
+
+
+def test_mujoco_reads_the_urdf_as_the_same_chain(stacks: dict[str, Stack]) -> None:
+    stack = stacks["lobed"]
+    model = mujoco.MjModel.from_xml_string(urdf_text("lobed", stack))
+    state = mujoco.MjData(model)
+    pose = stack.pose((10.0, 0.0, 0.0))
+    values = joint_values(pose.freedoms)
+    values[:, 2] /= 1000
+    for (level, place), value in np.ndenumerate(values):
+        state.joint(f"level{level + 1}_{JOINTS[place]}").qpos = value
+    mujoco.mj_kinematics(model, state)
+    for level, place in enumerate(pose.frames[0][1:], start=1):
+        assert 1000 * state.body(f"plate_{level}").xpos == pytest.approx(place, abs=1e-3)
+    assert float(model.body_mass.sum()) == pytest.approx(5 * stack.level_weight / 9806.65)

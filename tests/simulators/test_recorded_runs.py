@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.errors import OutputError, VoidError
+from sbafab.errors import DesignError, OutputError, VoidError
 from sbafab.laminate.laminate import Laminate
 from sbafab.runtime import ignore_progress
 from sbafab.simulators.shell_model import nearly_flat
@@ -26,7 +26,7 @@ from sbafab.simulators.simulator import (
     read_nodes,
     run_program,
 )
-from sbafab.simulators.sofa.run import run
+from sbafab.simulators.sofa.run import read_log, run
 from sbafab.simulators.sofa.scenes import scenes_of
 from tests.simulators.conftest import StandIn
 
@@ -205,3 +205,26 @@ def test_films_in_each_other_are_measured_along_their_normal() -> None:
     for apart, volume in ((0.4, 0.0), (-0.3, 4 * 0.3)):
         end = (flat + np.repeat([[0, 0, 0], [0, 0, apart]], 4, axis=0)) @ turn.T
         assert overlap(end, flat, start, films) == pytest.approx(volume)
+
+
+def test_a_run_that_takes_too_long_keeps_what_it_has_reached(
+    tmp_path: Path, stand_in: StandIn
+) -> None:
+    stand_in("runSofa", f"{SOFA}\nwrite(0, 1)\nwrite(0.1, 1.5)\ntime.sleep(60)")
+    found = ran(tmp_path, minutes=0.02)
+    assert found.last.time == pytest.approx(0.1)
+    assert "ran to 0.1 of 0.2 s: it was stopped after 0.02 minutes" in str(found.stopped)
+
+
+def test_each_scene_is_run_with_its_own_step(tmp_path: Path, stand_in: StandIn) -> None:
+    stand_in("runSofa", f"{GOOD}open('arguments', 'w').write(' '.join(sys.argv[1:]))")
+    ran(tmp_path, "frames")
+    assert (tmp_path / "sofa" / "arguments").read_text() == "-g batch -n 5 recorded.scn"
+    with pytest.raises(DesignError, match="scene beam needs three chambers or more"):
+        ran(tmp_path, "beam")
+
+
+def test_other_words_of_a_log_and_other_plugins_void_nothing() -> None:
+    assert read_log("nanometre and banana\n", []) == (None, None)
+    missing = '[ERROR] [PluginManager] Plugin not found: "SofaOpenGL"'
+    assert read_log(missing, ["Sofa.Component.Mass"]) == (None, None)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -203,3 +204,42 @@ def test_a_result_is_kept_where_its_folder_is_taken_meanwhile(
             kept = json.loads((out / name / "result.json").read_text())
             assert kept["tip"] == pytest.approx([0, 0, 1])
             assert (out / name / "actuator.scn").is_file()
+
+
+def test_a_design_that_breaks_a_rule_is_not_simulated(tmp_path: Path) -> None:
+    arguments = ["simulate", "1dof-5mm", "--with", "sofa", "--export", "-o", str(tmp_path)]
+    result = CliRunner().invoke(app, [*arguments, "--set", "bond.width=0.5"])
+    assert result.exit_code == 1
+    assert "bond-width" in result.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("kpa", "warned"), [("183", False), ("184", True)])
+def test_past_this_designs_burst_is_warned_of(kpa: str, warned: bool, tmp_path: Path) -> None:
+    """Pockets twice as wide as the paper's, which burst at 367 kPa: half of that by film stress."""
+    arguments = ["1dof-10mm", "--with", "sofa", "--export", "--pressure", kpa, "-o", str(tmp_path)]
+    result = CliRunner().invoke(app, ["simulate", *arguments])
+    assert result.exit_code == 0
+    assert ("past the estimated burst pressure" in result.stderr) == warned
+
+
+def test_a_simulator_that_cannot_take_a_design(tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        app, ["simulate", "radial-15mm", "--with", "mujoco", "--export", "-o", str(tmp_path)]
+    )
+    assert result.exit_code == 2
+    assert "lie on a sheet" in result.stderr
+
+
+def test_results_of_another_input_are_not_kept(tmp_path: Path) -> None:
+    common = ["1dof-5mm", "--with", "sofa", "--export", "-o", str(tmp_path)]
+    assert CliRunner().invoke(app, ["simulate", *common]).exit_code == 0
+    folder = tmp_path / "1dof-5mm"
+    (folder / "sofa" / "tip.state").write_text("of a run")
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["files"]["sofa/tip.state"] = sha256(b"of a run").hexdigest()
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    assert CliRunner().invoke(app, ["press", "1dof-5mm", "-o", str(tmp_path)]).exit_code == 0
+    assert (folder / "sofa" / "tip.state").exists()
+    assert CliRunner().invoke(app, ["simulate", *common, "--pressure", "2"]).exit_code == 0
+    assert not (folder / "sofa" / "tip.state").exists()

@@ -104,3 +104,31 @@ def test_dead_frames_are_told_by_where_the_tip_lies(
     monkeypatch.setattr(scenes, "pair_of_frames", lambda z, height, count: ((0, 1), (0.0, 1.0)))
     with pytest.raises(OutputError, match="its result cannot be: the tip lies at 0, 0, 0"):
         ran(tmp_path, ("3dof-15mm", "stack.balloons=2"), 5.0, 0.5, "beam")
+
+
+THREE = {1: 2.17, 2: 2.77, 5: 3.73, 10: 4.59}
+"""Stroke of three balloons on one axis: a quarter of C3D15 wedges in CalculiX, which ripples."""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kpa", [1, 10])
+def test_three_balloons_rise_as_calculix_s_do(tmp_path: Path, kpa: int) -> None:
+    done = ran(tmp_path, ("1dof-5mm", "stack.balloons=3"), kpa, 6.0)
+    assert done.figures["drift"] < 0.025
+    assert done.last.stroke == pytest.approx(THREE[kpa], rel=0.1)
+
+
+@pytest.mark.long
+def test_six_balloons_driven_by_volume(tmp_path: Path) -> None:
+    """As much air as pressure lets in lifts them as high."""
+    done = ran(tmp_path, ("1dof-5mm",), 5.0, 4.0, "volume")
+    assert done.figures["drift"] < 0.05
+    assert done.last.stroke == pytest.approx(6 * CAX8R[5], rel=0.1)
+
+
+@pytest.mark.long
+def test_a_drawn_pocket_rises(tmp_path: Path, square: Path) -> None:
+    """A square of 5 mm is higher than the disc in it, lower than that round it."""
+    design = ("1dof-5mm", "stack.balloons=3", f"chamber.outline={square}")
+    done = ran(tmp_path / "sofa", design, 5.0, 6.0)
+    assert THREE[5] < done.last.stroke < 2 * THREE[5]

@@ -13,14 +13,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 import sbafab
+from sbafab.errors import DesignError
 from sbafab.simulators.shell_model import round_stack
 from sbafab.simulators.simulator import SimulationRequest
 from sbafab.simulators.sofa.run import export
 from sbafab.simulators.sofa.scenes import (
     beam_of,
     conforming_shell,
+    prism,
     scenes_of,
 )
 
@@ -276,3 +279,69 @@ def test_other_pockets_have_the_shell_scene_alone(tmp_path: Path, square: Path) 
     for element in parsed(tmp_path / "sofa" / "actuator.scn").iter():
         if element.tag != "Node":
             assert set(element.attrib) <= known_fields(element.tag), element.tag
+
+
+def test_links_resolve(scene: ET.Element) -> None:
+    links = [
+        (path, value)
+        for path, element in walk(scene, [])
+        for value in element.attrib.values()
+        if value.startswith("@")
+    ]
+    assert len(links) >= 4
+    for path, link in links:
+        *ups, name = link[1:].split("/")
+        assert set(ups) <= {".."}
+        name, _, field = name.partition(".")
+        node = path[len(path) - 1 - len(ups)]
+        found = [e for e in node if e.attrib.get("name") == name and e.tag != "Node"]
+        assert len(found) == 1, link
+        assert not field or field in found[0].attrib
+
+
+def test_chambers_are_pressurised_apart() -> None:
+    laminate = sbafab.build("3dof-15mm", "stack.balloons=2")
+    pressures = {"chamber1": 4.0, "chamber2": 0.0, "chamber3": 2.5}
+    scene = ET.fromstring(scenes_of(laminate, pressures)["shell"].text().encode())
+    told = {
+        node.attrib["name"]: element.attrib
+        for node in scene.iter("Node")
+        for element in node.findall("SurfacePressureForceField")
+    }
+    assert {name: float(fields["pressure"]) for name, fields in told.items()} == pressures
+    assert told["chamber1"]["pressureSpeed"] == "4"
+    assert float(told["chamber3"]["pressureLowerBound"]) == pytest.approx(2.5, rel=1e-5)
+    assert "pulseMode" not in told["chamber2"]
+
+
+def test_prisms_are_closed_and_look_outward() -> None:
+    points, triangles = prism((4.25, 0.0), 10.9, 7.2)
+    surface = trimesh.Trimesh(points, triangles, process=False)
+    assert surface.is_watertight
+    assert surface.volume == pytest.approx(10.9 * 7.2)
+    assert surface.center_mass == pytest.approx([4.25, 0, 3.6])
+
+
+def test_scenes_that_are_fitted_say_so(folder: Path) -> None:
+    said = {name: (folder / name).read_text(encoding="utf-8").split("-->")[0] for name in SCENES}
+    assert all("Needs calibration" in said[name] for name in SCENES[1::2])
+    assert "SURROGATE" in said["actuator_beam.scn"]
+    assert "ARTIFICIAL: mass" in said["actuator.scn"]
+
+
+def test_volumes_that_cannot_be_are_refused(tmp_path: Path) -> None:
+    laminate = sbafab.build("1dof-5mm", "stack.balloons=1")
+    for volumes, words in (({"left": 3.0}, "left"), ({"chamber1": -1.0}, "must be 0 or more")):
+        with pytest.raises(DesignError, match=words):
+            export(laminate, SimulationRequest(volumes=volumes), tmp_path)
+
+
+def test_each_film_of_a_stack_stretches_as_itself() -> None:
+    """E t of TPE, of a cap of PET, and of the two bonded; 3,000 MPa, 0.012 mm."""
+    film = ("films.pet.kind=structural", "films.pet.product=P", "films.pet.thickness=0.012")
+    film += ("films.pet.density=1390", "films.pet.modulus=3000", "films.pet.poisson=0.3")
+    laminate = sbafab.build("1dof-5mm", "stack.balloons=1", *film, "layup.cap=pet")
+    groups = conforming_shell(laminate).membranes
+    stiffness = {round(group.stiffness): group.poisson for group in groups}
+    assert set(stiffness) == {380, 36_000, 36_380}
+    assert (stiffness[380], stiffness[36_000]) == (0.2, 0.3)
