@@ -62,3 +62,18 @@ def test_an_entity_marked_as_one_of_paper_space_is_refused() -> None:
     )
     with pytest.raises(OutputError, match="CIRCLE is in paper space"):
         read_profile(text)
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (lambda d, e: d.layers.get("REFERENCE").off(), "REFERENCE is off"),
+        (lambda d, e: d.layers.remove("CUT_OUTER"), "not in the layer table"),
+        (lambda d, e: e.dxf.set("thickness", 2.0), "2 mm high"),
+        (lambda d, e: setattr(e, "transparency", 0.5), "is transparent"),
+    ],
+)
+def test_what_may_be_skipped_is_refused(edit: Edit, said: str) -> None:
+    """The catalogue of faults has the other ways."""
+    with pytest.raises(OutputError, match=said):
+        read_profile(saved(edit))

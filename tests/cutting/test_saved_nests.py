@@ -66,3 +66,12 @@ def test_what_is_no_saved_nest_is_ignored(data: object) -> None:
 def test_a_spoilt_row_is_ignored(saved: Any, row: object) -> None:
     saved["nests"]["TPE"][0] = row
     assert from_dict(saved, PARTS, STOCKS) is None
+
+
+def test_another_stock_and_a_missing_row_or_material_are_nested_anew(saved: Any) -> None:
+    stocks = {**STOCKS, "PTFE": STOCKS["PTFE"].model_copy(update={"spacing": 0.8})}
+    assert from_dict(saved, PARTS, stocks) is None
+    del saved["nests"]["TPE"][0]
+    assert from_dict(saved, PARTS, STOCKS) is None
+    del saved["nests"]["TPE"]
+    assert from_dict(saved, PARTS, STOCKS) is None

@@ -116,7 +116,8 @@ def test_a_design_of_a_job_says_that_its_sheets_lie_elsewhere(clean_job: Path) -
     assert "above this one" in found[0].message
 
 
-JOB_FAULTS: list[tuple[str, Callable[[Claims], object]]] = [
+Change = Callable[[Claims], object]
+JOB_FAULTS: list[tuple[str, Change]] = [
     ("copies", lambda m: m["designs"][0].update(copies=1)),
     ("hash of a design", lambda m: m["designs"][1].update(design_sha256="0" * 64)),
     ("hash of all designs", lambda m: m.update(designs_sha256="0" * 64)),
@@ -128,12 +129,17 @@ JOB_FAULTS: list[tuple[str, Callable[[Claims], object]]] = [
 @pytest.mark.parametrize(
     "change", few([f[1] for f in JOB_FAULTS], 2), ids=[f[0] for f in JOB_FAULTS]
 )
-def test_wrong_claims_of_a_job_are_told(
-    change: Callable[[Claims], object], clean_job: Path, tmp_path: Path
-) -> None:
+def test_wrong_claims_of_a_job_are_told(change: Change, clean_job: Path, tmp_path: Path) -> None:
     doctor = Doctor(Path(shutil.copytree(clean_job, tmp_path / "batch")))
     doctor.set_manifest(change)
     assert rules_failing(doctor.folder) == {"manifest-claims"}
+
+
+def test_a_design_left_out_of_a_job_is_told(clean_job: Path, tmp_path: Path) -> None:
+    doctor = Doctor(Path(shutil.copytree(clean_job, tmp_path / "batch")))
+    doctor.set_manifest(lambda m: m["designs"].pop())
+    # The sheets hold more than what is left of the job makes.
+    assert rules_failing(doctor.folder) == {"manifest-claims", "as-designed"}
 
 
 def test_a_piece_missing_on_a_jobs_sheet_is_told(clean_job: Path, tmp_path: Path) -> None:

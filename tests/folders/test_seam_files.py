@@ -99,6 +99,26 @@ def test_bonds_are_measured_on_the_seam_as_it_is_drawn(
     assert (bond.verdict, bond.measured) == ("fail", pytest.approx(0.7, abs=1e-6))
 
 
+def test_a_path_that_is_moved_or_ends_early_is_found(
+    welded: dict[str, bytes], tmp_path: Path
+) -> None:
+    folder = laid_out(welded, tmp_path)
+    resave(folder, lambda document: moved(document, 0.3))
+    found = failures(folder)
+    assert "manifest-claims" in found
+    assert "seam rim is not what design.toml makes: its path is 0.300 mm off" in (
+        found["as-designed"].message
+    )
+
+    def shortened(document: Drawing) -> None:
+        (path,) = document.modelspace().query('LWPOLYLINE[layer=="SEAM"]')
+        path.set_points(path.get_points()[:-1])
+
+    folder = laid_out(welded, tmp_path)
+    resave(folder, shortened)
+    assert "leaks to the outside" in failures(folder)["sealing"].message
+
+
 SPOILED: list[tuple[Callable[[Drawing], object], str]] = [
     (
         lambda d: d.modelspace().add_circle((0, 0), 1, dxfattribs={"layer": "CUT_OUTER"}),

@@ -145,3 +145,17 @@ def test_parts_of_a_nest_that_lie_badly_are_not_let_through(
     ):
         generate(RunRequest(load_design("1dof-5mm", FEW), tmp_path, ("cut",)))
     assert not (tmp_path / "1dof-5mm").exists()
+
+
+def test_a_job_is_made_again_whole(tmp_path: Path) -> None:
+    """A folder of layer files is told by its place, not by letters in another folder's name."""
+    designs = [load_design("1dof-5mm", [*FEW, f"name={name}"]) for name in ("one", "multilayers")]
+    folder = generate(RunRequest(designs, tmp_path, name="both")).folder
+    assert as_designed(folder) == []
+    doctor = Doctor(folder / "multilayers")
+    path = doctor.folder / "press.json"
+    path.write_text(path.read_text().replace('"temperature_c": 135', '"temperature_c": 270'))
+    doctor.rehash()
+    Doctor(folder).rehash()
+    [said] = as_designed(folder)
+    assert said.startswith("multilayers/press.json is not what design.toml makes")

@@ -244,3 +244,32 @@ def test_a_table_that_reads_one_way_only_is_read(tmp_path: Path, name: str) -> N
 def test_a_table_that_cannot_be_understood_is_refused(text: str, says: str, tmp_path: Path) -> None:
     with pytest.raises(DesignError, match=says):
         read_measurements(table(tmp_path, text))
+
+
+def test_remarks_blank_and_empty_rows_are_skipped(tmp_path: Path) -> None:
+    rows = "A outer,x,20,19.9\n\nA outer,y,20,\nB window,y,10,10.1,\n"
+    assert read_measurements(table(tmp_path, f"# a remark, with commas\n{HEADER}{rows}")) == [
+        Measurement("outer", "x", 20.0, 19.9),
+        Measurement("window", "y", 10.0, 10.1),
+    ]
+
+
+def test_what_the_sizes_cannot_tell_is_not_claimed() -> None:
+    """A reading error from outsides alone, a scale read coarsely, anything from one row."""
+    outsides = [m for m in sizes(0.12, 0.12) if m.kind == "outer"]
+    assert calibrated(outsides, 0.001).overall.offsets == {}
+    assert not calibrated(sizes(0.12, 0.12, scale=0.9999), 0.1).overall.is_scaled
+    for count in (0, 1):
+        with pytest.raises(DesignError, match="needs 2"):
+            calibrated(sizes(0.1, 0.1)[:count], 0.01)
+
+
+def test_x_and_y_are_told_apart() -> None:
+    found = calibrated(sizes(0.12, 0.09), 0.001)
+    assert found.x is not None
+    assert found.y is not None
+    assert found.difference is not None
+    told = found.x.kerf.value, found.y.kerf.value, found.difference.value
+    assert told == pytest.approx((0.12, 0.09, 0.03), abs=1e-9)
+    assert found.differs
+    assert not calibrated(sizes(0.12, 0.12), 0.001).differs

@@ -10,7 +10,8 @@ import pytest
 import shapely
 
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.lab.coupon import SIZE, coupon, write_coupon
+from sbafab.errors import DesignError
+from sbafab.lab.coupon import SIZE, coupon, read_measurements, write_coupon
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -71,3 +72,15 @@ def test_it_fits_its_film_and_is_engraved_in_the_waste_alone(folder: Path) -> No
         line = shapely.LineString([(x, y) for x, y, *_ in stroke.get_points()])
         assert film.contains(line)
         assert line.distance(parts) > 0.5
+
+
+def test_sides_along_x_and_y_cannot_be_taken_for_each_other(folder: Path) -> None:
+    for box in (*boxes(folder, "CUT_OUTER"), *boxes(folder, "CUT_INNER")):
+        x0, y0, x1, y1 = box.bounds
+        assert x1 - x0 > y1 - y0 + 1
+
+
+def test_nothing_is_written_over_and_an_empty_table_has_no_measurements(folder: Path) -> None:
+    with pytest.raises(DesignError, match="exists"):
+        write_coupon(folder, "sbafab 0")
+    assert read_measurements(folder / "coupon.csv") == []

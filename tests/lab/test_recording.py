@@ -11,6 +11,7 @@ from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import assembly_sha256, assembly_toml, load
 from sbafab.assemblies.records import Assembly
 from sbafab.design.records import design_toml
+from sbafab.lab.builds import promised
 from sbafab.lab.recording import matching
 from sbafab.lab.store import Lab
 from sbafab.reports.traveller.page import record_text
@@ -63,3 +64,16 @@ def test_an_assembly_is_recorded_as_a_whole(tmp_path: Path) -> None:
     assert build.promise == pytest.approx(part.promise**3, abs=1e-4)
     scanned = record_text("standing", made.design_sha256)
     assert matching(scanned, "", records, builds) == [made, again]
+
+
+def test_a_proof_test_is_recorded_and_the_burst_is_scaled(tmp_path: Path) -> None:
+    """367 kPa of pockets of 5 mm (paper, Sec. 4) is less for wider ones by as much."""
+    lab = tmp_path / "lab.sqlite"
+    [found] = sbafab.record("1dof-5mm", lab=lab, serial="A1", leak="pass", proof_kpa=150, **SMALL)
+    assert found.numbers == {"proof_kpa": 150.0}
+    small = sbafab.load("1dof-5mm", **SMALL)
+    wide = small.with_({"chamber.diameter": 6.0})
+    burst = [promised(design).predicted["burst_kpa"][0] for design in (small, wide)]
+    assert burst == pytest.approx([367, 367 * 5 / 6])
+    other = small.with_({"films.tpe": {"product": "TPU", "thickness": 0.038}})
+    assert "burst_kpa" not in promised(other).predicted

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +16,7 @@ from sbafab.errors import DesignError
 from sbafab.lab.builds import RecordedDesign, promised
 from sbafab.lab.recording import matching
 from sbafab.lab.records import Record
-from sbafab.lab.report import Report, report
+from sbafab.lab.report import Report, report, success_svg
 from sbafab.lab.store import Lab
 from tests.lab.conftest import SHA, build, result
 
@@ -161,3 +162,24 @@ def test_a_mended_actuator_counts_by_its_first_attempt(lab: Lab) -> None:
     assert (overall.share.good, overall.share.builds, overall.passed_later) == (1, 2, 1)
     assert found.items == 2
     assert {c.quantity for c in found.comparisons} == {"stroke_mm", "burst_kpa"}
+
+
+def test_a_lot_of_another_design_may_use_the_same_serials(tmp_path: Path) -> None:
+    lab = tmp_path / "lab.sqlite"
+    sbafab.record("1dof-5mm", SMALL, lab=lab, serial="A1", leak="pass")
+    wider = {**SMALL, "bond": {"width": 0.8}}
+    sbafab.record("1dof-5mm", wider, lab=lab, serial="A1", leak="fail")
+    found = sbafab.report(lab)
+    assert found.items == 2
+    assert [s.name[:9] for s in found.success if s.by == "design"] == ["1dof-5mm "] * 2
+
+
+def test_the_chart_draws_the_share_so_far_and_of_the_last() -> None:
+    records, recorded = invented(LOTS[0], 0, 3)
+    svg = success_svg(records, {recorded.sha256: recorded})
+    curves = re.findall(r'id="curve1.\d">(.*?)</g>', svg)
+    assert [len(re.findall(r"[ML]\d", curve)) for curve in curves] == [60, 60, 60, 41]
+    assert "Success of 60 actuators" in svg
+    assert "last 20" not in success_svg(records[:19], {recorded.sha256: recorded})
+    with pytest.raises(DesignError, match="no leak test is recorded yet"):
+        success_svg([], {})

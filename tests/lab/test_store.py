@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.errors import DesignError, OutputError
-from sbafab.lab.records import Record, standing
+from sbafab.lab.records import HistoryEntry, Record, standing
 from sbafab.lab.store import Lab
 from tests.hardship.starting import WITHOUT_PRIVILEGES
 from tests.lab.conftest import SHA, build, result, step
@@ -230,3 +230,26 @@ def test_a_file_damaged_anywhere_is_one_sentence_or_whole(lab: Lab) -> None:
         else:
             assert len(records) in ((0, 12) if not content else (12,))
     assert refused > 50
+
+
+def test_lines_of_history_are_corrected_and_not_repeated(lab: Lab) -> None:
+    lab.add(SHA, build(), [step("A1"), step("A2")])
+    new = lab.correct(HistoryEntry, 1, {"temperature_c": "135,0"})
+    assert (new.id, new.corrects, new.serial, new.step) == (3, 1, "A1", "1")
+    assert new.readings == {"temperature_c": 135.0, "minutes": 20.0}
+    assert [entry.id for entry in standing(lab.contents().entries)] == [2, 3]
+    with pytest.raises(DesignError, match="entry e1 is corrected by entry e3 already"):
+        lab.correct(HistoryEntry, 1, {"note": "again"})
+    with pytest.raises(DesignError, match="A2 has this line already, entry e2"):
+        lab.add(SHA, None, [step("A2")])
+
+
+def test_tables_of_the_lab_s_own_are_no_harm(lab: Lab) -> None:
+    lab.add(SHA, build(), [result("A1", "fail")])
+    changed(
+        "CREATE VIEW failed AS SELECT content ->> 'serial' FROM record "
+        "WHERE content ->> 'leak' = 'fail'",
+        "CREATE TABLE shelf (serial TEXT, place TEXT)",
+    )(lab.path)
+    lab.add(SHA, None, [result("A2", "pass")])
+    assert len(lab.contents().records) == 2

@@ -102,6 +102,13 @@ def test_bond_and_overhang_grow_before_ears_and_no_more_than_needed() -> None:
     assert min(lower_end(*MORE, *less), lower_end(*MORE, *less, seed=CHECK_SEED)) < 0.97
 
 
+def test_a_rough_hand_takes_ears() -> None:
+    rough = ("registration.hand_placement=0.3", "registration.hand_turn=1.5")
+    found = reached(0.9, *rough)
+    assert found.changes == {"registration.method": "ears"}
+    assert is_good(found)
+
+
 def test_a_rough_plate_is_made_by_a_better_machine() -> None:
     found = reached(0.9, "registration.method=ears", "registration.plate_made_by=drill-press")
     assert found.changes["registration.plate_made_by"] in ("cnc-mill", "jig-borer")
