@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image, ImageDraw
 
@@ -79,14 +80,20 @@ def test_a_bar_tells_the_scale(coupon: Path, tmp_path: Path, run: Run) -> None:
         ("none.png", [], "is not a file"),
         ("bare.png", [], "states no resolution; give --dpi"),
         ("scan.png", ["--dpi", "300"], "does not show coupon"),
+        # Read as a sheet without its pieces, the film seems larger than drawn.
+        ("scan.png", ["--paper", "light"], ""),
         ("scan.png", ["--pins"], "--pins needs 2 pins"),
         ("scan.png", ["--bar", "55"], "no bar about that long"),
         ("scan.png", ["--bar", "-1"], "must be a length above 0 mm"),
+        ("dark.png", [], "film and paper differ by"),
+        ("tiny.png", [], "too small to measure"),
     ],
 )
 def test_bad_input_is_one_sentence(
     picture: str, more: list[str], says: str, coupon: Path, tmp_path: Path, run: Run
 ) -> None:
+    save(np.full((200, 200), 9, dtype=np.uint8), coupon / "dark.png", 400)
+    save(np.full((20, 20), 9, dtype=np.uint8), coupon / "tiny.png", 400)
     out = tmp_path / "out"
     arguments = ["inspect", str(coupon / "coupon/coupon.dxf"), str(coupon / picture), *more]
     code, printed, err = run(*arguments, "-o", str(out))
