@@ -50,6 +50,11 @@ def entity(text: str, kind: str) -> str:
         ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.0\n 40\n3.8\n", "touch or cross"),
         ("\n 40\n1.0\n", "\n 40\nwide\n", "not a sound DXF"),
         ("  0\nSECTION\n  2\nHEADER", "hello", "not an ASCII DXF"),
+        (" 70\n1\n 10\n", " 70\n0\n 10\n", "is open"),
+        ("$INSUNITS\n 70\n4", "$INSUNITS\n 70\n1", "not in millimetres"),
+        ("$MEASUREMENT\n 70\n1", "$MEASUREMENT\n 70\n0", "not in millimetres"),
+        ("  8\nCUT_OUTER\n100", "  8\n0\n100", "on layer 0"),
+        ("  8\nCUT_OUTER\n100", "  8\nCUT_INNER\n100", "is an outline but on CUT_INNER"),
     ],
 )
 def test_doctored_file_is_refused(

@@ -70,6 +70,7 @@ def test_what_sets_no_key_is_refused(assignment: str, says: str) -> None:
         (b"", "family is missing"),
         (b"a = " + b"[" * 5000, "is not valid TOML"),
         (b"#" * 1_100_000, "at most 1,000,000"),
+        (b'family = "lobed"\nname = ""', "name = ''"),
     ],
 )
 def test_bad_files_are_one_sentence(tmp_path: Path, content: bytes, says: str) -> None:

@@ -148,6 +148,11 @@ def test_an_unsound_seam_file_is_named(
         ("TOOL", "laser"),
         ("DESIGN_SHA256", "0" * 64),
         ("TOOL_OFFSET", "1, 2"),
+        ("LAYERS", "2, 3"),
+        ("ORDER", "2"),
+        ("SEAM", "other"),
+        ("KIND", "fin"),
+        ("UNITS", "inch"),
     ],
 )
 def test_what_a_seam_file_states_is_held_against_the_design(

@@ -239,6 +239,16 @@ def test_a_table_that_reads_one_way_only_is_read(tmp_path: Path, name: str) -> N
         (f"{HEADER}A outer,x,20,10000.1\n", "10000.1; .* above 0 and at most 10000"),
         (f"{HEADER}A outer,z,20,19.9\n", "axis must be x or y"),
         (f"{HEADER}A,x,20,19.9\n", "feature must end in outer, window or piece"),
+        (f"{HEADER}A outer,x,,19.9\n", "nominal_mm is '', not a number"),
+        (f"{HEADER}A outer,x,20,1_9\n", "'1_9', not a number"),
+        (f"{HEADER}A outer,x,24,0,23,9\n", "line 2 has 6 cells"),
+        (f"{HEADER[:-1]},\nA outer,x,24,23,9\n", "line 2 has 5 cells where the header has 4"),
+        (
+            "feature,nominal_mm,remark,axis,measured_mm\nA outer,24,5,x,23\n",
+            "may say 24 or 24,5 for nominal_mm",
+        ),
+        ("feature;axis;nominal_mm;measured_mm\nA outer;x;20;1.019,9\n", "not a number"),
+        (f"{HEADER}A outer,x,20,-19.9\n", "above 0"),
     ],
 )
 def test_a_table_that_cannot_be_understood_is_refused(text: str, says: str, tmp_path: Path) -> None:
