@@ -108,6 +108,16 @@ def test_the_kits_sources_count_in_the_hash(lab: Path) -> None:
 
 
 BAD = {
+    "modulus in another unit": (
+        "value = 10.0",
+        'value = "1450 psi"',
+        r"modulus = '1450 psi' must be a number, in MPa, or a text with its unit \(or kPa, GPa\)",
+    ),
+    "value out of range": (
+        "value = 0.038",
+        "value = 38",
+        r"films.tpe.thickness = 38 must be at most 1 mm",
+    ),
     "number without a source": (
         'thickness = { value = 0.038, source = "paper, Sec. 2" }',
         "thickness = 0.038",

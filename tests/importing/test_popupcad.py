@@ -370,6 +370,10 @@ UNREAD: dict[str, tuple[list[str], str]] = {
         ],
         "hinge.cad, operation 1 (holes): operations of class HoleOperation are not read",
     ),
+    "a later one": (
+        [combined(1, "union", [2], []), drawn(2, 1)],
+        "takes operation 2, which is not",
+    ),
     "a sketch": ([drawn(1, 77)], "operation 1 (SimpleSketchOp) takes a sketch that is not there"),
     "no list": (
         [drawn(1, 1).replace("sketch: [1]", "sketch: 1")],
@@ -449,7 +453,16 @@ def test_no_object_is_made_and_no_code_is_run(tmp_path: Path) -> None:
     assert not mark.exists()
 
 
-def test_a_layer_that_is_not_there_is_refused(importing: Importing, tmp_path: Path) -> None:
-    rows = ROWS.replace("film/1", "lid/1")
-    said = importing(pouch(tmp_path, rows=rows)).output
-    assert "'lid/1' of hinge.cad is no OPERATION/NUMBER; the operation is one of 1 to 4" in said
+@pytest.mark.parametrize(
+    ("layer", "sentence"),
+    [
+        ("1", "layer '1' of hinge.cad is no OPERATION/NUMBER"),
+        ("lid/1", "'lid/1' of hinge.cad is no OPERATION/NUMBER; the operation is one of 1 to 4"),
+        ("film/9", "hinge.cad has no layer '9'; its layers are 1 to 3"),
+        ("9/1", "the operation is one of 1 to 4"),
+    ],
+)
+def test_a_layer_that_is_not_there_is_refused(
+    layer: str, sentence: str, importing: Importing, tmp_path: Path
+) -> None:
+    assert sentence in importing(pouch(tmp_path, rows=ROWS.replace("film/1", layer))).output
