@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from sbafab.cutting.cut_settings import DxfProfile
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.dxf_write import dxf_text, number
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.contour import in_reading_order
@@ -79,3 +79,11 @@ def test_extents_bound_the_drawing(plate: Region, plate_text: str) -> None:
     assert high is not None
     found = [float(value) for value in (*low.groups(), *high.groups())]
     assert found == pytest.approx(plate.bounds, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(-0.0, "0.0"), (-1e-12, "0.0"), (2.5, "2.5"), (1e-7, "0.0000001"), (1 / 3, "0.333333333")],
+)
+def test_numbers_have_no_exponent_and_no_negative_zero(value: float, text: str) -> None:
+    assert number(value) == text

@@ -149,3 +149,9 @@ def test_five_folded_pouches_lie_on_one_sheet() -> None:
     assert len(result.placements) == 5
     assert result.sheets == 1
     judged(result)
+
+
+def test_only_turns_that_the_stock_allows_are_used() -> None:
+    triangle = polygon([(0.0, 0.0), (7.0, 0.0), (2.0, 11.0)])
+    for laid in lattices_of(triangle, 1.0, (0.0, 0.0, 50.0, 80.0), (0, 2)):
+        assert {turn for turn, _ in laid.places} <= {0, 2}

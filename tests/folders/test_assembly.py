@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -109,6 +110,27 @@ def words(node: Any) -> str:
     return " ".join(node.text_content().split())
 
 
+def test_names_on_the_page_are_one_each_and_every_link_leads_somewhere(brace: Run) -> None:
+    """Two designs stand on one page."""
+    tree = lxml_html.fromstring((brace.folder / "traveller.html").read_text(encoding="utf-8"))
+    names = Counter(node.get("id") for node in tree.iter() if node.get("id"))
+    assert [name for name, count in names.items() if count > 1] == []
+    links = {
+        value.removeprefix("#")
+        for node in tree.iter()
+        for name, value in node.attrib.items()
+        if name in ("href", "aria-labelledby") and not value.startswith("data:")
+    }
+    assert links <= set(names)
+
+
+def test_moulds_are_closed_bodies(brace: Run) -> None:
+    page = (brace.folder / "traveller.html").read_text(encoding="utf-8")
+    moulds = set(re.findall(r"mesh/[^\s<\"]*mould[^\s<\"]*\.stl", page))
+    assert len(moulds) == 2
+    assert all(trimesh.load(brace.folder / path).is_watertight for path in moulds)
+
+
 def test_the_total_counts_what_is_known_where_press_minutes_are_not(
     aperture: Run, tmp_path: Path
 ) -> None:
@@ -137,6 +159,14 @@ def test_a_failed_check_leaves_findings_and_nothing_to_cut(tmp_path: Path) -> No
     told = json.loads((run.folder / "checks.json").read_text(encoding="utf-8"))
     failed = {f["rule"] for f in told["findings"] if f["verdict"] == "fail"}
     assert failed == {"seat"}
+
+
+@pytest.mark.long
+def test_a_failed_rule_of_one_design_stops_all(tmp_path: Path) -> None:
+    keys = [*BRACE, "parts.arm.set.bond.width=0.4"]
+    run = generate(RunRequest(load_assembly("brace", keys), tmp_path))
+    assert run.failed
+    assert not list(run.folder.rglob("*.dxf"))
 
 
 @pytest.mark.long
@@ -195,6 +225,17 @@ def test_a_moved_part_is_found(standing: Run, tmp_path: Path) -> None:
     path.write_text(json.dumps(told), encoding="utf-8")
     said = claims_failed(folder)
     assert said.startswith("manifest-claims: manifest.json: parts.2.shift.1 is 16.0, not 15.0")
+
+
+@pytest.mark.long
+def test_another_design_file_is_found(standing: Run, tmp_path: Path) -> None:
+    folder = doctored(standing, tmp_path)
+    path = folder / "design.toml"
+    path.write_text(path.read_text("utf-8").replace("angle = 60.0", "angle = 30.0"), "utf-8")
+    said = claims_failed(folder)
+    assert "manifest-claims: manifest.json: " in said
+    assert "as-designed: traveller.html is not what design.toml makes" in said
+    assert "design.toml was changed" in said
 
 
 def test_a_broken_design_file_is_found(aperture: Run, tmp_path: Path) -> None:

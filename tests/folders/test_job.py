@@ -40,6 +40,8 @@ def test_every_design_has_its_folder_and_the_sheets_are_shared(job: Run) -> None
     for name in ("1dof-5mm", "3dof-15mm"):
         made = {path.name for path in (job.folder / name).iterdir()}
         assert {"layers", "press.json", "traveller.html", "mesh", "manifest.json"} <= made
+        page = (job.folder / name / "traveller.html").read_text(encoding="utf-8")
+        assert "../sheets/TPE_1.dxf" in page
 
 
 def test_the_sheets_hold_every_layer_of_every_design_as_often_as_ordered(job: Run) -> None:

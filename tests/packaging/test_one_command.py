@@ -64,6 +64,12 @@ def test_a_check_that_fails_is_shown_and_named_at_the_end(
     )
 
 
+def test_tests_that_fail_fail_the_command(
+    monkeypatch: pytest.MonkeyPatch, capfdbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    assert run(monkeypatch, capfdbinary, {"good": "pass"}, "raise SystemExit(5)")[0] == 1
+
+
 def is_long(case: object) -> bool:
     return any(mark.name == "long" for mark in getattr(case, "marks", ()))
 

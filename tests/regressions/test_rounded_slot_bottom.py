@@ -78,3 +78,11 @@ def test_a_drop_is_as_wide_as_its_round_end() -> None:
     width = least_width(drop, 15.0)
     assert width is not None
     assert width.value == pytest.approx(2.0, abs=1e-6)
+
+
+def test_a_blunter_or_filleted_corner_is_no_slot() -> None:
+    assert least_gap(PLATE - wedge(0.3, 35.0), SHARP) is None
+    for angle in (60.0, 90.0, 120.0):
+        x, y = unit(angle)
+        notched = disc((0.0, 0.0), 4.0) - polygon([(0.0, 0.0), (9.0, 0.0), (9.0 * x, 9.0 * y)])
+        assert least_gap(fillet(notched, 0.05), SHARP) is None

@@ -11,9 +11,11 @@ import pytest
 
 import sbafab
 from sbafab.reports.charts import (
+    COLOURS,
     ChartBars,
     ChartCurve,
     ChartPoints,
+    ChartSpecks,
     Panel,
     chart_svg,
     relation_svg,
@@ -129,3 +131,29 @@ def test_bars_stand_on_each_other_above_their_names() -> None:
     x, low, height = upper[0]
     assert (x, low + height) == pytest.approx(lower[0][:2])
     assert {"4", "4.5", "long", "a", "b"} <= set(texts(svg))
+
+
+def test_curves_differ_in_colour_and_in_dashes() -> None:
+    svg = panel([curve(0.0, float(n)) for n in range(6)])
+    styles = [next(group(svg, f"curve1.{n}").iter(f"{SVG}path")).attrib for n in range(1, 7)]
+    assert [style["stroke"] for style in styles] == list(COLOURS[:6])
+    assert len({style.get("stroke-dasharray") for style in styles}) == 6
+
+
+def test_specks_lie_where_the_ticks_say_and_equal_ones_are_drawn_once() -> None:
+    specks = ChartSpecks("many", [1.0, 1.0, 4.0] * 1000, [2.0, 2.0, 3.0] * 1000, "#111111", 1)
+    svg = panel(specks=[specks])
+    (places,) = paths(group(svg, "specks1.1"))
+    across, up = ticks(svg, "x"), ticks(svg, "y")
+    # To a quarter of a millimetre.
+    for found, expected in zip(places, [(across[1], up[2]), (across[4], up[3])], strict=True):
+        assert found == pytest.approx(expected, abs=0.13)
+
+
+def test_panels_stand_in_rows_below_each_other() -> None:
+    panels = [Panel(name, "x", "y", [curve(0.0, 1.0)]) for name in "abcd"]
+    (wide, low), (narrow, high) = (
+        map(float, ET.fromstring(chart_svg("t", panels, count)).attrib["viewBox"].split()[2:])
+        for count in (4, 2)
+    )
+    assert (narrow, high) == pytest.approx((wide / 2, 2 * low))

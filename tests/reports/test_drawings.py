@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -13,6 +14,7 @@ from PIL import ImageFont
 from svgelements import Path as SvgPath
 
 from sbafab.actuators import build, load_design
+from sbafab.design.files import design_path
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.layers_svg import layers_svg
@@ -237,3 +239,25 @@ def test_seams_and_folds_are_cut_where_they_lie(tmp_path: Path) -> None:
     # From the chamber's centre at y = -1 to the line at y = -12; the film lies toward the mouth.
     assert (fold.s, fold.is_ahead) == (pytest.approx(-11), True)
     assert stack_svg(folded).count("stroke-dasharray") == 2
+
+
+def test_widths_and_heights_are_to_their_two_scales() -> None:
+    svg = stack_svg(laminate_of("1dof-5mm", "stack.balloons=2"))
+    (factor,) = map(int, re.findall(r"Height exaggerated (\d+)\u00d7", svg))
+    across = (297 - 2 * 56) / (8.75 + 3.75)
+    found = {
+        (
+            box.attrib["fill"],
+            round(float(box.attrib["width"]) / across, 3),
+            round(float(box.attrib["height"]) / across / factor, 4),
+        )
+        for box in root_of(svg).iter(f"{SVG}rect")
+    }
+    assert {(BOND, 0.75, 0.025), ("#a9cfea", 6.5, 0.038), ("#a9cfea", 11.5, 0.038)} <= found
+
+
+def test_films_are_drawn_though_the_chamber_lies_beside_all_of_them(tmp_path: Path) -> None:
+    text = design_path("pouch").read_text(encoding="utf-8")
+    beside = text.replace("centres = [[0, 0]]", "centres = [[100, 0]]")
+    assert beside != text
+    assert "1 base" in words_of(root_of(stack_svg(written(tmp_path, beside))))

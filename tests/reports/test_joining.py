@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -73,3 +74,17 @@ def test_supply_tubes_run_where_no_balloon_opens() -> None:
     crossing = joint(together("brace", arm={"turn": 0}), "arm").supply
     assert {name for run in crossing for name in run.over} == {"grip"}
     assert joint(together("aperture"), "arm").supply == ()
+
+
+def test_stacked_actuators_go_by_each_others_tabs() -> None:
+    second = {"kind": "sba", "design": "1dof-5mm", "on": "arm", "at": "top", "turn": 90}
+    assert joint(together("aperture", second=second), "second").heading == 90
+    tube = {"kind": "tube", "on": "arm", "at": "top", "turn": 30}
+    assert joint(together("aperture", tube=tube), "tube").heading == 30
+
+
+def test_a_wrap_is_glued_with_what_its_design_names() -> None:
+    bare = together("brace")
+    part = bare["grip"].part.model_copy(update={"glue": None})
+    parts = tuple(replace(p, part=part) if p.name == "grip" else p for p in bare.parts)
+    assert joint(replace(bare, parts=parts), "grip").glue == "3M 1587"

@@ -73,3 +73,18 @@ def test_a_long_sheet_is_drawn_in_rows_across_the_page(sheet_files: Any) -> None
     assert moved.bounds == pytest.approx((*corner, *far), abs=0.01)
     # Turned, not mirrored: the page's y points down, so the determinant stays negative.
     assert a * d - b * c < 0
+
+
+def test_labels_hide_no_window(sheet_files: Any) -> None:
+    _, laminate = built("radial-15mm")
+    for sheet in (one for one in sheet_files(laminate) if one.material == "PTFE"):
+        svg = drawn(sheet, "radial-15mm")
+        frame = max(svg.iter("rect"), key=lambda rect: float(rect.get("width")))
+        scale = float(frame.get("width")) / sheet.width
+        foot = float(frame.get("y")) + float(frame.get("height"))
+        for placement in sheet.nest.on_sheet(sheet.number - 1):
+            for hole in sheet.nest.region(placement).holes:
+                points = [(0.5 + scale * x, foot - scale * y) for x, y in hole.polygon()]
+                window = shapely.Polygon(points)
+                hidden = sum(box.intersection(window).area for box in boxes(svg))
+                assert hidden < 0.2 * window.area

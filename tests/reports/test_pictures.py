@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner
-from PIL import Image
+from PIL import Image, ImageDraw
+from shapely.geometry import Polygon
 
 import sbafab
+from sbafab.assemblies.shapes import BOUGHT, FILMS, linear
 from sbafab.cli import app
 from sbafab.errors import DesignError
 from sbafab.geometry.region import disc, rectangle
@@ -30,7 +32,7 @@ from sbafab.reports.inflated_picture import (
     pose_of,
     write_picture,
 )
-from sbafab.reports.solid_png import cutaway, solid_png
+from sbafab.reports.solid_png import assembly_png, cutaway, keyhole, solid_png
 
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 CHANGES = ("stack.balloons=4",)
@@ -244,3 +246,35 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(
     code, said = run(*flat, "--to", "other.webp")
     assert (code, "a .png or .glb shows it flat" in said) == (2, True)
     assert not list(Path().glob("other.*"))
+
+
+def test_every_part_outside_is_seen_in_its_colour() -> None:
+    made = sbafab.assemble("brace", "parts.arm.set.stack.balloons=2")
+    picture = assembly_png(made, width=400, height=300)
+    assert picture == assembly_png(made, width=400, height=300)
+    upper = np.asarray(image_of(picture), dtype=float)[: round(300 * 0.8)].reshape(-1, 3)
+    share = upper / np.maximum(upper.max(axis=1, keepdims=True), 1)
+    for colour in (BOUGHT["tube"], BOUGHT["cup"], BOUGHT["line"], *FILMS[:2]):
+        wanted = np.array(colour) / max(colour)
+        assert (np.abs(share - wanted).max(axis=1) < 0.04).sum() > 5, colour
+    assert linear((0, 255, 188)) == pytest.approx((0, 1, 0.5029), abs=1e-3)
+
+
+def test_a_keyhole_encloses_and_paints_a_piece_with_its_holes_open() -> None:
+    plate = disc((0.0, 0.0), 10.0) - disc((4.0, 0.0), 1.0) - disc((-4.0, 0.0), 1.0)
+    [rings] = (plate - disc((0.0, 0.0), 2.0) - disc((0.0, 6.0), 1.5)).polygons(0.01)
+    ring = keyhole(rings)
+    pairs = zip(ring, [*ring[1:], ring[0]], strict=True)
+    shoelace = sum(a[0] * b[1] - b[0] * a[1] for a, b in pairs) / 2
+    assert shoelace == pytest.approx(Polygon(rings[0], rings[1:]).area, rel=1e-9)
+    square = [(10.0, 10.0), (90.0, 10.0), (90.0, 90.0), (10.0, 90.0)]
+    holes = [
+        [(x + 8 * math.cos(-t), y + 8 * math.sin(-t)) for t in (0.1, 1.7, 3.2, 4.8)]
+        for x, y in [(30.0, 50.0), (50.0, 50.0), (70.0, 50.0)]
+    ]
+    image = Image.new("L", (100, 100))
+    ImageDraw.Draw(image).polygon(keyhole([square, *holes]), fill=255)
+    # A slit led through another hole would leave a line of film across it.
+    assert {image.getpixel((x, y)) for x in (30, 50, 70) for y in range(46, 55)} == {0}
+    assert [image.getpixel((x, 30)) for x in (30, 50, 70)] == [255, 255, 255]
+    assert image.getpixel((5, 50)) == image.getpixel((95, 50)) == 0

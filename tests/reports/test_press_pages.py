@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from sbafab.reports.traveller.lay_up import beds
 from sbafab.reports.traveller.page import straight_run
 from sbafab.reports.traveller.pictures import plan
 from sbafab.reports.traveller.steps import FoldPage, PressPage, SeamPage, joint_pages, step_pages
-from tests.reports.pages import DOUBLE, EARS, bench, built, words_of, work_of
+from tests.reports.pages import DOUBLE, EARS, bench, built, page, words_of, work_of
 
 TPE, PTFE, BOND, OVERHANG = 0.038, 0.025, 0.75, 0.5
 
@@ -215,3 +216,26 @@ def test_paths_of_seams_are_printed_on_the_films_at_one_to_one() -> None:
     assert re.search(rf"q 1 0 0 1 {x} {y} cm [^Q]*\S+ -12 [ml]", words)
     assert float(x) > 0
     assert seams_pdf(built("pouch")[1], work.sha256) is None
+
+
+def test_pins_are_drawn_filled_where_they_are_in() -> None:
+    work = work_of("3dof-15mm")
+    for step, article in zip(work.schedule.steps, page(work).findall(".//article"), strict=True):
+        drawn = article.findall(".//svg")[0]
+        fills = Counter(circle.get("fill") for circle in drawn.iter("circle"))
+        # One circle of each kind belongs to the key.
+        assert fills["#1a1a1a"] == len(step.pins) + 1
+        assert fills["#ffffff"] == len(work.laminate.pins) - len(step.pins) + 1
+
+
+def test_the_places_of_a_full_plate_are_said_as_a_grid() -> None:
+    work = work_of("1dof-5mm", "stack.balloons=2", "order.copies=60", "order.at_once=60")
+    words = words_of(bench(work))
+    found = re.search(
+        r"rows of (\d+): .* next ([\d.]+) mm to the right, .* next ([\d.]+) mm", words
+    )
+    assert found is not None
+    columns, right, back = int(found[1]), float(found[2]), float(found[3])
+    for n, place in enumerate(work.cycles.places):
+        assert place == pytest.approx(((n % columns) * right, (n // columns) * back), abs=2e-2)
+    assert "place 2 by" not in words

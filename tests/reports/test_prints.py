@@ -19,6 +19,7 @@ from sbafab.actuators import build, load_design
 from sbafab.cutting.fixture import plate_corner
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.cycles import Runs, design_runs, runs_of
+from sbafab.pressing.schedule import schedule
 from sbafab.reports.prints import guides, leaves, tray_pdf, underlay_pdf
 
 SHA = "0123456789abcdef" * 4
@@ -232,3 +233,27 @@ def test_each_place_of_a_cycle_has_its_pages_with_its_serials() -> None:
         place = page + 1
         names = [f"24-{c}-{place:02d}" for c in ("ABC" if place < 7 else "AB")]
         assert f"place {place} ({', '.join(names)})" in words(document, page)
+
+
+def test_paper_that_is_no_plate_ends_on_the_plate() -> None:
+    laminate = build(load_design("1dof-5mm"))
+    [leaf] = leaves(laminate, ((0.0, 0.0),), (400.0, 400.0))
+    assert not leaf.is_plate
+    assert shapely.box(*leaf.trim.bounds).within(shapely.box(-200, -200, 200, 200))
+    [narrow] = leaves(laminate, ((0.0, 0.0),), (17.0, 170.0))
+    x0, _, x1, _ = narrow.trim.bounds
+    assert x1 - x0 <= 17.0 + 1e-9
+
+
+@pytest.mark.parametrize("method", ["channel-pin", "ears"])
+@pytest.mark.parametrize("template", ["3dof-15mm", "1dof-5mm", "radial-15mm"])
+def test_it_lies_in_every_step_that_counts_its_thickness(template: str, method: str) -> None:
+    design = load_design(template, [f'registration.method="{method}"'])
+    laminate = build(design)
+    with_lines = {number for guide in guides(laminate) for number in guide.steps}
+    counted = {
+        step.step
+        for step in schedule(laminate, design).steps
+        if any(item.part == "underlay" for item in step.build_up)
+    }
+    assert counted == with_lines

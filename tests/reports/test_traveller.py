@@ -14,14 +14,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import shapely
 from lxml import html as lxml_html
 
 from sbafab.cutting.cut_settings import COLOURS, CUT_SEQUENCE, REFERENCE
 from sbafab.design.sections import Acceptance
+from sbafab.geometry.region import Region
 from sbafab.lab.recording import entries_of
 from sbafab.reports.traveller import formatting
 from sbafab.reports.traveller.bench import cutting, held_films
-from sbafab.reports.traveller.materials import cut_list
+from sbafab.reports.traveller.materials import cut_list, release_films
 from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS
 from sbafab.reports.traveller.work import HANDLING_MINUTES, times
@@ -212,3 +214,35 @@ def test_layers_of_the_laser_program_are_those_of_the_files(program: str | None)
     assert [row[1] for row in cells] == [*CUT_SEQUENCE, REFERENCE]
     colours = [int(re.findall(r"\d+", row[2])[0]) for row in cells]
     assert colours == [COLOURS[row[1]] for row in cells]
+
+
+def corners_of(use: Any, part: Region) -> tuple[float, float, float, float]:
+    """Bounds on the page of a part that an SVG element draws through its matrix."""
+    a, b, c, d, e, f = map(float, re.findall(r"-?[\d.]+", use.get("transform")))
+    rings = [ring for piece in part.polygons(1e-3) for ring in piece]
+    points = [(a * x + c * y + e, b * x + d * y + f) for ring in rings for x, y in ring]
+    return shapely.MultiPoint(points).bounds
+
+
+def test_the_map_shows_parts_where_the_nest_puts_them(sheet_files: Any) -> None:
+    work = work_of("3dof-15mm", sheets=sheet_files)
+    figures = page(work).findall(".//div[@class='sheets']/figure")
+    for sheet, figure in zip(work.sheets, figures, strict=True):
+        placements = sheet.nest.on_sheet(sheet.number - 1)
+        frame = max(figure.iter("rect"), key=lambda rect: float(rect.get("width")))
+        left, top, wide, high = (float(frame.get(key)) for key in ("x", "y", "width", "height"))
+        scale, foot = wide / sheet.width, top + high
+        for use, placement in zip(figure.iter("use"), placements, strict=True):
+            low_x, low_y, high_x, high_y = sheet.nest.region(placement).bounds
+            x0, x1, y0, y1 = (scale * value for value in (low_x, high_x, low_y, high_y))
+            assert corners_of(use, sheet.nest.parts[placement.part].region) == pytest.approx(
+                (left + x0, foot - y1, left + x1, foot - y0), abs=2e-3
+            )
+
+
+@pytest.mark.parametrize(("copies", "cycles"), [(1, 1), (3, 1), (9, 3)])
+def test_release_films_count_every_press_cycle(copies: int, cycles: int) -> None:
+    """Two new ones each time the press closes, one below what is turned over."""
+    work = work_of("1dof-5mm", f"order.copies={copies}", "order.at_once=4")
+    assert work.cycles.count == cycles
+    assert release_films(work) == 2 * cycles * len(work.schedule.steps) + 1

@@ -150,3 +150,12 @@ def test_a_phone_reads_its_code_off_the_screen(html: str, tmp_path: Path) -> Non
     assert code.text == record_text("3dof-15mm", sha256)
     find = f"sbafab record --find {sha256[:12]}"
     assert code.text.splitlines() == ["3dof-15mm", f"sha256 {sha256}", GENERATOR, find]
+
+
+def test_it_prints_without_scripts(html: str, tmp_path: Path) -> None:
+    # Chromium prints nothing with scripts switched off as a whole; a policy stops the page's own.
+    policy = """<meta http-equiv="Content-Security-Policy" content="script-src 'none'">"""
+    target = printed(tmp_path, html.replace("<head>", f"<head>{policy}"))
+    assert pages_of(target) >= 5
+    if shutil.which("pdftotext"):
+        assert "Printed: ____" in text_of(target)
