@@ -68,6 +68,9 @@ def test_a_design_used_three_times_is_drawn_once_and_cut_three_times(
         )
         # A spare of every pattern.
         assert cut == pytest.approx((3 + 1) * one, abs=1e-3)
+    page = (standing.folder / "traveller.html").read_text(encoding="utf-8")
+    assert "3dof-15mm, 3 copies: 1 lamination, all at once" in page
+    assert "45 min in the press instead of 135" in page
 
 
 def test_the_solid_has_a_node_a_part_at_true_size(brace: Run) -> None:

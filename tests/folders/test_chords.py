@@ -38,11 +38,12 @@ def written(template: str, settings: tuple[str, ...], error: float, out: Path) -
 
 @cache
 def part(path: Path) -> shapely.Geometry:
-    """What a layer file cuts, from its vertices alone."""
+    """What a layer's or sheet's file cuts, from its vertices alone."""
     cut = {"CUT_OUTER": [], "CUT_INNER": []}  # type: dict[str, list[Polygon]]
     for entity in ezdxf.readfile(path).modelspace().query("LWPOLYLINE"):
         assert not any(bulge for *_, bulge in entity.get_points("xyb"))
-        cut[entity.dxf.layer].append(Polygon(entity.get_points("xy")))
+        if entity.dxf.layer in cut:
+            cut[entity.dxf.layer].append(Polygon(entity.get_points("xy")))
     return shapely.union_all(cut["CUT_OUTER"]) - shapely.union_all(cut["CUT_INNER"])
 
 
@@ -140,3 +141,18 @@ def test_round_holes_open_and_corners_stay() -> None:
         room = [edge.nearest((1.0, 2.0)) for edge in hole.edges]
         assert min(shapely.Point(1.0, 2.0).distance(shapely.Point(p)) for p in room) > 0.5 - 1e-9
         assert max(shapely.Point(1.0, 2.0).distance(shapely.Point(p)) for p in room) < 0.5005
+
+
+def test_sheets_are_cut_as_the_layers_are(tmp_path: Path) -> None:
+    doctor = written("1dof-5mm", ("order.spares=0", "order.spare_share=0"), 0.1, tmp_path)
+
+    def cut(rows: list[dict[str, Any]]) -> list[tuple[str, int, float]]:
+        return sorted(
+            (row["material"], len(piece.exterior.coords), piece.area)
+            for row in rows
+            for piece in shapely.get_parts(part(doctor.folder / row["file"]))
+        )
+
+    layers, sheets = cut(doctor.manifest["layers"]), cut(doctor.manifest["sheets"])
+    assert [row[:2] for row in sheets] == [row[:2] for row in layers]
+    assert [row[2] for row in sheets] == pytest.approx([row[2] for row in layers], abs=1e-6)

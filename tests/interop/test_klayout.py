@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -9,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 
 from sbafab.actuators import build, load_design
-from sbafab.geometry.region import Region, disc, polygon, strip
-from sbafab.geometry.width import least_width
+from sbafab.geometry.region import Region, disc, polygon, rectangle, strip
+from sbafab.geometry.width import least_gap, least_width
 from sbafab.laminate.laminate import Laminate
 from tests.interop.judging import TOLERANCE, compared, overhang, widths
 from tests.properties.designs import Draft, valid
@@ -45,6 +46,30 @@ def test_both_measure_the_width_that_a_closed_formula_gives(
     assert found.how == "square"
     assert ours.value == pytest.approx(expected)
     assert found.theirs == pytest.approx(expected, abs=TOLERANCE)
+
+
+def bulging() -> tuple[Region, float]:
+    """Two lobes 60 degrees off an axis, and the disc between them that ends their slot.
+
+    Hub and lobe meet where the law of cosines says; the slot ends between two such corners.
+    """
+    hub, lobe, away, turn = 5.565, 5.721, 8.0, math.radians(60.0)
+    region = disc((0.0, 0.0), hub)
+    for side in (-1, 1):
+        region = region | disc((away * math.cos(turn), side * away * math.sin(turn)), lobe)
+    corner = turn - math.acos((hub**2 + away**2 - lobe**2) / (2 * hub * away))
+    return region, 2 * hub * math.sin(corner)
+
+
+@pytest.mark.parametrize(
+    ("region", "expected"),
+    [(rectangle((0.0, 0.0), (4.0, 4.0)) | disc((5.6, 2.0), 1.2), 0.4), bulging()],
+)
+def test_both_measure_the_slot_that_a_closed_formula_gives(region: Region, expected: float) -> None:
+    found = compared("slot", region, 1, least_gap(region, 15.0))
+    assert found is not None
+    assert found.ours == pytest.approx(expected)
+    assert found.agrees, found
 
 
 @settings(max_examples=6)

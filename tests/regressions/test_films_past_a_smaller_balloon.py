@@ -39,6 +39,9 @@ def facing(folder: Path) -> list[Finding]:
 
 
 def test_the_mask_as_it_was_fails_as_built(waisted: Doctor) -> None:
+    area, overhang = facing(waisted.folder)
+    assert (area.verdict, area.measured) == ("pass", 0.0)
+    assert (overhang.verdict, overhang.measured) == ("pass", pytest.approx(0.5, abs=1e-5))
     kept = waisted.path(8).read_text()
 
     def as_it_was(mask: Region) -> Region:
