@@ -93,6 +93,22 @@ def on_a_contour(p: Point) -> bool:
     return any(line(c.edges).distance(shapely.Point(p)) < 0.01 for c in PARTS.contours)
 
 
+@pytest.mark.parametrize(
+    "lead_ins",
+    [
+        LeadIns(lead_in=1.0),
+        LeadIns(overcut=2.0),
+        LeadIns(tab_width=1.0, tabs=5),
+        LeadIns(lead_in=0.3, tab_width=0.2, tabs=1, kerf=0.1),
+    ],
+)
+def test_each_is_there_alone(lead_ins: LeadIns) -> None:
+    more = 4 * (lead_ins.lead_in + lead_ins.overcut) - 2 * lead_ins.tabs * lead_ins.gap
+    plain = sum(contour.length for contour in PARTS.contours)
+    for asked, expected in ((LeadIns(), plain), (lead_ins, plain + more)):
+        assert sum(map(length, runs_of(PARTS, asked))) == pytest.approx(expected)
+
+
 # Lead-ins find room, or are refused.
 
 

@@ -5,15 +5,22 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import ezdxf
 import pytest
 import tomli_w
+from ezdxf import path as dxf_path
 from ezdxf.document import Drawing
 
+from sbafab.actuators import build, load_design
 from sbafab.api import check_folder, generate, press
+from sbafab.cutting.cut_settings import CutSettings
+from sbafab.cutting.layer_files import path_difference, read_seam, write_seam_files
 from sbafab.folders.check import read_folder, rules_as_cut
+from sbafab.geometry.edges import Line, edge_from_bulge
+from sbafab.geometry.region import disc
 from sbafab.rules.finding import Finding
 from tests.designs import tables
 from tests.folders.doctoring import Doctor
@@ -203,3 +210,24 @@ def test_seams_stay_listed_when_another_part_is_written(
     (claim,) = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["seams"]
     assert claim["file"] == SEAM_FILE
     assert failures(folder) == {}
+
+
+def test_an_open_path_ends_where_it_ends_and_a_round_one_where_it_began(tmp_path: Path) -> None:
+    """As ezdxf reads them: two polylines on SEAM, of the lengths of their lines and arcs."""
+    quarter = edge_from_bulge((10.0, 0.0), (10.0, 5.0), math.tan(math.pi / 8))
+    chains = (Line((0.0, 0.0), (10.0, 0.0)), quarter), disc((20.0, 3.0), 2.0).outers[0].edges
+    laminate = build(load_design("folded"))
+    laminate = replace(laminate, seams=(replace(laminate.seams[0], path=chains),))
+    write_seam_files(laminate, tmp_path, CutSettings("folded", "0" * 64, "sbafab"))
+    (path,) = tmp_path.rglob("seam_*.dxf")
+    assert path_difference(read_seam(path)[0], chains) is None
+    document = ezdxf.readfile(path)
+    assert document.audit().errors == []
+    runs = list(document.modelspace().query('LWPOLYLINE[layer=="SEAM"]'))
+    assert [run.closed for run in runs] == [False, True]
+    flats = [[(p.x, p.y) for p in dxf_path.make_path(run).flattening(1e-4)] for run in runs]
+    assert flats[0][-1] == pytest.approx((10.0, 5.0))
+    lengths = [sum(map(math.dist, flat, flat[1:])) for flat in flats]
+    # The arc over a chord of 5 mm with a quarter of a turn has a radius of 5 / sqrt(2).
+    expected = [10 + math.pi / 2 * 5 / math.sqrt(2), 2 * math.pi * 2]
+    assert lengths == pytest.approx(expected, abs=0.002)
