@@ -15,7 +15,7 @@ from shapely import STRtree, unary_union
 from shapely.geometry import Point as ShapelyPoint
 from shapely.geometry import Polygon, box
 
-from sbafab.actuators import load_design
+from sbafab.actuators import build, load_design
 from sbafab.cutting.lattice import Lattice, lattices_of
 from sbafab.cutting.nest_check import check_nest
 from sbafab.cutting.nesting import nest, of_material
@@ -155,3 +155,26 @@ def test_only_turns_that_the_stock_allows_are_used() -> None:
     triangle = polygon([(0.0, 0.0), (7.0, 0.0), (2.0, 11.0)])
     for laid in lattices_of(triangle, 1.0, (0.0, 0.0, 50.0, 80.0), (0, 2)):
         assert {turn for turn, _ in laid.places} <= {0, 2}
+
+
+def commonest(role: str, count: int) -> NestPart:
+    """The shape that most layers of the 15 mm actuator have in a role."""
+    patterns = build(load_design("3dof-15mm")).patterns.values()
+    layer = max((own for own in patterns if own[0].role == role), key=len)[0]
+    return NestPart("3dof", role, 1, "TPE", layer.profile, count)
+
+
+def test_the_commonest_plate_lies_closer_than_bottom_left_puts_it() -> None:
+    """Walls of the 15 mm actuator at 1.23 mm on 132.4 mm: 105 a sheet, 96 by bottom-left alone."""
+    (result,) = nest([commonest("wall", 210)], {"TPE": Stock(spacing=1.23)})
+    check_nest(result)
+    assert result.sheets == 2
+    judged(result)
+
+
+def test_forty_lobed_plates_and_39_separators_lie_on_one_sheet() -> None:
+    """On the 132.4 mm square that a border of 10 mm leaves of the press's heated area."""
+    parts = [commonest("wall", 40), commonest("separator-mask", 39)]
+    (result,) = nest(parts, {"TPE": Stock()})
+    check_nest(result)
+    assert (len(result.placements), result.sheets) == (79, 1)

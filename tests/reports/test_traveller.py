@@ -18,6 +18,7 @@ import shapely
 from lxml import html as lxml_html
 
 from sbafab.cutting.cut_settings import COLOURS, CUT_SEQUENCE, REFERENCE
+from sbafab.design.records import keys_of
 from sbafab.design.sections import Acceptance
 from sbafab.geometry.region import Region
 from sbafab.lab.recording import entries_of
@@ -246,3 +247,20 @@ def test_release_films_count_every_press_cycle(copies: int, cycles: int) -> None
     work = work_of("1dof-5mm", f"order.copies={copies}", "order.at_once=4")
     assert work.cycles.count == cycles
     assert release_films(work) == 2 * cycles * len(work.schedule.steps) + 1
+
+
+@pytest.mark.parametrize(
+    "design",
+    few([("1dof-5mm", *TPU, EARS, "order.copies=5"), ("folded",), ("gripper",)], 2),
+    ids=" ".join,
+)
+def test_keys_of_a_design_file_are_not_for_the_bench(design: tuple[str, ...]) -> None:
+    """They are the designer's; commands may have them, and stand as code."""
+    work = work_of(*design)
+    keys = {key for key, *_ in keys_of(work.design) if "." in key}
+    assert {"press.time_constant", "press.minutes_for", "registration.pin_lengths"} <= keys
+    for tree in (page(work), bench(work)):
+        for code in tree.xpath("//code | //style | //script"):
+            code.drop_tree()
+        words = words_of(tree)
+        assert [key for key in sorted(keys) if re.search(rf"(?<![\w.]){key}\b", words)] == []
