@@ -17,7 +17,6 @@ from pathlib import Path
 from PIL import Image
 
 import sbafab
-from sbafab.cutting.sheets import STROKE
 from sbafab.reports.charts import relation_svg
 from sbafab.reports.inflated_picture import PictureRequest, write_picture
 from sbafab.reports.layers_svg import layers_svg
@@ -54,7 +53,7 @@ def tutorials() -> None:
             shutil.copyfile(first / "preview" / name, IMAGES / f"first-{name}")
         # A laser's lines are too fine for a small picture.
         sheet = (first / "sheets" / "TPE_1.svg").read_text(encoding="utf-8")
-        thicker = sheet.replace(f'stroke-width="{STROKE:g}"', 'stroke-width="0.6"')
+        thicker = re.sub(r'stroke-width="[\d.]+"', 'stroke-width="0.6"', sheet)
         (IMAGES / "first-sheet.svg").write_text(_lower_part(thicker), encoding="utf-8")
         oval = sbafab.generate(str(IMAGES.with_name("gallery") / "oval.toml"), out=scratch).folder
         shutil.copyfile(oval / "preview" / "layers.svg", IMAGES / "oval-layers.svg")

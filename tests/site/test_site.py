@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import runpy
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,18 @@ def test_the_page_of_commands_has_every_command_and_option() -> None:
 def test_the_page_of_keys_has_every_key() -> None:
     page = reference_keys.page()
     assert [row.key for row in design_keys() if f"`{row.key}`" not in page] == []
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "docs" / "scripts").glob("*.py")), ids=lambda path: path.stem
+)
+def test_what_makes_the_pages_finds_what_it_uses(path: Path) -> None:
+    try:
+        import_module(f"docs.scripts.{path.stem}")
+    except ModuleNotFoundError as missing:
+        if str(missing.name).split(".")[0] in {"sbafab", "docs", "tests"}:
+            raise
+        pytest.skip(f"{missing.name} is not installed")
 
 
 def test_every_rule_has_its_picture() -> None:
