@@ -13,6 +13,7 @@ from sbafab.actuators import build, load_design
 from sbafab.cutting.cut_settings import Curves, CutSettings
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.fixture import PATH, fixture, plate_corner, write_fixture
+from sbafab.folders.build import hole_notes
 
 SETTINGS = CutSettings("test", "0" * 64)
 PLATEN = (152.4, 152.4)
@@ -83,3 +84,13 @@ def test_the_plate_carries_what_the_shop_must_know(curves: Curves, tmp_path: Pat
         assert low_y + 1 < y < high_y - 1
     read = read_profile(tmp_path / path)
     assert len(read.region.holes) == len(laminate.pins)
+
+
+def test_a_machine_that_bores_less_true_is_told_on_the_drawing() -> None:
+    """What the plate's drawing asks for is what the rules count, for each machine."""
+    for machine, position, play in (("jig-borer", 0.003, 0.002), ("cnc-mill", 0.025, 0.008)):
+        design = load_design("3dof-15mm", [f'registration.plate_made_by="{machine}"'])
+        notes = hole_notes(design, build(design))
+        assert f"each hole within {position:g} of its place" in notes[-1]
+        assert design.pin_error == pytest.approx(position + play / 2)
+    assert load_design("3dof-15mm", ["registration.pin_error=0.01"]).pin_error == 0.01
