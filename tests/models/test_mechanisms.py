@@ -97,6 +97,7 @@ def test_a_beam_wrinkles_and_collapses_by_the_pressure_on_its_cap() -> None:
     moment = pouch.wrinkling_moment(kpa, width)
     assert moment == pytest.approx(31.4159, rel=1e-5) == math.pi * r**2 * 0.02 * r / 2
     assert pouch.collapse_moment(kpa, width) == pytest.approx(0.02 * math.pi * r**2 * r)
+    assert pouch.hoop_tension(kpa, width) == pytest.approx(0.02 * r)
 
 
 def test_sheets_jam_n_squared_times_as_stiff_and_slip_where_shear_reaches_friction() -> None:
