@@ -44,9 +44,12 @@ def test_pull_is_virtual_work(share: float) -> None:
     rate = float(
         pouch.volume(share + STEP, length, width) - pouch.volume(share - STEP, length, width)
     ) / (2 * STEP * length)
-    assert float(pouch.pull(kpa, share, length, width)) == pytest.approx(
-        kpa / 1000 * rate, rel=1e-5
-    )
+    pull = float(pouch.pull(kpa, share, length, width))
+    assert pull == pytest.approx(kpa / 1000 * rate, rel=1e-5)
+    # Both films pull at their edges, where they stand at half the arc's angle.
+    angle = float(pouch.half_angle(share))
+    tension = float(pouch.tension(kpa, angle, length))
+    assert pull == pytest.approx(2 * tension * width * math.cos(angle), rel=1e-9)
 
 
 def test_a_pouch_shortens_by_36_percent_at_most() -> None:
@@ -101,10 +104,10 @@ def test_a_beam_wrinkles_and_collapses_by_the_pressure_on_its_cap() -> None:
 
 
 def test_sheets_jam_n_squared_times_as_stiff_and_slip_where_shear_reaches_friction() -> None:
-    width, thick, count = 20.0, 0.1, 10
+    width, thick, count = 20.0, 0.2, 10
     loose = pouch.loose_stiffness(3000.0, width, thick, count)
-    # By hand: 10 x 3000 x 20 x 0.001 / 12.
-    assert loose == pytest.approx(50.0)
+    # By hand: 10 x 3000 x 20 x 0.008 / 12.
+    assert loose == pytest.approx(400.0)
     assert pouch.jammed_stiffness(3000.0, width, thick, count) == pytest.approx(100 * loose)
     load, depth = pouch.slip_force(80.0, 0.3, width, thick, count), count * thick
     # F S / I b at the middle, with S = b H^2 / 8 and I = b H^3 / 12.
