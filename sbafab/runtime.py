@@ -18,7 +18,7 @@ collecting at the default threshold takes a tenth of its time.
 
 
 def prepare() -> None:
-    """Set environment and garbage collection of the process; a second call changes nothing."""
+    """Set the process's environment and garbage collection; a second call changes nothing."""
     # pydantic searches all installed packages for plugins; none is used.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # Matrices are small: more threads are slower, and may change the order of sums.

@@ -532,7 +532,7 @@ def _faults_of_nets(design: DrawnDesign) -> Iterator[str]:
         for member in members:
             if member not in names:
                 remedy = hint(member, names)
-                yield f"nets.{net} names {shown(member)}, which is no port or chamber; {remedy}"
+                yield f"nets.{net} names {shown(member)}, which is not a port or chamber; {remedy}"
             if member in home:
                 where = "twice" if home[member] == net else f"and so does nets.{home[member]}"
                 yield f"nets.{net} names {shown(member)} {where}; a port belongs to one net, once"

@@ -66,8 +66,8 @@ def load_assembly(
     if isinstance(result, Assembly):
         return result
     raise DesignError(
-        f'{result.name} is no assembly; give a file with family = "{ASSEMBLY}" and [parts.NAME] '
-        "tables"
+        f'{result.name} is not an assembly; give a file with family = "{ASSEMBLY}" and '
+        "[parts.NAME] tables"
     )
 
 

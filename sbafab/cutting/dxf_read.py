@@ -60,7 +60,7 @@ def drawn_entity(entity: DXFEntity, may_be_open: bool = False) -> DrawnEntity:
     if kind not in DRAWN or (kind == "POLYLINE" and not _is_plain(entity)):
         raise OutputError(f"{name} cannot be cut; use {', '.join(DRAWN)}.")
     if not all(math.isfinite(value) for value in _numbers(entity)):
-        raise OutputError(f"{name} has a coordinate that is no number.")
+        raise OutputError(f"{name} has a coordinate that is not a number.")
     tilt = math.dist(dxf.get("extrusion", UPRIGHT), UPRIGHT)
     if max(tilt, *map(abs, _heights(entity))) > FLAT:
         raise OutputError(f"{name} is not at z = 0; move it there.")

@@ -374,7 +374,7 @@ def _read_rdworks(path: Path) -> LaserReading:
     try:
         document = readfile(path)
     except DXFError as error:
-        raise OutputError(f"it is no sound DXF ({error})") from error
+        raise OutputError(f"it is not a valid DXF ({error})") from error
     unit = document.header.get("$INSUNITS", UNITLESS)
     if unit not in (UNITLESS, MILLIMETRES):
         raise OutputError(f"not in millimetres: $INSUNITS is {unit}")
@@ -463,7 +463,7 @@ class _SvgCurve(NamedTuple):
 
 
 def _read_epilog(path: Path) -> LaserReading:
-    """Return an SVG, its paths read by svgelements, its layers by the colour of their strokes."""
+    """Read an SVG with svgelements; the colour of its strokes tells the layers apart."""
     from svgelements import Close
     from svgelements import Path as SvgPath
 
@@ -476,7 +476,8 @@ def _read_epilog(path: Path) -> LaserReading:
     for group in root.iter(f"{SVG}g"):
         layer = layers.get(group.get("stroke", ""))
         if layer is None or group.get("stroke-width") != f"{HAIRLINE:g}":
-            raise OutputError(f"lines of {group.get('id')} are no hairlines in a colour of a layer")
+            name = group.get("id")
+            raise OutputError(f"lines of {name} are not hairlines in the colour of a layer")
         for shape in group:
             curves: Sequence[BeamCurve]
             if shape.tag == f"{SVG}circle":

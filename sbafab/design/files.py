@@ -144,7 +144,7 @@ ALLOWED = {
     "float_parsing": "must be a number",
     "float_type": "must be a number",
     "string_type": "must be a text in quotes",
-    "string_unicode": "must be plain text; remove what is no letter in it",
+    "string_unicode": "must be plain text; remove characters that are not text",
     "bool_type": "must be true or false",
     "model_type": "must be a table of keys, such as {{key = value}}",
     "model_attributes_type": "must be a table of keys, such as {{key = value}}",

@@ -158,7 +158,7 @@ class FaceBondings(NamedTables):
         for name, bond in self.by_name.items():
             if bond.after is not None and (bond.after == name or bond.after not in self.by_name):
                 raise ValueError(
-                    f"has bond {name} after {bond.after[:40]!r}, which is no other bond of it; "
+                    f"has bond {name} after {bond.after[:40]!r}, which is not another bond of it; "
                     f"there are {', '.join(self.by_name)}"
                 )
         return self

@@ -216,7 +216,9 @@ def read_laminate(path: Path) -> Laminate:
             reason = first["ctx"]["error"]
             raise DesignError(f"{path} cannot be read as a laminate: {reason}") from None
         is_object = bool(first["loc"])
-        words = sentence(error, LaminateDocument, {}, "", FILE) if is_object else "it is no object"
+        words = (
+            sentence(error, LaminateDocument, {}, "", FILE) if is_object else "it is not an object"
+        )
         raise DesignError(f"{path} is not a sound laminate; {words}") from None
     fault = next(_faults(document), None)
     if fault is not None:

@@ -252,7 +252,7 @@ def read_part(path: Path, properties: Mapping[str, str], profile: Region, beam: 
     except OutputError:
         raise
     except (ArithmeticError, ValueError, LookupError) as error:
-        raise OutputError(f"holds no sound contours ({error}); regenerate it") from error
+        raise OutputError(f"holds no valid contours ({error}); regenerate it") from error
     return CutPart(region, off, drawing.properties, drawing.units)
 
 
@@ -370,7 +370,7 @@ def refuse_coarse(build: Build) -> None:
         findings = (finding for rule in rules for finding in run_rule(rule, measures))
         failed = next((finding for finding in findings if finding.verdict == "fail"), None)
     except (OutputError, GeometryError) as failure:
-        raise DesignError(_refusal(error, f"leave no sound contours: {failure}")) from failure
+        raise DesignError(_refusal(error, f"leave no valid contours: {failure}")) from failure
     if failed is not None:
         raise DesignError(_refusal(error, f"break {failed.rule}: {failed.message}"))
 

@@ -403,7 +403,9 @@ def _foreign_problems(
     # The pages of a job's design show the sheets of the job, and are compared there.
     excluded = (*excluded, *PAGES) if is_of_job else excluded
     return [
-        Problem(DESIGNED, f"{path} is listed and is no file of this design; regenerate the folder")
+        Problem(
+            DESIGNED, f"{path} is listed, but is not a file of this design; regenerate the folder"
+        )
         for path in index.files
         if path not in remade
         and (_could_be_cut(path) or path.partition("/")[0] not in excluded)

@@ -278,7 +278,7 @@ def _picture_difference(actual: bytes, expected: bytes) -> str:
             for data in (actual, expected)
         )
     except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        return f"it is no sound picture ({error})"
+        return f"it is not a valid picture ({error})"
     if pixels.shape != expected_pixels.shape:
         return f"it measures {pixels.shape[1]} x {pixels.shape[0]} pixels"
     difference = np.abs(pixels - expected_pixels).max(axis=2)
@@ -376,7 +376,7 @@ def bodies(path: Path) -> list[MeshBody]:
             surface = Surface(points, places.reshape(-1)[mesh.faces])
             read.append((surface, json.dumps([node, transform.tolist(), paint])))
     except Exception as error:  # readers of libraries raise anything on a damaged file
-        raise OutputError(f"no sound mesh: {error}") from error
+        raise OutputError(f"not a valid mesh: {error}") from error
     return read
 
 

@@ -108,7 +108,7 @@ class Contour:
         return ((*centre, -radius if self.is_hole else radius),)
 
     def coincides(self, other: Contour) -> bool:
-        """Return True if corners and middles of the edges of both lie within SAME of each other."""
+        """Return True if the corners and edge middles of the two lie within SAME of each other."""
         if len(self.marks) != len(other.marks) or self.is_hole != other.is_hole:
             return False
         if any(abs(a - b) > SAME for a, b in zip(self.bounds, other.bounds, strict=True)):

@@ -181,7 +181,7 @@ def rim(a: float, b: float, angle: float) -> Point:
 
 
 class Track(NamedTuple):
-    """The source of a piece of path: an arc of ``turn`` times ``radius`` (0: a corner), or a line.
+    """The source of a stretch of path: a line, or an arc ``turn`` x ``radius`` long (0: a corner).
 
     The parameter is the angle of the outward normal; along a line, the length.
     """

@@ -246,7 +246,7 @@ def _parts(path: Path, layer: str, number: int, text: str) -> Iterator[Region]:
     try:
         geometry = shapely.from_wkt(text)
     except ShapelyError:
-        raise DesignError(f"{where} is {shown(text)}, which is no WKT") from None
+        raise DesignError(f"{where} is {shown(text)}, which is not valid WKT") from None
     if not shapely.is_valid(geometry):
         reason = shapely.is_valid_reason(geometry)
         raise DesignError(f"{where}: {reason}; repair it, for instance with buffer(0)")

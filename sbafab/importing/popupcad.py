@@ -177,7 +177,7 @@ def _offset(flat: Flat, distance: float) -> Flat:
 
 def _number(value: Any) -> float:
     if not isinstance(value, int | float) or isinstance(value, bool):
-        raise DesignError(f"has {shown(value)} for a number; save the design again")
+        raise DesignError(f"has {shown(value)} where a number is expected; save the design again")
     if not abs(value) <= FARTHEST:
         raise DesignError(f"has {value:g} mm, where at most {FARTHEST:g} is allowed")
     return float(value)
@@ -272,7 +272,7 @@ class CadDesign:
 
     def __init__(self, root: CadRecord, place: str, depth: int = 0) -> None:
         if getattr(root, "kind", "") != "Design":
-            raise DesignError(f"{place} holds no design of popupCAD; save it again")
+            raise DesignError(f"{place} contains no popupCAD design; save it again")
         self.place, self.root, self.depth = place, root, depth
         self.remarks: dict[str, None] = {}
         self._here = place
@@ -299,7 +299,9 @@ class CadDesign:
             raise DesignError("takes an operation that is not there; save it again")
         index = self.ids.index(identity)
         if output != 0 and self.operations[index].kind in OPERATIONS:
-            raise DesignError(f"takes output {output} of operation {index + 1}: it has 0")
+            raise DesignError(
+                f"takes output {output} of operation {index + 1}, which has only output 0"
+            )
         return index
 
     def stack(self, index: int) -> CadLayers:
@@ -472,7 +474,7 @@ def _two_points(place: str, shape: CadRecord) -> Sequence[Point]:
     with _at(place):
         points = _points(shape["exterior"])
         if len(points) < 2:
-            raise DesignError("is no line to lay a design by; draw one")
+            raise DesignError("is not a line to place a design by; draw one")
     return points[:2]
 
 

@@ -140,7 +140,7 @@ def loaded(path: Path, text: str, loader: Any, what: str) -> Any:
         return yaml.load(text, loader)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         line = " ".join(str(error).split())
-        raise DesignError(f"{path} is no YAML of {what}: {line}; save it again") from None
+        raise DesignError(f"{path} is not valid YAML for {what}: {line}; save it again") from None
 
 
 def region_of(drawn: shapely.Polygon) -> Region:

@@ -56,7 +56,7 @@ class RecordedDesign:
 
     @property
     def promise(self) -> float:
-        """The share of random builds that keep every limit."""
+        """The share of random builds that meet every limit."""
         return self.good_builds[0] / self.good_builds[1]
 
     @cached_property

@@ -115,7 +115,7 @@ def _sheet(
 ) -> DrawnSheet:
     drawing = read_profile(path)
     if not drawing.region.contours:
-        raise OutputError(f"{path.name} holds no piece; give a sheet or layer with parts")
+        raise OutputError(f"{path.name} contains no parts; give a sheet or layer that has some")
     named: list[SheetShape] = []
     unnamed: list[SheetShape] = []
     for piece in drawing.region.pieces:

@@ -131,7 +131,7 @@ def _entry_tables(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield the tables of the list ``entry``, merged with the shared values, with their places."""
     parser = _PARSERS.get(path.suffix.lower())
     if parser is None:
-        raise DesignError(f"{path} ends in none of .csv, {', '.join(_PARSERS)}; save it as one")
+        raise DesignError(f"{path} must end in .csv, {', '.join(_PARSERS)}; save it as one")
     text = table_text(path)
     try:
         table = parser(text)
@@ -139,7 +139,7 @@ def _entry_tables(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
         raise DesignError(f"{path} cannot be read: {error}") from None
     rows = table.get("entry") if isinstance(table, dict) else None
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise DesignError(f"{path} needs a list of tables called entry, a table an entry")
+        raise DesignError(f"{path} needs a list of tables called entry, one for each entry")
     common = {name: value for name, value in table.items() if name != "entry"}
     for number, row in enumerate(rows, start=1):
         yield f"{path}, entry {number}", {**common, **row}
@@ -185,7 +185,7 @@ def write_history(contents: Contents, path: Path) -> int:
     writers = {".csv": _csv_history, ".json": _json_history}
     writer = writers.get(path.suffix.lower())
     if writer is None:
-        raise DesignError(f"{path} ends in none of {', '.join(writers)}; choose one of them")
+        raise DesignError(f"{path} must end in one of {', '.join(writers)}")
     rows: dict[tuple[str, str], list[LabRow]] = defaultdict(list)
     for row in (*contents.entries, *contents.records):
         rows[contents.builds[row.design_sha256].actuator, row.serial].append(row)

@@ -97,7 +97,7 @@ def read_netlist(path: Path) -> Netlist:
                 "and a source and sinks that name a component"
             ) from None
     raise DesignError(
-        f'{path} is no netlist; it is JSON with "schema": "{SCHEMA}" and "nets", or a ParchMint '
+        f'{path} is not a netlist; it is JSON with "schema": "{SCHEMA}" and "nets", or a ParchMint '
         'file with "connections"'
     )
 

@@ -308,7 +308,7 @@ PER_LINE = 16
 
 
 def write_inp(mesh: Mesh, path: Path) -> None:
-    """Write nodes, elements, NSET, ELSET and SURFACE; numbers count from 1, lengths are mm."""
+    """Write nodes, elements, NSET, ELSET and SURFACE; numbering starts at 1, lengths are in mm."""
     with path.open("w", encoding="ascii", newline="\n") as file:
         file.writelines(_inp_lines(mesh))
 

@@ -357,7 +357,7 @@ def cavity(
     sagitta: float = SAGITTA,
     step: float = 0.0,
 ) -> Surface:
-    """The closed surface of a chamber's cavity, normals out of the air.
+    """The closed surface of a chamber's cavity, with normals that point out of it.
 
     Its volume equals the sum over :func:`cavity_slabs`. Faces are split every ``step`` mm of x.
     Raises OutputError if it does not close.

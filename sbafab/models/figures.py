@@ -193,7 +193,7 @@ class Trace:
 
     @property
     def title(self) -> str:
-        """The model's title, or that it is measured."""
+        """The model's title, or a note that the figure is measured."""
         return self.model.title if self.model else MEASURED
 
     @property

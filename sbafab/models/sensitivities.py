@@ -151,7 +151,7 @@ def _value(design: Design, key: str) -> int | float:
         value = None
     if isinstance(value, bool) or not isinstance(value, int | float) or not value:
         raise DesignError(
-            f"{key} is no number above 0 in this design; give keys such as {', '.join(KEYS[:3])}"
+            f"{key} is not a number above 0 in this design; give keys such as {', '.join(KEYS[:3])}"
         )
     return value
 

@@ -582,7 +582,9 @@ def _places(tips: ArrayLike) -> Array:
     except (TypeError, ValueError):
         places = np.zeros(0)
     if places.ndim != 2 or places.shape[1] != 3 or not np.isfinite(places).all():
-        raise DesignError("places of the tip in mm must be finite numbers, a row of three a place")
+        raise DesignError(
+            "positions of the tip in mm must be finite numbers, one row of three for each"
+        )
     return places
 
 

@@ -272,7 +272,7 @@ def _has_drawn_pockets(laminate: Laminate) -> bool:
 
 
 def _caption(laminate: Laminate, pose: Pose, calibration: str) -> list[str]:
-    """Return the caption, above it the paper's measured bend or height beside the model's."""
+    """Return the caption, below the paper's measured bend or height beside the model's."""
     pressures = ", ".join(f"{p:.3g}" for p in pose.pressures)
     figure = "bend" if pose.bend > 0.5 else "height"
     bent = f", bent {pose.bend:.0f} degrees" if figure == "bend" else f", {pose.height:.1f} mm high"

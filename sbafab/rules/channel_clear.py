@@ -67,7 +67,7 @@ ON_ONE_PIN = (("base", "wall", "cap"), ("separator-mask",), ("sheet",))
 
 
 def tooling_pins(laminate: Laminate) -> list[Pin]:
-    """Return the pins that stand in no bore and not in the lumen."""
+    """Return the pins that stand in neither a bore nor the lumen."""
     axes = [channel.centre for channel in channels(laminate)]
     return [
         pin for pin in laminate.pins if all(math.dist(pin.centre, axis) > LOOSE for axis in axes)

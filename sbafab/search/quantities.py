@@ -321,7 +321,7 @@ def read_share(text: str) -> float:
     """
     read = share_of(text)
     if read is None or not 0 <= read <= 1:
-        raise ValueError("must be a share from 0 to 1, such as 0.95 or 95%")
+        raise ValueError("must be a fraction from 0 to 1, such as 0.95 or 95%")
     return read
 
 

@@ -1,4 +1,4 @@
-"""Run the trials of a sweep: measure designs in processes of this machine, or on a Dask cluster.
+"""Run the trials of a sweep: measure designs in local processes, or on a Dask cluster.
 
 A trial is a design's rules with their margins, its predicted figures, and all its keys. As a
 program this module measures designs one after the other, and may be killed at any moment.

@@ -148,8 +148,8 @@ class MeasuredCurve(Section):
         axes, values = QUANTITIES[self.quantity].axes, len(self.y)
         if self.x_name not in axes:
             raise ValueError(
-                f"has x_name = {shown(self.x_name)}, which is no axis of {self.quantity}; write "
-                f"one of {listed(axes)}"
+                f"has x_name = {shown(self.x_name)}, which is not an axis of {self.quantity}; "
+                f"write one of {listed(axes)}"
             )
         if len(self.x) != (values if self.x_name else 0):
             fix = "give one for each" if self.x_name else "remove them, or name their axis: x_name"

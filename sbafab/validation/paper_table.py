@@ -286,8 +286,8 @@ def _computed(predictions: Mapping[str, Prediction]) -> dict[str, float]:
         }
     for kpa in (1, 10):
         values[f"held_{kpa}"] = ten.value("balloon_volume", kpa=kpa)
-    for name, template in (("1dof", "1dof-5mm"), ("3dof", "3dof-15mm")):
-        prediction = predictions[template]
+    for template in ("1dof-5mm", "3dof-15mm"):
+        prediction, name = predictions[template], template.partition("-")[0]
         tip, height = (
             prediction.value("shut_stiffness", kpa=10),
             prediction.value("free_height", kpa=10),

@@ -100,7 +100,7 @@ def test_an_assembly_without_an_actuator_is_refused(put_together: Together) -> N
 
 
 def test_a_design_is_no_assembly_and_the_other_way_round() -> None:
-    with pytest.raises(DesignError, match="is no assembly"):
+    with pytest.raises(DesignError, match="is not an assembly"):
         load_assembly("3dof-15mm")
     with pytest.raises(DesignError, match="'brace' is an assembly of several designs"):
         load_design("brace")

@@ -120,11 +120,11 @@ find 1dof-5mm --max mass=nan | must be a number
 find 1dof-5mm --min bend=90 | 1dof-5mm does not bend
 find 1dof-5mm --max time=1 --flow "35 l" | must be a flow
 find 1dof-5mm --sure 0.4 | must be above 0.5 and below 1
-find 1dof-5mm --sure 90 | must be a share from 0 to 1
+find 1dof-5mm --sure 90 | must be a fraction from 0 to 1
 find 1dof-5mm --min reference_stroke=5 --sure 0.9 | ask for stroke@10kPa
 find 1dof-5mm --set models.calibration=none --sure 0.9 | needs a calibration
 find 1dof-5mm --max mass=-1 | must be at least 0
-find 1dof-5mm --min yield=95 | a share from 0 to 1
+find 1dof-5mm --min yield=95 | a fraction from 0 to 1
 find 1dof-5mm --min stroke@50=5 | '50' has no unit; write 50kPa
 find 1dof-5mm --min force@1mm@5kPa@6kPa=1 | names two pressures
 find 1dof-5mm --min chamber.diamter=5 | did you mean chamber.diameter?
@@ -153,7 +153,7 @@ record --chart a.svg | lab.sqlite is not a file of records
 record 1dof-5mm --serial A1 --entry step | must be fields such as step=1
 record 1dof-5mm --serial A1 --entry "note='x" | a quotation mark without
 record 1dof-5mm --entry note=x | an entry needs its serial
-record 1dof-5mm --history x.doc | ends in none of .csv, .toml, .json
+record 1dof-5mm --history x.doc | must end in .csv, .toml, .json
 record 1dof-5mm --serial A1 --leak pass --again | no attempt came before this
 record --correct 1 --leak fail | lab.sqlite does not exist
 record nosuch --serial A1 --leak pass | nosuch

@@ -46,7 +46,7 @@ def entity(text: str, kind: str) -> str:
         ("AcDbPolyline\n", "AcDbPolyline\n210\n0.0\n220\n0.0\n230\n-1.0\n", "not at z = 0"),
         ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.1\n 40\n1.0\n", "not at z = 0"),
         ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.0\n 40\n0.0\n", "an edge of no length"),
-        ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.0\n 40\nnan\n", "is no number"),
+        ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.0\n 40\nnan\n", "is not a number"),
         ("\n 30\n0.0\n 40\n1.0\n", "\n 30\n0.0\n 40\n3.8\n", "touch or cross"),
         ("\n 40\n1.0\n", "\n 40\nwide\n", "not a sound DXF"),
         ("  0\nSECTION\n  2\nHEADER", "hello", "not an ASCII DXF"),

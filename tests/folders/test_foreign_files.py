@@ -66,7 +66,7 @@ def test_a_file_of_another_design_is_named_with_its_hash_in_line(
     put(folder, name, next((folders[1] / "layers").glob("*TPE*")))
     found, *_ = failing(folder)
     assert found.rule == "as-designed"
-    assert found.message.startswith(f"{name} is listed and is no file of this design")
+    assert found.message.startswith(f"{name} is listed, but is not a file of this design")
 
 
 @pytest.mark.parametrize("ending", few(OPENED, 6))

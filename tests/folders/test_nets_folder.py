@@ -133,7 +133,7 @@ def test_a_netlist_that_differs_names_each_place(
     path = netlist(tmp_path, {"x": ["supply", "lft"], "y": ["tube", "right"]})
     (missing, *_) = check_against(clean_routed, path, capsys)["rows"]
     assert missing["message"] == (
-        "circuit.json names lft, which is no port or chamber of the design; did you mean left?"
+        "circuit.json names lft, which is not a port or chamber of the design; did you mean left?"
     )
 
 
@@ -221,7 +221,7 @@ def test_an_imported_circuit_matches_its_own_file(tmp_path: Path) -> None:
 
 
 BAD: list[tuple[object, str]] = [
-    ([], "is no netlist; it is JSON with"),
+    ([], "is not a netlist; it is JSON with"),
     ({"schema": "sbafab/nets@1"}, "nets must be an object of lists by name"),
     ({"schema": "sbafab/nets@1", "nets": {"a": "b"}}, "nets.a must be a list of ports"),
     ({"schema": "sbafab/nets@1", "nets": {"a": [1]}}, "nets.a[0] must be a name, or an object"),

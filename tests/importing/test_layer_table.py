@@ -144,7 +144,7 @@ def test_yaml_of_foldable_robotics_is_read_alike(tmp_path: Path) -> None:
     [
         ("LINESTRING (1 2, 3 4)", "layer 1, geometry 1 holds a LineString at x 1, y 2"),
         ("POLYGON ((0 0, 4 4, 4 0, 0 4, 0 0))", "layer 1, geometry 1: Self-intersection[2 2]"),
-        ("POLYGON", "layer 1, geometry 1 is 'POLYGON', which is no WKT"),
+        ("POLYGON", "layer 1, geometry 1 is 'POLYGON', which is not valid WKT"),
         (7, "layer 1 has no list of geoms as text"),
         (None, "layer 1 holds no polygon; leave its row out"),
     ],

@@ -434,8 +434,8 @@ def test_values_put_in_at_random_are_refused_or_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        (POUCH.replace("{_basename", "{{_basename", 1), "is no YAML of popupCAD"),
-        ("layers: []", "hinge.cad holds no design of popupCAD"),
+        (POUCH.replace("{_basename", "{{_basename", 1), "is not valid YAML for popupCAD"),
+        ("layers: []", "hinge.cad contains no popupCAD design"),
     ],
 )
 def test_a_damaged_design_is_refused(

@@ -113,7 +113,7 @@ def test_files_of_every_kind_say_the_same(tmp_path: Path) -> None:
         ("b.json", "[", "b.json cannot be read"),
         ("b.toml", "entry = 1", "needs a list of tables called entry"),
         ("b.csv", "serial,note\n", "holds no entry"),
-        ("b.doc", "", "ends in none of .csv, .toml, .json"),
+        ("b.doc", "", "must end in .csv, .toml, .json"),
     ):
         (tmp_path / name).write_text(text)
         with pytest.raises(DesignError, match=says):
@@ -177,5 +177,5 @@ def test_exports_hold_every_row(lab: Lab, tmp_path: Path) -> None:
     assert [by_row[row]["expired"] for row in ("e2", "e3", "1")] == ["0", "1", ""]
     assert (by_row["1"]["leak"], by_row["1"]["note"]) == ("pass", "'=1+1")
     assert by_row["2"]["offset_mm"] == "0.1 0.25"
-    with pytest.raises(DesignError, match="ends in none of"):
+    with pytest.raises(DesignError, match="must end in"):
         write_history(lab.contents(), tmp_path / "a.doc")

@@ -190,7 +190,7 @@ def test_bad_input_to_reach_is_refused(three: Stack) -> None:
 
 def test_bad_input_to_many_targets_is_refused(three: Stack) -> None:
     batch = StackBatch(three)
-    with pytest.raises(DesignError, match="places of the tip in mm must be finite numbers"):
+    with pytest.raises(DesignError, match="positions of the tip in mm must be finite numbers"):
         batch.reach((0, 0, 10))
     with pytest.raises(DesignError, match="most_pressure = 120 kPa must be above 0 and at most"):
         batch.reach([(0, 0, 10)], most_pressure=120)

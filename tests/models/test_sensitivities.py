@@ -68,5 +68,5 @@ def test_wider_pockets_raise_the_stroke_and_stiffer_films_lower_it() -> None:
 def test_keys_without_a_number_are_refused() -> None:
     design = sbafab.load("3dof-15mm")
     for key in ("chamber.colour", "name", "press"):
-        with pytest.raises(DesignError, match=f"{key} is no number above 0 in this design"):
+        with pytest.raises(DesignError, match=f"{key} is not a number above 0 in this design"):
             sensitivities(design, PRESSURES, [key])

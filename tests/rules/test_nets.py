@@ -260,8 +260,8 @@ def test_two_blind_ends_beside_each_other_are_both_named(side: int, longer: int)
 def test_a_name_that_the_design_lacks_gets_the_nearest_or_what_to_give() -> None:
     netlist = Netlist({"a": ("p", "q"), "b": ("r", "ss"), "c": ("outlet",)})
     findings = netlist_findings(laminate_of(straight()), LIMITS, netlist, "nets.json")
-    lacking = [each.message for each in findings if "is no port" in each.message]
-    where = "which is no port or chamber of the design"
+    lacking = [each.message for each in findings if "is not a port" in each.message]
+    where = "which is not a port or chamber of the design"
     assert lacking == [
         f"nets.json names ss, {where}; did you mean s?",
         f"nets.json names outlet, {where}; give its layers and its place, or correct it",

@@ -59,7 +59,7 @@ bend@5mm | only a force takes one
 stroke@50% | only a force takes one
 force@50%@5mm | needs one stroke
 force@50kPa | a force needs one stroke
-force@150% | must be a share from 0 to 1
+force@150% | must be a fraction from 0 to 1
 stroke@1001kPa | give 0 to 1000 kPa
 stroke@-5kPa | a vacuum does nothing
 slip@50kPa | a vacuum is negative: write -50

@@ -184,7 +184,7 @@ def test_a_file_is_read_with_its_name_as_id(tmp_path: Path) -> None:
     ("before", "after", "words"),
     [
         ('"force_n"', '"force"', "quantity 'force', which is not known; did you mean force_n?"),
-        ('"height_share"', '"volume_ul"', "x_name = 'volume_ul', which is no axis of force_n"),
+        ('"height_share"', '"volume_ul"', "x_name = 'volume_ul', which is not an axis of force_n"),
         ("x = [0, 0.5]", "x = [0]", "has 1 x for 2 y; give one for each"),
         ("[0.1, 0.1]", "[0.1]", "has 1 absolute errors for 2 y"),
         ("[0.1, 0.1]", "[0.1, -1]", "has an absolute error of -1; it must be at least 0"),

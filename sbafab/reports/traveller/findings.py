@@ -23,7 +23,7 @@ YIELD = "registration-yield"
 
 class Hand(NamedTuple):
     """A placement error of up to ``placement`` mm and ``turn`` degrees by hand, and the ``share``
-    of builds that keep every limit at it.
+    of builds that meet every limit at it.
     """
 
     placement: float

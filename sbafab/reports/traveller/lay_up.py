@@ -77,7 +77,8 @@ def _repetition(keys: Sequence[object]) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Bed:
-    """One of the stacks that a step lays on each other; ``made_in`` is the step that made it.
+    """One of the stacks that a step lays on top of each other; ``made_in`` is the step that made
+    it.
 
     Single layers come off the sheet: ``made_in`` is None.
     """

@@ -101,7 +101,7 @@ class AssemblyTimes(NamedTuple):
 
 
 def assembly_times(works: Sequence[Work]) -> AssemblyTimes:
-    """Return the times of an assembly until its parts can be joined."""
+    """Return the times that an assembly takes before its parts can be joined."""
     waited = handled = pressed = cure = 0.0
     for work in works:
         each, count = times(work), work.cycles.count
