@@ -1,4 +1,4 @@
-"""Cut files read back: entities, appearance, exact contours. ezdxf reads all but plain ones."""
+"""Cut files read back: entities, appearance, exact contours. ezdxf reads all but our own."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
 from sbafab.cutting.cut_settings import COLOURS, CUT_INNER, CUT_OUTER, REFERENCE, SEAM
-from sbafab.cutting.dxf_write import skeleton
+from sbafab.cutting.dxf_write import document_text
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, edge_from_bulge, quarter_arcs
@@ -279,7 +279,7 @@ def _read_text(text: str) -> ReadBack:
     """Equal texts hold the same, and are parsed once: a run reads its files when it writes them,
     and again, from the disk, when it checks the folder.
     """
-    plain = _filled_in(text)
+    plain = _as_written(text)
     if plain is not None:
         return _read_back(*plain, units="mm")
     check_space(text)
@@ -327,92 +327,73 @@ def _read_back(drawn: Sequence[DrawnEntity], properties: Mapping[str, str], unit
     )
 
 
-# A file that is the packaged empty document, filled in as ours are, is read without ezdxf, which
+# A file that is byte for byte what the writer makes of it is read without ezdxf, which
 # takes longer to load than all files of a run take to be read. Any other file is left to ezdxf.
 
 
-FILLED_IN = (
-    (re.compile(r"(?:  9\n\$CUSTOMPROPERTYTAG\n  1\n.*\n  9\n\$CUSTOMPROPERTY\n  1\n.*\n)+"), ""),
-    (re.compile(r"  9\n\$EXTMIN\n(?:.*\n)*?(?=  9\n\$ORTHOMODE\n)"), ""),
-    (re.compile(r"(?<=  9\n\$HANDSEED\n  5\n)\w+"), "0"),
-    (re.compile(r"(?<=  2\nENTITIES\n)(?:.*\n)*?(?=  0\nENDSEC\n)"), ""),
-)
-"""What differs between our files, and what stands for it to compare the rest."""
+NUMBER = r"(-?\d+\.\d+)\n"
+CORNER = rf" 10\n{NUMBER} 20\n{NUMBER}"
+EXTENTS = re.compile(rf"\$EXTMIN\n{CORNER} 30\n0\.0\n  9\n\$EXTMAX\n{CORNER}")
 PROPERTY = re.compile(r"\$CUSTOMPROPERTYTAG\n  1\n(.*)\n  9\n\$CUSTOMPROPERTY\n  1\n(.*)\n")
 ENTITY = re.compile(
-    r"  0\n(\w+)\n  5\n\w+\n330\n\w+\n100\nAcDbEntity\n  8\n(\w+)\n100\nAcDb\w+\n"
-    r"((?:(?: 90| 70| 10| 20| 30| 40| 42| 11| 21| 31| 50| 51)\n-?[0-9.]+\n|100\nAcDbArc\n)*)"
+    r"  0\n(\w+)\n  5\n\w+\n330\n\w+\n100\nAcDbEntity\n  8\n(\w+)\n100\n(\w+)\n((?:(?!  0\n).*\n)*)"
 )
+ROUND = rf"{CORNER} 30\n0\.0\n 40\n{NUMBER}"
+PLAIN = {
+    ("LINE", "AcDbLine"): rf"{CORNER} 30\n0\.0\n 11\n{NUMBER} 21\n{NUMBER} 31\n0\.0\n",
+    ("CIRCLE", "AcDbCircle"): ROUND,
+    ("ARC", "AcDbCircle"): rf"{ROUND}100\nAcDbArc\n 50\n{NUMBER} 51\n{NUMBER}",
+    ("LWPOLYLINE", "AcDbPolyline"): r" 90\n(\d+)\n 70\n([01])\n((?:.*\n)*)",
+}
+"""Bodies of entities, flat and without any attribute, by type and subclass."""
+VERTEX = re.compile(rf"{CORNER}(?: 42\n{NUMBER})?")
 
 
-@cache
-def _empty() -> str:
-    """The packaged empty document as it is compared."""
-    return _without_content(skeleton())
-
-
-def _without_content(text: str) -> str:
-    for pattern, substitute in FILLED_IN:
-        text = pattern.sub(substitute, text, count=1)
-    return text
-
-
-def _filled_in(text: str) -> tuple[list[DrawnEntity], dict[str, str]] | None:
-    """Return entities and properties of a file filled in as ours are; None for any other."""
-    if _without_content(text) != _empty():
+def _as_written(text: str) -> tuple[list[DrawnEntity], dict[str, str]] | None:
+    """Return entities and properties of a file as the writer writes it; None for any other."""
+    extents, begin = EXTENTS.search(text), text.find("  2\nENTITIES\n")
+    if extents is None or begin < 0:
         return None
-    body = text[text.index("  2\nENTITIES\n") + 13 :]
-    body = body[: body.index("  0\nENDSEC\n")]
-    entities = list(ENTITY.finditer(body))
-    if sum(len(entity[0]) for entity in entities) != len(body):
+    section = text[begin + len("  2\nENTITIES\n") : text.find("  0\nENDSEC\n", begin)]
+    entities = [(e[1], e[2], e[3], e[4]) for e in ENTITY.finditer(section)]
+    properties = dict(PROPERTY.findall(text))
+    left, low, right, high = map(float, extents.groups())
+    if document_text(entities, [(left, low, right, high)], properties) != text:
         return None
-    try:
-        drawn = [_plain_entity(*entity.groups()) for entity in entities]
-    except (LookupError, ValueError):
+    drawn = [_plain_entity(*entity) for entity in entities]
+    plain = [entity for entity in drawn if entity is not None]
+    if len(plain) < len(drawn):
         return None
-    _refuse_uncut(drawn)
-    return drawn, dict(PROPERTY.findall(text))
+    _refuse_uncut(plain)
+    return plain, properties
 
 
-def _plain_entity(kind: str, layer: str, body: str) -> DrawnEntity:
-    """Return an entity of the codes and numbers in a body.
-
-    Raises LookupError or ValueError unless it is plain and flat.
-    """
-    words = [word for word in body.split("\n") if word and word != "AcDbArc"]
-    pairs = [(code, float(value)) for code, value in zip(words[::2], words[1::2], strict=True)]
+def _plain_entity(kind: str, layer: str, subclass: str, body: str) -> DrawnEntity | None:
+    """Return an entity from its body; None unless it is plain and flat."""
+    read = re.fullmatch(PLAIN.get((kind, subclass), "(?!)"), body)
+    if read is None:
+        return None
     if kind == "LWPOLYLINE":
-        return _plain_polyline(layer, pairs)
-    values = dict(pairs)
-    if len(values) != len(pairs) or values[" 30"] or values.get(" 31"):
-        raise ValueError("not plain")
-    start = values[" 10"], values[" 20"]
+        return _plain_polyline(layer, *read.groups())
+    x, y, *rest = map(float, read.groups())
+    edges: Sequence[Edge]
     if kind == "LINE":
-        return DrawnEntity(kind, layer, [Line(start, (values[" 11"], values[" 21"]))], False)
-    if kind == "CIRCLE":
-        return DrawnEntity(kind, layer, circle(start, values[" 40"]).edges, True)
-    if kind != "ARC":
-        raise ValueError("not plain")
-    edges = _arc_edges(start, values[" 40"], values[" 50"], values[" 51"])
-    return DrawnEntity(kind, layer, edges, False)
+        edges = [Line((x, y), (rest[0], rest[1]))]
+    elif kind == "CIRCLE":
+        edges = circle((x, y), rest[0]).edges
+    else:
+        edges = _arc_edges((x, y), *rest)
+    return DrawnEntity(kind, layer, edges, kind == "CIRCLE")
 
 
-def _plain_polyline(layer: str, pairs: Sequence[tuple[str, float]]) -> DrawnEntity:
-    (_, count), (_, flags) = pairs[:2]
-    rows: list[list[float]] = []
-    for code, value in pairs[2:]:
-        if code == " 10":
-            rows.append([value, 0.0, 0.0])
-        else:
-            rows[-1][{" 20": 1, " 42": 2}[code]] = value
-    closed = flags == CLOSED
-    is_open = layer in (CUT_INNER, CUT_OUTER) and not closed
-    if count != len(rows) or len(rows) < 2 or flags not in (0, CLOSED) or is_open:
-        raise ValueError("not plain")
+def _plain_polyline(layer: str, count: str, flag: str, vertices: str) -> DrawnEntity | None:
+    matches, closed = list(VERTEX.finditer(vertices)), flag == str(CLOSED)
+    rows = [tuple(float(value or 0.0) for value in match.groups()) for match in matches]
+    is_whole = "".join(match[0] for match in matches) == vertices and int(count) == len(rows) > 1
+    if not is_whole or (layer in (CUT_INNER, CUT_OUTER) and not closed):
+        return None
     x, y = rows[0][:2]
-    edges = list(
-        _bulge_edges([(*row,) for row in rows], closed, f"polyline at x {x:.3f}, y {y:.3f}")
-    )
+    edges = list(_bulge_edges(rows, closed, f"polyline at x {x:.3f}, y {y:.3f}"))
     return DrawnEntity("LWPOLYLINE", layer, edges, closed)
 
 

@@ -78,7 +78,7 @@ def dxf_text(
             *(_stroke(REFERENCE, run) for run in sheet.frames),
         ]
         low, high = (0.0, 0.0), sheet.frame or (0.0, 0.0)
-    return _document(
+    return document_text(
         entities, [*(contour.bounds for contour in contours), (*low, *high)], properties
     )
 
@@ -89,7 +89,7 @@ def seam_text(path: Sequence[Sequence[Edge]], properties: Mapping[str, str]) -> 
     entities = [*map(_seam_run, runs), *_datum_cross()]
     arm = (-DATUM_ARM, -DATUM_ARM, DATUM_ARM, DATUM_ARM)
     boxes = [edge.bounds for run in runs for edge in run]
-    return _document(entities, [*boxes, arm], properties, has_seam=True)
+    return document_text(entities, [*boxes, arm], properties, has_seam=True)
 
 
 def _seam_run(edges: Sequence[Edge]) -> _Entity:
@@ -98,7 +98,7 @@ def _seam_run(edges: Sequence[Edge]) -> _Entity:
     return _polyline(SEAM, vertices if closed else [*vertices, (*edges[-1].end, 0.0)], closed)
 
 
-def _document(
+def document_text(
     entities: Sequence[_Entity],
     boxes: Sequence[Bounds],
     properties: Mapping[str, str],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from io import StringIO
 from pathlib import Path
@@ -10,7 +11,7 @@ import ezdxf
 import pytest
 from ezdxf.layouts import Modelspace
 
-from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_read import _as_written, read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
@@ -161,3 +162,46 @@ def test_an_old_polyline_is_read_as_it_stands_and_refused_with_a_curve_fitted(
     else:
         before = read_profile(plate_text).region.area
         assert read_profile(text).region.area == pytest.approx(before + 16.0)
+
+
+def _swapped(old: str, new: str) -> Callable[[str], str]:
+    """The file with the first such text among its entities replaced."""
+
+    def doctored(text: str) -> str:
+        head, mark, entities = text.partition("  2\nENTITIES\n")
+        assert old in entities
+        return head + mark + entities.replace(old, new, 1)
+
+    return doctored
+
+
+@pytest.mark.parametrize(
+    ("doctored", "says"),
+    [
+        (lambda t: re.sub(r"(?<=INSUNITS\n 70\n) *4", "1", t), "millimetres"),
+        (_swapped(" 30\n0.0\n", " 30\n1.0\n"), "not at z = 0"),
+        (_swapped("AcDbEntity\n", "AcDbEntity\n 60\n1\n"), "invisible"),
+        (_swapped("AcDbEntity\n", "AcDbEntity\n 67\n     1\n"), "paper space"),
+        (_swapped("AcDbEntity\n", "AcDbEntity\n  6\nDASHED\n"), "linetype"),
+    ],
+)
+def test_what_is_changed_in_our_own_form_is_seen(
+    doctored: Callable[[str], str], says: str, plate_text: str
+) -> None:
+    with pytest.raises(OutputError, match=says):
+        read_profile(doctored(plate_text))
+
+
+def test_a_file_that_is_not_byte_for_byte_ours_is_read_by_ezdxf(plate_text: str) -> None:
+    """Another owner, a handle that stands twice, another subclass, another next handle."""
+    assert _as_written(plate_text) is not None
+    entities = plate_text[plate_text.index("  2\nENTITIES\n") :]
+    handles, owner = re.findall(r"\n  5\n(\w+)\n330\n", entities), entities.split("330\n", 1)[1][:2]
+    for doctored in (
+        _swapped(f"330\n{owner.strip()}\n", "330\n1B\n"),
+        _swapped(f"  5\n{handles[1]}\n", f"  5\n{handles[0]}\n"),
+        _swapped("AcDbPolyline", "AcDbCircle"),
+        _swapped(" 90\n", " 91\n"),
+        lambda text: re.sub(r"(?<=HANDSEED\n  5\n)\w+", "FFF", text),
+    ):
+        assert _as_written(doctored(plate_text)) is None
