@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from sbafab.errors import DesignError
@@ -34,6 +35,13 @@ def _every() -> Any:
 def installed(group: str) -> tuple[EntryPoint, ...]:
     """Return the entry points of a group in all installed packages, by name."""
     return tuple(sorted(_every().select(group=group), key=lambda entry: (entry.name, entry.value)))
+
+
+def load(entry: str) -> Any:
+    """Return the object that an entry names: ``module:attribute``, or a module alone."""
+    name, _, attribute = entry.partition(":")
+    module = import_module(name)
+    return getattr(module, attribute) if attribute else module
 
 
 class Plugins(Mapping[str, Kind], Generic[Kind]):
@@ -73,16 +81,14 @@ class Plugins(Mapping[str, Kind], Generic[Kind]):
         return added
 
     def _load(self, name: str) -> Kind:
-        from importlib.metadata import EntryPoint
-
         if name in self.own:
-            own: Kind = EntryPoint(name, self.own[name], self.group).load()
+            own: Kind = load(self.own[name])
             return own
         entry = self._added[name]
         try:
             value = entry.load()
             if not isinstance(value, self.kind):
-                raise TypeError(f"{entry.value} is no {self.kind.__name__}")
+                raise TypeError(f"{entry.value} is not a {self.kind.__name__}")
         except Exception as error:
             raise DesignError(
                 f"{self.noun} {name} of the installed package {entry.module.partition('.')[0]} "

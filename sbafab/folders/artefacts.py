@@ -1,7 +1,7 @@
 """The files of a design's folder: one table with a row for each file or folder.
 
-Adding an output file takes one row of the table below and the function that renders it, which
-imports pictures and pages itself: a run of some parts loads none of them.
+Adding an output file takes one row of the table below and the function that renders it. Rows name
+the functions of pictures and pages, which are loaded when a run first needs them.
 """
 
 from __future__ import annotations
@@ -51,14 +51,12 @@ from sbafab.version import GENERATOR
 
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.meshes import ConformingMeshes
-    from sbafab.reports.traveller.work import Work
 
 TRAVELLER = "traveller.html"
 BENCH = "bench.html"
 FINDINGS = "findings.html"
 PREDICT = "predict"
 """Folder of a prediction's plots."""
-PICTURES_OF_A_DESIGN = 3
 
 
 RunPart = str
@@ -113,17 +111,15 @@ class DesignFolder:
         return replace(laminate, notes=(*laminate.notes, *notes)) if notes else laminate
 
     @cached_property
-    def work(self) -> Work:
-        """The work that the pages for the bench show."""
+    def work(self) -> Any:
+        """The ``Work`` that the pages for the bench show."""
         return work_of(self.build, self.sheets)
 
     @cached_property
     def solid_png(self) -> bytes:
         """The picture of the solid, which the traveller shows as well."""
-        # `check` draws no picture.
-        from sbafab.reports.solid_png import solid_png
-
-        return solid_png(self.marked)
+        picture: bytes = plugins.load("sbafab.reports.solid_png:solid_png")(self.marked)
+        return picture
 
 
 @dataclass(frozen=True)
@@ -155,17 +151,37 @@ class Artefact:
         return is_wanted and (folder.has_pages or not self.is_page)
 
 
+def made_by(
+    entry: str,
+    parameters: Callable[[DesignFolder], tuple[Any, ...]],
+    is_made: Callable[[DesignFolder], bool] = lambda folder: True,
+) -> Callable[[DesignFolder], str | bytes | None]:
+    """Return a row's ``render``: the function that an entry names, ``module:function``, called with
+    what the folder gives; None for a folder that does not need the file.
+    """
+
+    def render(folder: DesignFolder) -> str | bytes | None:
+        if not is_made(folder):
+            return None
+        contents: str | bytes | None = plugins.load(entry)(*parameters(folder))
+        return contents
+
+    return render
+
+
 def write_artefacts(folder: DesignFolder, rows: Iterable[Artefact] | None = None) -> None:
     """Write the artefacts (by default all) that belong in the folder."""
-    for artefact in artefacts() if rows is None else rows:
-        if artefact.render is None or not artefact.belongs_in(folder):
-            continue
-        contents = artefact.render(folder)
+    wanted = [row for row in rows or artefacts() if row.belongs_in(folder)]
+    drawn = [row.path for row in wanted if row.top == "preview"]
+    for artefact in wanted:
+        contents = None if artefact.render is None else artefact.render(folder)
         if contents is not None:
             path = folder.path / artefact.path
             path.parent.mkdir(exist_ok=True)
             data = contents.encode() if isinstance(contents, str) else contents
             path.write_bytes(data)
+        if artefact.path in drawn:
+            folder.progress("pictures", drawn.index(artefact.path) + 1, len(drawn))
 
 
 def tops_of(*parts: RunPart) -> tuple[str, ...]:
@@ -209,7 +225,7 @@ def write_nested_sheets(
     return sheets
 
 
-# Pressing.
+# Pressing and meshes.
 
 
 def _press_json(folder: DesignFolder) -> str:
@@ -220,22 +236,10 @@ def _press_json(folder: DesignFolder) -> str:
     return as_json(press_json(schedule))
 
 
-def _underlay(folder: DesignFolder) -> bytes | None:
-    # Only a folder with a traveller has an underlay.
-    from sbafab.reports.prints import underlay_pdf
-
-    build, platen = folder.build, folder.design.press.platen
-    return underlay_pdf(build.laminate, build.sha256, build.cycles.places, platen)
-
-
-def _seams(folder: DesignFolder) -> bytes | None:
-    # Only a folder with a traveller has pages of seams.
-    from sbafab.reports.prints import seams_pdf
-
-    return seams_pdf(folder.laminate, folder.build.sha256, folder.design.seam_offsets)
-
-
-# Meshes and pictures.
+def _has_tray(folder: DesignFolder) -> bool:
+    """Return True for a batch, unless its design says otherwise."""
+    has_tray = folder.design.order.tray
+    return folder.build.cycles.copies > 1 if has_tray is None else has_tray
 
 
 def _write_meshes(folder: DesignFolder) -> None:
@@ -243,37 +247,10 @@ def _write_meshes(folder: DesignFolder) -> None:
     written, left_out = write_meshes(folder.laminate, folder.path, progress=progress)
     folder.meshes += written
     folder.left_out += left_out
-    conforming = folder.conforming
-    if conforming is not None:
-        # Conforming meshes take the extra "mesh".
-        from sbafab.meshing.conforming.meshes import write_conforming
-
+    if folder.conforming is not None:
         progress = partial(folder.progress, "conforming meshes")
-        folder.meshes += write_conforming(conforming, folder.path, progress, folder.formats)
-
-
-def _layers_svg(folder: DesignFolder) -> str:
-    # `check` and `cut` draw no layers.
-    from sbafab.reports.layers_svg import layers_svg
-
-    picture = layers_svg(folder.marked)
-    folder.progress("pictures", 1, PICTURES_OF_A_DESIGN)
-    return picture
-
-
-def _stack_svg(folder: DesignFolder) -> str:
-    # `check` and `cut` draw no section.
-    from sbafab.reports.stack_svg import stack_svg
-
-    picture = stack_svg(folder.marked)
-    folder.progress("pictures", 2, PICTURES_OF_A_DESIGN)
-    return picture
-
-
-def _solid_png(folder: DesignFolder) -> bytes:
-    picture = folder.solid_png
-    folder.progress("pictures", PICTURES_OF_A_DESIGN, PICTURES_OF_A_DESIGN)
-    return picture
+        write = plugins.load("sbafab.meshing.conforming.meshes:write_conforming")
+        folder.meshes += write(folder.conforming, folder.path, progress, folder.formats)
 
 
 # Predictions and simulations.
@@ -309,15 +286,12 @@ def _predict_json(folder: DesignFolder) -> str:
 
 
 def _write_plots(folder: DesignFolder) -> None:
-    # Charts are for designs with a prediction.
-    from sbafab.reports.charts import relation_svg
-
     assert folder.prediction is not None
     relations = folder.prediction.relations
     if relations:
         (folder.path / PREDICT).mkdir()
     for relation in relations:
-        plot = relation_svg(folder.design.name, relation)
+        plot = plugins.load("sbafab.reports.charts:relation_svg")(folder.design.name, relation)
         write_text(folder.path / PREDICT / f"{relation.name}.svg", plot)
 
 
@@ -344,51 +318,12 @@ def _write_simulation(name: str, folder: DesignFolder) -> None:
 # Pages, findings and the design.
 
 
-def _tray_pdf(folder: DesignFolder) -> bytes | None:
-    # Only a batch, or a design that asks for it, has a tray plan.
-    from sbafab.reports.prints import tray_pdf
-
-    build, has_tray = folder.build, folder.design.order.tray
-    if not (build.cycles.copies > 1 if has_tray is None else has_tray):
-        return None
-    return tray_pdf(build.laminate, build.cycles, build.sha256, folder.design.order.batch)
-
-
-def _bill(folder: DesignFolder) -> str | None:
-    # The pages for the bench take as long to load as all the rules.
-    from sbafab.reports.traveller.materials import bill_csv
-
-    return bill_csv(folder.work)
-
-
-def _traveller(folder: DesignFolder) -> str:
-    # The pages for the bench take as long to load as all the rules.
-    from sbafab.reports.traveller.page import traveller_html
-
-    return traveller_html(replace(folder.work, solid_png=folder.solid_png))
-
-
-def _bench(folder: DesignFolder) -> str:
-    # The pages for the bench take as long to load as all the rules.
-    from sbafab.reports.traveller.bench import bench_html
-
-    work = folder.work
-    return bench_html(work.design.name, work.sha256, [work])
-
-
-def work_of(build: Build, sheets: Sequence[SheetFile], folder: str = "") -> Work:
-    """Return what the pages for the bench are made from; ``folder`` has the design's files."""
-    # `check` and `cut` have no pages for the bench.
-    from sbafab.reports.traveller.work import Work
-
-    return Work(build.design, build.laminate, build.findings, build.curves, sheets, folder)
-
-
-def _findings(folder: DesignFolder) -> str:
-    # The page of findings shares its pictures with the traveller.
-    from sbafab.reports.traveller.findings import findings_html
-
-    return findings_html(folder.design.name, folder.build.sha256, [folder.build])
+def work_of(build: Build, sheets: Sequence[SheetFile], folder: str = "") -> Any:
+    """Return the ``Work`` that pages for the bench are made from; ``folder`` has the design's
+    files.
+    """
+    work = plugins.load("sbafab.reports.traveller.work:Work")
+    return work(build.design, build.laminate, build.findings, build.curves, sheets, folder)
 
 
 def _checks(folder: DesignFolder) -> str:
@@ -434,13 +369,53 @@ _OWN: tuple[Artefact, ...] = (
         "the press schedule as a table",
         lambda folder: press_csv(folder.build.schedule),
     ),
-    Artefact("tray.pdf", "press", "of a batch: a place for every part, 1:1", _tray_pdf),
-    Artefact("underlay.pdf", "press", "guides for placing parts by hand, 1:1", _underlay),
-    Artefact("seams.pdf", "press", "paths of seams on the films in hand, 1:1", _seams),
+    Artefact(
+        "tray.pdf",
+        "press",
+        "of a batch: a place for every part, 1:1",
+        made_by(
+            "sbafab.reports.prints:tray_pdf",
+            lambda of: (of.laminate, of.build.cycles, of.build.sha256, of.design.order.batch),
+            _has_tray,
+        ),
+    ),
+    Artefact(
+        "underlay.pdf",
+        "press",
+        "guides for placing parts by hand, 1:1",
+        made_by(
+            "sbafab.reports.prints:underlay_pdf",
+            lambda of: (
+                of.laminate,
+                of.build.sha256,
+                of.build.cycles.places,
+                of.design.press.platen,
+            ),
+        ),
+    ),
+    Artefact(
+        "seams.pdf",
+        "press",
+        "paths of seams on the films in hand, 1:1",
+        made_by(
+            "sbafab.reports.prints:seams_pdf",
+            lambda of: (of.laminate, of.build.sha256, of.design.seam_offsets),
+        ),
+    ),
     Artefact("mesh", "mesh", "solid, cavities, and meshes for simulation", _write_meshes),
-    Artefact("preview/layers.svg", "preview", "every pattern", _layers_svg),
-    Artefact("preview/stack.svg", "preview", "the layers in section", _stack_svg),
-    Artefact("preview/solid.png", "preview", "the actuator, flat", _solid_png),
+    Artefact(
+        "preview/layers.svg",
+        "preview",
+        "every pattern",
+        made_by("sbafab.reports.layers_svg:layers_svg", lambda of: (of.marked,)),
+    ),
+    Artefact(
+        "preview/stack.svg",
+        "preview",
+        "the layers in section",
+        made_by("sbafab.reports.stack_svg:stack_svg", lambda of: (of.marked,)),
+    ),
+    Artefact("preview/solid.png", "preview", "the actuator, flat", lambda of: of.solid_png),
     Artefact(
         "predict.json",
         "predict",
@@ -463,7 +438,7 @@ _OWN: tuple[Artefact, ...] = (
         "bill.csv",
         "cut",
         "of a batch: the bill of materials",
-        _bill,
+        made_by("sbafab.reports.traveller.materials:bill_csv", lambda of: (of.work,)),
         needs=frozenset(("press", "preview")),
         is_page=True,
     ),
@@ -471,7 +446,10 @@ _OWN: tuple[Artefact, ...] = (
         TRAVELLER,
         "cut",
         "the pages that go with each actuator: steps, cut list, press steps with pictures, tests",
-        _traveller,
+        made_by(
+            "sbafab.reports.traveller.page:traveller_html",
+            lambda of: (replace(of.work, solid_png=of.solid_png),),
+        ),
         needs=frozenset(("press", "preview")),
         is_page=True,
     ),
@@ -479,11 +457,23 @@ _OWN: tuple[Artefact, ...] = (
         BENCH,
         "cut",
         "what is made, measured and read once for a bench: base plate, press, laser",
-        _bench,
+        made_by(
+            "sbafab.reports.traveller.bench:bench_html",
+            lambda of: (of.design.name, of.build.sha256, [of.work]),
+        ),
         needs=frozenset(("press", "preview")),
         is_page=True,
     ),
-    Artefact(FINDINGS, "preview", "the page for the designer", _findings, is_page=True),
+    Artefact(
+        FINDINGS,
+        "preview",
+        "the page for the designer",
+        made_by(
+            "sbafab.reports.traveller.findings:findings_html",
+            lambda of: (of.design.name, of.build.sha256, [of.build]),
+        ),
+        is_page=True,
+    ),
     Artefact("checks.json", "", "what the rules found", _checks, Checks.SCHEMA),
     Artefact(
         LAMINATE_FILE,

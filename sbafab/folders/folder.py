@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from sbafab import plugins
 from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
 from sbafab.assemblies.records import Cup
@@ -144,12 +145,10 @@ def _write_assembly(
     """Write what an assembly's folder holds beside its designs; return the keys that its manifest
     has beside a job's.
     """
-    # A design has no picture of an assembly.
-    from sbafab.reports.solid_png import assembly_pngs
-
     progress("assembled", 0, 1)
     (path / "preview").mkdir()
-    picture, bare = assembly_pngs(assembled, _note(order))
+    draw = plugins.load("sbafab.reports.solid_png:assembly_pngs")
+    picture, bare = draw(assembled, _note(order))
     (path / PICTURE).write_bytes(picture)
     meshes = []
     if sheets:
@@ -160,9 +159,7 @@ def _write_assembly(
         write_text(path / TRAVELLER, traveller)
         write_text(path / BENCH, bench)
     sha256 = assembly_sha256(assembled)
-    # Only a folder that is written has pages.
-    from sbafab.reports.traveller.findings import findings_html
-
+    findings_html = plugins.load("sbafab.reports.traveller.findings:findings_html")
     page = findings_html(order.name, sha256, order.builds, order.between or ())
     write_text(path / FINDINGS, page)
     designs = [build.design for build in order.builds]
@@ -225,12 +222,13 @@ def _bench_pages(
     order: Order, assembled: Assembled, sheets: Sequence[SheetFile], picture: bytes
 ) -> tuple[str, str]:
     """Return the traveller and the page of the bench."""
-    # Pages of an assembly: their modules take 0.1 s to load.
-    from sbafab.reports.traveller.assembly_page import AssemblyWork, assembly_html
-    from sbafab.reports.traveller.bench import bench_html
-
+    bench_html = plugins.load("sbafab.reports.traveller.bench:bench_html")
+    page = "sbafab.reports.traveller.assembly_page"
     works = [work_of(build, sheets, f"{build.design.name}/") for build in order.builds]
     sha256 = assembly_sha256(assembled)
     between, lowered = order.between or (), order.settings.lowered
-    work = AssemblyWork(assembled, sha256, works, sheets, between, order.waived, lowered, picture)
-    return assembly_html(work), bench_html(assembled.assembly.name, sha256, works, assembled)
+    work = plugins.load(f"{page}:AssemblyWork")(
+        assembled, sha256, works, sheets, between, order.waived, lowered, picture
+    )
+    traveller = plugins.load(f"{page}:assembly_html")(work)
+    return traveller, bench_html(assembled.assembly.name, sha256, works, assembled)

@@ -15,6 +15,7 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sbafab import plugins
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.cut_settings import TRUE_ARCS, Curves
 from sbafab.design.records import Design
@@ -221,10 +222,8 @@ def _extras(
     extras = {"prediction": request.prediction, "simulated": request.simulated}
     if request.conforming is None or "mesh" not in parts:
         return extras
-    # Conforming meshes take the extra "mesh".
-    from sbafab.meshing.conforming.meshes import conforming_meshes
-
     progress("meshing", 0, 1)
+    conforming_meshes = plugins.load("sbafab.meshing.conforming.meshes:conforming_meshes")
     meshes = conforming_meshes(build.laminate, request.conforming.settings)
     return {**extras, "conforming": meshes, "formats": request.conforming.formats}
 

@@ -11,9 +11,10 @@ import traceback
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from sbafab import api
+from sbafab.api.records import Assembled, Assembly, Design, Laminate
 from sbafab.errors import DesignError, SbafabError
 from sbafab.studio import design_files
 from sbafab.studio.editing import MOST_EDITS, edited
@@ -36,12 +37,6 @@ from sbafab.studio.moving import (
     stack_of,
     whole_prediction,
 )
-
-if TYPE_CHECKING:
-    from sbafab.assemblies.build import Assembled
-    from sbafab.assemblies.records import Assembly
-    from sbafab.design.records import Design
-    from sbafab.laminate.laminate import Laminate
 
 StudioJob = dict[str, Any]
 Answer = dict[str, Any]

@@ -10,18 +10,19 @@ import base64
 import hashlib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from sbafab import api
-from sbafab.folders.checks_json import FindingEntry
-
-if TYPE_CHECKING:
-    from sbafab.assemblies.build import Assembled, PlacedPart
-    from sbafab.geometry.region import Region
-    from sbafab.laminate.laminate import Laminate
-    from sbafab.meshing.surface import Surface
-    from sbafab.reports.nets_svg import NetMap
-    from sbafab.rules.finding import Finding
+from sbafab.api.records import (
+    Assembled,
+    Finding,
+    FindingEntry,
+    Laminate,
+    NetMap,
+    PlacedPart,
+    Region,
+    Surface,
+)
 
 Kept = TypeVar("Kept")
 CancelCheck = Callable[[], None]

@@ -5,18 +5,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from sbafab import api
+from sbafab.api.records import Assembled, Design, Motion, PlacedPart, Pose, Stack
 from sbafab.errors import DesignError
 from sbafab.studio.model import flat, of, packed, remembered
-
-if TYPE_CHECKING:
-    from sbafab.assemblies.build import Assembled, PlacedPart
-    from sbafab.design.records import Design
-    from sbafab.models.stack import Motion, Pose, Stack
 
 CURVE = 25
 """Points of the curves beside the view."""

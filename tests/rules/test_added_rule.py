@@ -131,7 +131,7 @@ RULE = Rule({name!r}, check, Explanation("", "", ""))
             ("mine",),
             "rule mine of the installed package broken cannot be loaded (division",
         ),
-        ("RULE = 3", ("mine",), "(broken:RULE is no Rule); repair or uninstall that package"),
+        ("RULE = 3", ("mine",), "(broken:RULE is not a Rule); repair or uninstall that package"),
         ("x = 3", ("mine",), "has no attribute 'RULE'"),
         (RULE.format(name="other"), ("mine",), "calls itself other"),
         (RULE.format(name="sealing"), ("sealing",), "rule sealing is there already; uninstall"),
