@@ -77,11 +77,11 @@ folder holds beside its `result.json`.
 def write(folder: Path) -> None:
     """The page, and beside it the schemas as files."""
     rows = []
-    for name, (identity, said, _) in FORMATS.items():
+    for name, each in FORMATS.items():
         text = json.dumps(schema_of(name), indent=1) + "\n"
         (folder / f"{name}.schema.json").write_text(text, encoding="utf-8")
         link = f"{{download}}`{name}.schema.json`"
-        rows.append(f"| `{name}` | `{identity}` | {said} | {link} |")
+        rows.append(f"| `{name}` | `{each.identity}` | {each.about} | {link} |")
     files = "".join(
         f"| `{file.path}` | {file.about} | {f'`{file.schema}`' if file.schema else ''} |\n"
         for file in artefacts()

@@ -11,38 +11,18 @@ from typing import Annotated, Any, NamedTuple
 import click
 from pydantic import Field
 
-from sbafab import actuators
+from sbafab import actuators, plugins
 from sbafab.assemblies.records import Assembly
 from sbafab.cli import show
-from sbafab.cli.evidence import CalibrateDocument
 from sbafab.cli.exit import ErrorKind
-from sbafab.cli.explain import ExplainDocument, ExplainedDocument
-from sbafab.cli.make import NestedDocument, RunDocument
-from sbafab.cli.measure import KerfDocument
-from sbafab.cli.start import TemplateEntry
-from sbafab.design.laminate_file import SCHEMA as LAMINATE
-from sbafab.design.laminate_file import LaminateDocument
+from sbafab.cli.make import RunDocument
 from sbafab.documents import Document, json_schema
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.folders.artefacts import PredictDocument
-from sbafab.folders.checks_json import Checks
-from sbafab.folders.manifest import AssemblyManifest, JobManifest, Manifest
-from sbafab.lab.inspection import InspectionDocument
-from sbafab.lab.records import HistoryDocument, RecordsDocument
-from sbafab.lab.report import ReportDocument
 from sbafab.laminate.joints import PortKind
 from sbafab.laminate.netlist import SCHEMA as NETS
-from sbafab.models.map_files import MapDocument
 from sbafab.models.sensitivities import SensitivityRow
-from sbafab.pressing.schedule_files import PressDocument
-from sbafab.reports.assembly_prediction import SCHEMA as ASSEMBLY_PREDICTION
-from sbafab.reports.assembly_prediction import AssemblyPrediction
-from sbafab.search.compare import CompareDocument, YieldEntry
-from sbafab.search.find import FindDocument
-from sbafab.search.sweep import SweepDocument
-from sbafab.simulators.simulator import SimulateDocument
-from sbafab.validation.comparison import ComparisonDocument
-from sbafab.validation.paper_table import ReproductionDocument
+from sbafab.search.compare import YieldEntry
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -97,65 +77,98 @@ class ErrorDocument(Document, schema=ERROR_SCHEMA):
 
 
 class Format(NamedTuple):
-    """A format: the id in its files, what it describes, and its record."""
+    """A format: the entry of its record, what it describes, and an id if its record has none."""
 
-    identity: str
+    entry: str
     about: str
-    record: Any
+    other_id: str = ""
 
+    @property
+    def record(self) -> Any:
+        """The record, loaded when first asked for."""
+        return plugins.load(f"sbafab.{self.entry}")
 
-def _of(about: str, document: type[Document]) -> Format:
-    return Format(document.SCHEMA, about, document)
+    @property
+    def identity(self) -> str:
+        """The id in its files."""
+        return self.other_id or str(self.record.SCHEMA)
 
 
 FORMATS: Mapping[str, Format] = {
-    "design": Format("sbafab/design@1", "design and assembly files (TOML)", Assembly),
-    "checks": _of("`checks.json`, and what `check --json` prints", Checks),
+    "design": Format(
+        "assemblies.records:Assembly", "design and assembly files (TOML)", "sbafab/design@1"
+    ),
+    "checks": Format("folders.checks_json:Checks", "`checks.json`, and what `check --json` prints"),
     "laminate": Format(
-        LAMINATE, "`laminate.json`: layers with exact edges, films, inlets", LaminateDocument
+        "design.laminate_file:LaminateDocument",
+        "`laminate.json`: layers with exact edges, films, inlets",
+        "sbafab/laminate@1",
     ),
-    "nets": _of("a netlist, for `check --nets`", NetsDocument),
-    "manifest": _of("`manifest.json` of a design's folder", Manifest),
-    "job": _of("`manifest.json` of several designs cut together by `nest`", JobManifest),
-    "assembly": _of("`manifest.json` of an assembly's folder", AssemblyManifest),
-    "press": _of("`press.json`, the heat-press schedule", PressDocument),
-    "predict": _of(
-        "`predict.json`, and what `predict --json` prints of a design", PrintedPrediction
+    "nets": Format("cli.formats:NetsDocument", "a netlist, for `check --nets`"),
+    "manifest": Format("folders.manifest:Manifest", "`manifest.json` of a design's folder"),
+    "job": Format(
+        "folders.manifest:JobManifest", "`manifest.json` of several designs cut together by `nest`"
     ),
-    "find": _of("what `find --json` prints", FindDocument),
-    "compare": _of("what `compare --json` prints", CompareDocument),
-    "run": _of("what `generate`, `cut`, `press` and `mesh` print with `--json`", YieldRunDocument),
-    "nested": _of("what `nest --json` prints", NestedDocument),
-    "records": _of("what `record --json` prints of records", RecordsDocument),
-    "history": _of("what `record --export FILE.json` writes", HistoryDocument),
-    "report": _of("what `record --report --json` prints", ReportDocument),
-    "sweep": _of("what `sweep --json` prints", SweepDocument),
-    "simulate": _of(
-        "`result.json` of a simulator's folder, and what `simulate --json` prints", SimulateDocument
+    "assembly": Format(
+        "folders.manifest:AssemblyManifest", "`manifest.json` of an assembly's folder"
+    ),
+    "press": Format(
+        "pressing.schedule_files:PressDocument", "`press.json`, the heat-press schedule"
+    ),
+    "predict": Format(
+        "cli.formats:PrintedPrediction",
+        "`predict.json`, and what `predict --json` prints of a design",
+    ),
+    "find": Format("search.find:FindDocument", "what `find --json` prints"),
+    "compare": Format("search.compare:CompareDocument", "what `compare --json` prints"),
+    "run": Format(
+        "cli.formats:YieldRunDocument",
+        "what `generate`, `cut`, `press` and `mesh` print with `--json`",
+    ),
+    "nested": Format("cli.make:NestedDocument", "what `nest --json` prints"),
+    "records": Format("lab.records:RecordsDocument", "what `record --json` prints of records"),
+    "history": Format("lab.records:HistoryDocument", "what `record --export FILE.json` writes"),
+    "report": Format("lab.report:ReportDocument", "what `record --report --json` prints"),
+    "sweep": Format("search.sweep:SweepDocument", "what `sweep --json` prints"),
+    "simulate": Format(
+        "simulators.simulator:SimulateDocument",
+        "`result.json` of a simulator's folder, and what `simulate --json` prints",
     ),
     "assembly-predict": Format(
-        ASSEMBLY_PREDICTION, "what `predict --json` prints of an assembly", AssemblyPrediction
+        "reports.assembly_prediction:AssemblyPrediction",
+        "what `predict --json` prints of an assembly",
+        "sbafab/assembly-predict@1",
     ),
-    "reproduction": _of(
-        "`reproduction.json`, and what `reproduce --json` prints", ReproductionDocument
+    "reproduction": Format(
+        "validation.paper_table:ReproductionDocument",
+        "`reproduction.json`, and what `reproduce --json` prints",
     ),
-    "comparison": _of("what `reproduce SOURCE --json` prints", ComparisonDocument),
-    "balloon-map": _of("what `map --to FILE.json` writes", MapDocument),
-    "inspection": _of("what `inspect` writes, and prints with `--json`", InspectionDocument),
-    "kerf": _of("what `kerf --json` prints", KerfDocument),
-    "explain": _of("what `explain NAME --json` prints", ExplainDocument),
-    "explained": _of("what `explain --json` prints of all rules", ExplainedDocument),
-    "calibrate": _of("what `calibrate --json` prints", CalibrateDocument),
+    "comparison": Format(
+        "validation.comparison:ComparisonDocument", "what `reproduce SOURCE --json` prints"
+    ),
+    "balloon-map": Format("models.map_files:MapDocument", "what `map --to FILE.json` writes"),
+    "inspection": Format(
+        "lab.inspection:InspectionDocument", "what `inspect` writes, and prints with `--json`"
+    ),
+    "kerf": Format("cli.measure:KerfDocument", "what `kerf --json` prints"),
+    "explain": Format("cli.explain:ExplainDocument", "what `explain NAME --json` prints"),
+    "explained": Format(
+        "cli.explain:ExplainedDocument", "what `explain --json` prints of all rules"
+    ),
+    "calibrate": Format("cli.evidence:CalibrateDocument", "what `calibrate --json` prints"),
     "templates": Format(
-        "sbafab/templates@1", "what `new --json` prints: a list, without id", list[TemplateEntry]
+        "cli.start:TEMPLATES", "what `new --json` prints: a list, without id", "sbafab/templates@1"
     ),
-    "error": _of("what any command prints with `--json` when it ends in an error", ErrorDocument),
+    "error": Format(
+        "cli.formats:ErrorDocument",
+        "what any command prints with `--json` when it ends in an error",
+    ),
 }
 
 
 def schema_of(name: str) -> dict[str, Any]:
     """Return the JSON schema of a format in ``FORMATS``."""
-    identity, _, record = FORMATS[name]
+    record, identity = FORMATS[name].record, FORMATS[name].identity
     # A design file is an assembly or of any family.
     body = actuators.schema(record) if record is Assembly else json_schema(record, identity)
     head = {"$schema": DIALECT, "$id": f"urn:{identity.replace('/', ':')}"}

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
+from sbafab import plugins
 from sbafab.cli import options as opt
 from sbafab.cli import show
 from sbafab.design.files import template_summaries, write_new
@@ -26,6 +27,10 @@ class TemplateEntry(Document):
 
     name: str
     summary: str
+
+
+TEMPLATES = list[TemplateEntry]
+"""What ``new --json`` prints."""
 
 
 def templates(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
@@ -100,8 +105,8 @@ def studio(source: str | None, port: int | None, browser: bool, phone: str | Non
     The page is served on this machine only, and needs the token in its link. Ctrl-C stops it.
     --phone prints the link as a code to scan; it goes through the network without encryption.
     """
-    # The server comes with the extra "studio".
-    from sbafab.studio.app import ADDRESS, serve
+    # The server comes with the extra "studio", which may be missing.
+    app = plugins.load("sbafab.studio.app")
 
     def announce(link: str) -> None:
         click.echo(f"studio: {link}")
@@ -115,4 +120,4 @@ def studio(source: str | None, port: int | None, browser: bool, phone: str | Non
 
             webbrowser.open(link)
 
-    serve(source, port, announce, phone or ADDRESS)
+    app.serve(source, port, announce, phone or app.ADDRESS)

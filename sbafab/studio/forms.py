@@ -10,10 +10,11 @@ from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
 
-from sbafab import __version__, api
+from sbafab import api
 from sbafab.api.designs import NAMED, ROW, JsonSchema, family_tables, schema_keys
 from sbafab.errors import SbafabError
 from sbafab.studio import design_files
+from sbafab.version import __version__
 
 PLACING = ("on", "at", "angle", "turn", "along", "offset", "glue", "note")
 """Keys of a part's position; its form ends with them."""
