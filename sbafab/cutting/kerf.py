@@ -48,14 +48,14 @@ def compensate(region: Region, kerf: Kerf) -> Region:
     if widths(kerf) == (0.0, 0.0):
         return region
     try:
-        path = beam_path(region, kerf)
+        path, lost = beam_path(region, kerf)
     except GeometryError as error:
         raise DesignError(
             f"no path for a kerf of {kerf_text(kerf)} mm: {error}; measure the kerf again."
         ) from error
-    if path.lost is not None:
-        raise _refused(region, path.lost, kerf)
-    return path.region
+    if lost is not None:
+        raise _refused(region, lost, kerf)
+    return path
 
 
 def _refused(region: Region, lost: Lost, kerf: Kerf) -> DesignError:

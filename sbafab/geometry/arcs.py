@@ -180,6 +180,16 @@ def _edge(start: Point, end: Point, turn: float, straight: float) -> Edge:
     return edge_from_bulge(start, end, bulge)
 
 
+def edge_through(start: Point, middle: Point, end: Point) -> Edge:
+    """Return the arc from start to end through a point half way; a line if it is straight."""
+    half = _angle(
+        (middle[0] - start[0], middle[1] - start[1]), (end[0] - middle[0], end[1] - middle[1])
+    )
+    if abs(half) * math.dist(start, end) < EPSILON / 10:
+        return Line(start, end)
+    return edge_from_bulge(start, end, math.tan(half / 2))
+
+
 def _unit_tangent(curve: Curve, at: float, towards: float) -> Point:
     """Unit derivative at a parameter, or just beside it where it vanishes."""
     for nudge in (0.0, 1e-6, 1e-4):

@@ -3,29 +3,28 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Literal, NamedTuple
 
 from sbafab.errors import GeometryError
-from sbafab.geometry.arcs import biarc, ellipse
+from sbafab.geometry.arcs import Curve, biarc, edge_through
 from sbafab.geometry.boolean import FAR, alone, meets_itself
 from sbafab.geometry.cache import cached
 from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import (
     EPSILON,
+    SAME,
     Arc,
     Edge,
     Line,
     Point,
     distance_to,
-    edge_from_bulge,
     left_turn,
-    meeting_points,
 )
 from sbafab.geometry.region import Region, enclosed, union
-from sbafab.geometry.spatial_index import EdgeIndex, close_pairs, widened
+from sbafab.geometry.spatial_index import EdgeIndex, widened
 
 CUSP = 3.0
 """Radians: a path that turns by more is treated as turning back on itself."""
@@ -159,177 +158,23 @@ def _corner_arcs(before: Edge, after: Edge, distance: float) -> Iterator[Arc]:
         yield Arc(start, end, (x, y), distance, True)
 
 
-# Tracks of a beam's middle in closed form, their crossings, and arcs along them.
-
-
-TOLERANCE = 0.0001
-"""Farthest an arc of the path may lie from the exact curve, in mm."""
-STEP, CORNER_STEP = math.radians(15), math.radians(30)
-"""Maximum turn of one arc along a curve, and round a corner."""
-LEAST_ARCS = 3
-"""Minimum arcs per curve: four points identify its circle when the kerf is undone."""
-SHORT = 1e-3
-SHARES = tuple(0.75**k for k in range(16, 0, -1))
-"""Shares of two tracks at which the search for a crossing starts."""
-
-
-def rim(a: float, b: float, angle: float) -> Point:
-    """The point of a beam's rim (half widths ``a`` and ``b``) with this angle of its normal."""
-    x, y = math.cos(angle), math.sin(angle)
-    size = math.hypot(a * x, b * y)
-    return a * a * x / size, b * b * y / size
-
-
-class Track(NamedTuple):
-    """The source of a stretch of path: a line, or an arc ``turn`` x ``radius`` long (0: a corner).
-
-    The parameter is the angle of the outward normal; along a line, the length.
-    """
-
-    beam: tuple[float, float]
-    centre: Point
-    radius: float
-    turn: int
-    line: Line | None = None
-
-    def at(self, t: float) -> Point:
-        if self.line is not None:
-            ux, uy = self.line.direction(self.line.start)
-            (x, y), (ex, ey) = self.line.start, rim(*self.beam, math.atan2(-ux, uy))
-            return x + ex + t * ux, y + ey + t * uy
-        (cx, cy), (ex, ey) = self.centre, rim(*self.beam, t)
-        r = self.turn * self.radius
-        return cx + r * math.cos(t) + ex, cy + r * math.sin(t) + ey
-
-    def bend(self, t: float) -> float:
-        """Radius of curvature of source and rim, positive to the left of the normal's turn."""
-        a, b = self.beam
-        rim_bend = (a * b) ** 2 / math.hypot(a * math.cos(t), b * math.sin(t)) ** 3
-        return self.turn * self.radius + rim_bend
-
-    def rate(self, t: float) -> Point:
-        if self.line is not None:
-            return self.line.direction(self.line.start)
-        bend = self.bend(t)
-        return -bend * math.sin(t), bend * math.cos(t)
-
-    def runs_on(self, t: float) -> bool:
-        """True if the beam moves forward; in a hollow narrower than its rim it moves back."""
-        return self.turn >= 0 or self.bend(t) < 0
-
-
-def crossing(
-    arriving: tuple[Track, float, float], leaving: tuple[Track, float, float]
-) -> tuple[float, float]:
-    """Return the parameters at which a track that ends meets one that starts.
-
-    The search starts there, or farther away if the beam moves back there.
-    """
-    (before, far, end), (after, start, on) = arriving, leaving
-    if before.runs_on(end) and after.runs_on(start):
-        if math.dist(before.at(end), after.at(start)) < 2 * EPSILON:
-            return end, start
-        return _met(before, end, after, start) or (end, start)
-    back, ahead = far - end, on - start
-    for share in SHARES:
-        reach = share * max(abs(back), abs(ahead))
-        met = _met(
-            before,
-            end + math.copysign(min(reach, abs(back)), back),
-            after,
-            start + math.copysign(min(reach, abs(ahead)), ahead),
-        )
-        if met and (met[0] - end) * back >= 0 and (met[1] - start) * ahead >= 0:
-            return met
-    return end, start
-
-
-def _met(before: Track, s: float, after: Track, t: float) -> tuple[float, float] | None:
-    """The parameters at which two forward tracks cross, by Newton's method from near ones."""
-    first = s, t
-    for _ in range(8):
-        (x, y), (u, v) = before.at(s), after.at(t)
-        if max(abs(s - first[0]), abs(t - first[1])) > 0.5:
-            return None
-        if math.hypot(u - x, v - y) < 1e-10:
-            return (s, t) if before.runs_on(s) and after.runs_on(t) else None
-        (px, py), (qx, qy) = before.rate(s), after.rate(t)
-        det = px * qy - py * qx
-        if abs(det) < 1e-3 * math.hypot(px, py) * math.hypot(qx, qy):
-            return None
-        s += ((u - x) * qy - (v - y) * qx) / det
-        t += ((u - x) * py - (v - y) * px) / det
-    return None
-
-
-def arcs_along(track: Track, t0: float, t1: float) -> list[Edge]:
-    """Return enough arcs through points of the track to stay within the tolerance."""
-    step, tolerance = (STEP, TOLERANCE) if track.radius else (CORNER_STEP, TOLERANCE / 10)
-    count = max(1, math.ceil(abs(t1 - t0) / step - 1e-9))
-    if track.radius * abs(t1 - t0) > SHORT:
-        count = max(LEAST_ARCS, count)
-    return through(track.at, t0, t1, count, tolerance)
-
-
-def through(
-    curve: Callable[[float], Point], t0: float, t1: float, count: int, tolerance: float
-) -> list[Edge]:
-    """Arcs through ``count`` + 1 points of the curve, doubled until they fit."""
-    while True:
-        stops = [t0 + (t1 - t0) * k / count for k in range(count + 1)]
-        points = [curve(t) for t in stops]
-        if math.dist(points[0], points[-1]) < EPSILON:
-            points[-1] = points[0]
-            if count == 1:
-                return []
-        edges = [
-            _through(p, curve((s + t) / 2), q)
-            for (s, t), (p, q) in zip(pairwise(stops), pairwise(points), strict=True)
-        ]
-        off = max(
-            distance_to(edge, curve(s + (t - s) * share))
-            for edge, (s, t) in zip(edges, pairwise(stops), strict=True)
-            for share in (0.2, 0.8)
-        )
-        if off <= tolerance or count > 1000:
-            return [edge for edge in edges if math.dist(edge.start, edge.end) > EPSILON]
-        count *= 2
-
-
-def _through(start: Point, middle: Point, end: Point) -> Edge:
-    """Return the arc from start to end through a point half way."""
-    (ax, ay), (bx, by) = (
-        (middle[0] - start[0], middle[1] - start[1]),
-        (end[0] - middle[0], end[1] - middle[1]),
-    )
-    half = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
-    if abs(half) * math.dist(start, end) < EPSILON / 10:
-        return Line(start, end)
-    return edge_from_bulge(start, end, math.tan(half / 2))
-
-
-# The path of a beam of some width: regions grown by half of it, contour by contour.
+# The path of a beam of some width: a region grown by half of it.
 #
-# A beam of equal width along x and y grows a region by a disc, and arcs stay arcs. An unequal beam
-# grows it by an ellipse: straight edges stay straight, and arcs are fitted through points of every
-# other piece of the path, which has a closed form.
+# A beam of equal width along x and y grows a region by a disc, and arcs stay arcs. For an unequal
+# one the plane is stretched until the beam is round: straight edges stay straight, and arcs become
+# pieces of ellipses, which arcs follow.
 
 
 Kerf = float | tuple[float, float]
 """Full width of the cut, mm: the same everywhere, or measured along x and along y."""
 Fate = Literal["vanishes", "splits in parts", "runs into another"]
 
-FINE = 0.00005
-"""Farthest a stretched arc may lie off, mm; its error shifts the ends of the path's pieces."""
-SHORTEST = 4 * EPSILON
-"""An arc shorter than this is stretched as a line."""
-STRETCHED_STEP, MOST_PIECES = math.radians(30), 1000
-"""Maximum turn of two arcs along a stretched curve, and more pieces than any curve needs."""
-SMOOTH = 1e-3
-"""Radians: a curve with a sharper kink crosses itself or another one there."""
-PROJECTIONS, BEND = 3, 0.01
-"""Iterations to a track's nearest point; radius in mm at which distance along it counts equally.
-"""
+FINE, ALONG = 1e-6, 3e-6
+"""Farthest an arc may lie off a stretched edge, and off the stretched path, mm."""
+SMOOTH, SIMILAR = 1e-6, 2.0
+"""Radians a smooth run may turn from arc to arc, and the most that their radii differ by."""
+STEP, LEAST_SHARE = math.radians(30), 1e-5
+"""Most that a piece turns, and a smaller share of a run than any piece has."""
 
 
 class Lost(NamedTuple):
@@ -339,110 +184,127 @@ class Lost(NamedTuple):
     fate: Fate
 
 
-@dataclass(frozen=True)
-class BeamPath:
-    """The path, and the first contour of the region without a single path."""
-
-    region: Region
-    lost: Lost | None
-
-
 def widths(kerf: Kerf) -> tuple[float, float]:
     """Full width along x and along y."""
     return kerf if isinstance(kerf, tuple) else (kerf, kerf)
 
 
-def beam_path(region: Region, kerf: Kerf) -> BeamPath:
-    """The path of the beam's centre that leaves ``region``; both widths are 0, or neither is.
+def beam_path(region: Region, kerf: Kerf) -> tuple[Region, Lost | None]:
+    """The path of the beam's centre that leaves ``region``, and the first contour of the region
+    without a single path; both widths are 0, or neither is.
 
     Raises GeometryError if the offset cannot be computed.
     """
     a, b = (width / 2 for width in widths(kerf))
-    if a == b:
-        path = grow(region, a)
-        return BeamPath(path, _lost(region.contours, region.contours, path, a))
     reach = max(a, b)
-    sx, sy = reach / a, reach / b
-    # Stretch until the beam is round; the arcs stay within 0.05 um of the ellipses.
-    rounds = [[_stretched(edge, sx, sy) for edge in c.edges] for c in region.contours]
-    wide = Region(tuple(Contour(tuple(e for part in c for e in part)) for c in rounds))
-    grown = grow(wide, reach)
-    lost = _lost(region.contours, wide.contours, grown, reach)
-    sources = _Sources(
-        EdgeIndex(wide.edges),
-        [
-            _Source(edge, part is parts[0], part is parts[-1])
-            for contour, pieces in zip(region.contours, rounds, strict=True)
-            for edge, parts in zip(contour.edges, pieces, strict=True)
-            for part in parts
-        ],
-        (a, b),
-        reach,
-    )
-    contours = []
-    for contour in grown.contours:
-        tracks = [_track(edge, sources) for edge in contour.edges]
-        contours.append(_untangled(_drawn(contour.edges, tracks, (sx, sy))))
-    return BeamPath(Region(tuple(contours)), lost)
+    alone = [[[edge] for edge in contour.edges] for contour in region.contours]
+    wide = region if a == b else _stretched(alone, reach / a, reach / b, _smooth)
+    path = grown = grow(wide, reach)
+    if a != b:
+        runs = [_smooth_runs(contour.edges) for contour in grown.contours]
+        path = _stretched(runs, a / reach, b / reach, _through)
+    return path, _lost(region.contours, wide.contours, grown, reach)
 
 
-class _Source(NamedTuple):
-    """The true edge of a piece of the stretched region, and whether the piece starts or ends it."""
-
-    edge: Edge
-    is_first: bool
-    is_last: bool
+Run = Sequence[Edge]
+"""A line, or arcs that go on from each other smoothly."""
+Fit = Callable[[Curve, float, float], list[Edge]]
+"""Edges along a curve between two parameters; none if they would stray from it."""
 
 
-class _Sources(NamedTuple):
-    """A spatial index of the stretched region's edges, and the source of each."""
+def _stretched(contours: Sequence[Sequence[Run]], sx: float, sy: float, fit: Fit) -> Region:
+    """Return a region stretched along x and y, with edges fitted to the images of arcs.
 
-    near: EdgeIndex
-    of: Sequence[_Source]
-    beam: tuple[float, float]
-    reach: float
-
-
-def _stretched(edge: Edge, sx: float, sy: float) -> list[Edge]:
-    """Return edges within FINE of the stretched edge, without kinks, which would count as corners.
-
-    The ends match the edge's exactly; an edge too short to turn becomes a line.
+    Raises GeometryError for arcs that cannot be followed.
     """
-    start, end = ((p[0] * sx, p[1] * sy) for p in (edge.start, edge.end))
-    if isinstance(edge, Line) or math.dist(start, end) < SHORTEST:
+    images = []
+    for runs in contours:
+        edges: list[Edge] = []
+        x, y = runs[0][0].start
+        here = x * sx, y * sy
+        for piece in (piece for run in runs for piece in _pieces(run, sx, sy, fit)):
+            edges.append(piece.part(here, piece.end))
+            here = piece.end
+        images.append(Contour(tuple(edges)))
+    return Region(tuple(images))
+
+
+def _pieces(run: Run, sx: float, sy: float, fit: Fit) -> list[Edge]:
+    start, end = ((p[0] * sx, p[1] * sy) for p in (run[0].start, run[-1].end))
+    arcs = [edge for edge in run if isinstance(edge, Arc)]
+    if not arcs or (len(arcs) == 1 and math.dist(start, end) < 2 * SAME):
         return [Line(start, end)]
-    (cx, cy), r, first, sweep = edge.centre, edge.radius, edge.start_angle, edge.sweep
-    curve = ellipse((cx * sx, cy * sy), (r * sx, 0.0), (0.0, r * sy))
-    count = math.ceil(abs(sweep) / STRETCHED_STEP)
-    while count < MOST_PIECES:
-        angles = [first + sweep * k / count for k in range(count + 1)]
-        points = [start, *(curve(t)[0] for t in angles[1:-1]), end]
-        ways = [_unit(curve(t)[1], sweep) for t in angles]
-        pieces = [
-            biarc(p, u, q, v, 0.0)
-            for (p, q), (u, v) in zip(pairwise(points), pairwise(ways), strict=True)
-        ]
-        # A biarc deviates most from its curve at one sixth and five sixths of its length.
-        if all(
-            pair and distance_to(pair[half], curve(s + (t - s) * share)[0]) < FINE
-            for pair, (s, t) in zip(pieces, pairwise(angles), strict=True)
-            for half, share in ((0, 1 / 6), (1, 5 / 6))
-        ):
-            return [piece for pair in pieces for piece in pair]
-        count *= 2
-    x, y = edge.start
-    raise GeometryError(f"the arc at x {x:.6f}, y {y:.6f} cannot be stretched to the kerf")
+    image, turn = _image(arcs, sx, sy), sum(abs(arc.sweep) for arc in arcs)
+
+    def follow(here: float, there: float) -> list[Edge]:
+        edges = fit(image, here, there)
+        if edges:
+            return edges
+        if there - here < LEAST_SHARE:
+            raise GeometryError(
+                f"the arc at x {start[0]:.6f}, y {start[1]:.6f} cannot be stretched to the kerf"
+            )
+        middle = (here + there) / 2
+        return [*follow(here, middle), *follow(middle, there)]
+
+    count = max(1, math.ceil(turn / STEP - 1e-9))
+    *inner, last = (edge for k in range(count) for edge in follow(k / count, (k + 1) / count))
+    return [*inner, last.part(last.start, end)]
 
 
-def _unit(way: Point, sign: float) -> Point:
-    size = math.copysign(math.hypot(*way), sign)
+def _image(arcs: Sequence[Arc], sx: float, sy: float) -> Curve:
+    """Return the stretched arcs as one curve, by the share of their turn, 0 to 1."""
+    turned = list(accumulate(abs(arc.sweep) for arc in arcs))
+
+    def image(share: float) -> tuple[Point, Point]:
+        turn = share * turned[-1]
+        number = min(bisect_left(turned, turn), len(arcs) - 1)
+        arc = arcs[number]
+        sign = 1.0 if arc.ccw else -1.0
+        angle = arc.start_angle + arc.sweep - sign * (turned[number] - turn)
+        (x, y), r, c, s = arc.centre, arc.radius, math.cos(angle), math.sin(angle)
+        return (sx * (x + r * c), sy * (y + r * s)), (-sign * sx * r * s, sign * sy * r * c)
+
+    return image
+
+
+def _smooth(image: Curve, start: float, end: float) -> list[Edge]:
+    (p, u), (q, v) = image(start), image(end)
+    # A kink would count as a corner. A biarc strays most a sixth from either end.
+    pair = biarc(p, _unit(u), q, _unit(v), 0.0)
+    places = [image(start + share * (end - start))[0] for share in (1 / 6, 5 / 6)]
+    return pair if max(map(distance_to, pair, places), default=FINE) < FINE else []
+
+
+def _through(image: Curve, start: float, end: float) -> list[Edge]:
+    p, a, middle, b, q = (
+        image(start + share * (end - start))[0] for share in (0.0, 0.2, 0.5, 0.8, 1.0)
+    )
+    edge = edge_through(p, middle, q)
+    return [edge] if max(distance_to(edge, a), distance_to(edge, b)) < ALONG else []
+
+
+def _unit(way: Point) -> Point:
+    size = math.hypot(*way)
     return way[0] / size, way[1] / size
 
 
-def _nearest(near: EdgeIndex, p: Point, reach: float) -> int:
-    """Return the number of the edge nearest to a point ``reach`` away from them."""
-    numbers = list(near.numbers(widened((*p, *p), 1.01 * reach))) or range(len(near.edges))
-    return min(numbers, key=lambda n: (round(distance_to(near.edges[n], p), 9), n))
+def _smooth_runs(edges: Sequence[Edge]) -> list[list[Edge]]:
+    """Lines, and arcs that go on from each other without a corner and with little more bend."""
+    count = len(edges)
+    starts = [i for i in range(count) if not _goes_on(edges[i - 1], edges[i])] or [0]
+    stops = [*starts[1:], starts[0] + count]
+    return [[edges[k % count] for k in range(i, j)] for i, j in zip(starts, stops, strict=True)]
+
+
+def _goes_on(before: Edge, after: Edge) -> bool:
+    return (
+        isinstance(before, Arc)
+        and isinstance(after, Arc)
+        and before.ccw == after.ccw
+        and abs(left_turn(before, after)) < SMOOTH
+        and 1 / SIMILAR < before.radius / after.radius < SIMILAR
+    )
 
 
 def _lost(
@@ -450,10 +312,13 @@ def _lost(
 ) -> Lost | None:
     near = EdgeIndex([edge for contour in stretched for edge in contour.edges])
     owners = [n for n, contour in enumerate(stretched) for _ in contour.edges]
-    followed = [
-        {owners[_nearest(near, edge.at(0.5), reach)] for edge in contour.edges}
-        for contour in grown.contours
-    ]
+
+    def nearest(p: Point) -> int:
+        """Return the contour of the edge nearest to a point ``reach`` away from them."""
+        numbers = list(near.numbers(widened((*p, *p), 1.01 * reach))) or range(len(owners))
+        return owners[min(numbers, key=lambda n: (round(distance_to(near.edges[n], p), 9), n))]
+
+    followed = [{nearest(edge.at(0.5)) for edge in contour.edges} for contour in grown.contours]
     for number, contour in enumerate(originals):
         paths = [sources for sources in followed if number in sources]
         if not paths:
@@ -463,133 +328,6 @@ def _lost(
         if len(paths[0]) > 1:
             return Lost(contour, "runs into another")
     return None
-
-
-def _track(edge: Edge, sources: _Sources) -> Track:
-    """Return the track of a piece of the stretched path, in unstretched lengths."""
-    near, reach = sources.near, sources.reach
-    if isinstance(edge, Arc) and edge.ccw and abs(edge.radius - reach) < EPSILON:
-        for number in near.numbers(widened((*edge.centre, *edge.centre), 2 * EPSILON)):
-            piece, (source, is_first, is_last) = near.edges[number], sources.of[number]
-            if is_first and math.dist(piece.start, edge.centre) < 2 * EPSILON:
-                return Track(sources.beam, source.start, 0.0, 1)
-            if is_last and math.dist(piece.end, edge.centre) < 2 * EPSILON:
-                return Track(sources.beam, source.end, 0.0, 1)
-    source = sources.of[_nearest(near, edge.at(0.5), reach)].edge
-    if isinstance(source, Line):
-        return Track(sources.beam, source.start, 0.0, 0, source)
-    return Track(sources.beam, source.centre, source.radius, 1 if source.ccw else -1)
-
-
-def _drawn(edges: Sequence[Edge], tracks: Sequence[Track], scale: tuple[float, float]) -> Contour:
-    """Return a contour of the path from its stretched image and the tracks of its edges."""
-    count = len(edges)
-    starts = [
-        i
-        for i in range(count)
-        if tracks[i] != tracks[i - 1] or abs(left_turn(edges[i - 1], edges[i])) > SMOOTH
-    ]
-    if not starts:
-        track = tracks[0]
-        start = _parameter(track, edges[0], edges[0].start, scale)
-        return Contour(tuple(arcs_along(track, start, start + track.turn * math.tau)))
-    spans: list[tuple[Track, float, float]] = []
-    for i, after in zip(starts, [*starts[1:], starts[0] + count], strict=True):
-        stretch = [edges[k % count] for k in range(i, max(after, i + 1))]
-        t0 = _parameter(tracks[i], stretch[0], stretch[0].start, scale)
-        stops = _cut_where_wide(tracks[i], t0, _last(tracks[i], t0, stretch, scale))
-        # If the beam moves back along the whole piece, its neighbours cross each other.
-        spans += [
-            (tracks[i], s, t)
-            for s, t in pairwise(stops)
-            if any(tracks[i].runs_on(s + share * (t - s)) for share in (0.0, 0.5, 1.0))
-        ]
-    return Contour(tuple(_joined(spans)))
-
-
-def _untangled(contour: Contour) -> Contour:
-    """The contour without loops below a micrometre, made by tracks with an extra crossing."""
-    edges, count = contour.edges, len(contour.edges)
-    if not any(
-        (i - j) % count not in (1, count - 1) and meeting_points(edges[i], edges[j])
-        for i, j in close_pairs(contour.boxes, EPSILON)
-    ):
-        return contour
-    whole = enclosed([contour.reversed() if contour.is_hole else contour]).contours
-    # A larger loop is not rounding: keep it, so that reading the file back reports it.
-    if len(whole) != 1 or abs(whole[0].area - abs(contour.area)) > EPSILON * contour.length:
-        return contour
-    return whole[0].reversed() if contour.is_hole else whole[0]
-
-
-def _cut_where_wide(track: Track, t0: float, t1: float) -> list[float]:
-    """Both ends, and the points between at which the beam's flat side moves back over itself."""
-    flat = 0.0 if track.beam[1] > track.beam[0] else math.pi / 2
-    low, high = sorted((t0, t1))
-    sides = [
-        flat + math.pi * k
-        for k in range(math.ceil((low - flat) / math.pi), math.floor((high - flat) / math.pi) + 1)
-    ]
-    back = [t for t in sides if low < t < high and not track.runs_on(t)]
-    return [t0, *sorted(back, reverse=t1 < t0), t1]
-
-
-def _parameter(track: Track, edge: Edge, p: Point, scale: tuple[float, float]) -> float:
-    sx, sy = scale
-    if track.line is not None:
-        (x0, y0), (ux, uy) = track.at(0.0), track.line.direction(track.line.start)
-        return (p[0] / sx - x0) * ux + (p[1] / sy - y0) * uy
-    ux, uy = edge.direction(p)
-    t = math.atan2(-ux * sy, uy * sx)
-    for _ in range(PROJECTIONS):
-        # The length gives the parameter, more exactly than the position if the track bends little.
-        (x, y), (rx, ry) = track.at(t), track.rate(t)
-        t += ((p[0] / sx - x) * rx + (p[1] / sy - y) * ry) / (rx * rx + ry * ry + BEND**2)
-    return t
-
-
-def _last(track: Track, t0: float, edges: Sequence[Edge], scale: tuple[float, float]) -> float:
-    """The parameter at the end of a track's edges, counted from ``t0`` as the track turns."""
-    t1 = _parameter(track, edges[-1], edges[-1].end, scale)
-    if track.line is not None:
-        return t1
-    # No edge turns by more than half a turn, so their sum counts the normal's full turns.
-    turn = sum(
-        math.remainder(
-            _parameter(track, e, e.end, scale) - _parameter(track, e, e.start, scale), math.tau
-        )
-        for e in edges
-    )
-    t1 += math.tau * round((t0 + turn - t1) / math.tau)
-    return t1 if (t1 - t0) * track.turn > 0 else t0
-
-
-def _joined(spans: Sequence[tuple[Track, float, float]]) -> Iterator[Edge]:
-    """Yield edges along the tracks; each ends where it crosses the next."""
-    starts, ends = [t0 for _, t0, _ in spans], [t1 for _, _, t1 in spans]
-    for i, span in enumerate(spans):
-        ends[i - 1], starts[i] = crossing(spans[i - 1], span)
-    visible = [
-        i
-        for i, (track, _, _) in enumerate(spans)
-        if math.dist(track.at(starts[i]), track.at(ends[i])) > EPSILON
-    ]
-    for i, following in zip(visible, [*visible[1:], *visible[:1]], strict=True):
-        track = spans[i][0]
-        start, end = track.at(starts[i]), spans[following][0].at(starts[following])
-        miss = math.dist(end, track.at(ends[i]))
-        if miss > TOLERANCE:
-            raise GeometryError(
-                f"the edges that meet at x {end[0]:.6f}, y {end[1]:.6f} miss each other by "
-                f"{miss:.6f} mm once the kerf is added; change a size there by 0.001 mm"
-            )
-        edges: list[Edge] = [Line(start, end)]
-        if track.line is None:
-            edges = arcs_along(track, starts[i], ends[i])
-        if edges:
-            edges[0] = edges[0].part(start, edges[0].end)
-            edges[-1] = edges[-1].part(edges[-1].start, end)
-            yield from edges
 
 
 # Strips: the area swept by a tool of some width along a path, or by a region along an edge.

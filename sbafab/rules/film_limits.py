@@ -84,7 +84,7 @@ def _lost_to_kerf(laminate: Laminate, design: Design) -> Finding | None:
             continue
         place, fault = Place(None, (layer.index,)), say("film-limits.unnamed")
         try:
-            lost = beam_path(laminate.as_cut(layer), kerf).lost
+            _, lost = beam_path(laminate.as_cut(layer), kerf)
             if lost is None:
                 continue
             spot = place_of(laminate.as_cut(layer), lost, kerf)
