@@ -24,7 +24,7 @@ from sbafab.folders.build import Build, refuse_undoable
 from sbafab.folders.checks_json import checks
 from sbafab.folders.order import make_order
 from sbafab.laminate.netlist import read_netlist
-from sbafab.models.formulas import size_phrases, sizes
+from sbafab.models.sizes import size_phrases, sizes
 from sbafab.rules.nets import netlist_findings
 from sbafab.search.advice import advise
 

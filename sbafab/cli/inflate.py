@@ -13,11 +13,12 @@ from sbafab.cli import options as opt
 from sbafab.cli import show
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
+from sbafab.laminate.burst import refuse_beyond_burst
+from sbafab.models.actuator import model_form, near_discs
 from sbafab.models.balloons import has_balloons
-from sbafab.models.drawn_pockets import model_form, near_discs
-from sbafab.models.formulas import refuse_beyond_burst, refuse_pressure
 from sbafab.models.intervals import factors_of
 from sbafab.models.map_files import FORMATS, map_text
+from sbafab.models.pneumatics import refuse_pressure
 from sbafab.models.stack import MOST_PRESSURE, stack
 from sbafab.reports.inflated_picture import (
     MOVING,

@@ -19,8 +19,8 @@ from sbafab.design.records import Design, Drawn
 from sbafab.errors import OutputError
 from sbafab.folders.artefacts import prediction_json
 from sbafab.folders.run import RunRequest, generate
+from sbafab.models.actuator import model_form
 from sbafab.models.balloons import has_balloons
-from sbafab.models.drawn_pockets import model_form
 from sbafab.models.figures import (
     FLAGS,
     LEFT_OUT,
@@ -30,9 +30,10 @@ from sbafab.models.figures import (
     Prediction,
     PredictionRequest,
 )
-from sbafab.models.formulas import size_phrases, usual_pressures
+from sbafab.models.pneumatics import usual_pressures
 from sbafab.models.prediction import predict as predicted
 from sbafab.models.sensitivities import SensitivityRow, sensitivity_table
+from sbafab.models.sizes import size_phrases
 from sbafab.reports.assembly_prediction import SCHEMA, AssemblyPrediction, predict_assembly
 
 ELASTIC_OPTIONS = ("pocket_loss", "modulus_mpa", "sensitivity")

@@ -18,8 +18,9 @@ from sbafab.cli import show
 from sbafab.cli.exit import print_error
 from sbafab.design.files import changed_keys, name_of, template_names
 from sbafab.errors import DesignError
+from sbafab.laminate.burst import is_near_burst
 from sbafab.models.figures import FLAGS
-from sbafab.models.formulas import MOST_PRESSURE, is_near_burst
+from sbafab.models.pneumatics import MOST_PRESSURE
 from sbafab.runtime import Progress
 from sbafab.search import compare as comparing
 from sbafab.search import sweep as sweeping

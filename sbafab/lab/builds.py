@@ -18,8 +18,8 @@ from sbafab.design.identity import actuator_sha256, design_sha256
 from sbafab.design.records import Design, design_toml, validated
 from sbafab.errors import DesignError
 from sbafab.models.figures import PredictionRequest
-from sbafab.models.formulas import usual_pressures
 from sbafab.models.paper import FORCE_KPA
+from sbafab.models.pneumatics import usual_pressures
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.rules.registration_yield import simulate

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from sbafab.errors import BeyondError
 from sbafab.geometry.cache import stored
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point
@@ -49,6 +50,23 @@ def burst(laminate: Laminate) -> Burst | None:
     film is of another product than the burst film.
     """
     return stored(laminate, "_burst", _burst)
+
+
+def refuse_beyond_burst(laminate: Laminate, kpa: float) -> None:
+    """Raise BeyondError for a pressure in kPa past the estimated burst pressure of a laminate."""
+    estimate = burst(laminate)
+    if estimate is not None and kpa > estimate.kpa:
+        raise BeyondError(
+            f"{kpa:g} kPa is past the estimated burst pressure, {estimate.kpa:.3g} kPa; give less "
+            "pressure, or take narrower pockets or thicker film",
+            kpa / estimate.kpa - 1,
+        )
+
+
+def is_near_burst(laminate: Laminate, kpa: float) -> bool:
+    """Return True for a pressure in kPa above half of the estimated burst pressure."""
+    estimate = burst(laminate)
+    return estimate is not None and kpa > estimate.kpa / 2
 
 
 def _burst(laminate: Laminate) -> Burst | None:

@@ -1,26 +1,29 @@
-"""Closed forms of pockets whose films keep their length, each as its source has it: the paper's
+"""Closed forms, each as its source has it. Of pockets whose films keep their length: the paper's
 Eq. 4 as printed, its Eqs. 1 to 3 solved numerically (Sec. 3.1), a lens of two arcs for oblong
-pockets, its cylinder; and the constant curvature of parallel chambers.
+pockets, its cylinder. Of actuators: constant curvature, folded lobes, tubes, the cantilever.
 
-Each pocket is a family of shapes by one parameter, from 0 (flat) to its fullest state. Lengths mm,
-volumes ul, rates dv/dh in mm2.
+Lengths mm, volumes ul, rates dv/dh in mm2.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sbafab.errors import DesignError
+from sbafab.geometry.region import Region, centroid
+from sbafab.models.figures import Model
 from sbafab.models.film_elements import Array
+from sbafab.models.paper import FULL_SHARE, VALID, VALID_RADIUS
+from sbafab.models.quantity import ModelId
 
-BISECTIONS = 60
+BISECTIONS, SAMPLES = 60, 401
 ROUNDING = 1e-9
 """Relative rounding error by which a value may lie past the end of its range."""
 SHALLOW = 1e-3
@@ -65,67 +68,126 @@ def last_positive(falling: Callable[[float], float], low: float, high: float) ->
     return low
 
 
+PocketShape = Callable[[Array], tuple[Array, Array, Array]]
+"""Height, volume and dv/dh of a pocket of size 1 by a parameter, from 0 (flat) to its fullest."""
+
+
 @dataclass(frozen=True)
-class PocketModel:
-    """One pocket from flat to its fullest state: ``shape`` gives height, volume and dv/dh by a
-    parameter from 0 to ``fullest``.
+class ClosedForm:
+    """The pockets of one chamber by a closed form: ``shape`` of one up to ``fullest``, and the
+    ``sizes`` of all, bottom to top.
+
+    Pockets of unlike size (a tapered stack) are taken at equal height over size, so that one
+    formula holds for all: strokes add up with the size, volumes with its cube. Volumes are the mean
+    of the balloons. Methods raise DesignError out of range.
     """
 
-    name: str
+    model: Model
     fullest: float
-    shape: Callable[[Array], tuple[Array, Array, Array]]
+    shape: PocketShape
+    sizes: tuple[float, ...]
 
-    @property
+    @cached_property
+    def _length(self) -> float:
+        return sum(self.sizes)
+
+    @cached_property
+    def _cube(self) -> float:
+        """The mean cube of the sizes."""
+        return sum(size**3 for size in self.sizes) / len(self.sizes)
+
+    @cached_property
     def largest_stroke(self) -> float:
-        """The height in mm of the fullest pocket."""
-        return float(self.shape(np.asarray(self.fullest))[0])
+        """The stroke in mm of the fullest pockets."""
+        return float(self.shape(np.asarray(self.fullest))[0]) * self._length
 
-    @property
+    @cached_property
     def largest_volume(self) -> float:
-        """The volume in ul of the fullest pocket."""
-        return float(self.shape(np.asarray(self.fullest))[1])
+        """The volume in ul a balloon of the fullest pockets."""
+        return float(self.shape(np.asarray(self.fullest))[1]) * self._cube
 
-    def stroke(self, v: ArrayLike) -> Array:
-        """Return the height (mm) at ``v`` ul. Raises DesignError out of range."""
-        volumes = within(v, self.largest_volume, "volume of a balloon", "ul", self.name)
-        return self.shape(inverse(lambda at: self.shape(at)[1], volumes, self.fullest))[0]
+    def stroke(self, volume: ArrayLike) -> Array:
+        """Return the stroke in mm at ul a balloon."""
+        name = self.model.name
+        volumes = within(volume, self.largest_volume, "volume", "ul a balloon", name) / self._cube
+        at = inverse(lambda at: self.shape(at)[1], volumes, self.fullest)
+        return np.asarray(self.shape(at)[0] * self._length)
 
-    def volume(self, h: ArrayLike) -> Array:
-        """Return ul at a height of ``h`` mm. Raises DesignError out of range."""
-        return self._shape_at(h)[1]
+    def volume(self, stroke: ArrayLike) -> Array:
+        """Return ul a balloon at a stroke in mm."""
+        return np.asarray(self._shape_at(stroke)[1] * self._cube)
 
-    def rate(self, h: ArrayLike) -> Array:
-        """Return dv/dh in mm2 at a height of ``h`` mm. Raises DesignError out of range."""
-        return self._shape_at(h)[2]
+    def rate(self, stroke: ArrayLike) -> Array:
+        """Return dv/dh in mm2: the chamber's whole volume by its stroke."""
+        slope = self._shape_at(stroke)[2] * self._cube
+        return np.asarray(slope * len(self.sizes) / self._length)
 
-    def _shape_at(self, h: ArrayLike) -> tuple[Array, Array, Array]:
-        heights = within(h, self.largest_stroke, "stroke of a balloon", "mm", self.name)
+    def push(self, stroke: ArrayLike) -> Array:
+        """Return force over pressure in mm2 of the chamber blocked at a stroke, the same for every
+        balloon in it.
+
+        Of unlike ones at most the value of the smallest when flat; additional force from solid
+        films of shut balloons is not counted. They are then at unlike heights over size.
+        """
+        if len(set(self.sizes)) == 1:
+            return self.rate(stroke)
+        return np.asarray(np.interp(self._within(stroke), *self._in_series))
+
+    @cached_property
+    def _in_series(self) -> tuple[Array, Array]:
+        """Strokes, and force over pressure there, of unlike balloons that carry the same force."""
+        at = np.linspace(0.0, float(self.shape(np.asarray(self.fullest))[0]), SAMPLES)
+        rates = self.shape(inverse(lambda each: self.shape(each)[0], at, self.fullest))[2]
+        # A formula may rise again past the full state; a balloon does not.
+        falling = np.minimum.accumulate(rates)
+        force = np.linspace(0.0, min(self.sizes) ** 2 * falling[0], SAMPLES)
+        stroke = sum(r * np.interp(force / r**2, falling[::-1], at[::-1]) for r in self.sizes)
+        return np.asarray(stroke)[::-1], force[::-1]
+
+    def _shape_at(self, stroke: ArrayLike) -> tuple[Array, Array, Array]:
+        heights = self._within(stroke) / self._length
         return self.shape(inverse(lambda at: self.shape(at)[0], heights, self.fullest))
+
+    def _within(self, stroke: ArrayLike) -> Array:
+        return within(stroke, self.largest_stroke, "stroke of the stack", "mm", self.model.name)
 
 
 @cache
-def eq_4(length: float) -> PocketModel:
-    """Return Eq. 4 as printed, of a round pocket with this radius: v = pi (32 h^5 - 24 h^3 l^2 + 18
-    h l^4) / (27 l^2).
+def eq_4(*radii: float) -> ClosedForm:
+    """Return Eq. 4 as printed, of round pockets: v = pi (32 h^5 - 24 h^3 l^2 + 18 h l^4) /
+    (27 l^2).
 
     It begins 4/3 as steep as the Eqs. 1 to 3 that it is derived from (docs/prediction.md). It rises
     for every h, but means something only up to the height at which one half by those holds most:
     1.328 mm and 13.30 ul at l = 2.5.
     """
-    scale = math.pi / (27 * length**2)
 
     def shape(h: Array) -> tuple[Array, Array, Array]:
-        volume = 32 * h**5 - 24 * h**3 * length**2 + 18 * h * length**4
-        rate = 160 * h**4 - 72 * h**2 * length**2 + 18 * length**4
-        return h, scale * volume, scale * rate
+        volume, rate = 32 * h**5 - 24 * h**3 + 18 * h, 160 * h**4 - 72 * h**2 + 18
+        return h, math.pi / 27 * volume, math.pi / 27 * rate
 
-    return PocketModel("Eq. 4", eqs_1_to_3(length).largest_stroke / 2, shape)
+    source = "Sec. 3.1, h the stroke of one balloon"
+    model = Model(ModelId.EQ_4, source, _eq_4_trust(max(radii)))
+    return ClosedForm(model, eqs_1_to_3(1.0).largest_stroke / 2, shape, radii)
+
+
+def _eq_4_trust(radius: float) -> str:
+    scale = (radius / VALID_RADIUS) ** 3
+    limits = [
+        f"within {error.value * radius / VALID_RADIUS:.2g} mm a balloon to "
+        f"{volume * scale:.3g} ul in {fluid}"
+        for fluid, volume, error in VALID
+    ]
+    origin = "" if radius == VALID_RADIUS else f", scaled from d = {2 * VALID_RADIUS:g}"
+    if radius == 2.5:
+        origin += "; the regime ends near 0.95 kPa"
+    return f"geometric regime only: {', '.join(limits)} (measured{origin})"
 
 
 @cache
-def eqs_1_to_3(length: float) -> PocketModel:
-    """Return two halves by Eqs. 1 to 3, of a round pocket with this radius: 16.947 ul at most at
-    l = 2.5, each half 1.33 mm high.
+def eqs_1_to_3(*radii: float) -> ClosedForm:
+    """Return two halves by Eqs. 1 to 3, of round pockets: 16.947 ul at most at l = 2.5, each half
+    1.33 mm high.
 
     The meridian of a half is the parabola y = h - a x^2 down to y = 0 at x = rho; its arc keeps the
     length l of the flat pocket's radius. Eq. 1 prints an upper limit of infinity where rho is
@@ -141,12 +203,17 @@ def eqs_1_to_3(length: float) -> PocketModel:
     def shape(k: Array) -> tuple[Array, Array, Array]:
         safe = np.where(k > 0, k, 1.0)
         s, q = np.sqrt(1 + k**2), np.where(k > 0, np.arcsinh(safe) / safe, 1.0)
-        rho = 2 * length / (s + q)
+        rho = 2 / (s + q)
         height = k * rho
         return height, math.pi * rho**2 * height / 2, math.pi * rho**2 * (2 * q - s) / (2 * q)
 
     steepest = last_positive(lambda k: 2 * math.asinh(k) / k - math.hypot(1, k), 1.0, 10.0)
-    return PocketModel("Eqs. 1-3", steepest, shape)
+    trust = (
+        "geometric regime only: films that do not stretch, wrinkle or have a neck ring; "
+        "3/4 of Eq. 4's volume and force at small strokes"
+    )
+    model = Model(ModelId.EQS_1_TO_3, "Sec. 3.1, solved for two halves", trust)
+    return ClosedForm(model, steepest, shape, radii)
 
 
 def paraboloid_radius(volume: float, height: float) -> float:
@@ -155,9 +222,9 @@ def paraboloid_radius(volume: float, height: float) -> float:
 
 
 @cache
-def lens(width: float, run: float) -> PocketModel:
-    """Return the lens of an oblong pocket: a slot ``width`` wide, with a straight ``run`` and half
-    discs at its ends.
+def lens(width: float, run: float, balloons: int = 1) -> ClosedForm:
+    """Return the lens of oblong pockets: slots ``width`` wide, with a straight ``run`` and half
+    discs at their ends.
 
     Two films of equal half angle b: each arc is R = width / 2b in radius and keeps its length. The
     straight run is then a prism of that lens, and the ends together one body of revolution with the
@@ -179,7 +246,12 @@ def lens(width: float, run: float) -> PocketModel:
         return height, content * np.minimum(b / SHALLOW, 1.0), (prism * run + ends) / rise
 
     fullest = last_positive(lambda b: float(shape(np.asarray(b))[2]), SHALLOW, math.pi / 2)
-    return PocketModel("the lens of two arcs", fullest, shape)
+    model = Model(
+        ModelId.LENS_STROKE,
+        "films of constant length, ends as spherical caps",
+        "geometric regime only; the paper measured no oblong balloon but the inflated diameter",
+    )
+    return ClosedForm(model, fullest, shape, (1.0,) * balloons)
 
 
 def cylinder_height(width: float) -> float:
@@ -187,6 +259,11 @@ def cylinder_height(width: float) -> float:
     back: what the paper's "about 28" answers to (Sec. 2.1).
     """
     return 2 * width / math.pi
+
+
+def scaled_stroke(radii: Sequence[float]) -> float:
+    """Return the paper's stroke in mm in proportion to radii: 17.5 for 15 of 2.5 (Sec. 4.6)."""
+    return FULL_SHARE * sum(radii)
 
 
 class Bend(NamedTuple):
@@ -219,3 +296,63 @@ def bend(lengths: ArrayLike, axes: ArrayLike) -> Bend:
     up = np.where(angle > 0, length * np.sin(safe) / safe, length)
     tip = np.stack([aside * np.cos(towards), aside * np.sin(towards), up], axis=-1)
     return Bend(angle, towards, length, tip)
+
+
+# Diameter of a folded actuator (paper, Sec. 2: three lobes pass a channel of 9.25 mm).
+
+
+LOBES = 3
+
+
+def folded_diameter(width: float, thickness: float) -> float:
+    """Return the circle (mm) round three lobes folded into a triangle, their outer corners on it.
+
+    Each lobe is a bar ``width`` long and ``thickness`` deep, a chord of the circle; their inner
+    faces are the triangle's sides.
+    """
+    inside = width / (2 * math.tan(math.pi / LOBES))
+    return 2 * math.hypot(inside + thickness, width / 2)
+
+
+# Tubes of inlet strips.
+
+
+def largest_tube(width: float, strip: float = 0.0) -> float:
+    """Return the outer diameter (mm) of the tube that fills a flat channel ``width`` mm wide.
+
+    The tube and a PTFE strip ``strip`` mm thick along one side of it have half their perimeter
+    equal to the channel's width.
+    """
+    return 2 * width / math.pi - strip
+
+
+# The cantilever formula E = F l^3 / (3 delta I) (paper, Sec. 4.4), and its I.
+
+
+SAGITTA = 1e-4
+
+
+def tip_stiffness(modulus_kpa: float, second_moment: float, length: float) -> float:
+    """Return F / delta in N/mm of a cantilever, from E (kPa), I (mm4) and length (mm)."""
+    return 3 * modulus_kpa * 1e-3 * second_moment / length**3
+
+
+def modulus(force: float, deflection: float, length: float, second_moment: float) -> float:
+    """Return E in kPa, from tip force (N), deflection and length (mm), I (mm4)."""
+    return force * length**3 / (3 * deflection * second_moment) * 1e3
+
+
+def second_moments(region: Region) -> tuple[float, float]:
+    """Return the least and largest second moment of area (mm4) of a section about its centre."""
+    x0, y0 = centroid(region)
+    xx = yy = xy = 0.0
+    for piece in region.polygons(SAGITTA):
+        for ring in piece:
+            for (xa, ya), (xb, yb) in zip(ring, [*ring[1:], ring[0]], strict=True):
+                ax, ay, bx, by = xa - x0, ya - y0, xb - x0, yb - y0
+                cross = ax * by - bx * ay
+                xx += cross * (ay * ay + ay * by + by * by) / 12
+                yy += cross * (ax * ax + ax * bx + bx * bx) / 12
+                xy += cross * (ax * by + 2 * ax * ay + 2 * bx * by + bx * ay) / 24
+    middle, half = (xx + yy) / 2, ((xx - yy) ** 2 / 4 + xy * xy) ** 0.5
+    return middle - half, middle + half

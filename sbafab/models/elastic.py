@@ -6,24 +6,25 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from functools import lru_cache
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations, product
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sbafab.errors import BeyondError, DesignError
-from sbafab.laminate.laminate import Laminate
 from sbafab.models import paper
-from sbafab.models.balloon import Balloon, Shapes, distinct, inflate
+from sbafab.models.actuator import Actuator
+from sbafab.models.balloon import Balloon, Shapes, inflate
 from sbafab.models.balloon_map import MOST_STRETCH, BalloonMap, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.figures import (
+    MODELS,
     Factors,
     Figure,
+    FigureItem,
     LeftOut,
     Model,
     PredictionRequest,
@@ -32,27 +33,41 @@ from sbafab.models.figures import (
 )
 from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
-from sbafab.models.pocket_models import Actuator
-from sbafab.models.quantity import Conditions, ModelId, Quantity, chamber_count
+from sbafab.models.quantity import Conditions, Quantity, chamber_count
 from sbafab.models.rippled_balloon import compressed_shapes, free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
 from sbafab.models.stack_balance import BatchPoses
 
-Inflated = Mapping[Balloon, Shapes]
-ELASTIC = Model(
-    ModelId.ELASTIC_BALLOON,
-    "membrane of revolution, the film's modulus",
-    "one balloon to 10 kPa: within 1.2 % of an axisymmetric mesh; of a solid one that ripples, "
-    "d = 5 to 15 within 3 %, d = 20 within 5 %, but d = 10 is 6 to 19 % low where a lone one's rim "
-    "rolls to one side; all balloons of a stack are taken for inner ones, inlets left out",
+Value = TypeVar("Value")
+ELASTIC, TIME, SHUT = (MODELS[of] for of in ("elastic-balloon", "stack-in-time", "stack-shut"))
+FORCE, BEND, CONTACT, HELD = (
+    MODELS[f"elastic-stack {of}"] for of in ("force", "bend", "contact", "held")
 )
-
-
 CALIBRATED_TRUST = (
     "modulus, pockets, pressed thickness and delays as the calibration has them; what would be "
     "measured lies in the interval with 90 %. Plates are rigid and carry no shear; poses and "
     "forces are those of films that lose no energy"
 )
+OUTSIDE = (
+    "outside the checked part of the balloons' map, which misses a balloon computed there by more "
+    "than 3 %"
+)
+"""Flag of a figure whose pose has balloons outside the valid range of a map."""
+BUCKLES = (
+    "that of a straight column, which is unstable here and buckles: it may push harder, or give "
+    "way to a tenth or less"
+)
+"""Flag of the force of a column that would buckle (docs/measured/candidates.csv)."""
+SAMPLES, SERIES_SAMPLES = 21, 401
+ANGLES = (30.0, 60.0, 90.0)
+LEAST_PRESSURE, NO_FURTHER = 0.01, 1e-7
+"""Lowest pressure of a bend in kPa, and the relative tolerance of its pressure."""
+NEARBY = 2.0
+"""Largest ratio of a bend's pressure to that of another stack which guides the search."""
+PROBE_FORCE = 1e-5
+"""Lateral force in N on the tip with which its stiffness is probed."""
+LEAST_GAP = 0.02
+"""Least gap in mm of a balloon whose radius is computed."""
 
 
 def calibrated(model: Model, factors: Factors) -> Model:
@@ -68,54 +83,8 @@ def calibrated(model: Model, factors: Factors) -> Model:
     return replace(model, factors=named)
 
 
-def free_strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure | LeftOut]:
-    """Yield stroke, volume and input work of a free stack of round pockets at each pressure."""
-    if not actuator.radii or not request.pressures_kpa:
-        return
-    try:
-        kinds = Counter(
-            balloons_of(actuator.design, actuator.laminate, request.factors, actuator.form)
-        )
-    except DesignError as error:
-        yield LeftOut("free stroke, elastic balloon", str(error), (Quantity.FREE_STROKE,))
-        return
-    model = calibrated(ELASTIC, request.factors)
-    together = _inflated(kinds, request.pressures_kpa)
-    for row, pressure in enumerate(request.pressures_kpa):
-        at = Conditions(kpa=pressure)
-        try:
-            rise = free_rise(kinds, pressure, together[row] if together else None)
-        except DesignError as error:
-            name = f"{Quantity.FREE_STROKE.named(at)}, elastic balloon"
-            yield LeftOut(name, str(error), (Quantity.FREE_STROKE,))
-            continue
-        height = actuator.thickness + rise.stroke
-        volume = rise.volume / actuator.balloons
-        yield Figure(Quantity.FREE_STROKE, rise.stroke, model, at)
-        yield Figure(Quantity.FREE_HEIGHT, height, model, at)
-        yield Figure(Quantity.BALLOON_VOLUME, volume, model, at)
-        work = rise.energy * actuator.form.stacks / 1000
-        yield Figure(Quantity.FREE_WORK, work, model, at)
-    if request.factors.loss_share:
-        yield Figure(Quantity.LOST_WORK, 100 * request.factors.loss_share, model)
-
-
-def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Inflated] | None:
-    """Return the balloons at each pressure, solved at once; None if one has no equilibrium."""
-    try:
-        shapes = {kind: _free_shapes(kind, tuple(pressures)) for kind in kinds}
-    except DesignError:
-        return None
-    return [
-        {kind: shapes[kind].rows(slice(row, row + 1)) for kind in shapes}
-        for row in range(len(pressures))
-    ]
-
-
-@lru_cache(maxsize=64)
-def _free_shapes(kind: Balloon, pressures: tuple[float, ...]) -> Shapes:
-    """Return ``free_shapes``, cached for factors that do not change the balloon."""
-    return free_shapes(kind, pressures)
+# Actuators at several factors, inflated together. At equal pressure over modulus balloons have
+# equal shapes, so that one computation of a balloon serves all moduli, all pressures and poses.
 
 
 class Rise(NamedTuple):
@@ -128,18 +97,177 @@ class Rise(NamedTuple):
     energy: float
 
 
-def free_rise(kinds: Counter[Balloon], pressure: float, shapes: Inflated | None = None) -> Rise:
-    """Return the rise of the counted balloons of each kind at a pressure in kPa; ``shapes`` are
-    their shapes if known. Raises BeyondError if a film would be stretched too far.
+@dataclass(frozen=True)
+class Inflated:
+    """An actuator with its stack, or why it has none (None: not computed); the ``rises`` of a free
+    chamber by pressure in kPa; and the poses ``bent`` by some chambers, each with the clearance
+    between chambers in mm. Errors stand for what has no equilibrium.
     """
-    stroke = volume = energy = 0.0
+
+    actuator: Actuator
+    stack: Stack | LeftOut | None
+    rises: Mapping[float, Rise | DesignError] | DesignError
+    bent: Mapping[Conditions, tuple[Pose, float] | DesignError]
+
+
+def inflated(
+    actuators: Sequence[Actuator],
+    stacks: Sequence[Stack | LeftOut | None],
+    pressures: Sequence[float],
+) -> list[Inflated]:
+    """Return actuators of one form at pressures in kPa."""
+    bent = [_bent_poses(each, pressures) for each in stacks]
+    posed = [
+        (each, pose)
+        for each, poses in zip(stacks, bent, strict=True)
+        for pose in poses.values()
+        if isinstance(each, Stack) and isinstance(pose, Pose)
+    ]
+    rooms = iter(chamber_clearances(posed))
+    states = []
+    rises = _rises(actuators, pressures)
+    for actuator, there, rise, poses in zip(actuators, stacks, rises, bent, strict=True):
+        with_rooms = {
+            at: (pose, next(rooms)) if isinstance(pose, Pose) else pose
+            for at, pose in poses.items()
+        }
+        states.append(Inflated(actuator, there, rise, with_rooms))
+    return states
+
+
+def _attempt(value: Callable[..., Value], *at: Any) -> Value | DesignError:
+    """Return a value, or why there is none."""
+    try:
+        return value(*at)
+    except DesignError as error:
+        return error
+
+
+def _drawn(of: Actuator) -> Counter[Balloon]:
+    """Return the balloons of a chamber with films of the modulus as bought."""
+    drawn = replace(of.factors, modulus_ratio=1.0)
+    return Counter(balloons_of(of.design, of.laminate, drawn, of.form))
+
+
+def _rises(
+    actuators: Sequence[Actuator], pressures: Sequence[float]
+) -> list[dict[float, Rise | DesignError] | DesignError]:
+    """Return the rises of a free chamber by pressure, or why it has no elastic balloons."""
+    if not pressures:
+        return [{} for _ in actuators]
+    kinds = [_attempt(_drawn, of) for of in actuators]
+    ratios = [of.factors.modulus_ratio for of in actuators]
+    asked: dict[Balloon, dict[float, None]] = {}
+    for each, ratio in zip(kinds, ratios, strict=True):
+        for kind in () if isinstance(each, DesignError) else each:
+            asked.setdefault(kind, {}).update(dict.fromkeys(p / ratio for p in pressures))
+    shapes: dict[tuple[Balloon, float], Shapes | DesignError] = {}
+    for kind, at in asked.items():
+        together = _attempt(free_shapes, kind, [*at])
+        for row, p in enumerate(at):
+            # A balloon without an equilibrium spoils no other.
+            shapes[kind, p] = (
+                _attempt(free_shapes, kind, p)
+                if isinstance(together, DesignError)
+                else together.rows(slice(row, row + 1))
+            )
+    return [
+        each
+        if isinstance(each, DesignError)
+        else {p: _attempt(_rise, each, shapes, p, ratio) for p in pressures}
+        for each, ratio in zip(kinds, ratios, strict=True)
+    ]
+
+
+def _rise(
+    kinds: Counter[Balloon],
+    shapes: Mapping[tuple[Balloon, float], Shapes | DesignError],
+    pressure: float,
+    ratio: float,
+) -> Rise:
+    total = np.zeros(3)
     for kind, count in kinds.items():
-        shape = shapes[kind] if shapes else free_shapes(kind, pressure)
+        shape = shapes[kind, pressure / ratio]
+        if isinstance(shape, DesignError):
+            raise shape
         refuse_stretched(float(stretch(kind, shape)[0]))
-        stroke += count * float(shape.height[0])
-        volume += count * float(shape.volume[0])
-        energy += count * float(shape.energy[0])
-    return Rise(stroke, volume, energy)
+        total += count * np.array([shape.height[0], shape.volume[0], ratio * shape.energy[0]])
+    return Rise(*total.tolist())
+
+
+def free_rise(kinds: Counter[Balloon], pressure: float) -> Rise:
+    """Return the rise of the counted balloons of each kind at a pressure in kPa. Raises BeyondError
+    if a film would be stretched too far.
+    """
+    shapes = {(kind, pressure): free_shapes(kind, pressure) for kind in kinds}
+    return _rise(kinds, shapes, pressure, 1.0)
+
+
+def _bent_poses(
+    whole: Stack | LeftOut | None, pressures: Sequence[float]
+) -> dict[Conditions, Pose | DesignError]:
+    """Return poses with some chambers at each pressure, the others empty, or why there is none."""
+    if not isinstance(whole, Stack):
+        return {}
+    return {
+        Conditions(kpa=kpa, chambers=count): _attempt(whole.pose, _pressures(whole, count, kpa))
+        for kpa, count in product(pressures, range(1, whole.chambers))
+    }
+
+
+def chamber_clearances(posed: Sequence[tuple[Stack, Pose]]) -> list[float]:
+    """Return the smallest clearance in mm between the films of balloons side by side in each pose
+    of a stack.
+
+    Below 0 they would pass through each other. Both are in the frame of their level, and balloons
+    of other levels lie beyond a plate, so that axes and largest radii suffice. Raises DesignError
+    for a balloon without an equilibrium.
+    """
+    firsts: dict[Balloon, BalloonMap] = {}
+    states = [_balloon_states(*each, firsts) for each in posed]
+    radii: dict[Balloon, dict[tuple[float, float], float]] = {}
+    for balloon, state in (each for levels in states for row in levels for each in row):
+        radii.setdefault(balloon, {})[state] = 0.0
+    for balloon, known in radii.items():
+        pressures, heights = np.array([*known]).T
+        shapes = inflate(balloon, pressures, heights, tied=True)
+        widest = shapes.r[:, balloon.neck_edge : balloon.edge + 1].max(-1)
+        known.update(zip([*known], widest.tolist(), strict=True))
+    rooms = []
+    for (whole, _), levels in zip(posed, states, strict=True):
+        wide = np.array([[radii[balloon][state] for balloon, state in row] for row in levels])
+        nearest = min(
+            float(np.hypot(*(whole.axes[i] - whole.axes[j])) - (wide[:, i] + wide[:, j]).max())
+            for i, j in combinations(range(whole.chambers), 2)
+        )
+        rooms.append(nearest - max(kind.balloon.thickness for kind in whole.maps))
+    return rooms
+
+
+def _balloon_states(
+    whole: Stack, pose: Pose, firsts: dict[Balloon, BalloonMap]
+) -> list[list[tuple[Balloon, tuple[float, float]]]]:
+    """Return each balloon by level and chamber: one of equal sizes, and the pressure in kPa and the
+    height in mm at which that has the same shape. Those are the ``firsts`` of each size.
+    """
+    rows = []
+    for level, gaps in zip(whole.levels, pose.gaps.tolist(), strict=True):
+        kind = whole.maps[level]
+        first = firsts.setdefault((kind.base or kind).balloon, kind)
+        ratio = kind.most_pressure / first.most_pressure
+        heights = (round(max(gap, LEAST_GAP), 4) for gap in gaps)
+        pairs = zip((p / ratio for p in pose.pressures), heights, strict=True)
+        rows.append([(first.balloon, pair) for pair in pairs])
+    return rows
+
+
+def rim_gap(stack: Stack, pose: Pose) -> float:
+    """Return the smallest gap in mm between rims of neighbouring levels.
+
+    0 for flat levels, and if levels lean so far that their rims touch.
+    """
+    gaps = stack.rims[stack.levels] @ pose.freedoms[..., None]
+    return max(float(gaps.min()), 0.0)
 
 
 def held_stretch(kinds: Sequence[Balloon], pressures: ArrayLike, strokes: ArrayLike) -> Array:
@@ -164,66 +292,28 @@ def refuse_stretched(longer: float) -> None:
         )
 
 
+def free_strokes(state: Inflated) -> Iterator[FigureItem]:
+    """Yield stroke, volume and input work of a free stack of round pockets at each pressure."""
+    actuator, quantity = state.actuator, Quantity.FREE_STROKE
+    if isinstance(state.rises, DesignError):
+        yield LeftOut("free stroke, elastic balloon", str(state.rises), (quantity,))
+        return
+    model = calibrated(ELASTIC, actuator.factors)
+    for pressure, rise in state.rises.items():
+        at = Conditions(kpa=pressure)
+        if isinstance(rise, DesignError):
+            yield LeftOut(f"{quantity.named(at)}, elastic balloon", str(rise), (quantity,))
+            continue
+        yield Figure(quantity, rise.stroke, model, at)
+        yield Figure(Quantity.FREE_HEIGHT, actuator.thickness + rise.stroke, model, at)
+        yield Figure(Quantity.BALLOON_VOLUME, rise.volume / actuator.balloons, model, at)
+        work = rise.energy * actuator.form.stacks / 1000
+        yield Figure(Quantity.FREE_WORK, work, model, at)
+    if actuator.factors.loss_share and state.rises:
+        yield Figure(Quantity.LOST_WORK, 100 * actuator.factors.loss_share, model)
+
+
 # The elastic stack: forces, bending, time, stiffness.
-
-
-SAMPLES = 21
-ANGLES = (30.0, 60.0, 90.0)
-LEAST_PRESSURE, NO_FURTHER = 0.01, 1e-7
-"""Lowest pressure of a bend in kPa, and the relative tolerance of its pressure."""
-NEARBY = 2.0
-"""Largest ratio of a bend's pressure to that of another stack which guides the search."""
-PROBE_FORCE = 1e-5
-"""Lateral force in N on the tip with which its stiffness is probed."""
-SOURCE = "membrane of revolution between plates, the film's modulus"
-FORCE = Model(
-    ModelId.ELASTIC_STACK,
-    SOURCE,
-    "no shear between plates; films of constant modulus to 100 kPa. The paper's 3-DoF at 100 kPa "
-    "has 0.9, 0.8 and 0.6 of it, its 1-DoF less",
-)
-BEND = Model(
-    ModelId.ELASTIC_STACK,
-    SOURCE,
-    "rigid plates that tilt, balloons that push by the gap at their ring, rims that touch on the "
-    "inner side. The 3-DoF at 5 kPa has 86 deg with two chambers, 105 with one, where shells in "
-    "SOFA, whose rims do not touch, have 85 and 109; the paper's largest is 81 +- 6 at a pressure "
-    "that it does not give",
-)
-CONTACT = Model(
-    ModelId.ELASTIC_STACK,
-    SOURCE,
-    "films as wide as their meridians in balance; 0 is touching, which the stack then allows for",
-)
-TIME = Model(
-    ModelId.STACK_IN_TIME,
-    f"Poiseuille or Blasius in {TUBE_LENGTH:g} mm of tube to each chamber",
-    "the paper gives no length, and this one makes its 0.92 s come out; the sensor is taken to sit "
-    "at the pump; no lag of valve and pump",
-)
-AT_PRESSURE = Model(
-    ModelId.ELASTIC_STACK,
-    SOURCE,
-    "no shear between plates; the paper's moduli would make it 15 times as firm, at a pressure "
-    "that it does not give",
-)
-CHAMBERS_SHUT = Model(
-    ModelId.STACK_SHUT,
-    SOURCE,
-    "the air that is in the chambers stays in, tubes left out; no shear between plates",
-)
-
-
-OUTSIDE = (
-    "outside the checked part of the balloons' map, which misses a balloon computed there by more "
-    "than 3 %"
-)
-"""Flag of a figure whose pose has balloons outside the valid range of a map."""
-BUCKLES = (
-    "that of a straight column, which is unstable here and buckles: it may push harder, or give "
-    "way to a tenth or less"
-)
-"""Flag of the force of a column that would buckle (docs/measured/candidates.csv)."""
 
 
 def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | LeftOut | None:
@@ -232,46 +322,46 @@ def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | Lef
         return None
     most = max(MOST_PRESSURE, *request.pressures_kpa, 0.0)
     try:
-        return stack(actuator.design, actuator.laminate, most, request.factors, actuator.form)
+        return stack(actuator.design, actuator.laminate, most, actuator.factors, actuator.form)
     except DesignError as error:
         return LeftOut("elastic stack", str(error))
 
 
-def moved_stack(
-    together: Stack, laminate: Laminate, factors: Factors, moved: Factors
-) -> Stack | None:
-    """Return a laminate's stack of ``factors`` at other ones without new maps; None if it needs
-    new ones.
+def moved_stack(together: Stack, actuator: Actuator, moved: Factors) -> Stack | None:
+    """Return an actuator's stack at ``moved`` factors without new maps; None if it needs new
+    ones.
     """
+    factors = actuator.factors
     if (moved.pocket_loss, moved.modulus_mpa) != (factors.pocket_loss, factors.modulus_mpa):
         return None
     ratio = moved.modulus_ratio / factors.modulus_ratio
     return replace(
         together,
         maps=tuple(kind.stiffened(ratio) for kind in together.maps),
-        pitch=moved.folded(laminate).height / len(together.levels),
+        pitch=moved.folded(actuator.laminate).height / len(together.levels),
     )
 
 
-PosedItem = tuple[Figure | LeftOut, Pose | None]
+PosedItem = tuple[FigureItem, Pose | None]
 """A figure with the pose that it is taken from."""
 Guides = dict[Conditions, tuple[Pose, Pose]]
 """Bent poses, and those pressed further, by conditions: starts for those of other stacks."""
 
 
 def stack_figures(
-    actuator: Actuator,
+    state: Inflated,
     request: PredictionRequest,
-    stack: Stack,
     guides: Guides,
     checks_films: bool = True,
     checks_maps: bool = False,
-) -> Iterator[Figure | LeftOut]:
+) -> Iterator[FigureItem]:
     """Yield forces, bending, times and stiffness of the stack. With ``checks_films`` figures with
     films stretched too far are left out; with ``checks_maps`` figures are flagged if their balloons
     are outside the valid range of a map. Poses that ``guides`` lack are added.
     """
-    rows = list(_posed_figures(actuator, request, stack, guides, checks_films))
+    assert isinstance(state.stack, Stack)
+    stack = state.stack
+    rows = list(_posed_figures(state, stack, request, guides, checks_films))
     poses = list({id(pose): pose for _, pose in rows if pose and checks_maps}.values())
     outside = {id(pose) for pose, holds in zip(poses, stack.hold(poses), strict=True) if not holds}
     for item, pose in rows:
@@ -283,50 +373,44 @@ def stack_figures(
 
 
 def _posed_figures(
-    actuator: Actuator,
-    request: PredictionRequest,
+    state: Inflated,
     stack: Stack,
+    request: PredictionRequest,
     guides: Guides,
     checks_films: bool,
 ) -> Iterator[PosedItem]:
-    yield from _forces(actuator, request, stack, checks_films)
-    if actuator.form.is_parallel:
-        yield from _bends(request, stack)
-        yield from _bent_forces(request, stack, guides)
-    yield from _times(request, stack)
-    yield from _stiffness(request, stack)
-
-
-def stroke_at(actuator: Actuator, share: float) -> float:
-    """Return the stroke in mm at a share of the way from the flat to the reference height."""
-    return max(share * (actuator.reference_height - actuator.thickness), 0.0)
+    factors = state.actuator.factors
+    yield from _forces(state.actuator, request, stack, checks_films)
+    if state.actuator.form.is_parallel:
+        yield from _bends(state, stack)
+        yield from _bent_forces(request, stack, guides, calibrated(FORCE, factors))
+    yield from _times(request, stack, factors)
+    yield from _stiffness(request, stack, factors)
 
 
 def _forces(
     actuator: Actuator, request: PredictionRequest, stack: Stack, checks_films: bool
 ) -> Iterator[PosedItem]:
-    kinds = balloons_of(actuator.design, actuator.laminate, request.factors, actuator.form)
+    quantity, model = Quantity.BLOCKED_FORCE, calibrated(FORCE, actuator.factors)
     shares = paper.HEIGHTS if actuator.has_reference else paper.HEIGHTS[:1]
-    strokes = [stroke_at(actuator, share) for share in shares]
-    for pressure in request.pressures_kpa:
-        longer = np.zeros(len(strokes))
-        if checks_films:
-            longer = held_stretch(kinds, [pressure] * len(strokes), strokes)
-        for share, stroke, strain in zip(shares, strokes, longer.tolist(), strict=True):
-            quantity, at = Quantity.BLOCKED_FORCE, Conditions(kpa=pressure, share=share)
-            try:
-                refuse_stretched(strain)
-                value = float(blocked_force(stack, pressure, stroke))
-            except DesignError as error:
-                name = f"{quantity.named(at)}, elastic stack"
-                yield LeftOut(name, str(error), (quantity,)), None
-                continue
-            model = calibrated(FORCE, request.factors)
-            pose = _level_pose(stack, pressure, stroke)
-            if pose and not pose.stable:
-                model = replace(model, trust=f"{BUCKLES}; {model.trust}")
-            value *= actuator.form.pushing
-            yield Figure(quantity, value, model, at), pose
+    places = list(product(request.pressures_kpa, shares))
+    strokes = [actuator.stroke_at(share) for _, share in places]
+    strains = [0.0] * len(places)
+    if checks_films and places:
+        kinds = balloons_of(actuator.design, actuator.laminate, actuator.factors, actuator.form)
+        strains = held_stretch(kinds, [kpa for kpa, _ in places], strokes).tolist()
+    for (pressure, share), stroke, strain in zip(places, strokes, strains, strict=True):
+        at = Conditions(kpa=pressure, share=share)
+        try:
+            refuse_stretched(strain)
+            value = actuator.form.pushing * float(blocked_force(stack, pressure, stroke))
+        except DesignError as error:
+            yield LeftOut(f"{quantity.named(at)}, elastic stack", str(error), (quantity,)), None
+            continue
+        pose = _level_pose(stack, pressure, stroke)
+        buckles = pose is not None and not pose.stable
+        by = replace(model, trust=f"{BUCKLES}; {model.trust}") if buckles else model
+        yield Figure(quantity, value, by, at), pose
 
 
 def _level_pose(stack: Stack, pressure: float, stroke: float) -> Pose | None:
@@ -346,17 +430,15 @@ def _pressures(
     return (pressure,) * chambers + (rest,) * (stack.chambers - chambers)
 
 
-def _bends(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
-    bent: list[tuple[Conditions, Pose]] = []
-    for pressure, chambers in product(request.pressures_kpa, range(1, stack.chambers)):
-        at = Conditions(kpa=pressure, chambers=chambers)
-        try:
-            bent.append((at, stack.pose(_pressures(stack, chambers, pressure))))
-        except DesignError as error:
-            yield LeftOut(Quantity.BEND.named(at), str(error), (Quantity.BEND,)), None
-    rooms = chamber_clearances(stack, [pose for _, pose in bent])
-    bends, contacts = (calibrated(model, request.factors) for model in (BEND, CONTACT))
-    for (at, pose), room in zip(bent, rooms.tolist(), strict=True):
+def _bends(state: Inflated, stack: Stack) -> Iterator[PosedItem]:
+    bends, contacts = (calibrated(model, state.actuator.factors) for model in (BEND, CONTACT))
+    left_out = {at: bent for at, bent in state.bent.items() if isinstance(bent, DesignError)}
+    for at, error in left_out.items():
+        yield LeftOut(Quantity.BEND.named(at), str(error), (Quantity.BEND,)), None
+    for at, bent in state.bent.items():
+        if isinstance(bent, DesignError):
+            continue
+        pose, room = bent
         for quantity, value, model in (
             (Quantity.BEND, pose.bend, bends),
             (Quantity.RIM_ROOM, rim_gap(stack, pose), contacts),
@@ -398,39 +480,42 @@ def pose_bent_by(
     return None
 
 
-def _bent_forces(request: PredictionRequest, stack: Stack, guides: Guides) -> Iterator[PosedItem]:
+def _bent_forces(
+    request: PredictionRequest, stack: Stack, guides: Guides, model: Model
+) -> Iterator[PosedItem]:
     """Yield forces on a plate square to the bent tip, its chambers pressurised further."""
     if not request.pressures_kpa:
         return
-    model = calibrated(FORCE, request.factors)
-    pressure = max(request.pressures_kpa)
-    for chambers in range(1, min(stack.chambers, 3)):
-        for angle in ANGLES:
-            quantity = Quantity.BENT_FORCE
-            at = Conditions(kpa=pressure, chambers=chambers, angle=angle)
-            pose, guide = None, guides.get(at)
-            if guide is not None:
-                usual = guide[0].pressures[0]
-                pose = pose_bent_by(stack, chambers, angle, usual / NEARBY, usual * NEARBY)
-            pose = pose or pose_bent_by(stack, chambers, angle)
-            if pose is None or pose.pressures[0] > pressure:
-                reason = "it does not bend so far"
-                yield LeftOut(quantity.named(at), reason, (quantity,)), None
-                continue
-            plate = Plate(_three(pose.tip), _three(pose.frames[1][-1][:, 2]))
-            try:
-                start = pose if guide is None else guide[1]
-                pressed = stack.pose(_pressures(stack, chambers, pressure), plate=plate, near=start)
-            except DesignError as error:
-                yield LeftOut(quantity.named(at), str(error), (quantity,)), None
-                continue
-            guides.setdefault(at, (pose, pressed))
-            yield Figure(quantity, pressed.force, model, at), pressed
+    quantity, pressure = Quantity.BENT_FORCE, max(request.pressures_kpa)
+    for chambers, angle in product(range(1, min(stack.chambers, 3)), ANGLES):
+        at = Conditions(kpa=pressure, chambers=chambers, angle=angle)
+        pose, guide = None, guides.get(at)
+        if guide is not None:
+            usual = guide[0].pressures[0]
+            pose = pose_bent_by(stack, chambers, angle, usual / NEARBY, usual * NEARBY)
+        pose = pose or pose_bent_by(stack, chambers, angle)
+        if pose is None or pose.pressures[0] > pressure:
+            yield LeftOut(quantity.named(at), "it does not bend so far", (quantity,)), None
+            continue
+        try:
+            start = pose if guide is None else guide[1]
+            pressed = pressed_further(stack, chambers, pressure, pose, start)
+        except DesignError as error:
+            yield LeftOut(quantity.named(at), str(error), (quantity,)), None
+            continue
+        guides.setdefault(at, (pose, pressed))
+        yield Figure(quantity, pressed.force, model, at), pressed
 
 
-def _three(values: Array) -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return (x, y, z)
+def pressed_further(
+    stack: Stack, chambers: int, pressure: float, bent: Pose, near: Pose | None = None
+) -> Pose:
+    """Return the pose with some chambers at a pressure in kPa below a plate square to the tip of a
+    bent pose; ``near`` is a pose to start from. Raises DesignError without one.
+    """
+    (x, y, z), (across, aside, along) = bent.tip.tolist(), bent.frames[1][-1][:, 2].tolist()
+    plate = Plate((x, y, z), (across, aside, along))
+    return stack.pose(_pressures(stack, chambers, pressure), plate=plate, near=near or bent)
 
 
 def time_to_fill(
@@ -463,8 +548,8 @@ def air_time(whole: Stack, flow_ml_min: float, until: float, line: Line) -> floa
     return line.delay + (full - empty) / flow
 
 
-def _times(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
-    model = calibrated(TIME, request.factors)
+def _times(request: PredictionRequest, stack: Stack, factors: Factors) -> Iterator[PosedItem]:
+    model = calibrated(TIME, factors)
     at = Conditions(kpa=paper.FULL_KPA, flow=request.flow_ml_min)
     try:
         time, pose = time_to_fill(stack, request.flow_ml_min, paper.FULL_KPA)
@@ -472,15 +557,15 @@ def _times(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
         quantity = Quantity.WATER_TIME
         yield LeftOut(quantity.named(at), str(error), (quantity,)), None
         return
-    yield Figure(Quantity.WATER_TIME, time + request.factors.water_delay, model, at), pose
+    yield Figure(Quantity.WATER_TIME, time + factors.water_delay, model, at), pose
     at = Conditions(kpa=paper.FULL_KPA)
     yield Figure(Quantity.WATER_HEIGHT, pose.height, model, at), pose
 
 
-def _stiffness(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
+def _stiffness(request: PredictionRequest, stack: Stack, factors: Factors) -> Iterator[PosedItem]:
+    held, shut = (calibrated(each, factors) for each in (HELD, SHUT))
     for pressure in request.pressures_kpa[:1]:
         at = Conditions(kpa=pressure)
-        held, shut = (calibrated(each, request.factors) for each in (AT_PRESSURE, CHAMBERS_SHUT))
         try:
             start = stack.pose((pressure,) * stack.chambers)
             aside = (PROBE_FORCE, 0.0, 0.0)
@@ -510,9 +595,9 @@ def force_traces(actuator: Actuator, request: PredictionRequest, stack: Stack) -
     """Return curves of force against stroke, one a pressure."""
     most = actuator.reference_height - actuator.thickness
     if not actuator.has_reference:
-        most = min(k.largest_stroke for k in actuator.kinematics)
+        most = min(each.largest_stroke for each in actuator.pockets)
     strokes = np.linspace(0, most, SAMPLES)
-    model = calibrated(FORCE, request.factors)
+    model = calibrated(FORCE, actuator.factors)
     lines = []
     for pressure in request.pressures_kpa:
         if pressure > stack.most_pressure:
@@ -522,9 +607,9 @@ def force_traces(actuator: Actuator, request: PredictionRequest, stack: Stack) -
     return lines
 
 
-def bend_relation(request: PredictionRequest, stack: Stack) -> Relation:
+def bend_relation(factors: Factors, stack: Stack) -> Relation:
     """Return the curves of bend against pressure."""
-    model = calibrated(BEND, request.factors)
+    model = calibrated(BEND, factors)
     pressures = np.geomspace(0.01, 20.0, SAMPLES)
     lines = []
     for chambers in range(1, stack.chambers):
@@ -536,9 +621,9 @@ def bend_relation(request: PredictionRequest, stack: Stack) -> Relation:
     )
 
 
-def workspace_traces(request: PredictionRequest, stack: Stack) -> list[Trace]:
+def workspace_traces(factors: Factors, stack: Stack) -> list[Trace]:
     """Return paths of the tip with 1, 2 ... chambers up to 10 kPa, the others empty or full."""
-    model = calibrated(BEND, request.factors)
+    model = calibrated(BEND, factors)
     pressures = np.linspace(0.1, paper.FULL_KPA**0.5, SAMPLES) ** 2
     lines = []
     for rest, words in ((0.0, "empty"), (paper.FULL_KPA, f"at {paper.FULL_KPA:g} kPa")):
@@ -559,62 +644,7 @@ def _poses(stack: Stack, chambers: int, pressures: Array, rest: float = 0.0) -> 
     return stack.poses_of(states.part(slice(count)))
 
 
-# Clearances of an inflated stack.
-#
-# The elastic balloon covers contact between balloons on each other, at the plate between them; the
-# stack covers contact between leaning levels, at their rims. Balloons side by side do not touch if
-# the clearance below is positive. Lengths mm.
-
-
-LEAST_GAP = 0.02
-"""Least gap in mm of a balloon whose radius is computed."""
-
-
-def rim_gap(stack: Stack, pose: Pose) -> float:
-    """Return the smallest gap in mm between rims of neighbouring levels.
-
-    0 for flat levels, and if levels lean so far that their rims touch.
-    """
-    gaps = stack.rims[stack.levels] @ pose.freedoms[..., None]
-    return max(float(gaps.min()), 0.0)
-
-
-def chamber_clearances(stack: Stack, poses: Sequence[Pose]) -> Array:
-    """Return the smallest clearance in mm between the films of balloons side by side, by pose.
-
-    Below 0 they would pass through each other. Both are in the frame of their level, and balloons
-    of other levels lie beyond a plate, so that axes and largest radii suffice. Raises DesignError
-    for a balloon without an equilibrium.
-    """
-    widest = _radii(stack, poses)
-    nearest = np.full(len(poses), math.inf)
-    for first, second in combinations(range(stack.chambers), 2):
-        apart = float(np.hypot(*(stack.axes[first] - stack.axes[second])))
-        together = (widest[..., first] + widest[..., second]).max(-1)
-        nearest = np.minimum(nearest, apart - together)
-    return nearest - max(kind.balloon.thickness for kind in stack.maps)
-
-
-def _radii(stack: Stack, poses: Sequence[Pose]) -> Array:
-    """Return the largest radius of each balloon's middle surface: (poses, levels, chambers)."""
-    gaps = np.array([pose.gaps for pose in poses])
-    radii = np.empty_like(gaps)
-    pressures = np.array([np.broadcast_to(pose.pressures, pose.gaps.shape) for pose in poses])
-    for kind, balloon in enumerate(stack.maps if poses else ()):
-        rows = stack.levels == kind
-        heights = np.maximum(gaps[:, rows], LEAST_GAP).round(4)
-        states = np.stack([pressures[:, rows], heights], -1)
-        unique, back = distinct(states.reshape(-1, 2))
-        shapes = inflate(balloon.balloon, unique[:, 0], unique[:, 1], tied=True)
-        within = shapes.r[:, balloon.balloon.neck_edge : balloon.balloon.edge + 1].max(-1)
-        radii[:, rows] = within[back].reshape(heights.shape)
-    return radii
-
-
 # Balloons on top of each other: all carry the same force, and their strokes add up.
-
-
-SERIES_SAMPLES = 401
 
 
 def blocked_force(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:

@@ -4,12 +4,13 @@ model to design with.
 
 from __future__ import annotations
 
+import csv
 import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from operator import attrgetter
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, PlainSerializer, WithJsonSchema
@@ -19,7 +20,6 @@ from sbafab.errors import DesignError
 from sbafab.laminate.lay_up import folded_height
 from sbafab.markup import data_frame, table_html
 from sbafab.models import paper
-from sbafab.models.closed_forms import eq_4
 from sbafab.models.paper import Counterpart, CounterpartEntry
 from sbafab.models.quantity import (
     ANYWHERE,
@@ -81,9 +81,25 @@ class Model:
         """Name and source in one."""
         return f"{self.name} ({self.source})" if self.source else self.name
 
+    def filled(self, **facts: object) -> Model:
+        """Return the model with facts in the places of its source and validity."""
+        source, trust = self.source.format(**facts), self.trust.format(**facts)
+        return replace(self, source=source, trust=trust)
+
     def times(self, factor: str, value: float) -> Model:
         """Return the model with a factor (a field of ``Factors``), unless that is 1."""
         return self if value == 1 else replace(self, factors=(*self.factors, (factor, value)))
+
+
+def _models() -> Iterator[tuple[str, Model]]:
+    """Yield models with source and validity, from ``models.csv``."""
+    with Path(__file__).with_name("models.csv").open(encoding="utf-8", newline="") as opened:
+        for name, source, trust in list(csv.reader(opened))[1:]:
+            yield name, Model(ModelId(name.split()[0]), source, trust)
+
+
+MODELS = dict(_models())
+"""Models by id; of several with one id with a word more."""
 
 
 @dataclass(frozen=True)
@@ -262,6 +278,10 @@ class LeftOut:
     name: str
     reason: str
     quantities: tuple[Quantity, ...] = ()
+    group = ""
+
+
+FigureItem = Figure | LeftOut
 
 
 @dataclass(frozen=True)
@@ -443,8 +463,6 @@ BLOCKED = (Quantity.BLOCKED_FORCE, Quantity.FORCE_BOUND)
 LOADS = (Quantity.WRINKLING_LOAD, Quantity.COLLAPSE_LOAD, Quantity.SLIP_LOAD)
 PULLS = ((Quantity.PULL,), (Quantity.MOMENT,), LOADS)
 """Forces of drawn mechanisms."""
-RADIUS = 2.5
-"""Pocket radius in mm of the actuators whose forces were measured."""
 INTERVAL_NOTE = (
     "in parentheses the 90 % interval: from the calibration's uncertainty, and from what the model "
     "missed of the measured curves"
@@ -516,24 +534,12 @@ def _note(figure: Figure) -> str:
     if figure.model.id is ModelId.SCALED_HEIGHT:
         return SCALED_NOTE
     if figure.model.id is ModelId.WORK_ON_EQ_4:
-        low, high = eq_4_ratios()
+        low, high = paper.EQ_4_RATIOS
         return (
             f"{low * figure.value:.3g} to {high * figure.value:.3g} N by the paper's six forces at "
             f"{paper.FORCE_KPA:g} kPa, {low:.2f} to {high:.2f} times this model"
         )
     return figure.model.trust
-
-
-@lru_cache(maxsize=1)
-def eq_4_ratios() -> tuple[float, float]:
-    """Return the range of ratios of the paper's forces (Sec. 4.3) to virtual work on Eq. 4."""
-    full = paper.FULL_SHARE * RADIUS
-    ratios = [
-        measured.value / (chambers * paper.FORCE_KPA / 1000 * float(eq_4(RADIUS).rate(h)))
-        for chambers, forces in ((1, paper.FORCE_1DOF), (3, paper.FORCE_3DOF))
-        for h, measured in zip([s * full for s in paper.HEIGHTS], forces, strict=True)
-    ]
-    return min(ratios), max(ratios)
 
 
 # Choice of the figure to design with where several models give one quantity.

@@ -5,7 +5,7 @@ they are assumed to be off the evidence.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any, NamedTuple
@@ -26,11 +26,11 @@ from sbafab.models.calibrated import (
     deviations,
     load_calibration,
 )
-from sbafab.models.figures import EXTRAPOLATION, Factors, Figure, Flag, LeftOut
+from sbafab.models.figures import EXTRAPOLATION, Factors, Figure, FigureItem, Flag
 from sbafab.models.paper import BALLOONS, CALIBRATED_MODELS
 from sbafab.models.quantity import FigureKey, Quantity
 
-Items = Sequence[Figure | LeftOut]
+Items = Sequence[FigureItem]
 FLAT = "flat height"
 """The group of folded heights."""
 MODULUS_RATIO, LOSS = (
@@ -216,19 +216,19 @@ class Uncertainty:
         terms = self._term_slopes(value, term)
         return value, self._interval(group, value, moved, terms, share=share)
 
-    def bounded(
-        self, items: Items, evaluated: Callable[[Factors], Items]
-    ) -> list[Figure | LeftOut]:
-        """Return the items with the intervals of figures that the calibration covers.
+    @property
+    def moved(self) -> list[Factors]:
+        """The factors of ``shifted`` that differ from the median."""
+        return [factors for change, factors in self.shifted() if change]
 
-        ``evaluated`` gives the same figures with other factors. A figure that one of them lacks has
-        no interval.
+    def bounded(self, items: Items, moved: Iterable[Items]) -> list[FigureItem]:
+        """Return the items with the intervals of figures that the calibration covers; ``moved`` are
+        the same figures at each of the ``moved`` factors. A figure that one of them lacks has no
+        interval.
         """
-        moved = [
-            (change, {} if change == 0 else _by_key(evaluated(factors)))
-            for change, factors in self.shifted()
-        ]
-        return [self._bounded(item, moved) if isinstance(item, Figure) else item for item in items]
+        others = iter(moved)
+        pairs = [(change, _by_key(next(others)) if change else {}) for change, _ in self.shifted()]
+        return [self._bounded(item, pairs) if isinstance(item, Figure) else item for item in items]
 
     def _bounded(
         self, figure: Figure, moved: Sequence[tuple[float, Mapping[FigureKey, float]]]

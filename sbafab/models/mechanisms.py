@@ -20,8 +20,7 @@ from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, strip
 from sbafab.laminate.laminate import Chamber, Interface, Laminate
 from sbafab.models import pouch
-from sbafab.models.figures import Figure, LeftOut, Model, PredictionRequest
-from sbafab.models.formulas import force
+from sbafab.models.figures import Figure, FigureItem, LeftOut, Model
 from sbafab.models.quantity import Conditions, ModelId, Quantity
 
 NOT_CALIBRATED = "not calibrated: no interval"
@@ -141,8 +140,8 @@ def _span(region: Region, centre: Point, axis: int, off: float) -> float:
 
 
 def mechanism_figures(
-    mechanism: Mechanism, laminate: Laminate, request: PredictionRequest
-) -> Iterator[Figure | LeftOut]:
+    mechanism: Mechanism, laminate: Laminate, pressures: Sequence[float]
+) -> Iterator[FigureItem]:
     """Yield the figures of a mechanism, chamber by chamber, and those left out with the reason."""
     several = len(laminate.chambers) > 1
     for chamber in laminate.chambers:
@@ -157,7 +156,7 @@ def mechanism_figures(
             reason = "its pockets are of different sizes, and the model is of equal ones"
             yield LeftOut(f"what chamber {chamber.name} does", reason)
             continue
-        filled = FilledChamber(mechanism, laminate, chamber, pockets, request.pressures_kpa, of)
+        filled = FilledChamber(mechanism, laminate, chamber, pockets, pressures, of)
         yield from FIGURES[mechanism.kind](filled)
 
 
@@ -211,7 +210,7 @@ def _while_it_holds(
     limit: Limit,
     pressures: Sequence[float],
     value: Callable[[float], float],
-) -> Iterator[Figure | LeftOut]:
+) -> Iterator[FigureItem]:
     """Yield a figure at each pressure up to the limit, and at the limit if that is below all;
     ``value`` gives it by the pressure.
     """
@@ -238,7 +237,7 @@ def _stretch_note(stiffness: float | None) -> str:
     return f"films that stretch less than {100 * MOST_STRETCH:g} %"
 
 
-def _motor(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
+def _motor(filled: FilledChamber) -> Iterator[FigureItem]:
     of = filled.of
     pocket = filled.pockets[0]
     if not pocket.is_rectangular:
@@ -271,7 +270,7 @@ def _motor(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     yield Figure(Quantity.CONTRACTION_VOLUME, content, model, at)
 
 
-def _hinge(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
+def _hinge(filled: FilledChamber) -> Iterator[FigureItem]:
     of = filled.of
     pocket = filled.pockets[0]
     if not pocket.is_rectangular:
@@ -313,7 +312,7 @@ def _hinge(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
         yield from _while_it_holds(Quantity.MOMENT, bent, model, limit, filled.pressures, moment)
 
 
-def _beam(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
+def _beam(filled: FilledChamber) -> Iterator[FigureItem]:
     of = filled.of
     pocket = filled.pockets[0]
     length, width = pocket.length, pocket.width
@@ -345,7 +344,7 @@ def _beam(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
         yield from _while_it_holds(quantity, at, model, limit, filled.pressures, load)
 
 
-def _jammed(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
+def _jammed(filled: FilledChamber) -> Iterator[FigureItem]:
     of = filled.of
     pocket = filled.pockets[0]
     sheets = pocket.interface.masks
@@ -392,15 +391,15 @@ PUSH = Model(
 )
 
 
-def _push(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
+def _push(filled: FilledChamber) -> Iterator[FigureItem]:
     of = filled.of
     each = "pouch" if len(filled.pockets) > 1 else ""
     for pressure in filled.pressures:
-        value = float(force(pressure, filled.pockets[0].area))
+        value = pressure * filled.pockets[0].area / 1000
         yield Figure(Quantity.FORCE_BOUND, value, PUSH, Conditions(pressure, of=of, each=each))
 
 
-FIGURES: Mapping[MechanismKind, Callable[[FilledChamber], Iterator[Figure | LeftOut]]] = {
+FIGURES: Mapping[MechanismKind, Callable[[FilledChamber], Iterator[FigureItem]]] = {
     "pouch-motor": _motor,
     "hinge": _hinge,
     "beam": _beam,
@@ -442,7 +441,7 @@ def mechanism_value(
         has = "no mechanism" if mechanism is None else f"a mechanism of {mechanism.kind}"
         raise DesignError(f"{quantity} is of a {asked.kind}, and the design has {has}")
     values = []
-    for item in mechanism_figures(mechanism, laminate, PredictionRequest((kpa,))):
+    for item in mechanism_figures(mechanism, laminate, (kpa,)):
         if isinstance(item, LeftOut):
             if not item.quantities or asked.figure in item.quantities:
                 raise DesignError(f"{item.name}: {item.reason}")

@@ -87,6 +87,9 @@ VALID_RADIUS = 5.0
 FULL_SHARE = FULL_HEIGHT.value / BALLOONS / 2.5
 """Stroke of a full balloon over its pocket's radius: 17.5 mm of 15 balloons of radius 2.5."""
 
+EQ_4_RATIOS = (0.75992, 1.240135)
+"""Least and largest of the six forces over virtual work on Eq. 4."""
+
 
 # Measured counterparts of figures that are off by more than a quarter of them, for predictions,
 # searches, sweeps, pictures, pages and the studio. A row applies to every design whose figure comes

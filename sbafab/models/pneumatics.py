@@ -1,4 +1,5 @@
-"""Supply of a chamber: fluid, tube, valve and pump, and filling times (paper, Sec. 4.5 and 7).
+"""Supply of a chamber: fluid, tube, valve and pump, filling times (paper, Sec. 4.5 and 7), and the
+range of pressures.
 
 Flow through the tube is laminar (Poiseuille) or, where that is less, turbulent in a smooth tube
 (Blasius). A gas is isothermal: pressures squared take the place of pressures, and its volumes are
@@ -13,7 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sbafab.design.records import Form
 from sbafab.errors import DesignError
+from sbafab.models.figures import USUAL_PRESSURES
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -138,3 +141,31 @@ def seconds(
         )
     squeezed = 1 + gas_at_kpa / ATMOSPHERE_KPA
     return np.asarray(volume_ul, dtype=float) * squeezed / (flow_ml_min * 1000 / 60)
+
+
+# Pressures of chambers: gauge pressures in kPa, a vacuum below 0.
+
+
+MOST_PRESSURE = 1000.0
+"""kPa, nearly three times what burst the paper's actuators."""
+
+
+def usual_pressures(form: Form) -> tuple[float, ...]:
+    """Return the pressures in kPa of a design's prediction; negative if it works under a vacuum."""
+    return tuple(-kpa if form.works_under_vacuum else kpa for kpa in USUAL_PRESSURES)
+
+
+def refuse_pressure(kpa: ArrayLike, is_vacuum: bool = False) -> None:
+    """Raise DesignError for a pressure in kPa that no model takes: pressures of inflated pockets
+    are from 0 up, pressures of pockets that work under a vacuum from 0 down.
+    """
+    low, high = (-ATMOSPHERE_KPA, 0.0) if is_vacuum else (0.0, MOST_PRESSURE)
+    for each in np.atleast_1d(kpa).tolist():
+        if low <= each <= high:
+            continue
+        hint = f"; a vacuum is negative: write {-each:g}" if is_vacuum and each > 0 else ""
+        hint = "; it is inflated, and a vacuum does nothing" if not is_vacuum and each < 0 else hint
+        raise DesignError(
+            f"pressure = {each:g} kPa is out of range; give {low:g} to {high:g} kPa, as a gauge "
+            f"shows it{hint}"
+        )

@@ -4,36 +4,41 @@ chambers in step, bending and workspace of parallel ones, and their order in a p
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sbafab.actuators import build
+from sbafab.design.outline import read_outline
 from sbafab.design.records import Design, Slots
 from sbafab.errors import BeyondError, DesignError, GeometryError
 from sbafab.geometry.region import Region
-from sbafab.laminate.burst import NOT_BURST, burst
+from sbafab.laminate.burst import NOT_BURST, burst, is_near_burst, refuse_beyond_burst
 from sbafab.laminate.laminate import Laminate, film_mass
-from sbafab.models import elastic, mechanisms, paper
-from sbafab.models.closed_forms import bend, eqs_1_to_3, paraboloid_radius
-from sbafab.models.drawn_pockets import (
-    bounded,
-    flat_forces,
-    near_discs,
-    relation_by_disc,
-    why_no_disc,
+from sbafab.models import elastic, paper
+from sbafab.models.actuator import NOT_MEASURED, Actuator, NearDiscs, near_discs, why_no_disc
+from sbafab.models.closed_forms import (
+    LOBES,
+    ClosedForm,
+    bend,
+    eqs_1_to_3,
+    folded_diameter,
+    largest_tube,
+    paraboloid_radius,
+    second_moments,
+    tip_stiffness,
 )
 from sbafab.models.figures import (
+    BY_DISC,
+    MODELS,
     NEAR_BURST,
     Factors,
     Figure,
+    FigureItem,
     Flag,
     LeftOut,
     Model,
@@ -45,19 +50,6 @@ from sbafab.models.figures import (
     chosen,
 )
 from sbafab.models.film_elements import Array
-from sbafab.models.formulas import (
-    LOBES,
-    folded_diameter,
-    force,
-    is_near_burst,
-    is_the_papers_3dof,
-    largest_tube,
-    refuse_beyond_burst,
-    refuse_pressure,
-    second_moments,
-    sizes,
-    tip_stiffness,
-)
 from sbafab.models.intervals import (
     PAPER_3DOF,
     burst_uncertainty,
@@ -67,11 +59,9 @@ from sbafab.models.intervals import (
     sizes_of,
     uncertainty_of,
 )
-from sbafab.models.mechanisms import mechanism_figures
-from sbafab.models.paper import Counterpart, Measured, counterpart
-from sbafab.models.pneumatics import seconds
-from sbafab.models.pocket_models import NOT_MEASURED, Actuator, Kinematics
-from sbafab.models.pocket_models import actuator as actuator_of
+from sbafab.models.mechanisms import LEFT_OUT, mechanism_figures
+from sbafab.models.paper import Measured, counterpart
+from sbafab.models.pneumatics import refuse_pressure, seconds
 from sbafab.models.quantity import (
     OF_STACK,
     OVER_FLOW,
@@ -82,29 +72,23 @@ from sbafab.models.quantity import (
     Quantity,
     chamber_count,
 )
+from sbafab.models.sizes import is_the_papers_3dof, sizes
 from sbafab.models.stack import Stack
 
 SAMPLES = 61
-FigureItems = Iterator[Figure | LeftOut]
-
-
-def _models() -> Iterator[tuple[ModelId, Model]]:
-    """Yield models with source and validity, from ``models.csv``."""
-    with Path(__file__).with_name("models.csv").open(encoding="utf-8", newline="") as opened:
-        for model, source, trust in list(csv.reader(opened))[1:]:
-            yield ModelId(model), Model(ModelId(model), source, trust)
-
-
-MODELS = dict(_models())
-GEOMETRY, CURVATURE = MODELS[ModelId.GEOMETRY], MODELS[ModelId.CONSTANT_CURVATURE]
-ROUND_THE_TUBE = {
-    Quantity.DEFLATED_DIAMETER: MODELS[ModelId.TUBE_AND_FILMS],
-    Quantity.REACHED_DIAMETER: MODELS[ModelId.LENS],
-    Quantity.INFLATED_DIAMETER: MODELS[ModelId.CYLINDER],
+GEOMETRY, CURVATURE = MODELS["geometry"], MODELS["constant-curvature"]
+FLAT_PLATES = MODELS["flat-plates"]
+SIZES = {
+    Quantity.DEFLATED_DIAMETER: MODELS["tube-and-films"],
+    Quantity.REACHED_DIAMETER: MODELS["lens"],
+    Quantity.INFLATED_DIAMETER: MODELS["cylinder"],
 }
+"""Models of sizes that the press changes."""
 PAPER_SLOTS = Slots(width=10.0, run=8.5)
 """The paper's SBAs of 11.5 x 20 mm less a bond of 0.75 all round (Sec. 2.1)."""
 GROUPS = ("size", "inlet", "strength", "stroke", "force", "actuation", "bending", "stiffness")
+EXACT_GROUPS = ("size", "inlet")
+"""Groups of figures that are computed for a drawn pocket itself."""
 
 
 def predict(
@@ -133,38 +117,34 @@ def predict(
         uncertainty = uncertainty_of(design, asked.overrides, flat, form)
         factors = uncertainty.factors if uncertainty else factors_of(design, asked.overrides)
         asked = replace(asked, calibration=factors)
-    subject = actuator_of(design, flat, asked.factors, form)
+    subject = Actuator(design, flat, asked.factors, form)
     _check_request(subject, asked)
     request, past = _within_burst(asked, flat)
-
-    def stack_of(actuator: Actuator) -> Stack | LeftOut | None:
-        return None if quick else elastic.elastic_stack(actuator, request)
-
-    together = stack_of(subject)
-    guides: elastic.Guides = {}
-    items = _figures(subject, request, together, guides, checks_maps=checks_maps)
+    moved = uncertainty.moved if uncertainty else ()
+    (state, *others), guides = _states(subject, moved, request, quick), elastic.Guides()
+    items = _figures(state, request, guides, checks_maps=checks_maps)
     if uncertainty is not None:
-        moved = partial(_moved_figures, subject, request, together, guides)
-        items = uncertainty.bounded(items, moved)
-    relations = () if quick else tuple(_relations(subject, request, _solved(together)))
+        moved_items = (_figures(each, request, guides, checks_films=False) for each in others)
+        items = uncertainty.bounded(items, moved_items)
+    relations = () if quick else tuple(_relations(state, request))
     if discs is not None:
         ends = []
         for diameter in (discs.inner, discs.outer):
-            end = actuator_of(design, flat, asked.factors, discs.form(design, diameter))
+            end = replace(subject, drawn_as=discs.form(design, diameter))
             is_same = diameter == discs.equal
-            ends.append(items if is_same else _figures(end, request, stack_of(end), guides))
-        items = list(bounded(items, ends, discs))
-        relations = tuple(relation_by_disc(relation, discs) for relation in relations)
+            [there] = [state] if is_same else _states(end, (), request, quick)
+            ends.append(items if is_same else _figures(there, request, guides))
+        items = list(_by_discs(items, ends, discs))
+        relations = tuple(_relation_by_disc(relation, discs) for relation in relations)
     items = [*(_flagged(item, flat) for item in items), *past]
     figures = chosen(
         (item for item in items if isinstance(item, Figure)),
         OF_STACK if quick and subject.radii else (),
         uncertainty is not None,
     )
-    calibration = asked.factors.calibration
     return Prediction(
         asked,
-        tuple(replace(each, measured=_measured(each, subject, calibration)) for each in figures),
+        tuple(replace(figure, measured=_measured(figure, subject)) for figure in figures),
         relations,
         tuple(item for item in items if isinstance(item, LeftOut)),
     )
@@ -174,18 +154,21 @@ def _check_request(actuator: Actuator, request: PredictionRequest) -> None:
     """Raise DesignError for pressures, flows or volumes out of every model's range."""
     refuse_pressure(request.pressures_kpa, actuator.form.works_under_vacuum)
     seconds(0.0, request.flow_ml_min)
-    if actuator.kinematics:
-        max(actuator.kinematics, key=lambda k: k.largest_volume).stroke(request.volumes_ul)
+    if actuator.pockets:
+        max(actuator.pockets, key=lambda each: each.largest_volume).stroke(request.volumes_ul)
 
 
-def _measured(figure: Figure, actuator: Actuator, calibration: str) -> Counterpart | None:
+def _measured(figure: Figure, actuator: Actuator) -> paper.Counterpart | None:
     """Return the paper's measurement if the figure is far off; None for a folded height with a
     factor.
     """
     model, form = figure.model, actuator.form
     if model.id is ModelId.FILMS and model.factors:
         return None
-    of_papers = is_the_papers_3dof(form, actuator.laminate)
+    of_papers, calibration = (
+        is_the_papers_3dof(form, actuator.laminate),
+        actuator.factors.calibration,
+    )
     return counterpart(form, figure.quantity, figure.at, model.id, calibration, of_papers)
 
 
@@ -205,7 +188,7 @@ def _within_burst(
     return replace(request, pressures_kpa=tuple(within)), past
 
 
-def _flagged(item: Figure | LeftOut, laminate: Laminate) -> Figure | LeftOut:
+def _flagged(item: FigureItem, laminate: Laminate) -> FigureItem:
     """Return a figure, flagged if its pressure is near the estimated burst, or left out if it is
     past that.
     """
@@ -219,86 +202,130 @@ def _flagged(item: Figure | LeftOut, laminate: Laminate) -> Figure | LeftOut:
     return replace(item, flags=(*item.flags, NEAR_BURST)) if is_near else item
 
 
-def _moved_figures(
-    actuator: Actuator,
-    request: PredictionRequest,
-    together: Stack | LeftOut | None,
-    guides: elastic.Guides,
-    factors: Factors,
-) -> list[Figure | LeftOut]:
-    """Return the figures of an actuator at other factors."""
-    subject = actuator_of(actuator.design, actuator.laminate, factors, actuator.form)
-    moved = replace(request, calibration=factors)
-    other: Stack | LeftOut | None = together
-    if isinstance(together, Stack):
-        other = elastic.moved_stack(together, actuator.laminate, request.factors, factors)
-        other = other or elastic.elastic_stack(subject, moved)
-    return _figures(subject, moved, other, guides, checks_films=False)
-
-
-def _solved(together: Stack | LeftOut | None) -> Stack | None:
-    return together if isinstance(together, Stack) else None
+def _states(
+    subject: Actuator, moved: Sequence[Factors], request: PredictionRequest, quick: bool
+) -> list[elastic.Inflated]:
+    """Return an actuator inflated, and inflated at ``moved`` factors; ``quick`` without stacks."""
+    actuators = [subject, *(replace(subject, factors=factors) for factors in moved)]
+    stacks = [None if quick else elastic.elastic_stack(subject, request)]
+    first = stacks[0]
+    for each in actuators[1:]:
+        moved_one = isinstance(first, Stack) and elastic.moved_stack(first, subject, each.factors)
+        has_new = isinstance(first, Stack) and not moved_one
+        stacks.append(elastic.elastic_stack(each, request) if has_new else moved_one or first)
+    pressures = request.pressures_kpa if subject.radii else ()
+    return elastic.inflated(actuators, stacks, pressures)
 
 
 def _figures(
-    actuator: Actuator,
+    state: elastic.Inflated,
     request: PredictionRequest,
-    together: Stack | LeftOut | None,
     guides: elastic.Guides,
     checks_films: bool = True,
     checks_maps: bool = False,
-) -> list[Figure | LeftOut]:
+) -> list[FigureItem]:
     """Return all figures, and the ones left out, in the order of their groups."""
-    items = list(_geometric_figures(actuator, request))
-    if isinstance(together, LeftOut):
-        items.append(together)
-    elif together is not None:
-        items += elastic.stack_figures(
-            actuator, request, together, guides, checks_films, checks_maps
-        )
-    order = {group: place for place, group in enumerate(GROUPS)}
-    return sorted(
-        items, key=lambda item: order[item.group] if isinstance(item, Figure) else len(GROUPS)
-    )
+    items = list(_geometric_figures(state, request))
+    if isinstance(state.stack, LeftOut):
+        items.append(state.stack)
+    elif state.stack is not None:
+        items += elastic.stack_figures(state, request, guides, checks_films, checks_maps)
+    return sorted(items, key=lambda item: GROUPS.index(item.group) if item.group else len(GROUPS))
 
 
-def _geometric_figures(actuator: Actuator, request: PredictionRequest) -> FigureItems:
-    has_model, form = bool(actuator.kinematics), actuator.form
-    yield from _sizes(actuator, request.factors)
-    if has_model and form.is_parallel:
+def _geometric_figures(state: elastic.Inflated, request: PredictionRequest) -> Iterator[FigureItem]:
+    actuator = state.actuator
+    form, laminate = actuator.form, actuator.laminate
+    yield from _sizes(actuator)
+    if actuator.pockets and form.is_parallel:
         yield _folding(actuator)
-    mass = _mass(actuator.laminate)
+    mass = _mass(laminate)
     yield mass
-    if isinstance(mass, LeftOut) and has_model:
+    if isinstance(mass, LeftOut) and actuator.pockets:
         yield LeftOut("power density", mass.reason, (Quantity.POWER_DENSITY,))
     yield from _tubes(actuator)
     if not form.works_under_vacuum:
-        yield _burst(actuator.laminate)
-    pushed = list(flat_forces(actuator, request))
+        yield _burst(laminate)
+    pushed = list(_flat_forces(actuator, request))
     yield from pushed
     if form.mechanism is not None:
-        yield from mechanism_figures(form.mechanism, actuator.laminate, request)
-        for name in mechanisms.LEFT_OUT[form.mechanism.kind]:
+        yield from mechanism_figures(form.mechanism, laminate, request.pressures_kpa)
+        for name in LEFT_OUT[form.mechanism.kind]:
             yield LeftOut(name, f"the model of its mechanism, {form.mechanism.kind}, gives none")
-        return
-    if not has_model:
+    elif not actuator.pockets:
         of_force = "force once the plates part" if pushed else "force"
         for name in ("stroke", of_force, "actuation", "bending", "folded diameter"):
             yield LeftOut(name, why_no_disc(actuator.design))
+    else:
+        yield from _strokes(actuator, request)
+        yield from elastic.free_strokes(state)
+        yield from _forces(actuator, request)
+        yield from _power(actuator, request, mass)
+        if form.is_parallel:
+            yield from _bending(actuator)
+        yield from _stiffness(actuator)
+
+
+# Drawn pockets: figures between those of two discs, and a bound that holds for any outline.
+
+
+def _by_discs(
+    items: list[FigureItem], bounds: Sequence[list[FigureItem]], discs: NearDiscs
+) -> Iterator[FigureItem]:
+    """Yield figures by the disc of equal area, each between those by the discs of ``bounds``.
+
+    A figure that one of the bounds lacks is left out.
+    """
+    values_of = [
+        {figure.key: figure.value for figure in bound if isinstance(figure, Figure)}
+        for bound in bounds
+    ]
+    for item in items:
+        if isinstance(item, LeftOut) or item.model is FLAT_PLATES or item.group in EXACT_GROUPS:
+            yield item
+            continue
+        values = [item.value, *(of[item.key] for of in values_of if item.key in of)]
+        if len(values) <= len(bounds):
+            reason = "a disc within or round the drawn pocket has none"
+            yield LeftOut(item.name, reason, (item.quantity,))
+        else:
+            between = min(values), max(values)
+            yield replace(item, model=_by_disc(item.model, discs), between=between)
+
+
+def _by_disc(model: Model, discs: NearDiscs) -> Model:
+    """Return a model as applied to a disc in place of the drawn pocket."""
+    return replace(
+        model,
+        by_disc=True,
+        trust=f"{model.trust}; the drawn pocket taken for a disc of d = {discs.equal:.4g} mm, "
+        f"bounds by the discs within and round it, {discs.inner:.4g} and {discs.outer:.4g} mm, "
+        "where a wider pocket rises more and pushes harder",
+    )
+
+
+def _relation_by_disc(relation: Relation, discs: NearDiscs) -> Relation:
+    lines = (
+        replace(line, model=_by_disc(line.model, discs)) if line.model else line
+        for line in relation.lines
+    )
+    return replace(relation, title=f"{relation.title}, {BY_DISC}", lines=tuple(lines))
+
+
+def _flat_forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
+    """Yield upper bounds of the drawn pockets' blocked force, before plates part."""
+    drawing = actuator.design.drawing
+    if drawing is None or actuator.form.wrap is not None:
         return
-    yield from _strokes(actuator, request)
-    yield from elastic.free_strokes(actuator, request)
-    yield from _forces(actuator, request)
-    yield from _power(actuator, request, mass.value if isinstance(mass, Figure) else None)
-    if form.is_parallel:
-        yield from _bending(actuator)
-    yield from _stiffness(actuator)
+    area = actuator.form.pushing * read_outline(drawing).area
+    for kpa in request.pressures_kpa:
+        yield Figure(Quantity.FORCE_BOUND, kpa * area / 1000, FLAT_PLATES, Conditions(kpa=kpa))
 
 
 # Sizes, mass, inlet and burst.
 
 
-def _sizes(actuator: Actuator, factors: Factors) -> Iterator[Figure]:
+def _sizes(actuator: Actuator) -> Iterator[Figure]:
     """Yield flat sizes, and diameters round the tube for radial designs."""
     folded = actuator.folded
     factor = folded.factor if folded.molten else 1.0
@@ -308,17 +335,16 @@ def _sizes(actuator: Actuator, factors: Factors) -> Iterator[Figure]:
     elif folded.molten:
         trust += ", the others this share of it"
     trust += f"; {folded.remark}" if folded.remark else ""
-    models = ROUND_THE_TUBE | {Quantity.FOLDED_HEIGHT: Model(ModelId.FILMS, "Sec. 2", trust)}
-    for name, value in sizes(actuator.design, actuator.laminate, factors).items():
+    models = SIZES | {Quantity.FOLDED_HEIGHT: Model(ModelId.FILMS, "Sec. 2", trust)}
+    for name, value in sizes(actuator.design, actuator.laminate, actuator.factors).items():
         if name != "thickness":
             quantity = Quantity.of(name)
             model = models.get(quantity)
-            yield Figure(
-                quantity, value, model.times("press_factor", factor) if model else GEOMETRY
-            )
+            model = model.times("press_factor", factor) if model else GEOMETRY
+            yield Figure(quantity, value, model)
 
 
-def _folding(actuator: Actuator) -> Figure | LeftOut:
+def _folding(actuator: Actuator) -> FigureItem:
     """Return the diameter of the channel that three folded lobes pass."""
     quantity, stacks = Quantity.FOLDED_DIAMETER, actuator.form.stacks
     if stacks != LOBES:
@@ -327,39 +353,36 @@ def _folding(actuator: Actuator) -> Figure | LeftOut:
     factor = actuator.folded.factor if actuator.folded.molten else 1.0
     width = 2 * max(actuator.radii) + 2 * actuator.design.bond.width
     value = folded_diameter(width, actuator.thickness)
-    return Figure(quantity, value, MODELS[ModelId.FOLDED_LOBES].times("press_factor", factor))
+    return Figure(quantity, value, MODELS["folded-lobes"].times("press_factor", factor))
 
 
-def _mass(laminate: Laminate) -> Figure | LeftOut:
+def _mass(laminate: Laminate) -> FigureItem:
     try:
-        return Figure(Quantity.MASS, film_mass(laminate), MODELS[ModelId.FILM_MASS])
+        return Figure(Quantity.MASS, film_mass(laminate), MODELS["film-mass"])
     except DesignError as error:
         return LeftOut("mass", str(error), (Quantity.MASS,))
 
 
-def _tubes(actuator: Actuator) -> FigureItems:
+def _tubes(actuator: Actuator) -> Iterator[FigureItem]:
     if not actuator.laminate.inlets:
         yield LeftOut("tube", "it has no inlet strip: tubes are glued on holes of its films")
         return
     inlet = min(actuator.laminate.inlets, key=lambda inlet: inlet.width - inlet.tube_diameter)
     narrowest, tube = inlet.width - actuator.design.strip_loss, inlet.tube_diameter
     most = largest_tube(narrowest, actuator.design.films.ptfe.thickness)
-    yield Figure(Quantity.LARGEST_TUBE, most, MODELS[ModelId.HALF_PERIMETER])
-    yield Figure(
-        Quantity.TUBE_ROOM, most - tube, MODELS[ModelId.HALF_PERIMETER], Conditions(tube=tube)
-    )
+    model = MODELS["half-perimeter"]
+    yield Figure(Quantity.LARGEST_TUBE, most, model)
+    yield Figure(Quantity.TUBE_ROOM, most - tube, model, Conditions(tube=tube))
 
 
-def _burst(laminate: Laminate) -> Figure | LeftOut:
+def _burst(laminate: Laminate) -> FigureItem:
     """Return the burst pressure with its interval, which is ours."""
     estimate = burst(laminate)
     if estimate is None:
         return LeftOut("burst pressure", NOT_BURST, (Quantity.BURST,))
     interval, missed = burst_uncertainty(estimate)
     pocket = "round pocket" if estimate.is_round else "pocket, taken for a long one,"
-    model = MODELS[ModelId.FILM_STRESS]
-    source = model.source.format(burst=paper.BURST)
-    model = replace(model, source=source, trust=model.trust.format(pocket=pocket))
+    model = MODELS["film-stress"].filled(burst=paper.BURST, pocket=pocket)
     flags = flags_at(missed)
     return Figure(Quantity.BURST, estimate.kpa, model, interval=interval, flags=flags)
 
@@ -367,55 +390,58 @@ def _burst(laminate: Laminate) -> Figure | LeftOut:
 # Strokes, forces, work and time of chambers in step.
 
 
-def _strokes(actuator: Actuator, request: PredictionRequest) -> FigureItems:
+def _strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[FigureItem]:
     """Yield the full state, the largest volumes, and strokes at each volume of the request."""
     stroke = actuator.reference_stroke
     if actuator.has_reference:
-        first = actuator.kinematics[0].model
+        first = actuator.pockets[0].model
         model, flags = Model(ModelId.LARGEST_VOLUME, first.name, first.trust), tuple[Flag, ...]()
         if actuator.radii:
             at = sizes_of(actuator.form, actuator.laminate)
-            model, flags = MODELS[ModelId.SCALED_HEIGHT], flags_at(farther(at, PAPER_3DOF, False))
+            model, flags = MODELS["scaled-height"], flags_at(farther(at, PAPER_3DOF, False))
         yield Figure(Quantity.REFERENCE_STROKE, stroke, model, flags=flags)
         yield Figure(Quantity.REFERENCE_HEIGHT, actuator.reference_height, model, flags=flags)
-        for k in actuator.kinematics:
-            yield Figure(Quantity.REFERENCE_VOLUME, float(k.volume(stroke)), k.model)
+        for each in actuator.pockets:
+            yield Figure(Quantity.REFERENCE_VOLUME, float(each.volume(stroke)), each.model)
     else:
         yield LeftOut("reference stroke and height, and what is predicted at them", NOT_MEASURED)
-    for k in actuator.kinematics:
-        yield Figure(Quantity.LARGEST_VOLUME, k.largest_volume, k.model)
-        yield Figure(Quantity.LARGEST_STROKE, k.largest_stroke, k.model)
+    for each in actuator.pockets:
+        yield Figure(Quantity.LARGEST_VOLUME, each.largest_volume, each.model)
+        yield Figure(Quantity.LARGEST_STROKE, each.largest_stroke, each.model)
     if actuator.radii:
         widest = eqs_1_to_3(max(actuator.radii))
         drawn_in = 2 * paraboloid_radius(widest.largest_volume, widest.largest_stroke)
-        yield Figure(Quantity.BALLOON_DIAMETER, drawn_in, actuator.kinematics[-1].model)
+        yield Figure(Quantity.BALLOON_DIAMETER, drawn_in, actuator.pockets[-1].model)
     quantity = Quantity.VOLUME_STROKE
     for volume in request.volumes_ul:
-        for k in actuator.kinematics:
+        for each in actuator.pockets:
             at_volume = Conditions(volume=volume)
             try:
-                yield Figure(quantity, float(k.stroke(volume)), k.model, at_volume)
+                yield Figure(quantity, float(each.stroke(volume)), each.model, at_volume)
             except DesignError as error:
-                name = f"{quantity.named(at_volume)}, {k.model.name}"
+                name = f"{quantity.named(at_volume)}, {each.model.name}"
                 yield LeftOut(name, str(error), (quantity,))
 
 
 def _pushes(
     actuator: Actuator, request: PredictionRequest
 ) -> Iterator[tuple[Model, Callable[[float, ArrayLike], Array]]]:
-    """Yield the blocked force in N at a pressure in kPa and strokes in mm, by every model."""
+    """Yield the blocked force in N at a pressure in kPa and strokes in mm, by every model: virtual
+    work, F dh = p dv.
+    """
     trust = (
         "no film tension, no stretch; for d = 5 at 100 kPa the paper measured 0.76 to 1.24 times "
         "what Eq. 4 says, 0.74 to 1.65 times what Eqs. 1-3 say"
         if actuator.radii
         else "no film tension, no stretch, one balloon stack; not measured"
     )
-    contact = request.factors.contact_factor
-    for k in actuator.kinematics:
-        model = Model(WORK_ON[k.model.id], "Sec. 4.3, F = p dv/dh", trust)
+    contact = actuator.factors.contact_factor
+    for each in actuator.pockets:
+        model = Model(WORK_ON[each.model.id], "Sec. 4.3, F = p dv/dh", trust)
 
-        def push(pressure: float, stroke: ArrayLike, k: Kinematics = k) -> Array:
-            return actuator.form.pushing * contact * force(pressure, k.push(stroke))
+        def push(pressure: float, stroke: ArrayLike, each: ClosedForm = each) -> Array:
+            rate = each.push(stroke)
+            return np.asarray(actuator.form.pushing * contact * pressure * rate / 1000)
 
         yield model.times("contact_factor", contact), push
 
@@ -437,39 +463,39 @@ def _forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
                 yield Figure(Quantity.BLOCKED_FORCE, value, model, at)
 
 
-def _power(actuator: Actuator, request: PredictionRequest, mass_g: float | None) -> FigureItems:
+def _power(actuator: Actuator, request: PredictionRequest, mass: FigureItem) -> Iterator[Figure]:
     """Yield time, work, speed and power density, all of it at the volume of the reference stroke:
     where that is not known only times to the volumes of the request, and without a mass no power
     density.
     """
-    first, form, flow = actuator.kinematics[0], actuator.form, request.flow_ml_min
+    first, form, flow = actuator.pockets[0], actuator.form, request.flow_ml_min
     stroke, whole = actuator.reference_stroke, 0.0
-    plain = MODELS[ModelId.VOLUME_OVER_FLOW]
-    over_flow = replace(plain, id=OVER_FLOW[first.model.id], source="Sec. 4.5, 7")
+    plain = MODELS["volume-over-flow"]
     if actuator.has_reference:
         whole = actuator.balloons * float(first.volume(stroke)) * form.stacks
         yield Figure(Quantity.TOTAL_VOLUME, whole, first.model)
         time = float(seconds(whole, flow))
+        over_flow = replace(plain, id=OVER_FLOW[first.model.id], source="Sec. 4.5, 7")
         yield Figure(Quantity.REFERENCE_TIME, time, over_flow, Conditions(flow=flow))
     for volume in request.volumes_ul:
         time = float(seconds(volume * actuator.balloons * form.stacks, flow))
         yield Figure(Quantity.VOLUME_TIME, time, plain, Conditions(volume=volume, flow=flow))
     if not actuator.has_reference:
         return
-    bound = replace(MODELS[ModelId.P_V_EQ_4], id=P_V[first.model.id])
+    bound = replace(MODELS["p-v-eq-4"], id=P_V[first.model.id])
     for pressure in request.pressures_kpa:
         # 1 kPa x 1 ul = 1 uJ.
         work = pressure * whole / 1000
         yield Figure(Quantity.WORK_BOUND, work, bound, Conditions(kpa=pressure))
-    if request.pressures_kpa and mass_g is not None:
+    if request.pressures_kpa and isinstance(mass, Figure):
         # With the paper's air: its pump's flow, up to 10 kPa.
         time = float(seconds(whole, paper.AIR_FLOW, paper.FULL_KPA))
         highest = max(request.pressures_kpa)
         _, push = next(_pushes(actuator, request))
         watts = form.stacks / form.pushing * float(push(highest, 0.0)) * stroke / 1000 / time
-        model = MODELS[ModelId.POWER].times("contact_factor", request.factors.contact_factor)
+        model = MODELS["power"].times("contact_factor", actuator.factors.contact_factor)
         at = Conditions(kpa=highest, flow=paper.AIR_FLOW)
-        yield Figure(Quantity.POWER_DENSITY, watts / (mass_g / 1000), model, at)
+        yield Figure(Quantity.POWER_DENSITY, watts / (mass.value / 1000), model, at)
 
 
 # Bending and stiffness of parallel chambers.
@@ -505,7 +531,7 @@ def _paths(actuator: Actuator, others_full: bool = False) -> list[TipPath]:
     return paths
 
 
-def _bending(actuator: Actuator) -> FigureItems:
+def _bending(actuator: Actuator) -> Iterator[FigureItem]:
     """Yield the largest bend of each number of chambers, and the lateral tip displacement."""
     quantity, largest = Quantity.REFERENCE_BEND, Quantity.LARGEST_ASIDE
     if not actuator.has_reference:
@@ -531,7 +557,7 @@ def plate_of(laminate: Laminate) -> Region | None:
     return laminate.tpe_layers[-1].profile
 
 
-def _stiffness(actuator: Actuator) -> FigureItems:
+def _stiffness(actuator: Actuator) -> Iterator[FigureItem]:
     """Yield the bending stiffness of a full actuator by the paper's cantilever formula."""
     quantity, plate = Quantity.REFERENCE_STIFFNESS, plate_of(actuator.laminate)
     reason = ""
@@ -547,8 +573,7 @@ def _stiffness(actuator: Actuator) -> FigureItems:
     measured = paper.MODULUS_3DOF if actuator.form.is_parallel else paper.MODULUS_1DOF
     least, _ = second_moments(plate)
     yield Figure(Quantity.SECOND_MOMENT, least, GEOMETRY)
-    model = MODELS[ModelId.CANTILEVER]
-    model = replace(model, source=model.source.format(modulus=measured.value))
+    model = MODELS["cantilever"].filled(modulus=measured.value)
     value = tip_stiffness(measured.value, least, actuator.reference_height)
     yield Figure(quantity, value, model)
 
@@ -556,10 +581,10 @@ def _stiffness(actuator: Actuator) -> FigureItems:
 # Curves.
 
 
-def _relations(
-    actuator: Actuator, request: PredictionRequest, together: Stack | None
-) -> Iterator[Relation]:
-    if not actuator.kinematics:
+def _relations(state: elastic.Inflated, request: PredictionRequest) -> Iterator[Relation]:
+    actuator, factors = state.actuator, state.actuator.factors
+    together = state.stack if isinstance(state.stack, Stack) else None
+    if not actuator.pockets:
         return
     yield _stroke_relation(actuator)
     if request.pressures_kpa:
@@ -570,8 +595,8 @@ def _relations(
             yield _bending_relation(actuator, request)
         traces = ()
         if together is not None:
-            yield elastic.bend_relation(request, together)
-            traces = elastic.workspace_traces(request, together)
+            yield elastic.bend_relation(factors, together)
+            traces = elastic.workspace_traces(factors, together)
         reached = workspace_relation(actuator, traces)
         if reached.lines:
             yield reached
@@ -601,19 +626,19 @@ def _is_full_3dof(actuator: Actuator) -> bool:
 def _stroke_relation(actuator: Actuator) -> Relation:
     """Return stroke against volume, by every model of the pockets."""
     lines, points = [], []
-    for k in actuator.kinematics:
+    for k in actuator.pockets:
         stroke = np.linspace(0, k.largest_stroke, SAMPLES)
         lines.append(_trace(k.model.name, k.volume(stroke), stroke, k.model))
     if actuator.is_like_paper(1, paper.VALID_RADIUS):
         for fluid, volume, error in paper.VALID:
             label = f"paper: Eq. 4 within {error.value:g} mm a balloon to here ({fluid})"
-            stroke_there = float(actuator.kinematics[0].stroke(volume))
+            stroke_there = float(actuator.pockets[0].stroke(volume))
             slack = error.value * actuator.balloons
             points.append(Points(label, [volume], [stroke_there], [slack]))
     if _is_full_3dof(actuator):
-        most, high = max(k.largest_volume for k in actuator.kinematics), paper.FULL_HEIGHT
+        most, high = max(k.largest_volume for k in actuator.pockets), paper.FULL_HEIGHT
         lines.append(_level(f"paper: {high.value:g} mm high when full", most, high))
-    volume_label = "mean volume" if actuator.is_tapered else "volume"
+    volume_label = "mean volume" if len(set(actuator.radii)) > 1 else "volume"
     return Relation(
         "stroke",
         "Stroke against volume",
@@ -628,12 +653,12 @@ def _force_relation(
     actuator: Actuator, request: PredictionRequest, traces: Sequence[Trace]
 ) -> Relation:
     """Return force against stroke, to the reference stroke, at every pressure of the request."""
-    most = min(k.largest_stroke for k in actuator.kinematics)
+    most = min(k.largest_stroke for k in actuator.pockets)
     stroke = np.linspace(0, actuator.reference_stroke if actuator.has_reference else most, SAMPLES)
     lines = [
         _trace(f"{k.model.name}, {pressure:g} kPa", stroke, push(pressure, stroke), model)
         for pressure in request.pressures_kpa
-        for k, (model, push) in zip(actuator.kinematics, _pushes(actuator, request), strict=True)
+        for k, (model, push) in zip(actuator.pockets, _pushes(actuator, request), strict=True)
     ]
     places = [share * actuator.reference_stroke for share in paper.HEIGHTS]
     points = [
@@ -658,7 +683,7 @@ def _bending_relation(actuator: Actuator, request: PredictionRequest) -> Relatio
     model = Model(ModelId.CURVATURE_OVER_FLOW, CURVATURE.source, trust)
     lines, points = [], []
     for path in _paths(actuator):
-        content = actuator.kinematics[0].volume(path.stroke) * actuator.balloons
+        content = actuator.pockets[0].volume(path.stroke) * actuator.balloons
         label = f"{chamber_count(path.chambers)} inflated, the others flat"
         lines.append(_trace(label, seconds(content, flow), np.degrees(path.angle), model))
     if _is_full_3dof(actuator):
@@ -708,7 +733,7 @@ def workspace_relation(actuator: Actuator, traces: Sequence[Trace] = ()) -> Rela
 
 def _diameter_relation(actuator: Actuator, tube: float) -> Relation:
     """Return the diameter round the tube against the volume of a balloon."""
-    k, full = actuator.kinematics[0], paper.RADIAL_FULL
+    k, full = actuator.pockets[0], paper.RADIAL_FULL
     stroke = np.linspace(0, k.largest_stroke, SAMPLES)
     around = tube + 2 * (actuator.thickness + stroke)
     lines = [_trace(k.model.name, k.volume(stroke), around, k.model)]

@@ -599,7 +599,7 @@ def stack(
 
     ``most_pressure`` in kPa is the range of its maps; maps of wide pockets end earlier. A lone
     balloon is held by a small disc. ``factors`` are calibrated ones; ``form`` replaces the
-    design's, for drawn pockets that are nearly round (``drawn_pockets.model_form``). Raises
+    design's, for drawn pockets that are nearly round (``actuator.model_form``). Raises
     DesignError for pockets of another shape, for actuators round a tube and for films of unknown
     modulus.
     """

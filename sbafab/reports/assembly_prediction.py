@@ -15,14 +15,15 @@ from sbafab.assemblies.build import Assembled, PartDesign, PlacedPart, PlacedSba
 from sbafab.assemblies.checks import TOUCH
 from sbafab.assemblies.shapes import placed_surface
 from sbafab.design.records import Discs, Slots
+from sbafab.laminate.burst import is_near_burst, refuse_beyond_burst
 from sbafab.meshing.surface import Surface
 from sbafab.models.balloons import balloons_of
 from sbafab.models.closed_forms import cylinder_height, lens
 from sbafab.models.elastic import free_rise
-from sbafab.models.formulas import is_near_burst, is_the_papers_3dof, refuse_beyond_burst, sizes
 from sbafab.models.intervals import factors_of
 from sbafab.models.paper import counterpart
 from sbafab.models.quantity import ANYWHERE, Conditions, ModelId, Quantity
+from sbafab.models.sizes import is_the_papers_3dof, sizes
 from sbafab.models.stack import Stack, stack
 from sbafab.reports.inflated import COARSE, inflated
 

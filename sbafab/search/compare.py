@@ -23,12 +23,13 @@ from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError, OutputError
 from sbafab.folders.build import Build, make_build
 from sbafab.folders.swap import replace_text
+from sbafab.laminate.burst import refuse_beyond_burst
+from sbafab.models.actuator import model_form
 from sbafab.models.balloons import has_balloons
 from sbafab.models.calibrated import Ends
-from sbafab.models.drawn_pockets import model_form
 from sbafab.models.figures import Figure, PredictionRequest
-from sbafab.models.formulas import refuse_beyond_burst, usual_pressures
 from sbafab.models.intervals import factors_of
+from sbafab.models.pneumatics import usual_pressures
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import MOST_PRESSURE, stack

@@ -28,8 +28,9 @@ from sbafab.design.units import (
     share_of,
 )
 from sbafab.errors import DesignError
-from sbafab.laminate.burst import NOT_BURST, Burst, burst
+from sbafab.laminate.burst import NOT_BURST, Burst, burst, is_near_burst, refuse_beyond_burst
 from sbafab.laminate.laminate import Laminate, film_mass
+from sbafab.models.actuator import Actuator
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
 from sbafab.models.calibrated import SHARE
@@ -40,18 +41,9 @@ from sbafab.models.elastic import (
     moved_stack,
     refuse_stretched,
     shut_stiffness,
-    stroke_at,
     time_to_fill,
 )
 from sbafab.models.figures import NEAR_BURST, Factors, Flag
-from sbafab.models.formulas import (
-    force,
-    is_near_burst,
-    is_the_papers_3dof,
-    refuse_beyond_burst,
-    refuse_pressure,
-    sizes,
-)
 from sbafab.models.intervals import (
     GROUP_BY_UNIT,
     PAPER_3DOF,
@@ -65,9 +57,9 @@ from sbafab.models.intervals import (
 )
 from sbafab.models.mechanisms import ASKED, mechanism_value
 from sbafab.models.paper import FULL_KPA, HEIGHTS, WATER_FLOW, Counterpart, counterpart
-from sbafab.models.pneumatics import seconds
-from sbafab.models.pocket_models import Actuator, actuator
+from sbafab.models.pneumatics import refuse_pressure, seconds
 from sbafab.models.quantity import ANYWHERE, Conditions, ModelId, Quantity
+from sbafab.models.sizes import is_the_papers_3dof, sizes
 from sbafab.models.stack import MOST_PRESSURE, Stack, stack
 from sbafab.search.vary import key_values
 
@@ -540,7 +532,7 @@ class Subject:
         reference = self._actuator.known_stroke
         if isinstance(self.design.form.pockets, Slots):
             return quantity.share * reference
-        return stroke_at(self._actuator, quantity.share)
+        return self._actuator.stroke_at(quantity.share)
 
     @cached_property
     def factors(self) -> Factors:
@@ -589,14 +581,12 @@ class Subject:
 
     @cached_property
     def _actuator(self) -> Actuator:
-        return actuator(self.design, self.laminate, self.factors)
+        return Actuator(self.design, self.laminate, self.factors)
 
     @cached_property
     def _stack(self) -> Stack:
         if self.origin is not None:
-            moved = moved_stack(
-                self.origin._stack, self.laminate, self.origin.factors, self.factors
-            )
+            moved = moved_stack(self.origin._stack, self.origin._actuator, self.factors)
             if moved is not None:
                 return moved
         return stack(self.design, self.laminate, self.most_kpa, self.factors)
@@ -621,10 +611,10 @@ class Subject:
     def _force(self, stroke: float, kpa: float) -> float:
         form = self.design.form
         if isinstance(form.pockets, Slots):
-            first = self._actuator.kinematics[0]
+            first = self._actuator.pockets[0]
             if stroke > first.largest_stroke:
                 return first.largest_stroke - stroke
-            return form.pushing * float(force(kpa, first.rate(stroke)))
+            return form.pushing * kpa * float(first.rate(stroke)) / 1000
         kinds = balloons_of(self.design, self.laminate, self.factors)
         push = float(blocked_force(self._stack, kpa, stroke))
         if push <= 0:

@@ -21,8 +21,8 @@ from sbafab.documents import Document, attribute
 from sbafab.errors import OutputError
 from sbafab.folders.swap import MANIFEST
 from sbafab.markup import data_frame
-from sbafab.models.formulas import refuse_pressure, usual_pressures
 from sbafab.models.intervals import factors_of
+from sbafab.models.pneumatics import refuse_pressure, usual_pressures
 from sbafab.runtime import Progress, ignore_progress
 from sbafab.search.sweep_report import (
     CSV,

@@ -18,19 +18,19 @@ from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.models import elastic, paper
+from sbafab.models.actuator import Actuator
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.calibrated import UNKNOWNS
+from sbafab.models.closed_forms import modulus, second_moments
 from sbafab.models.figures import Factors, Figure, PredictionRequest
 from sbafab.models.film_elements import Array
-from sbafab.models.formulas import modulus, second_moments, usual_pressures
-from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line
-from sbafab.models.pocket_models import Actuator, actuator
+from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line, usual_pressures
 from sbafab.models.prediction import plate_of, predict
 from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count
 from sbafab.models.rippled_balloon import free_shapes
-from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack
+from sbafab.models.stack import MOST_PRESSURE, Pose, Stack, stack
 from sbafab.validation.evidence import QUANTITIES, MeasuredCurve
 
 ModelValue = float | None
@@ -108,13 +108,14 @@ def _measured_design(text: str) -> tuple[Design, Laminate]:
 
 
 @lru_cache(maxsize=64)
-def _drawn_stack(text: str, loss: float) -> tuple[Stack, Factors]:
-    """Return the stack with a pocket loss in mm at the least modulus ratio, and its factors.
+def _drawn_stack(text: str, loss: float) -> tuple[Stack, Actuator]:
+    """Return the stack with a pocket loss in mm at the least modulus ratio, and its actuator.
 
     Its maps also serve all other factors.
     """
     factors = Factors(pocket_loss=loss, modulus_ratio=LEAST_RATIO)
-    return stack(*_measured_design(text), factors=factors), factors
+    drawn = Actuator(*_measured_design(text), factors)
+    return stack(drawn.design, drawn.laminate, factors=factors), drawn
 
 
 @dataclass(frozen=True)
@@ -147,14 +148,14 @@ class ModelledActuator:
     @cached_property
     def actuator(self) -> Actuator:
         """The actuator of the geometric models. Raises DesignError."""
-        return actuator(self.design, self.laminate, self.factors)
+        return Actuator(self.design, self.laminate, self.factors)
 
     @cached_property
     def stack(self) -> Stack:
         """The elastic stack. Raises DesignError for pockets that are not round."""
         if self.shares_maps:
-            together, base = _drawn_stack(self._text, self.factors.pocket_loss)
-            moved = elastic.moved_stack(together, self.laminate, base, self.factors)
+            together, drawn = _drawn_stack(self._text, self.factors.pocket_loss)
+            moved = elastic.moved_stack(together, drawn, self.factors)
             if moved is not None:
                 return moved
         return stack(self.design, self.laminate, factors=self.factors)
@@ -291,7 +292,7 @@ def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> Series:
 
     full = {f"full stroke at {p:g} kPa": _tried(free, p) for p in OPEN_PRESSURES}
     if of.actuator.has_reference:
-        full["full height as in Sec. 4.6"] = elastic.stroke_at(of.actuator, 1.0)
+        full["full height as in Sec. 4.6"] = of.actuator.stroke_at(1.0)
         longer = paper.LONGEST_STROKE.value / paper.FULL_HEIGHT.value
         full["full stroke as in Sec. 4.2"] = longer * of.actuator.reference_height
     return {
@@ -318,11 +319,8 @@ def _bent_force(of: ModelledActuator, chambers: int, angle: float, pressure: flo
     pose = elastic.pose_bent_by(of.stack, chambers, angle)
     if pose is None or pose.pressures[0] > pressure:
         return None
-    x, y, z = pose.tip.tolist()
-    across, aside, along = pose.frames[1][-1][:, 2].tolist()
-    plate = Plate((x, y, z), (across, aside, along))
-    pressures = of.filled(chambers, pressure)
-    return _tried(lambda: of.stack.pose(pressures, plate=plate, near=pose).force)
+    bent = pose
+    return _tried(lambda: elastic.pressed_further(of.stack, chambers, pressure, bent).force)
 
 
 # Strokes, heights and bends.

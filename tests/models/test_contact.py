@@ -80,7 +80,7 @@ def test_mylar_balloons_side_by_side_leave_what_their_equators_do(three: Stack) 
     apart = 0.5 * 4.25 * math.sqrt(3) - 2 * 0.7627 * 2.5
     assert apart < 0  # so near together they would pass through each other
     close = replace(three, maps=maps, axes=three.axes * 0.5)
-    assert chamber_clearances(close, [pose])[0] == pytest.approx(apart, abs=0.01)
+    assert chamber_clearances([(close, pose)])[0] == pytest.approx(apart, abs=0.01)
 
 
 def test_predict_tells_the_room_within_a_bent_stack() -> None:

@@ -8,21 +8,20 @@ import pytest
 
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, disc, rectangle
-from sbafab.models.formulas import (
+from sbafab.models.closed_forms import (
     folded_diameter,
-    force,
     largest_tube,
     modulus,
     second_moments,
     tip_stiffness,
 )
-from sbafab.models.pneumatics import seconds
+from sbafab.models.pneumatics import refuse_pressure, seconds
 
 
 @pytest.mark.parametrize("pressure", [-1, 1001, math.nan])
 def test_pressure_out_of_range_says_the_range(pressure: float) -> None:
     with pytest.raises(DesignError, match="give 0 to 1000 kPa, as a gauge shows it"):
-        force(pressure, 1.0)
+        refuse_pressure(pressure)
 
 
 def test_gas_is_counted_at_the_atmosphere() -> None:

@@ -12,14 +12,13 @@ import pytest
 import sbafab
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
+from sbafab.models.actuator import Actuator
 from sbafab.models.balloon import inflate
 from sbafab.models.balloons import balloons_of
 from sbafab.models.calibrated import load_calibration
-from sbafab.models.closed_forms import eq_4, eqs_1_to_3
-from sbafab.models.drawn_pockets import FLAT_PLATES
+from sbafab.models.closed_forms import eq_4, eqs_1_to_3, lens
 from sbafab.models.figures import Factors, Prediction
-from sbafab.models.pocket_models import actuator, round_stack, slot_stack
-from sbafab.models.prediction import workspace_relation
+from sbafab.models.prediction import FLAT_PLATES, workspace_relation
 from sbafab.models.quantity import Quantity
 from tests.quick import few
 
@@ -51,7 +50,7 @@ def test_the_papers_height_stands_beside_its_own_actuator_alone(three: Predictio
         ("3dof-15mm", ["chamber.diameter=4.5"]),
     ]:
         design = load_design(template, changes)
-        other = actuator(design, build(design), Factors())
+        other = Actuator(design, build(design), Factors())
         assert workspace_relation(other).points == ()
 
 
@@ -340,7 +339,8 @@ def test_unlike_balloons_add_up_and_carry_one_force(radii: tuple[float, ...]) ->
     """At equal height over radius each holds by its own formula; flat, a stack pushes as its
     smallest balloon; farther out strokes at one force add up.
     """
-    for k, pocket in zip(round_stack(radii), (eq_4, eqs_1_to_3), strict=True):
+    for pocket in (eq_4, eqs_1_to_3):
+        k = pocket(*radii)
         u, step = 0.3, 1e-5
         each = [float(pocket(radius).volume(u * radius)) for radius in radii]
         stroke = u * sum(radii)
@@ -349,19 +349,19 @@ def test_unlike_balloons_add_up_and_carry_one_force(radii: tuple[float, ...]) ->
         slope = 3 * float(k.volume(stroke + step) - k.volume(stroke - step)) / (2 * step)
         assert float(k.rate(stroke)) == pytest.approx(slope, rel=1e-6)
         assert float(k.push(0.0)) == pytest.approx(float(pocket(min(radii)).rate(0.0)))
-    by_eqs_1_to_3 = round_stack(radii)[1]
+    by_eqs_1_to_3 = eqs_1_to_3(*radii)
     force = float(eqs_1_to_3(min(radii)).rate(min(radii) / 2))
     strokes = []
     for radius in radii:
         rises = np.linspace(0.0, eqs_1_to_3(radius).largest_stroke, 20001)
         strokes.append(np.interp(-force, -eqs_1_to_3(radius).rate(rises), rises))
     assert float(by_eqs_1_to_3.push(sum(strokes))) == pytest.approx(force, rel=1e-3)
-    (alike,) = {float(k.push(1.0) / k.rate(1.0)) for k in round_stack((2.5, 2.5))}
+    (alike,) = {float(of(2.5, 2.5).push(1.0) / of(2.5, 2.5).rate(1.0)) for of in (eq_4, eqs_1_to_3)}
     assert alike == 1
 
 
 def test_stack_of_slots_is_as_many_times_one() -> None:
-    (one,), (four,) = slot_stack(10.0, 8.5, 1), slot_stack(10.0, 8.5, 4)
+    one, four = lens(10.0, 8.5), lens(10.0, 8.5, 4)
     assert float(four.stroke(100.0)) == pytest.approx(4 * float(one.stroke(100.0)))
     assert float(four.rate(4.0)) == pytest.approx(float(one.rate(1.0)))
 

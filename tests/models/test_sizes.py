@@ -12,7 +12,7 @@ from shapely import Polygon
 from sbafab.actuators import build, load_design
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.models.formulas import sizes
+from sbafab.models.sizes import sizes
 
 SAGITTA = 1e-4
 BOND = 0.75

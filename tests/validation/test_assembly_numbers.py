@@ -12,8 +12,8 @@ from sbafab.assemblies.build import assemble
 from sbafab.assemblies.checks import run_checks
 from sbafab.assemblies.files import load_assembly
 from sbafab.models.figures import Factors
-from sbafab.models.formulas import sizes
 from sbafab.models.intervals import factors_of
+from sbafab.models.sizes import sizes
 
 
 def measured(template: str, rule: str) -> tuple[float | None, float | None, str]:

@@ -20,8 +20,8 @@ from docs.scripts.gallery import figures_of
 from sbafab.cli import app
 from sbafab.models import paper
 from sbafab.models.calibrated import load_calibration
+from sbafab.models.closed_forms import modulus
 from sbafab.models.figures import Figure, Prediction
-from sbafab.models.formulas import modulus
 from sbafab.models.paper import (
     CALIBRATED_MODELS,
     MISFIT,

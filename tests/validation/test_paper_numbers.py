@@ -11,7 +11,7 @@ from sbafab.actuators.radial import RadialDesign
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import Factors
-from sbafab.models.formulas import sizes
+from sbafab.models.sizes import sizes
 
 
 def laminate(name: str, *assignments: str) -> Laminate:

@@ -15,7 +15,7 @@ from sbafab.assemblies.checks import SupplyRun, supply_runs
 from sbafab.assemblies.records import AnyPart, Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.assemblies.shapes import colours, own_surface
 from sbafab.cutting.sheets import SheetFile
-from sbafab.models.formulas import sizes
+from sbafab.models.sizes import sizes
 from sbafab.pressing.schedule import joined_words
 from sbafab.reports.traveller.bench import cutting
 from sbafab.reports.traveller.formatting import frame, millimetres, render, size

@@ -22,8 +22,8 @@ from sbafab.geometry.region import coord
 from sbafab.laminate.burst import RADIUS, burst
 from sbafab.laminate.laminate import Inlet, Laminate, Layer
 from sbafab.laminate.lay_up import pins_when_added
-from sbafab.models.formulas import sizes
 from sbafab.models.paper import BURST, FORCE_KPA
+from sbafab.models.sizes import sizes
 from sbafab.pressing.cycles import (
     CYCLE_HOURS,
     Runs,
