@@ -38,6 +38,7 @@ from sbafab.models.film_elements import (
     curvature,
     membrane,
     strain,
+    strain_measure,
 )
 from sbafab.models.least_energy import Descent, NoEquilibrium, equilibrium
 from sbafab.runtime import one_blas_thread
@@ -51,8 +52,8 @@ LEAST_PRESSURE = 0.01
 """Least pressure in kPa for the tolerance of the residual."""
 PLATE_STIFFNESS = 20_000.0
 """Penalty of a plate: the pressure on the film presses it in by 1 / PLATE_STIFFNESS mm."""
-FEW = 4
-"""Number of balloons up to which solving by blocks is faster than all rows together."""
+FEW = 8
+"""Number of balloons up to which solving whole matrices is faster than all bands together."""
 BAND = 6
 """Coordinates that a film couples, from each one on."""
 WRINKLE_ROUNDS = 3
@@ -116,8 +117,9 @@ class Balloon:
 
     @cached_property
     def node_areas(self) -> Array:
-        """Area in mm2 that belongs to each node."""
-        return np.asarray(math.tau * self.nodes * np.gradient(self.nodes))
+        """Area in mm2 that belongs to each node, 0 outside the pocket: (nodes, 1)."""
+        areas = math.tau * self.nodes * np.gradient(self.nodes)
+        return np.asarray(np.where(np.arange(len(areas)) < self.edge, areas, 0.0)[:, None])
 
     @property
     def membrane_stiffness(self) -> float:
@@ -188,8 +190,8 @@ def distinct(states: Array) -> tuple[Array, NDArray[np.int_]]:
 
 
 class BalloonLoad(NamedTuple):
-    """Pressure, half the height between the plates, the hoop stress that wrinkles carry (``cap``),
-    whether plates hold the necks (``tied``), and the rim's ripple.
+    """Pressure, half the height between the plates, both (rows,); the hoop stress that wrinkles
+    carry, ``cap`` (elements, rows); whether plates hold the necks (``tied``); the rim's ripple.
     """
 
     pressure: Array
@@ -199,7 +201,7 @@ class BalloonLoad(NamedTuple):
     ripple: Ripple
 
     def rows(self, these: NDArray[np.int_]) -> BalloonLoad:
-        pressure, half, cap = self.pressure[these], self.half[these], self.cap[these]
+        pressure, half, cap = self.pressure[these], self.half[these], self.cap[:, these]
         return BalloonLoad(pressure, half, cap, self.tied, self.ripple.rows(these))
 
 
@@ -220,30 +222,25 @@ def inflate(
     p, high = np.broadcast_arrays(p, high)
     if not (((p > 0) | (tied & (p == 0))) & np.isfinite(p) & (high > 0)).all():
         raise DesignError("pressure and height of a balloon must be above 0 kPa and 0 mm")
-    elements = len(balloon.nodes) - 1
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
-    cap = np.broadcast_to(smooth, (len(p), elements))
+    cap = np.broadcast_to(smooth[:, None], (len(smooth), len(p)))
     load = BalloonLoad(p, high / 2, cap, tied, no_ripples(balloon, len(p)))
     mate = balloon.mate
     films = (balloon,) if mate is None else (replace(balloon, mate=None), mate)
     motion = _motion(films, is_free=bool(np.isinf(high).any()))
     loads = [load] * len(films)
-    begin = [coordinates(*initial_shape(film, load)) for film in films]
-    y = motion.inverse @ np.concatenate(begin)
+    y = motion.inverse @ np.concatenate([initial_shape(film, load) for film in films])
     # Elements may collapse before equilibrium; that raises an error in the end.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         y = _equilibrium(FilmEnergy(films, loads, motion), y)
         if balloon.wrinkles and not balloon.inextensible:
-            shapes = motion.shapes(y)
-            zones = [
-                compressed_length(film, *shape) for film, shape in zip(films, shapes, strict=True)
-            ]
+            zones = [compressed_length(*each) for each in zip(films, motion.shapes(y), strict=True)]
             for _ in range(WRINKLE_ROUNDS):
                 shapes = motion.shapes(y)
                 ripples = ripples_at(films, shapes)
                 loads = [
-                    load._replace(cap=wrinkle_stress(film, *shape, zone), ripple=ripple)
-                    for film, shape, zone, ripple in zip(films, shapes, zones, ripples, strict=True)
+                    load._replace(cap=wrinkle_stress(film, x, zone), ripple=ripple)
+                    for film, x, zone, ripple in zip(films, shapes, zones, ripples, strict=True)
                 ]
                 y = _equilibrium(FilmEnergy(films, loads, motion), y)
     return _shapes(films, loads, motion, y)
@@ -251,21 +248,24 @@ def inflate(
 
 def _shapes(films: FilmPair, loads: Sequence[BalloonLoad], motion: FilmMotion, y: Array) -> Shapes:
     """Return the shapes at freedoms (freedoms, rows); one film stands for two."""
+    shapes, both = motion.shapes(y), 2 / len(films)
     height = volume = force = np.zeros(y.shape[1])
-    energy, both = motion.twist @ y**2 / 2, 2 / len(films)
-    for film, load, basis in zip(films, loads, motion.bases, strict=True):
-        state, (r, z) = total_energy(film, load, basis @ y), node_positions(basis @ y)
-        half = air_volume(film.film, film.edge, Elements.of(r, z)).energy
+    energy = motion.twist @ y**2 / 2
+    for film, load, x in zip(films, loads, shapes, strict=True):
+        state = total_energy(film, load, x)
+        half = air_volume(film.film, film.edge, Elements.of(x[0::2], x[1::2])).energy
         energy = energy + both * (state.energy + load.pressure * half)
-        height, volume = height + both * z[:, 0], volume + both * half
+        height, volume = height + both * x[1], volume + both * half
         force = force + both / 2 * state.force
     softer = int(films[-1].membrane_stiffness < films[0].membrane_stiffness)
-    r, z = (np.ascontiguousarray(part) for part in motion.shapes(y)[softer])
+    r, z = (np.ascontiguousarray(shapes[softer][place::2].T) for place in (0, 1))
     return Shapes(loads[0].pressure, height, volume, force, energy, r, z)
 
 
-def initial_shape(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
-    """Return bulged films to start from, as high as their pressure could lift them: r and z."""
+def initial_shape(balloon: Balloon, load: BalloonLoad) -> Array:
+    """Return the coordinates of bulged films to start from, as high as their pressure could lift
+    them: (coordinates, rows).
+    """
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
     if balloon.bending_stiffness > 0:
@@ -278,9 +278,8 @@ def initial_shape(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
     rise = np.maximum(rise, load.half) if load.tied else rise
     shape = np.clip(1 - ((flat - balloon.neck) / free) ** 2, 0.0, 1.0)
     shape[: balloon.neck_edge + 1] = 1.0
-    return np.tile(flat, (len(rise), 1)), np.minimum(
-        rise[:, None] * shape, load.half[:, None] + 1 / PLATE_STIFFNESS
-    )
+    z = np.minimum(rise * shape[:, None], load.half + 1 / PLATE_STIFFNESS)
+    return coordinates(np.tile(flat, (len(rise), 1)), z.T)
 
 
 class TotalEnergy(NamedTuple):
@@ -299,50 +298,43 @@ class TotalEnergy(NamedTuple):
 
 
 def coordinates(r: Array, z: Array) -> Array:
-    """Return the coordinates r, z of each node in turn: (coordinates, rows)."""
+    """Return the coordinates r, z of each node in turn, (coordinates, rows), of radii and heights
+    (rows, nodes).
+    """
     return np.stack([r.T, z.T], 1).reshape(-1, len(r))
-
-
-def node_positions(x: Array) -> tuple[Array, Array]:
-    """Return the radii and heights of the nodes, one row per film."""
-    return x[0::2].T, x[1::2].T
 
 
 def total_energy(balloon: Balloon, load: BalloonLoad, x: Array) -> TotalEnergy:
     """Return the potential energy at coordinates, with residual and tangent stiffness."""
-    film, edge = balloon.film, balloon.edge
-    r, z = node_positions(x)
+    film, edge, p = balloon.film, balloon.edge, load.pressure
+    r, z = x[0::2], x[1::2]
     elements = Elements.of(r, z)
-    p = load.pressure
     bend = bending(film, balloon.bending_stiffness, slice(balloon.neck_edge, edge), elements)
     stretch, content = membrane(film, elements, load.cap), air_volume(film, edge, elements)
     eased = ripple_energy(film, edge, load.ripple, r)
     slopes, curves = (
-        [a + b - p[:, None] * c for a, b, c in zip(*parts, strict=True)]
-        for parts in (
-            (bend.term.slopes, stretch.slopes, content.slopes),
-            (bend.term.curves, stretch.curves, content.curves),
-        )
+        [a - p * b for a, b in zip(*both, strict=True)]
+        for both in ((stretch.slopes, content.slopes), (stretch.curves, content.curves))
     )
-    number = np.arange(len(film.nodes))
-    stiff = PLATE_STIFFNESS * p[:, None] * np.where(number < edge, balloon.node_areas, 0.0)
-    over = np.maximum(z - load.half[:, None], 0.0)
+    for total, bent in ((slopes, bend.term.slopes), (curves, bend.term.curves)):
+        for number, part in enumerate(bent):
+            total[number] += part
+    over = z - load.half
     touches = over > 0
+    stiff = PLATE_STIFFNESS * p * balloon.node_areas
     if load.tied:
-        holds = number <= balloon.neck_edge
-        stiff = np.where(
-            holds, PLATE_STIFFNESS * np.maximum(p, 1.0)[:, None] * balloon.node_areas, stiff
-        )
-        over = np.where(holds, z - load.half[:, None], over)
-        touches |= holds
+        held = slice(balloon.neck_edge + 1)
+        touches[held] = True
+        stiff[held] = PLATE_STIFFNESS * np.maximum(p, 1.0) * balloon.node_areas[held]
+    over, stiff = np.where(touches, over, 0.0), np.where(touches, stiff, 0.0)
     pressed = stiff * over
     energy = bend.term.energy + stretch.energy + eased.energy
-    energy = energy - p * content.energy + (pressed * over).sum(-1) / 2
+    energy = energy - p * content.energy + (pressed * over).sum(0) / 2
     by_place, band = assembled_gradient(slopes), assembled_tangent(curves, bend.joined)
-    by_place[1::2] += pressed.T
+    by_place[1::2] += pressed
     by_place[2 * edge :: 2] += eased.slopes
-    band[1::2, 0] += np.where(touches, stiff, 0.0).T
-    return TotalEnergy(energy, by_place, band, eased.curves, pressed.sum(-1))
+    band[1::2, 0] += stiff
+    return TotalEnergy(energy, by_place, band, eased.curves, pressed.sum(0))
 
 
 FilmPair = tuple["Balloon", ...]
@@ -363,9 +355,9 @@ class FilmMotion(NamedTuple):
     packing: least_energy.Packing
     twist: Array
 
-    def shapes(self, y: Array) -> list[tuple[Array, Array]]:
-        """Return radii and heights of each film's nodes at freedoms (freedoms, rows)."""
-        return [node_positions(basis @ y) for basis in self.bases]
+    def shapes(self, y: Array) -> list[Array]:
+        """Return the coordinates of each film at freedoms (freedoms, rows)."""
+        return [basis @ y for basis in self.bases]
 
 
 @lru_cache(maxsize=64)
@@ -433,7 +425,7 @@ class FilmEnergy:
         # A share of the order of rounding is for slack films, which may be unsupported.
         band[:, 0] += damping * size + 1e-15 * size.max(0)
         few = len(damping) <= FEW
-        step = least_energy.solve_positive(band, -state.gradient) if few else None
+        step = least_energy.solve_whole(band, -state.gradient) if few else None
         return least_energy.solve(band, -state.gradient) if step is None else step
 
     def change(self, x: Array, ahead: Array) -> Array:
@@ -464,36 +456,32 @@ def _equilibrium(problem: FilmEnergy, y: Array) -> Array:
         ) from None
 
 
-def compressed_length(balloon: Balloon, r: Array, z: Array) -> Array:
+def compressed_length(balloon: Balloon, x: Array) -> Array:
     """Return the length in mm along the film over which the smooth hoop is compressed."""
-    strains = strain(balloon.film, r, z)
-    is_film = balloon.may_wrinkle & (not balloon.inextensible)
-    is_compressed = (strains.hoop + balloon.poisson * strains.meridian < 0) & is_film
-    shortest = balloon.film.lengths.min()
-    return np.asarray(np.maximum((is_compressed * balloon.film.lengths).sum(-1), shortest))
+    strains, lengths = strain(balloon.film, x[0::2], x[1::2]), balloon.film.lengths
+    is_compressed = strains.hoop + balloon.poisson * strains.meridian < 0
+    return np.asarray(np.maximum((lengths * balloon.may_wrinkle) @ is_compressed, lengths.min()))
 
 
-def wrinkle_stress(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
+def wrinkle_stress(balloon: Balloon, x: Array, zone: Array) -> Array:
     """Return the hoop stress in kPa that wrinkles over a zone carry, by each element's tension."""
-    film = balloon.film
+    film, (r, z) = balloon.film, (x[0::2], x[1::2])
     tension = balloon.membrane_stiffness * strain(film, r, z).meridian
     # A wrinkle in a curved film stretches the meridian: a large number of short ones costs least.
-    support = np.maximum(tension, 0.0) * (math.pi / zone[:, None]) ** 2
+    support = np.maximum(tension, 0.0) * (math.pi / zone) ** 2
     support = support + balloon.membrane_stiffness * curvature(film, r, z) ** 2
     force = 2 * np.sqrt(balloon.bending_stiffness * support)
-    carried: Array = np.full_like(force, math.inf)
-    carried[:, balloon.may_wrinkle] = force[:, balloon.may_wrinkle] / balloon.thickness
-    return carried
+    return np.where(balloon.may_wrinkle[:, None], force / balloon.thickness, math.inf)
 
 
-def ripples_at(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) -> list[Ripple]:
-    """Return the rim's ripples at shapes of one film, mirrored by the other, or of both."""
-    strains = [strain(film.film, *shape) for film, shape in zip(films, shapes, strict=True)]
+def ripples_at(films: Sequence[Balloon], shapes: Sequence[Array]) -> list[Ripple]:
+    """Return the rim's ripples at coordinates of one film, mirrored by the other, or of both."""
+    strains = [strain(film.film, x[0::2], x[1::2]) for film, x in zip(films, shapes, strict=True)]
     pulls = [
-        film.membrane_stiffness * strains_of.meridian[:, film.edge - 1]
+        film.membrane_stiffness * strains_of.meridian[film.edge - 1]
         for film, strains_of in zip(films, strains, strict=True)
     ]
-    return rim_ripples(films, strains[0].hoop[:, films[0].edge :], pulls)
+    return rim_ripples(films, strains[0].hoop[films[0].edge :], pulls)
 
 
 # The bonded rim of a balloon, which buckles out of its plane where its hoop is compressed.
@@ -528,69 +516,57 @@ GAUSS_WEIGHTS = np.array(
 
 
 class Ripple(NamedTuple):
-    """Ripple of one film's rim, one row per balloon.
+    """Ripple of one film's rim, rows last.
 
-    ``waves`` round the rim; ``cost`` is K / 2, infinite for a smooth rim; ``relief`` the rho of the
-    rim's elements, ``pull`` each element's volume times modulus times rho, and ``stiff`` the
-    integral of E rho^2.
+    ``waves`` round the rim; ``cost`` is K / 2, infinite for a smooth rim; ``pull`` each element's
+    volume times modulus times rho, and ``stiff`` the integral of E rho^2.
     """
 
     waves: Array
     cost: Array
-    relief: Array
     pull: Array
     stiff: Array
 
     def rows(self, these: NDArray[np.int_]) -> Ripple:
-        return Ripple(*(part[these] for part in self))
+        return Ripple(*(part[..., these] for part in self))
 
 
 def no_ripples(balloon: Balloon, count: int) -> Ripple:
     """Return the ripples of rims that stay smooth."""
-    elements = np.zeros((count, len(balloon.nodes) - 1 - balloon.edge))
     none = np.full(count, math.inf)
-    return Ripple(np.zeros(count), none, elements, elements, np.ones(count))
+    pull = np.zeros((len(balloon.nodes) - 1 - balloon.edge, count))
+    return Ripple(np.zeros(count), none, pull, np.ones(count))
 
 
 def rim_ripples(films: Sequence[Balloon], hoop: Array, tensions: Sequence[Array]) -> list[Ripple]:
-    """Return the ripples of least energy at the rim's hoop strains (rows, elements), one part per
+    """Return the ripples of least energy at the rim's hoop strains (elements, rows), one part per
     film; ``tensions`` in N/m are the films' tensions at the pocket's edge, one row per film.
 
     One film represents two equal ones.
     """
     pair = films[0], films[-1]
-    pulls = tensions if len(films) == 2 else (tensions[0], tensions[0])
     roots = sum(
         np.sqrt(film.bending_stiffness * np.maximum(pull, 0.0))
-        for film, pull in zip(pair, pulls, strict=True)
+        for film, pull in zip(pair, (tensions[0], tensions[-1]), strict=True)
     )
     rigid = sum(film.membrane_stiffness for film in pair)
-    cost, relief, weight, stiff = _rim_modes(pair)
-    cost = cost + math.pi * pair[0].pocket * np.asarray(roots)[:, None] / 2
-    pull = rigid * weight * relief
-    drive = -(hoop @ pull.T + cost)
-    gain = np.where(drive > 0, drive**2 / stiff, 0.0)
-    best = gain.argmax(-1)
-    row = np.arange(len(hoop))
+    cost, relief, stiff = _rim_modes(pair)
+    cost = cost[:, None] + math.pi * pair[0].pocket * np.asarray(roots) / 2
+    pull = rigid * relief
+    drive = -(pull @ hoop + cost)
+    best = np.where(drive > 0, drive**2 / stiff[:, None], 0.0).argmax(0)
     ripples = []
     for film in films:
         share = film.membrane_stiffness / rigid
-        ripples.append(
-            Ripple(
-                WAVE_NUMBERS[best].astype(float),
-                share * cost[row, best],
-                relief[best],
-                share * pull[best],
-                share * stiff[best],
-            )
-        )
+        found = cost[best, np.arange(len(best))], pull[best].T, stiff[best]
+        ripples.append(Ripple(WAVE_NUMBERS[best] * 1.0, *(share * part for part in found)))
     return ripples
 
 
 @lru_cache(maxsize=64)
-def _rim_modes(pair: tuple[Balloon, Balloon]) -> tuple[Array, Array, Array, Array]:
-    """Return, by number of waves: half the cost of bending; rho of each element; each element's
-    area; and the integral of E rho^2 over both films.
+def _rim_modes(pair: tuple[Balloon, Balloon]) -> tuple[Array, Array, Array]:
+    """Return, by number of waves: half the cost of bending; each element's area times its mean rho;
+    and the integral of E rho^2 over both films.
     """
     balloon = pair[0]
     nodes = balloon.nodes[balloon.edge :]
@@ -603,9 +579,8 @@ def _rim_modes(pair: tuple[Balloon, Balloon]) -> tuple[Array, Array, Array, Arra
     plate = bonded_bending_stiffness(pair) / (1 - balloon.poisson**2)
     cost = plate / 4 * (area * (around**2 + 2 * (1 - balloon.poisson) * twist**2)).sum((1, 2))
     rho = (n**2 * s**2 / r**2 - s / r) / 4
-    size = area.sum(-1)
     stiff = sum(film.membrane_stiffness for film in pair) * (area * rho**2).sum((1, 2))
-    return cost, (area * rho).sum(-1) / size, size, stiff
+    return cost, (area * rho).sum(-1), stiff
 
 
 def bonded_bending_stiffness(pair: Sequence[Balloon]) -> float:
@@ -615,45 +590,35 @@ def bonded_bending_stiffness(pair: Sequence[Balloon]) -> float:
     return (e1**2 * t1**4 + e2**2 * t2**4 + mixed) / (12 * (e1 * t1 + e2 * t2))
 
 
-def squared_tilt(flat: FlatFilm, edge: int, ripple: Ripple, r: Array) -> Array:
-    """Return the squared tilt a^2 of least energy, one row per balloon."""
-    return np.asarray(_ripple_drive(_rim_hoop(flat, edge, r), ripple) / ripple.stiff)
-
-
 class RippleEnergy(NamedTuple):
-    """Energy (rows,); derivatives by the rim's radii (nodes, rows), (nodes, nodes, rows)."""
+    """The squared ``tilt`` a^2 of least energy and the energy (rows,), less that of a smooth rim:
+    at most 0; derivatives by the rim's radii (nodes, rows), (nodes, nodes, rows).
+    """
 
+    tilt: Array
     energy: Array
     slopes: Array
     curves: Array
 
 
 def ripple_energy(flat: FlatFilm, edge: int, ripple: Ripple, r: Array) -> RippleEnergy:
-    """Return the energy of a rippled rim less the energy of a smooth one: at most 0."""
-    drive = _ripple_drive(_rim_hoop(flat, edge, r), ripple)
-    middles = flat.middles[edge:]
-    wide = (r[:, edge + 1 :] + r[:, edge:-1]) / (2 * middles)
+    """Return the energy of a rippled rim at the radii of a film's nodes (nodes, rows)."""
+    rim, middles = r[edge:], flat.middles[edge:, None]
+    wide = (rim[1:] + rim[:-1]) / (2 * middles)
+    hoop = strain_measure(flat, wide * wide)
+    drive = np.maximum(-(ripple.cost + (hoop * ripple.pull).sum(0)), 0.0)
     # Slopes of the hoop strain by the radius of either node, and their derivatives.
     first = wide ** (flat.order - 1) / (2 * middles)
     second = (flat.order - 1) * wide ** (flat.order - 2) / (2 * middles) ** 2
     tilt = drive / ripple.stiff
-    pulled = (ripple.pull * first).T
-    steep = np.zeros((len(pulled) + 1, len(r)))
+    pulled = ripple.pull * first
+    steep = np.zeros_like(rim)
     steep[:-1] += pulled
     steep[1:] += pulled
     curves = np.where(drive > 0, -1 / ripple.stiff, 0.0) * steep[:, None] * steep
-    bent = (tilt[:, None] * ripple.pull * second).T
+    bent = tilt * ripple.pull * second
     number = np.arange(len(bent))
     for i in (0, 1):
         for j in (0, 1):
             curves[number + i, number + j] += bent
-    return RippleEnergy(-drive * tilt / 2, tilt * steep, curves)
-
-
-def _rim_hoop(flat: FlatFilm, edge: int, r: Array) -> Array:
-    return strain(flat, r, np.zeros_like(r)).hoop[:, edge:]
-
-
-def _ripple_drive(hoop: Array, ripple: Ripple) -> Array:
-    """Return the excess of the hoop's compression over the ripples' cost, at least 0."""
-    return np.asarray(np.maximum(-(ripple.cost + (hoop * ripple.pull).sum(-1)), 0.0))
+    return RippleEnergy(tilt, -drive * tilt / 2, tilt * steep, curves)

@@ -497,6 +497,10 @@ class MapLimits:
         return np.asarray((MARGIN - np.concatenate(rooms)) / self.size)
 
     @cached_property
+    def _unit_products(self) -> Array:
+        return np.asarray(self.units[:, None] * self.units)
+
+    @cached_property
     def _outer_products(self) -> list[tuple[Array, Array]]:
         """Products of pairs of near coefficients, of each kind's rows: (rows, pairs), twice."""
         first, second = PAIRS
@@ -520,7 +524,9 @@ class MapLimits:
         grids = self._grids(weights / self.size**2)
         for (across, along), grid in zip(self._outer_products, grids, strict=True):
             pairs[:-1, :-1] += across.T @ (grid @ along)
-        return np.asarray(self.units[:, None] * pairs.ravel()[PAIR_OF] * self.units)
+        matrix = pairs.take(PAIR_OF)
+        matrix *= self._unit_products
+        return np.asarray(matrix)
 
     def _grids(self, values: Array) -> list[Array]:
         """Return each kind's values: (by pressure, by height)."""
@@ -648,6 +654,8 @@ def stretch(kind: Balloon, shape: Shapes) -> Array:
 QP_STEPS = 80
 CLOSE, SMALL = 1e-7, 1e-10
 """Tolerance of the residual; tolerance of a violation, and of slack times its multiplier."""
+BLOCK = 3
+"""Pressures whose coefficients are eliminated together."""
 STEP_SHARE = 0.99
 """Maximum step as a share of the distance to the next limit."""
 
@@ -668,28 +676,69 @@ def nearest_admissible(point: Array, metric: Array, limits: MapLimits) -> Array 
         mean = float(slack @ push) / len(least)
         if np.abs(off).max() < CLOSE and max(np.abs(gap).max(), mean) < SMALL:
             return x
-        matrix = metric + limits.normal_matrix(push / slack)
+        ratio = push / slack
+        matrix = limits.normal_matrix(ratio)
+        matrix += metric
+        parts = _eliminated(matrix)
+        even = ratio * gap
 
-        def step(target: Array) -> tuple[Array, Array, Array]:
-            right_side = limits.transposed((-target - push * gap) / slack) - off  # noqa: B023
-            ahead = np.asarray(np.linalg.solve(matrix, right_side), float)  # noqa: B023
+        def step(pull: Array) -> tuple[Array, Array, Array]:
+            ahead = _solved(parts, -limits.transposed(pull + even) - off)  # noqa: B023
             slacker = limits.times(ahead) + gap  # noqa: B023
-            return ahead, slacker, (-target - push * slacker) / slack  # noqa: B023
+            return ahead, slacker, -pull - ratio * slacker  # noqa: B023
 
-        _, slacker, harder = step(slack * push)
+        _, slacker, harder = step(push)
         to = _share(slack, slacker), _share(push, harder)
         remainder = (slack + to[0] * slacker) @ (push + to[1] * harder) / len(least)
         aim = (remainder / mean) ** 3 * mean
-        ahead, slacker, harder = step(slack * push + slacker * harder - aim)
+        ahead, slacker, harder = step(push + (slacker * harder - aim) / slack)
         share = min(1.0, STEP_SHARE * min(_share(slack, slacker), _share(push, harder)))
         x, slack, push = x + share * ahead, slack + share * slacker, push + share * harder
     return None
 
 
+class _Eliminated(NamedTuple):
+    """A block of unknowns, and those ``after`` it that it is coupled to: of a matrix L L^T, the
+    ``inverse`` of its part of L, and its rows ``across`` of L^T.
+    """
+
+    here: slice
+    after: slice
+    inverse: Array
+    across: Array
+
+
+def _eliminated(rows: Array) -> list[_Eliminated]:
+    """Return the blocks of a positive definite matrix (coefficients, coefficients), which is
+    overwritten, eliminated in turn: those of a few pressures, coupled to the next DEGREE ones.
+    LAPACK's solver for whole matrices takes three times as long.
+    """
+    parts = []
+    width = HEIGHT_SPANS + DEGREE
+    for start in range(0, len(rows), BLOCK * width):
+        end = start + BLOCK * width
+        here, after = slice(start, end), slice(end, end + DEGREE * width)
+        inverse = np.linalg.inv(np.linalg.cholesky(rows[here, here]))
+        across = inverse @ rows[here, after]
+        rows[after, after] -= across.T @ across
+        parts.append(_Eliminated(here, after, inverse, across))
+    return parts
+
+
+def _solved(parts: list[_Eliminated], right_side: Array) -> Array:
+    x = right_side.copy()
+    for here, after, inverse, across in parts:
+        x[here] = inverse @ x[here]
+        x[after] -= across.T @ x[here]
+    for here, after, inverse, across in reversed(parts):
+        x[here] = inverse.T @ (x[here] - across @ x[after])
+    return x
+
+
 def _share(values: Array, by: Array) -> float:
-    """Return the share of a step after which the first value is 0; inf if none reaches 0."""
-    falls = by < 0
-    return float((values[falls] / -by[falls]).min(initial=np.inf))
+    """Return the share of a step after which the first of positive values is 0; inf if none."""
+    fall = -float((by / values).min())
+    return 1 / fall if fall > 0 else math.inf
 
 
 # Valid range of a map: within 3 % of balloons computed between its support points.

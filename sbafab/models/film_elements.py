@@ -1,10 +1,10 @@
 """Energy of a film of revolution by element: membrane stretch, wrinkling, bending, and its air.
 
-A film is a chain of nodes r, z (mm). Many films are computed at once: arrays have one row per film.
-Each function returns an energy (uJ: kPa mm3) per film with its first and second derivatives by the
-coordinates of an element: the differences of its two nodes in r and z, and their mean radius. Kinks
-couple neighbours. ``assembled_gradient`` and ``assembled_tangent`` turn these into derivatives by
-the coordinates of nodes.
+A film is a chain of nodes r, z (mm). Many films are computed at once: arrays have a column for
+each. Functions return an energy (uJ: kPa mm3) for each film with its first and second derivatives
+by the coordinates of an element: the differences of its two nodes in r and z, and their mean
+radius. Kinks couple neighbours. ``assembled_gradient`` and ``assembled_tangent`` turn these into
+derivatives by the coordinates of nodes.
 """
 
 from __future__ import annotations
@@ -47,19 +47,15 @@ class FlatFilm:
         return np.asarray((self.nodes[1:] + self.nodes[:-1]) / 2)
 
     @cached_property
-    def squares(self) -> tuple[Array, Array]:
-        """Squares of lengths and of middle radii, mm2."""
-        return self.lengths**2, self.middles**2
-
-    @cached_property
-    def volumes(self) -> Array:
-        """Volumes of the elements, mm3."""
-        return np.asarray(math.tau * self.middles * self.lengths * self.thickness)
+    def columns(self) -> tuple[Array, Array, Array]:
+        """Squares of lengths and of middle radii, mm2, and volumes in mm3: (elements, 1) each."""
+        volumes = math.tau * self.middles * self.lengths * self.thickness
+        return self.lengths[:, None] ** 2, self.middles[:, None] ** 2, volumes[:, None]
 
 
 class Elements(NamedTuple):
-    """Deformed elements, (rows, elements): from node to node in r and z, middle radius, mm; and the
-    square of their length.
+    """Deformed elements, (elements, films): from node to node in r and z, middle radius, mm; and
+    the square of their length.
     """
 
     dr: Array
@@ -69,22 +65,20 @@ class Elements(NamedTuple):
 
     @classmethod
     def of(cls, r: Array, z: Array) -> Elements:
-        dr, dz = r[:, 1:] - r[:, :-1], z[:, 1:] - z[:, :-1]
-        return cls(dr, dz, (r[:, 1:] + r[:, :-1]) / 2, dr * dr + dz * dz)
-
-
-Slopes = list["Array"]
-"""Derivatives by dr, dz and the middle radius, each (rows, elements)."""
-SecondSlopes = list["Array"]
-"""Second derivatives: dr dr, dr dz, dz dz, dr middle, dz middle, middle middle."""
+        """Return the elements between nodes at r and z, (nodes, films)."""
+        dr, dz = r[1:] - r[:-1], z[1:] - z[:-1]
+        return cls(dr, dz, (r[1:] + r[:-1]) / 2, dr * dr + dz * dz)
 
 
 class EnergyTerm(NamedTuple):
-    """An energy, (rows,), with its derivatives."""
+    """An energy, (films,), with its derivatives by dr, dz and the middle radius, each (elements,
+    films), and second ones: dr dr, dr dz, dz dz, and if it depends on the radius dr middle,
+    dz middle, middle middle.
+    """
 
     energy: Array
-    slopes: Slopes
-    curves: SecondSlopes
+    slopes: list[Array]
+    curves: list[Array]
 
 
 class Strain(NamedTuple):
@@ -96,31 +90,30 @@ class Strain(NamedTuple):
 
 def strain(flat: FlatFilm, r: Array, z: Array) -> Strain:
     """Return the strains of each element."""
-    along, around = _squared_stretches(flat, Elements.of(r, z))
-    return Strain(_strain_measure(flat, along), _strain_measure(flat, around))
+    stretches = _squared_stretches(flat, Elements.of(r, z))
+    return Strain(*(strain_measure(flat, square) for square in stretches))
 
 
 def curvature(flat: FlatFilm, r: Array, z: Array) -> Array:
     """Return the curvature of the meridian in 1/mm by element: mean of its two ends."""
-    slope = np.arctan2(-np.diff(z), np.diff(r))
-    bent = np.diff(slope) / ((flat.lengths[1:] + flat.lengths[:-1]) / 2)
-    ends = np.concatenate([bent[:, :1], bent, bent[:, -1:]], axis=1)
-    return np.asarray((ends[:, 1:] + ends[:, :-1]) / 2)
+    slope = np.arctan2(-np.diff(z, axis=0), np.diff(r, axis=0))
+    bent = np.diff(slope, axis=0) / ((flat.lengths[1:] + flat.lengths[:-1]) / 2)[:, None]
+    ends = np.concatenate([bent[:1], bent, bent[-1:]])
+    return np.asarray((ends[1:] + ends[:-1]) / 2)
 
 
 def _squared_stretches(flat: FlatFilm, at: Elements) -> tuple[Array, Array]:
     """Return the squared meridional and hoop stretch of each element."""
-    return at.square / flat.squares[0], (at.middle / flat.middles) ** 2
+    length2, middle2, _ = flat.columns
+    return at.square / length2, at.middle * at.middle / middle2
 
 
-def _strain_measure(flat: FlatFilm, square: Array) -> Array:
+def strain_measure(flat: FlatFilm, square: Array) -> Array:
+    """Return the strain of squared stretches."""
     if flat.order == 0:
         return np.asarray(np.log(square) / 2)
-    return np.asarray((_power(square, flat.order / 2) - 1) / flat.order)
-
-
-def _power(square: Array, exponent: float) -> Array:
-    return square if exponent == 1.0 else square**exponent
+    power = square if flat.order == 2 else square ** (flat.order / 2)
+    return np.asarray((power - 1) / flat.order)
 
 
 def membrane(flat: FlatFilm, at: Elements, cap: Array) -> EnergyTerm:
@@ -133,34 +126,34 @@ def membrane(flat: FlatFilm, at: Elements, cap: Array) -> EnergyTerm:
     """
     nu, plane = flat.poisson, flat.modulus / (1 - flat.poisson**2)
     sq1, sq2 = _squared_stretches(flat, at)
-    e1, e2 = _strain_measure(flat, sq1), _strain_measure(flat, sq2)
-    wrinkled = plane * (e2 + nu * e1) < -cap
+    e1, e2 = strain_measure(flat, sq1), strain_measure(flat, sq2)
+    lateral = nu * e1
+    wrinkled = plane * (e2 + lateral) < -cap
     # The hoop strain of the film itself, the wrinkles' waste of length left out.
     support = np.where(wrinkled, cap, 0.0)
-    film_hoop = np.where(wrinkled, support / -plane - nu * e1, e2)
-    s1, s2 = plane * (e1 + nu * film_hoop), plane * (film_hoop + nu * e1)
-    volume, (length2, middle2) = flat.volumes, flat.squares
+    film_hoop = np.where(wrinkled, support / -plane - lateral, e2)
+    s1, s2 = plane * (e1 + nu * film_hoop), plane * (film_hoop + lateral)
+    length2, middle2, volume = flat.columns
     density = (s1 * e1 + s2 * film_hoop) / 2 + support * (film_hoop - e2)
     c11 = np.where(wrinkled, flat.modulus, plane)
-    c12 = np.where(wrinkled, 0.0, plane * nu)
     c22 = np.where(wrinkled, 0.0, plane)
     # Strains by the squares of stretches, and those by dr, dz and the middle radius.
-    by1, by2 = 2 * volume / length2, 2 * volume / middle2
+    by1, by2 = volume / length2, volume / middle2
     if flat.order == 2:
-        g1, g2 = by1 / 2 * s1, by2 / 2 * s2
-        k1, k2 = by1 / length2 / 2 * c11, by2 / middle2 / 2 * c22
-        k12 = by1 / middle2 / 2 * c12
+        g1, g2 = by1 * s1, by2 * s2
+        k1, k2 = by1 / length2 * c11, by2 / middle2 * c22
+        k12 = nu * by1 / middle2 * c22
     else:
         half = flat.order / 2 - 1
-        f1, f2 = sq1**half / 2, sq2**half / 2
+        f1, f2 = sq1**half, sq2**half
         g1, g2 = by1 * (s1 * f1), by2 * (s2 * f2)
-        k1 = by1 * 2 / length2 * (c11 * f1 * f1 + s1 * half * f1 / sq1)
-        k2 = by2 * 2 / middle2 * (c22 * f2 * f2 + s2 * half * f2 / sq2)
-        k12 = by1 * 2 / middle2 * (c12 * f1 * f2)
+        k1 = by1 / length2 * (c11 * f1 * f1 + 2 * s1 * half * f1 / sq1)
+        k2 = by2 / middle2 * (c22 * f2 * f2 + 2 * s2 * half * f2 / sq2)
+        k12 = nu * by1 / middle2 * (c22 * f1 * f2)
     dr, dz, middle = at.dr, at.dz, at.middle
     k1_dr, k12_middle = k1 * dr, k12 * middle
     return EnergyTerm(
-        (volume * density).sum(-1),
+        (volume * density).sum(0),
         [g1 * dr, g1 * dz, g2 * middle],
         [
             g1 + k1_dr * dr,
@@ -175,7 +168,7 @@ def membrane(flat: FlatFilm, at: Elements, cap: Array) -> EnergyTerm:
 
 class BendingTerm(NamedTuple):
     """Bending energy, and the second derivatives that couple the elements before and after a kink,
-    by dr dr, dr dz, dz dr and dz dz of the two; each (rows, kinks).
+    by dr dr, dr dz, dz dr and dz dz of the two; each (kinks, films).
     """
 
     term: EnergyTerm
@@ -190,33 +183,33 @@ def bending(flat: FlatFilm, rigidity: float, bent: slice, at: Elements) -> Bendi
     """
     slope = np.arctan2(-at.dz, at.dr)
     first, edge = bent.start, bent.stop
-    kink = slope[:, 1 : edge + 1] - slope[:, :edge]
+    kink = slope[1 : edge + 1] - slope[:edge]
     number = np.arange(len(flat.lengths))
     along = np.where(
         (number >= first) & (number < edge), flat.lengths, 2 * ROOT_LENGTH * flat.thickness
     )
     between = (along[:edge] + along[1 : edge + 1]) / 2
-    stiff = math.tau * rigidity * flat.nodes[1 : edge + 1] / between
-    ring = math.tau * rigidity * flat.lengths / flat.middles
+    stiff = (math.tau * rigidity * flat.nodes[1 : edge + 1] / between)[:, None]
+    ring = (math.tau * rigidity * flat.lengths / flat.middles)[:, None]
     moment = stiff * kink
     # Of the slope: by dr and by dz; and the squares of its sine and cosine.
     a, b = at.dz / at.square, -at.dr / at.square
     sine2, cosine2 = a * at.dz, -b * at.dr
-    energy = ((moment * kink).sum(-1) + (ring * sine2).sum(-1)) / 2
+    energy = ((moment * kink).sum(0) + (ring * sine2).sum(0)) / 2
     # The energy by the slope of each element, first and second.
-    turn = -ring * at.dz * at.dr / at.square
-    turn[:, 1 : edge + 1] += moment
-    turn[:, :edge] -= moment
+    turn = ring * b * at.dz
+    turn[1 : edge + 1] += moment
+    turn[:edge] -= moment
     stiffness = ring * (cosine2 - sine2)
-    stiffness[:, 1 : edge + 1] += stiff
-    stiffness[:, :edge] += stiff
+    stiffness[1 : edge + 1] += stiff
+    stiffness[:edge] += stiff
     stiff_a, stiff_b = stiffness * a, stiffness * b
-    none, twice = np.zeros_like(a), 2 * turn * a * b
+    twice = 2 * turn * a * b
     curves = [stiff_a * a + twice, stiff_a * b + turn * (b * b - a * a), stiff_b * b - twice]
-    term = EnergyTerm(energy, [turn * a, turn * b, none], [*curves, none, none, none])
-    before = -stiff * a[:, :edge], -stiff * b[:, :edge]
-    after = a[:, 1 : edge + 1], b[:, 1 : edge + 1]
-    return BendingTerm(term, [x * y for x in before for y in after])
+    before = -stiff * a[:edge], -stiff * b[:edge]
+    after = a[1 : edge + 1], b[1 : edge + 1]
+    joined = [x * y for x in before for y in after]
+    return BendingTerm(EnergyTerm(energy, [turn * a, turn * b], curves), joined)
 
 
 def air_volume(flat: FlatFilm, edge: int, at: Elements) -> EnergyTerm:
@@ -226,39 +219,41 @@ def air_volume(flat: FlatFilm, edge: int, at: Elements) -> EnergyTerm:
     Steiner's formula for the volume of a thick film.
     """
     dr, dz, middle = at.dr, at.dz, at.middle
-    half = np.where(np.arange(dr.shape[1]) < edge, math.pi * flat.thickness, 0.0)
+    half = np.where(np.arange(len(dr)) < edge, math.pi * flat.thickness, 0.0)[:, None]
     length = np.sqrt(at.square)
-    area = math.pi * middle**2 + math.pi / 12 * dr**2
-    volume = -(area * dz + half * middle * length).sum(-1)
+    area = math.pi * middle * middle + math.pi / 12 * dr * dr
+    mean = half * middle
+    volume = -(area * dz + mean * length).sum(0)
     along_r, along_z = dr / length, dz / length
-    mean, pi_dz, twice = half * middle, math.pi * dz, math.tau * middle
+    pi_dz, twice = math.pi * dz, math.tau * middle
     bend = mean / length
-    by_dr = -pi_dz * dr / 6 - mean * along_r
+    bend_z = bend * along_z
+    by_dr = pi_dz * dr / -6 - mean * along_r
     by_dz = -area - mean * along_z
     by_middle = -twice * dz - half * length
     curves = [
-        -pi_dz / 6 - bend * along_z**2,
-        -math.pi / 6 * dr + bend * along_r * along_z,
-        -bend * along_r**2,
+        pi_dz / -6 - bend_z * along_z,
+        bend_z * along_r - math.pi / 6 * dr,
+        -bend * along_r * along_r,
         -half * along_r,
         -twice - half * along_z,
         -2 * pi_dz,
     ]
     # The disc at the edge, half a thickness high; its radius is middle + dr / 2 of the last one.
     last, disc = edge - 1, math.pi * flat.thickness
-    rim = middle[:, last] + dr[:, last] / 2
-    by_dr[:, last] += disc / 2 * rim
-    by_middle[:, last] += disc * rim
+    rim = middle[last] + dr[last] / 2
+    by_dr[last] += disc / 2 * rim
+    by_middle[last] += disc * rim
     for curve, share in ((0, 0.25), (3, 0.5), (5, 1.0)):
-        curves[curve][:, last] += disc * share
+        curves[curve][last] += disc * share
     return EnergyTerm(volume + disc / 2 * rim**2, [by_dr, by_dz, by_middle], curves)
 
 
-def assembled_gradient(slopes: Slopes) -> Array:
-    """Return the derivatives by the coordinates r, z of each node in turn: (coordinates, rows)."""
-    by_dr, by_dz, by_middle = (slope.T for slope in slopes)
-    count, rows = by_dr.shape
-    by_node = np.zeros((2 * count + 2, rows))
+def assembled_gradient(slopes: list[Array]) -> Array:
+    """Return the derivatives by the coordinates r, z of each node in turn: (coordinates, films)."""
+    by_dr, by_dz, by_middle = slopes
+    count, films = by_dr.shape
+    by_node = np.zeros((2 * count + 2, films))
     half = by_middle / 2
     by_node[0:-2:2] = half - by_dr
     by_node[2::2] += half + by_dr
@@ -267,13 +262,13 @@ def assembled_gradient(slopes: Slopes) -> Array:
     return by_node
 
 
-def assembled_tangent(curves: SecondSlopes, joined: list[Array]) -> Array:
-    """Return the second derivatives by coordinates, as a band: (coordinates, 6, rows), in which
+def assembled_tangent(curves: list[Array], joined: list[Array]) -> Array:
+    """Return the second derivatives by coordinates, as a band: (coordinates, 6, films), in which
     ``[i, k]`` is the derivative by coordinates i and i + k.
     """
-    rr, rz, zz, rm, zm, mm = (curve.T for curve in curves)
-    count, rows = rr.shape
-    band = np.zeros((2 * count + 2, 6, rows))
+    rr, rz, zz, rm, zm, mm = curves
+    count, films = rr.shape
+    band = np.zeros((2 * count + 2, 6, films))
     r, z = band[0::2], band[1::2]
     quarter, half = mm / 4, zm / 2
     diagonal = rr + quarter
@@ -286,7 +281,7 @@ def assembled_tangent(curves: SecondSlopes, joined: list[Array]) -> Array:
     r[:-1, 2], r[:-1, 3] = quarter - rr, half - rz
     z[:-1, 1], z[:-1, 2] = -rz - half, -zz
     # A kink couples three nodes: the ones before and after it, and its node with each of them.
-    c_rr, c_rz, c_zr, c_zz = (each.T for each in joined)
+    c_rr, c_rz, c_zr, c_zz = joined
     before, centre = slice(0, len(c_rr)), slice(1, len(c_rr) + 1)
     for node in (before, centre):
         r[node, 2] += c_rr

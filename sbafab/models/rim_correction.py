@@ -510,14 +510,14 @@ class Waves:
         """Add the volume between the film's middle and its inner face; return it in ul."""
         balloon = self.of.balloon
         film = slice(balloon.edge + 1)
-        lie = Elements.of(places[:, film, R], places[:, film, Z])
+        lie = Elements.of(places[:, film, R].T, places[:, film, Z].T)
         thick, thin = (
             air_volume(replace(balloon.film, thickness=by), balloon.edge, lie)
             for by in (balloon.thickness, 0.0)
         )
         slopes = [a - b for a, b in zip(thick.slopes, thin.slopes, strict=True)]
         curves = [a - b for a, b in zip(thick.curves, thin.curves, strict=True)]
-        none = np.zeros((len(p), balloon.edge - 1))
+        none = np.zeros((balloon.edge - 1, len(p)))
         size = (len(p), balloon.edge + 1, 2)
         sums.by_node[:, film, :2] -= p[:, None, None] * assembled_gradient(slopes).T.reshape(size)
         band = -p[:, None, None] * assembled_tangent(curves, [none] * 4).transpose(2, 0, 1)

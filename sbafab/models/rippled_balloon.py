@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon import Balloon, Shapes, inflate, ripples_at
+from sbafab.models.balloon import Balloon, Shapes, coordinates, inflate, ripples_at
 from sbafab.models.film_elements import Array
 from sbafab.models.least_energy import NoEquilibrium, equilibrium
 from sbafab.models.rim_correction import EDGE, PLACES, UP, R, Waves, Waving, Z
@@ -308,7 +308,7 @@ def rippled(balloon: Balloon, pressure: ArrayLike, waves: int | None = None) -> 
 def usual_waves(balloon: Balloon) -> int:
     """Return the number of waves of least energy of well-grown ripples, by ``ripples_at``."""
     shape = inflate(balloon, _first_pressure(balloon) * USUAL / START)
-    (ripple,) = ripples_at((balloon,), ((shape.r, shape.z),))
+    (ripple,) = ripples_at((balloon,), [coordinates(shape.r, shape.z)])
     return int(ripple.waves[0])
 
 

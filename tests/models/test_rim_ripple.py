@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sbafab.models import balloon
-from sbafab.models.balloon import Balloon, inflate, ripples_at
+from sbafab.models.balloon import Balloon, coordinates, inflate, ripples_at
 
 WIDE = Balloon(pocket=60.0)
 """So wide that its rim is nearly a straight strip."""
@@ -18,11 +18,11 @@ WIDE = Balloon(pocket=60.0)
 def onset(one: Balloon, tension: float) -> tuple[float, float]:
     """Hoop force (N/m of the rim's width) from which a rim ripples, and the number of waves."""
     low, high = 0.0, 0.2
-    shape = (1, len(one.nodes) - 1 - one.edge)
+    shape = (len(one.nodes) - 1 - one.edge, 1)
     for _ in range(60):
         middle = (low + high) / 2
         (found,) = balloon.rim_ripples((one,), np.full(shape, -middle), [np.array([tension])])
-        ripples = (found.cost - middle * found.pull.sum(-1) < 0).all()
+        ripples = (found.cost - middle * found.pull.sum(0) < 0).all()
         low, high = (low, middle) if ripples else (middle, high)
     (found,) = balloon.rim_ripples((one,), np.full(shape, -high), [np.array([tension])])
     return 2 * one.membrane_stiffness * high, float(found.waves[0])
@@ -48,16 +48,16 @@ def test_a_straight_rim_ripples_as_a_strip_hinged_at_one_edge_does(tension: floa
 def test_what_ripples_take_off_has_the_slopes_that_it_says() -> None:
     lone = Balloon()
     found = inflate(lone, 6.0)
-    (ripple,) = ripples_at((lone,), ((found.r, found.z),))
+    (ripple,) = ripples_at((lone,), [coordinates(found.r, found.z)])
     for law in (2, 0):
         flat = replace(lone.film, order=law)
-        term = balloon.ripple_energy(flat, lone.edge, ripple, found.r)
+        term = balloon.ripple_energy(flat, lone.edge, ripple, found.r.T)
         assert term.energy[0] < 0
         for node in (lone.edge, lone.edge + 2, len(lone.nodes) - 1):
-            step = np.zeros_like(found.r)
-            step[0, node] = 1e-5
+            step = np.zeros_like(found.r.T)
+            step[node] = 1e-5
             up, down = (
-                balloon.ripple_energy(flat, lone.edge, ripple, found.r + sign * step)
+                balloon.ripple_energy(flat, lone.edge, ripple, found.r.T + sign * step)
                 for sign in (1, -1)
             )
             slope = (up.energy - down.energy) / 2e-5
@@ -71,7 +71,7 @@ def test_the_amplitude_is_the_one_of_least_energy_and_the_waves_too() -> None:
     """Summed over a fine mesh, stretching and bending of a tilted rim are least where it says."""
     lone = Balloon()
     found = inflate(lone, 6.0)
-    (ripple,) = ripples_at((lone,), ((found.r, found.z),))
+    (ripple,) = ripples_at((lone,), [coordinates(found.r, found.z)])
     hoop = ((found.r[0, 1:] + found.r[0, :-1]) / (lone.nodes[1:] + lone.nodes[:-1])) ** 2 / 2 - 0.5
     tension = lone.membrane_stiffness * (
         (np.hypot(np.diff(found.r[0]), np.diff(found.z[0])) / np.diff(lone.nodes)) ** 2 / 2 - 0.5
@@ -95,7 +95,7 @@ def test_the_amplitude_is_the_one_of_least_energy_and_the_waves_too() -> None:
 
     tilts = np.linspace(0, 0.6, 601)
     best = min((energy(tilt, n), tilt, n) for tilt in tilts for n in range(2, 20))
-    told = math.sqrt(balloon.squared_tilt(lone.film, lone.edge, ripple, found.r)[0])
+    told = math.sqrt(balloon.ripple_energy(lone.film, lone.edge, ripple, found.r.T).tilt[0])
     assert ripple.waves[0] == pytest.approx(best[2], abs=1)
     assert told == pytest.approx(
         min((energy(tilt, int(ripple.waves[0])), tilt) for tilt in tilts)[1], rel=0.05

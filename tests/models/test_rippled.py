@@ -64,8 +64,8 @@ def test_without_waves_it_is_the_smooth_balloon() -> None:
     for one in (WIDE, INNER):
         problem, x = at(one, 2.0, 12)
         found = problem.total(x, np.array([0]))
-        lie = Elements.of(x[R::PLACES].T, x[Z::PLACES].T)
-        never = np.full((1, len(one.nodes) - 1), math.inf)
+        lie = Elements.of(x[R::PLACES], x[Z::PLACES])
+        never = np.full((len(one.nodes) - 1, 1), math.inf)
         stored = membrane(one.film, lie, never).energy
         stored = (
             stored
