@@ -11,18 +11,11 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.cutting.lattice import Lattice, lattice_of, lattices_of, most_copies
-from sbafab.cutting.placements import (
-    TURNS,
-    NestPart,
-    Placement,
-    Stock,
-    Turn,
-    placed,
-)
+from sbafab.cutting.placements import TURNS, NestPart, Placement, Stock, Turn, placed
 from sbafab.errors import DesignError
 from sbafab.geometry.contour import ticks
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point, distance_to
@@ -38,6 +31,8 @@ if TYPE_CHECKING:
     Counts = NDArray[np.intp]
     Numbers = NDArray[np.float64]
 
+Cell = tuple[int, int]
+"""Row and column of the lower left cell of a form."""
 _Copies = tuple[tuple[int, int, int], ...]
 
 MANY = 600
@@ -50,6 +45,13 @@ FEW = 16
 """Copies on a sheet, by their area, up to which an arrangement is searched."""
 BEAM = 6
 """Arrangements that are continued at each step of the search."""
+CELL = 0.1
+"""mm; the finest grid. It is coarser where the maps would outgrow ``MEMORY`` bytes."""
+MEMORY = 120e6
+SNAP = 1e-6
+"""Cells by which a shape may lie off the grid as if it lay on it."""
+ROUNDING = 5e-7
+"""mm by which a part may lie past the border: less than the check's tolerance."""
 
 
 def bottom_left(
@@ -60,13 +62,11 @@ def bottom_left(
     Without ``lattices`` all sheets start empty. Raises DesignError if the pins leave no place
     for one.
     """
-    shapes, shape_of = _shapes(parts)
-    low_x, low_y, high_x, high_y = stock.usable
+    _, low_y, _, high_y = stock.usable
     window = min(high_y - low_y, _length_needed(parts, stock))
     while True:
-        grid = grid_of(shapes, (low_x, low_y, high_x, low_y + window), stock.spacing, stock.turns)
-        filler = _Filler(tuple(parts), tuple(shape_of), stock, grid)
-        best = min((filler.filled(way) for way in _ways(parts)), key=_score)
+        filler = _Filler(parts, stock, low_y + window)
+        best = min(map(filler.filled, _ways(parts)), key=_score)
         if window >= high_y - low_y or (best.stuck is None and best.sheets == 1):
             break
         window = min(high_y - low_y, 2 * window)
@@ -78,7 +78,13 @@ def bottom_left(
             "the sheet."
         )
     if lattices and takes_lattices(parts, stock, best.sheets):
-        ways = [way for lattices in filler.lattices() for way in _lattice_ways(parts, lattices)]
+        ways = (
+            way._replace(lattices=copies, whole_only=whole_only)
+            for copies in filler.lattices()
+            if copies
+            for way in _ways(parts)
+            for whole_only in (True, False)
+        )
         best = min([best, *map(filler.filled, ways)], key=_score)
     return best.placements
 
@@ -89,8 +95,7 @@ def sheet_section(material: Material) -> str:
     return f"sheets.{name}" if material in FIRST else f"films.{name}.sheet"
 
 
-@dataclass(frozen=True)
-class _Way:
+class _Way(NamedTuple):
     """A way to fill: the order of the parts, and the share of their height that counts as low.
 
     Sheets start with a lattice of the shape with the largest remaining area that has a lattice;
@@ -99,12 +104,11 @@ class _Way:
 
     order: tuple[int, ...]
     share: float
-    lattices: Mapping[int, Lattice] = field(default_factory=dict)
+    lattices: Mapping[int, Lattice] = MappingProxyType({})
     whole_only: bool = False
 
 
-@dataclass(frozen=True)
-class _Filled:
+class _Filled(NamedTuple):
     """``reach`` is the last sheet's highest y; ``stuck`` the part that found no place at all."""
 
     placements: tuple[Placement, ...]
@@ -118,8 +122,8 @@ def _score(filled: _Filled) -> tuple[bool, int, float]:
     return filled.stuck is not None, filled.sheets, round(filled.reach, 3)
 
 
-def _size(part: NestPart) -> tuple[float, float]:
-    low_x, low_y, high_x, high_y = part.region.bounds
+def _size(region: Region) -> tuple[float, float]:
+    low_x, low_y, high_x, high_y = region.bounds
     return high_x - low_x, high_y - low_y
 
 
@@ -127,41 +131,29 @@ def _ways(parts: Sequence[NestPart]) -> list[_Way]:
     """Ways to fill, large parts first by area or by longest side: small ones fit between them."""
     orders = []
     for measure in (math.prod, max):
-        sizes = [-round(measure(_size(part)), 6) for part in parts]
+        sizes = [-round(measure(_size(part.region)), 6) for part in parts]
         orders.append(tuple(sorted(range(len(parts)), key=sizes.__getitem__)))
     ways = [_Way(order, share) for order in dict.fromkeys(orders) for share in (0.5, 0.0, 1.0)]
     return ways if sum(part.count for part in parts) < MANY else ways[:2]
 
 
-def _lattice_ways(parts: Sequence[NestPart], lattices: Mapping[int, Lattice]) -> list[_Way]:
-    """Return ways to fill that start with lattices."""
-    if not lattices:
-        return []
-    return [
-        replace(way, lattices=lattices, whole_only=whole_only)
-        for way in _ways(parts)
-        for whole_only in (True, False)
-    ]
-
-
 def takes_lattices(parts: Sequence[NestPart], stock: Stock, sheets: int) -> bool:
     """Return True if lattices may save film; bottom-left alone needs this number of ``sheets``."""
     shapes, shape_of = _shapes(parts)
-    counts: Counter[int] = Counter()
-    for part, shape in zip(parts, shape_of, strict=True):
-        counts[shape] += part.count
+    counts = _counts(shape_of, [part.count for part in parts])
     if max(counts.values()) < LEAST_COPIES:
         return False
-    return stock.roll or (sheets > 1 and sheets > _area_bound(shapes, counts, stock))
-
-
-def _area_bound(shapes: Sequence[Region], counts: Mapping[int, int], stock: Stock) -> int:
-    """Return the sheets that are filled by the shapes, each with half the spacing round it.
-
-    The usable area with half the spacing round it holds as much at most.
-    """
+    # A lower bound: the room is filled by the shapes, each with half the spacing round it.
     grown = sum(counts[i] * _grown(shape, stock) for i, shape in enumerate(shapes))
-    return math.ceil(grown / _room(stock) - 1e-6)
+    return stock.roll or (sheets > 1 and sheets > math.ceil(grown / _room(stock) - 1e-6))
+
+
+def _counts(shape_of: Sequence[int], counts: Sequence[int]) -> Counter[int]:
+    """Return the number of parts of each shape."""
+    by_shape: Counter[int] = Counter()
+    for shape, count in zip(shape_of, counts, strict=True):
+        by_shape[shape] += count
+    return by_shape
 
 
 def _grown(shape: Region, stock: Stock) -> float:
@@ -177,14 +169,11 @@ def _room(stock: Stock) -> float:
 
 def _length_needed(parts: Sequence[NestPart], stock: Stock) -> float:
     """Return a length that most likely holds all parts, to limit the maps of long rolls."""
-    area, longest = 0.0, 0.0
-    for part in parts:
-        width, height = (size + stock.spacing for size in _size(part))
-        area += part.count * width * height
-        longest = max(longest, width, height)
+    sizes = [[side + stock.spacing for side in _size(part.region)] for part in parts]
+    area = sum(part.count * math.prod(size) for part, size in zip(parts, sizes, strict=True))
     low_x, _, high_x, _ = stock.usable
     pins = sum((diameter + 2 * stock.spacing) ** 2 for _, _, diameter in stock.pins)
-    return 1.3 * (area + pins) / (high_x - low_x) + 2 * longest
+    return 1.3 * (area + pins) / (high_x - low_x) + 2 * max(map(max, sizes), default=0.0)
 
 
 def _shapes(parts: Sequence[NestPart]) -> tuple[list[Region], list[int]]:
@@ -193,51 +182,133 @@ def _shapes(parts: Sequence[NestPart]) -> tuple[list[Region], list[int]]:
     Holes count as full: they are cut before all outlines, and a part in one would drop out.
     """
     numbers: dict[Region, int] = {}
-    shape_of = []
-    for part in parts:
-        shape_of.append(numbers.setdefault(Region(part.region.outers), len(numbers)))
+    shape_of = [numbers.setdefault(Region(part.region.outers), len(numbers)) for part in parts]
     return list(numbers), shape_of
 
 
-class _Filler:
-    """Fills sheets of one grid by a given way."""
+class _Form(NamedTuple):
+    """A shape in one of its turns; ``number`` counts the forms of all shapes.
 
-    def __init__(
-        self, parts: tuple[NestPart, ...], shape_of: tuple[int, ...], stock: Stock, grid: Grid
-    ) -> None:
-        self.parts, self.shape_of, self.stock, self.grid = parts, shape_of, stock, grid
-        self.empty = [grid.places(form, stock) for form in grid.forms]
-        self.forms = [[form for form in grid.forms if form.shape == shape] for shape in shape_of]
+    ``cells``, of the shape grown by half the spacing, fill ``frame``; ``bounds`` are the bounds of
+    the shape itself; both mm, in the shape's own frame turned.
+    """
+
+    number: int
+    shape: int
+    turn: Turn
+    cells: Cells
+    frame: Bounds
+    bounds: Bounds
+
+
+class _Filler:
+    """Fills sheets of the usable area up to ``top`` by a given way, on one grid.
+
+    Shapes are grown by half the spacing, so cells that are disjoint keep it.
+    """
+
+    def __init__(self, parts: Sequence[NestPart], stock: Stock, top: float) -> None:
+        self.parts, self.stock, self.margin = parts, stock, stock.spacing / 2
+        self.shapes, self.shape_of = _shapes(parts)
+        low_x, low_y, high_x, _ = stock.usable
+        self.area: Bounds = (low_x, low_y, high_x, top)
+        # Parts grown by the margin may reach past the border by it.
+        self.origin: Point = (low_x - self.margin, low_y - self.margin)
+        self.cell = _cell_size(self.shapes, self.area, stock)
+        self.forms: list[_Form] = []
+        self.form_of: dict[tuple[int, Turn], _Form] = {}
+        for number, shape in enumerate(self.shapes):
+            self._add_forms(number, shape)
+        self._clear: dict[tuple[int, int], Cells] = {}
         self._started: dict[tuple[int, int], list[Cells]] = {}
+        self.empty = [self._places(form) for form in self.forms]
+
+    # The grid.
+
+    def _add_forms(self, number: int, shape: Region) -> None:
+        """Add the turns of a shape that differ on the grid."""
+        cells, frame = raster(grow(shape, self.margin), self.cell)
+        by_cells: dict[tuple[tuple[int, ...], bytes], _Form] = {}
+        for turn in self.stock.turns:
+            turned = quarter_turned(cells, turn)
+            key = (turned.shape, turned.tobytes())
+            if key not in by_cells:
+                boxes = _turned(frame, turn), _turned(shape.bounds, turn)
+                by_cells[key] = _Form(len(self.forms), number, turn, turned, *boxes)
+                self.forms.append(by_cells[key])
+            self.form_of[number, turn] = by_cells[key]
+
+    def clear(self, a: _Form, b: _Form) -> Cells:
+        """Offsets of ``b`` from ``a`` without overlap, from one less than b's size below 0."""
+        key = (a.number, b.number)
+        if key not in self._clear:
+            opposite = self._clear.get(key[::-1])
+            if opposite is not None:
+                self._clear[key] = np.ascontiguousarray(opposite[::-1, ::-1])
+            elif a.turn == 0:
+                self._clear[key] = ~meetings(a.cells, b.cells)
+            else:
+                # A common turn of both turns the offsets with them.
+                back = self.form_of[b.shape, TURNS[(b.turn - a.turn) % len(TURNS)]]
+                offsets = self.clear(self.form_of[a.shape, 0], back)
+                self._clear[key] = quarter_turned(offsets, a.turn)
+        return self._clear[key]
+
+    def shift(self, form: _Form, row: int, column: int) -> Point:
+        """Return the shift in mm of the turned shape to a place."""
+        x, y = self.origin
+        return x + column * self.cell - form.frame[0], y + row * self.cell - form.frame[1]
+
+    def _around(self, shape: int, turn: Turn, shift: Point) -> Iterator[Cell]:
+        """Yield up to four places whose cells together hold a shape that lies off the grid."""
+        corner = _turned(self.form_of[shape, 0].frame, turn)
+        x, y = ((corner[k] + shift[k] - self.origin[k]) / self.cell for k in (0, 1))
+        for row in sorted({math.floor(y + SNAP), math.ceil(y - SNAP)}):
+            for column in sorted({math.floor(x + SNAP), math.ceil(x - SNAP)}):
+                yield row, column
+
+    def _places(self, form: _Form) -> Cells:
+        """Return the places of a form inside the border and clear of the pins."""
+        room = (
+            self.area[side + 2] - form.bounds[side + 2] - self.shift(form, 0, 0)[side]
+            for side in (1, 0)
+        )
+        counts = [max(0, math.floor((r + ROUNDING) / self.cell) + 1) for r in room]
+        free = np.ones(counts, dtype=np.bool_)
+        for x, y, diameter in self.stock.pins:
+            pin = disc((x, y), diameter / 2 + self.margin)
+            cells, place = aligned(pin, self.origin, self.cell)
+            strike(free, ~meetings(cells, form.cells), form, place)
+        return free
+
+    # Copies of one shape on an empty sheet.
 
     def lattices(self) -> list[dict[int, Lattice]]:
         """Return copies on a sheet, for the shapes of most area that come often enough.
 
         They are the best lattices, and arrangements or pairs of lattices if these hold more.
         """
-        areas = dict.fromkeys(range(len(self.grid.shapes)), 0.0)
-        counts: Counter[int] = Counter()
+        counts = _counts(self.shape_of, [part.count for part in self.parts])
+        areas = dict.fromkeys(range(len(self.shapes)), 0.0)
         for part, shape in zip(self.parts, self.shape_of, strict=True):
             areas[shape] += part.count * part.region.area
-            counts[shape] += part.count
         kinds: list[dict[int, Lattice]] = [{}, {}, {}]
         for shape in sorted(areas, key=lambda shape: -areas[shape])[:MOST_LATTICES]:
             if counts[shape] >= LEAST_COPIES:
-                laid = sorted(self._clear_lattices(self.grid.shapes[shape]), key=most_copies)
+                laid = sorted(self._clear_lattices(self.shapes[shape]), key=most_copies)
                 alone = next(lattice for lattice in laid if not lattice.is_pair)
                 # Of equal ones the first, which rows are.
-                for kind, paired in zip(
+                for kind, other in zip(
                     kinds, (alone, self._arrangement(shape), laid[0]), strict=True
                 ):
-                    has_more = len(paired.places) > len(alone.places)
-                    kind[shape] = paired if has_more else alone
+                    kind[shape] = other if len(other.places) > len(alone.places) else alone
         return [kind for number, kind in enumerate(kinds) if kind not in kinds[:number]]
 
     def _clear_lattices(self, shape: Region) -> Iterator[Lattice]:
         """Yield the lattices of a shape without the copies that are too near to pins."""
         stock = self.stock
         turned = {turn: placed(shape, turn, (0.0, 0.0)) for turn in TURNS}
-        for lattice in lattices_of(shape, stock.spacing, self.grid.area, stock.turns):
+        for lattice in lattices_of(shape, stock.spacing, self.area, stock.turns):
             places = (
                 place for place in lattice.places if _is_clear(turned[place[0]], place[1], stock)
             )
@@ -248,9 +319,9 @@ class _Filler:
 
         Each step puts a copy at an extreme free place and keeps the sheets with most free places.
         """
-        if _room(self.stock) > FEW * _grown(self.grid.shapes[shape], self.stock):
+        if _room(self.stock) > FEW * _grown(self.shapes[shape], self.stock):
             return Lattice((), 0.0)
-        forms = [form for form in self.grid.forms if form.shape == shape]
+        forms = [form for form in self.forms if form.shape == shape]
         # Copies, each a form's number, row and column in order, and the free places of each form.
         sheets: list[tuple[_Copies, list[Cells]]] = [((), [self.empty[f.number] for f in forms])]
         best: _Copies = ()
@@ -262,32 +333,23 @@ class _Filler:
                     for place in _extremes(places):
                         more = tuple(sorted((*copies, (form.number, *place))))
                         if more not in steps:
-                            steps[more] = self._left(forms, maps, form, place)
+                            steps[more] = [np.copy(left) for left in maps]
+                            for there, left in zip(forms, steps[more], strict=True):
+                                strike(left, self.clear(form, there), there, place)
             sheets = sorted(steps.items(), key=lambda step: -sum(map(np.count_nonzero, step[1])))
             sheets = sheets[:BEAM]
-        chosen = [(self.grid.forms[number], row, column) for number, row, column in best]
+        chosen = [(self.forms[number], place) for number, *place in best]
         return lattice_of(
-            self.grid.shapes[shape],
-            [(form.turn, self.grid.shift(form, row, column)) for form, row, column in chosen],
+            self.shapes[shape], [(form.turn, self.shift(form, *place)) for form, place in chosen]
         )
 
-    def _left(
-        self,
-        forms: Sequence[TurnedShape],
-        maps: Sequence[Cells],
-        form: TurnedShape,
-        place: tuple[int, int],
-    ) -> list[Cells]:
-        """Return the free places of forms after one of them is put at a place."""
-        left = [np.copy(places) for places in maps]
-        for form_there, places in zip(forms, left, strict=True):
-            strike(places, self.grid.clear(form, form_there), form_there, place)
-        return left
+    # Sheet after sheet.
 
     def filled(self, way: _Way) -> _Filled:
         """Fill sheet after sheet with the remaining parts, in the way's order."""
         remaining = [part.count for part in self.parts]
         placements: list[Placement] = []
+        on_sheet: list[Placement] = []
         sheet = 0
         while any(remaining):
             on_sheet = self._sheet(sheet, remaining, way) or self._alone(
@@ -300,34 +362,35 @@ class _Filler:
                 remaining[placement.part] -= 1
             placements += on_sheet
             sheet += 1
-        return _Filled(tuple(placements), sheet, self._reach(on_sheet))
+        tops = {(form.shape, form.turn): form.bounds[3] for form in self.forms}
+        reach = max(
+            tops.get((self.shape_of[at.part], at.turn), math.inf) + at.shift[1] for at in on_sheet
+        )
+        return _Filled(tuple(placements), sheet, reach)
 
-    def _sheet(self, sheet: int, remaining: Sequence[int], way: _Way) -> list[Placement]:
-        placements, maps = self._start(sheet, remaining, way)
-        free = _Free(self.grid, [np.copy(places) for places in maps], way.share)
-        remaining = list(remaining)
+    def _sheet(self, sheet: int, counts: Sequence[int], way: _Way) -> list[Placement]:
+        placements, maps = self._start(sheet, counts, way)
+        free = _Free(self, [np.copy(places) for places in maps], way.share)
+        remaining = list(counts)
         for placement in placements:
             remaining[placement.part] -= 1
         for step, part in enumerate(way.order):
             for number in range(remaining[part]):
-                spot = free.lowest(self.forms[part])
+                spot = free.lowest(self.shape_of[part])
                 if spot is None:
                     break
-                form, row, column = spot
-                shift = self.grid.shift(form, row, column)
-                placements.append(Placement(part, sheet, form.turn, shift))
+                form, *place = spot
+                placements.append(Placement(part, sheet, form.turn, self.shift(form, *place)))
                 rest = way.order[step + (number + 1 == remaining[part]) :]
                 open_shapes = {self.shape_of[later] for later in rest if remaining[later]}
-                free.occupy(form, (row, column), open_shapes)
+                free.occupy(*spot, open_shapes)
         return placements
 
     def _start(
         self, sheet: int, remaining: Sequence[int], way: _Way
     ) -> tuple[list[Placement], list[Cells]]:
         """Return the lattice that a sheet starts with, and the places that it leaves free."""
-        left: Counter[int] = Counter()
-        for part, count in enumerate(remaining):
-            left[self.shape_of[part]] += count
+        left = _counts(self.shape_of, remaining)
         shapes = [
             shape
             for shape, lattice in way.lattices.items()
@@ -335,90 +398,93 @@ class _Filler:
         ]
         if not shapes:
             return [], self.empty
-        shape = max(shapes, key=lambda shape: left[shape] * self.grid.shapes[shape].area)
+        shape = max(shapes, key=lambda shape: left[shape] * self.shapes[shape].area)
         places = way.lattices[shape].places[: left[shape]]
-        queue = [
-            part
-            for part in way.order
-            if self.shape_of[part] == shape
-            for _ in range(remaining[part])
-        ]
+        mine = [part for part in way.order if self.shape_of[part] == shape]
+        queue = (part for part in mine for _ in range(remaining[part]))
         placements = [
-            Placement(part, sheet, turn, shift)
-            for part, (turn, shift) in zip(queue, places, strict=False)
+            Placement(part, sheet, *place) for place, part in zip(places, queue, strict=False)
         ]
         key = shape, len(placements)
         if key not in self._started:
-            free = _Free(self.grid, [np.copy(places) for places in self.empty], way.share)
-            everything = set(self.shape_of)
+            free = _Free(self, [np.copy(maps) for maps in self.empty], way.share)
             for turn, shift in places:
-                form = self.grid.form_of[shape, turn]
-                for place in self.grid.around(shape, turn, shift):
-                    free.occupy(form, place, everything)
+                for place in self._around(shape, turn, shift):
+                    free.occupy(self.form_of[shape, turn], *place, set(self.shape_of))
             self._started[key] = free.maps
         return placements, self._started[key]
 
     def _alone(self, sheet: int, remaining: Sequence[int], order: Sequence[int]) -> list[Placement]:
         """Place the next part in the corner of an empty sheet, for a fit too tight for the grid."""
-        if self.stock.pins:
-            return []
         part = next(part for part in order if remaining[part])
         low_x, low_y, high_x, high_y = self.stock.usable
-        for turn in self.stock.turns:
+        for turn in self.stock.turns if not self.stock.pins else ():
             bounds = placed(self.parts[part].region, turn, (0.0, 0.0)).bounds
             shift: Point = (low_x - bounds[0], low_y - bounds[1])
             if max(bounds[2] + shift[0] - high_x, bounds[3] + shift[1] - high_y) <= ROUNDING:
                 return [Placement(part, sheet, turn, shift)]
         return []
 
-    def _reach(self, placements: Sequence[Placement]) -> float:
-        tops = {
-            (part, form.turn): form.bounds[3]
-            for part, forms in enumerate(self.forms)
-            for form in forms
-        }
-        return max(
-            tops.get((placement.part, placement.turn), math.inf) + placement.shift[1]
-            for placement in placements
-        )
+
+def _is_clear(region: Region, shift: Point, stock: Stock) -> bool:
+    """Return True if a region that is moved keeps the spacing from all pins."""
+    low_x, low_y, high_x, high_y = region.bounds
+    for x, y, diameter in stock.pins:
+        room, p = diameter / 2 + stock.spacing, (x - shift[0], y - shift[1])
+        is_near = low_x - room < p[0] < high_x + room and low_y - room < p[1] < high_y + room
+        if is_near and (
+            Region(region.outers).contains(p)
+            or min(distance_to(edge, p) for edge in region.edges) < room
+        ):
+            return False
+    return True
 
 
-def _extremes(places: Cells) -> list[tuple[int, int]]:
+def _extremes(places: Cells) -> list[Cell]:
     """Return the ends of the outermost rows and columns that have free places."""
     rows, columns = (np.flatnonzero(places.any(axis=axis)) for axis in (1, 0))
     if not rows.size:
         return []
     extremes = set()
-    for row in (int(rows[0]), int(rows[-1])):
-        across = np.flatnonzero(places[row])
-        extremes |= {(row, int(across[0])), (row, int(across[-1]))}
-    for column in (int(columns[0]), int(columns[-1])):
-        up = np.flatnonzero(places[:, column])
-        extremes |= {(int(up[0]), column), (int(up[-1]), column)}
+    for row in rows[[0, -1]].tolist():
+        extremes |= {(row, column) for column in np.flatnonzero(places[row])[[0, -1]].tolist()}
+    for column in columns[[0, -1]].tolist():
+        extremes |= {(row, column) for row in np.flatnonzero(places[:, column])[[0, -1]].tolist()}
     return sorted(extremes)
+
+
+def strike(free: Cells, clear: Cells, form: _Form, place: Sequence[int]) -> None:
+    """Remove a form's free places that are not ``clear`` of a form at ``place``."""
+    row, column = (at - size + 1 for at, size in zip(place, form.cells.shape, strict=True))
+    first_row, first_column = max(0, row), max(0, column)
+    window = free[
+        first_row : max(0, row + clear.shape[0]), first_column : max(0, column + clear.shape[1])
+    ]
+    there = clear[first_row - row :, first_column - column :]
+    window &= there[: window.shape[0], : window.shape[1]]
 
 
 class _Free:
     """The free places of every form on one sheet, and the start of the search for the lowest."""
 
-    def __init__(self, grid: Grid, maps: list[Cells], share: float) -> None:
-        self.grid, self.maps, self.share = grid, maps, share
+    def __init__(self, filler: _Filler, maps: list[Cells], share: float) -> None:
+        self.filler, self.maps, self.share = filler, maps, share
         self.searched = [0] * len(maps)
 
-    def lowest(self, forms: Sequence[TurnedShape]) -> tuple[TurnedShape, int, int] | None:
+    def lowest(self, shape: int) -> tuple[_Form, int, int] | None:
         """The form that lies lowest, by the share of its height that counts; row and column."""
         spots = []
-        for form in forms:
-            place = self._first(form.number)
+        for form in self.filler.forms:
+            place = self._first(form.number) if form.shape == shape else None
             if place is not None:
                 low = place[0] + self.share * form.cells.shape[0]
                 spots.append((low, place[1], form.number, place[0]))
         if not spots:
             return None
         _, column, number, row = min(spots)
-        return self.grid.forms[number], row, column
+        return self.filler.forms[number], row, column
 
-    def _first(self, number: int) -> tuple[int, int] | None:
+    def _first(self, number: int) -> Cell | None:
         """Return row and column of the lowest free place, the leftmost of its row."""
         places = self.maps[number].reshape(-1)
         # Places are only ever taken, so the search continues where it stopped.
@@ -431,16 +497,12 @@ class _Free:
         columns: int = self.maps[number].shape[1]
         return divmod(start, columns)
 
-    def occupy(self, form: TurnedShape, place: tuple[int, int], shapes: set[int]) -> None:
-        """Remove the places that a form at ``place`` blocks from the maps of these shapes."""
-        for neighbour in self.grid.forms:
-            if (
-                neighbour.shape in shapes
-                and self.searched[neighbour.number] < self.maps[neighbour.number].size
-            ):
-                strike(
-                    self.maps[neighbour.number], self.grid.clear(form, neighbour), neighbour, place
-                )
+    def occupy(self, form: _Form, row: int, column: int, shapes: set[int]) -> None:
+        """Remove the places that a form at a place blocks from the maps of these shapes."""
+        for near in self.filler.forms:
+            places = self.maps[near.number]
+            if near.shape in shapes and self.searched[near.number] < places.size:
+                strike(places, self.filler.clear(form, near), near, (row, column))
 
 
 # Regions as sets of square cells, and the offsets at which two sets meet.
@@ -455,30 +517,29 @@ TOUCH = 1e-7
 """mm by which a region may reach into a cell that is not set: regions side by side may touch."""
 
 
-class Raster(NamedTuple):
-    """``cells`` of a region and the box in mm, in the region's frame, that they fill."""
-
-    cells: Cells
-    frame: Bounds
-
-
-def raster(region: Region, cell: float) -> Raster:
-    """Return the cells of a region, centred in their box, so that turns of it agree."""
+def raster(region: Region, cell: float) -> tuple[Cells, Bounds]:
+    """Return the cells of a region, centred in their box, so that turns of it agree; the box."""
     low_x, low_y, high_x, high_y = region.bounds
     columns, x = _centred(low_x, high_x, cell)
     rows, y = _centred(low_y, high_y, cell)
-    cells = reached(region, (x, y), (rows, columns), cell)
-    return Raster(cells, (x, y, x + columns * cell, y + rows * cell))
+    box = x, y, x + columns * cell, y + rows * cell
+    return reached(region, (x, y), (rows, columns), cell), box
 
 
-def aligned(region: Region, origin: Point, cell: float) -> tuple[Cells, int, int]:
-    """Return the cells of a region on the grid through ``origin``; row and column of the first."""
-    low_x, low_y, high_x, high_y = region.bounds
-    first_column, last_column = _span(low_x - origin[0], high_x - origin[0], cell)
-    first_row, last_row = _span(low_y - origin[1], high_y - origin[1], cell)
+def _centred(low: float, high: float, cell: float) -> tuple[int, float]:
+    count = max(1, math.ceil((high - low - 2 * TOUCH) / cell))
+    return count, (low + high - count * cell) / 2
+
+
+def aligned(region: Region, origin: Point, cell: float) -> tuple[Cells, Cell]:
+    """Return the cells of a region on the grid through ``origin``, and the place of the first."""
+    box = region.bounds
+    (first_column, last_column), (first_row, last_row) = (
+        _span(box[k] - origin[k], box[k + 2] - origin[k], cell) for k in (0, 1)
+    )
     corner = (origin[0] + first_column * cell, origin[1] + first_row * cell)
     shape = (last_row - first_row + 1, last_column - first_column + 1)
-    return reached(region, corner, shape, cell), first_row, first_column
+    return reached(region, corner, shape, cell), (first_row, first_column)
 
 
 def reached(region: Region, corner: Point, shape: tuple[int, int], cell: float) -> Cells:
@@ -524,11 +585,6 @@ def _runs(cells: Cells) -> tuple[Counts, Counts, Counts]:
 def quarter_turned(cells: Cells, turns: int) -> Cells:
     """Return the cells turned counterclockwise; rows count upward, so against NumPy's own sense."""
     return np.ascontiguousarray(np.rot90(cells, -turns))
-
-
-def _centred(low: float, high: float, cell: float) -> tuple[int, float]:
-    count = max(1, math.ceil((high - low - 2 * TOUCH) / cell))
-    return count, (low + high - count * cell) / 2
 
 
 def _span(low: float, high: float, cell: float) -> tuple[int, int]:
@@ -596,154 +652,6 @@ def _add_winding(turns: NDArray[np.int32], edge: Edge, corner: Point, cell: floa
     turns[row, column] += 1 if x1 > x0 else -1
 
 
-# The usable area as a grid, with shapes as cells.
-#
-# Shapes are grown by half the spacing, so cells that are disjoint keep it. A place is the row and
-# column of the lower left cell of a form.
-
-
-CELL = 0.1
-"""mm; the finest grid. It is coarser where the maps would outgrow ``MEMORY`` bytes."""
-MEMORY = 120e6
-SNAP = 1e-6
-"""Cells by which a shape may lie off the grid as if it lay on it."""
-ROUNDING = 5e-7
-"""mm by which a part may lie past the border: less than the check's tolerance."""
-
-
-@dataclass(frozen=True)
-class TurnedShape:
-    """A shape in one of its turns.
-
-    ``cells`` fill ``frame``; ``bounds`` are the bounds of the shape itself; both mm, in the
-    shape's own frame turned. ``number`` counts the forms of all shapes.
-    """
-
-    number: int
-    shape: int
-    turn: Turn
-    cells: Cells = field(repr=False)
-    frame: Bounds
-    bounds: Bounds
-
-
-def _is_clear(region: Region, shift: Point, stock: Stock) -> bool:
-    """Return True if a region that is moved keeps the spacing from all pins."""
-    low_x, low_y, high_x, high_y = region.bounds
-    for x, y, diameter in stock.pins:
-        room, p = diameter / 2 + stock.spacing, (x - shift[0], y - shift[1])
-        is_near = low_x - room < p[0] < high_x + room and low_y - room < p[1] < high_y + room
-        if is_near and (
-            Region(region.outers).contains(p)
-            or min(distance_to(edge, p) for edge in region.edges) < room
-        ):
-            return False
-    return True
-
-
-@dataclass(frozen=True)
-class Grid:
-    """The forms of all shapes on the grid of one usable ``area``."""
-
-    shapes: tuple[Region, ...]
-    area: Bounds
-    margin: float
-    cell: float
-    forms: tuple[TurnedShape, ...]
-    form_of: dict[tuple[int, Turn], TurnedShape] = field(repr=False)
-    _clear: dict[tuple[int, int], Cells] = field(default_factory=dict, repr=False)
-
-    @property
-    def origin(self) -> Point:
-        """The grid's corner; parts grown by the margin may reach past the border by it."""
-        return self.area[0] - self.margin, self.area[1] - self.margin
-
-    def clear(self, a: TurnedShape, b: TurnedShape) -> Cells:
-        """Offsets of ``b`` from ``a`` without overlap, from one less than b's size below 0."""
-        key = (a.number, b.number)
-        if key not in self._clear:
-            self._clear[key] = self._offsets(a, b)
-        return self._clear[key]
-
-    def _offsets(self, a: TurnedShape, b: TurnedShape) -> Cells:
-        opposite = self._clear.get((b.number, a.number))
-        if opposite is not None:
-            return np.ascontiguousarray(opposite[::-1, ::-1])
-        if a.turn == 0:
-            # The reverse pair, turned until a lies as it is drawn.
-            turned = self.form_of[a.shape, TURNS[-b.turn % len(TURNS)]]
-            twin = self._clear.get((self.form_of[b.shape, 0].number, turned.number))
-            if twin is not None:
-                return np.ascontiguousarray(quarter_turned(twin, b.turn)[::-1, ::-1])
-            return ~meetings(a.cells, b.cells)
-        # A common turn of both turns the offsets with them.
-        back = self.form_of[b.shape, TURNS[(b.turn - a.turn) % len(TURNS)]]
-        return quarter_turned(self.clear(self.form_of[a.shape, 0], back), a.turn)
-
-    def shift(self, form: TurnedShape, row: int, column: int) -> Point:
-        """Return the shift in mm of the turned shape to a place."""
-        x, y = self.origin
-        return x + column * self.cell - form.frame[0], y + row * self.cell - form.frame[1]
-
-    def around(self, shape: int, turn: Turn, shift: Point) -> Iterator[tuple[int, int]]:
-        """Yield up to four places whose cells together hold a shape that lies off the grid."""
-        left, low, _, _ = _turned(self.form_of[shape, 0].frame, turn)
-        x = (left + shift[0] - self.origin[0]) / self.cell
-        y = (low + shift[1] - self.origin[1]) / self.cell
-        for row in sorted({math.floor(y + SNAP), math.ceil(y - SNAP)}):
-            for column in sorted({math.floor(x + SNAP), math.ceil(x - SNAP)}):
-                yield row, column
-
-    def places(self, form: TurnedShape, stock: Stock) -> Cells:
-        """Return the places of the form inside the border and clear of the pins."""
-        x, y = self.shift(form, 0, 0)
-        rows = self._count(self.area[3] - form.bounds[3] - y)
-        columns = self._count(self.area[2] - form.bounds[2] - x)
-        free = np.ones((rows, columns), dtype=np.bool_)
-        for pin_x, pin_y, diameter in stock.pins:
-            pin = disc((pin_x, pin_y), diameter / 2 + self.margin)
-            cells, row, column = aligned(pin, self.origin, self.cell)
-            strike(free, ~meetings(cells, form.cells), form, (row, column))
-        return free
-
-    def _count(self, room: float) -> int:
-        return max(0, math.floor((room + ROUNDING) / self.cell) + 1)
-
-
-def strike(free: Cells, clear: Cells, form: TurnedShape, place: tuple[int, int]) -> None:
-    """Remove a form's free places that are not ``clear`` of a form at ``place``."""
-    row, column = (at - size + 1 for at, size in zip(place, form.cells.shape, strict=True))
-    rows = slice(max(0, row), max(0, row + clear.shape[0]))
-    columns = slice(max(0, column), max(0, column + clear.shape[1]))
-    window = free[rows, columns]
-    first_row, first_column = rows.start - row, columns.start - column
-    window &= clear[
-        first_row : first_row + window.shape[0], first_column : first_column + window.shape[1]
-    ]
-
-
-def grid_of(shapes: Sequence[Region], area: Bounds, spacing: float, turns: Sequence[Turn]) -> Grid:
-    """Return the grid for shapes, turned by ``turns``, ``spacing`` mm apart in ``area``."""
-    margin = spacing / 2
-    cell = _cell_size(shapes, area, spacing, len(turns))
-    grown = [grow(shape, margin) for shape in shapes]
-    forms: list[TurnedShape] = []
-    form_of: dict[tuple[int, Turn], TurnedShape] = {}
-    for number, shape in enumerate(shapes):
-        cells, frame = raster(grown[number], cell)
-        by_cells: dict[tuple[tuple[int, ...], bytes], TurnedShape] = {}
-        for turn in turns:
-            turned = quarter_turned(cells, turn)
-            key = (turned.shape, turned.tobytes())
-            # Only turns that differ on the grid.
-            if key not in by_cells:
-                boxes = _turned(frame, turn), _turned(shape.bounds, turn)
-                by_cells[key] = TurnedShape(len(forms), number, turn, turned, *boxes)
-                forms.append(by_cells[key])
-            form_of[number, turn] = by_cells[key]
-    return Grid(tuple(shapes), area, margin, cell, tuple(forms), form_of)
-
-
 def _turned(box: Bounds, turn: Turn) -> Bounds:
     for _ in range(turn):
         low_x, low_y, high_x, high_y = box
@@ -751,12 +659,9 @@ def _turned(box: Bounds, turn: Turn) -> Bounds:
     return box
 
 
-def _cell_size(shapes: Sequence[Region], area: Bounds, spacing: float, turns: int) -> float:
+def _cell_size(shapes: Sequence[Region], area: Bounds, stock: Stock) -> float:
     """Return the cell at which the maps of free places and of meetings stay within ``MEMORY``."""
-    sizes = [
-        (high_x - low_x + spacing, high_y - low_y + spacing)
-        for low_x, low_y, high_x, high_y in (shape.bounds for shape in shapes)
-    ]
+    turns, sides = len(stock.turns), [max(_size(shape)) + stock.spacing for shape in shapes]
     maps = 2 * turns * len(shapes) * (area[2] - area[0]) * (area[3] - area[1])
-    pairs = sum((max(a) + max(b)) ** 2 for a in sizes for b in sizes) * turns**2
+    pairs = sum((a + b) ** 2 for a in sides for b in sides) * turns**2
     return CELL * max(1.0, math.sqrt((maps + pairs) / CELL**2 / MEMORY))

@@ -105,31 +105,17 @@ def document_text(
     has_seam: bool = False,
 ) -> str:
     """Return the packaged empty document with the entities, extents and custom properties."""
-    text = skeleton()
-    space = re.search(r"\nBLOCK_RECORD\n  5\n(\w+)\n(?:(?!  0\n).*\n)*?\*Model_Space\n", text)
-    seed = re.search(r"(?<=\$HANDSEED\n  5\n)\w+", text)
-    if space is None or seed is None:
-        raise ValueError("skeleton.dxf has no model space: regenerate it.")
-    first = int(seed[0], 16)
+    space, first, (head, to_extents, to_seed, tables, end) = _shell()
     drawn = "".join(
-        f"  0\n{kind}\n  5\n{handle:X}\n330\n{space[1]}\n100\nAcDbEntity\n"
+        f"  0\n{kind}\n  5\n{handle:X}\n330\n{space}\n100\nAcDbEntity\n"
         f"  8\n{layer}\n100\n{subclass}\n{body}"
         for handle, (kind, layer, subclass, body) in enumerate(entities, first)
     )
     free = first + len(entities)
     if has_seam:
-        text, free = _with_seam_layer(text, free), free + 1
-    # From the end to the beginning, so that no insertion is searched.
-    for start, stop, new in (
-        ("  2\nENTITIES\n", "", drawn),
-        ("  9\n$HANDSEED\n  5\n", "\n", f"{free:X}"),
-        ("", "  9\n$ORTHOMODE\n", _extents(boxes)),
-        ("", "  9\n$INSBASE\n", _custom_properties(properties)),
-    ):
-        place = text.index(start or stop) + len(start)
-        end = text.index(stop, place)
-        text = text[:place] + new + text[end:]
-    return text
+        tables, free = _with_seam_layer(tables, free), free + 1
+    filled = (_custom_properties(properties), to_extents, _extents(boxes), to_seed)
+    return "".join((head, *filled, f"{free:X}", tables, drawn, end))
 
 
 def _with_seam_layer(text: str, handle: int) -> str:
@@ -261,10 +247,22 @@ SKELETON = Path(__file__).with_name("skeleton.dxf")
 
 
 @cache
-def skeleton() -> str:
-    """Return the packaged empty document without its extents, which differ between files."""
+def _shell() -> tuple[str, int, tuple[str, ...]]:
+    """Return the owner and first handle of entities, and the packaged empty document in parts.
+
+    Between the parts go custom properties, extents, the next free handle and the entities.
+    """
     text = SKELETON.read_text(encoding="utf-8")
-    return text[: text.index("  9\n$EXTMIN\n")] + text[text.index("  9\n$ORTHOMODE\n") :]
+    space = re.search(r"\nBLOCK_RECORD\n  5\n(\w+)\n(?:(?!  0\n).*\n)*?\*Model_Space\n", text)
+    parts = re.fullmatch(
+        r"(.*)(  9\n\$INSBASE\n.*)  9\n\$EXTMIN\n.*(  9\n\$ORTHOMODE\n.*\$HANDSEED\n  5\n)"
+        r"(\w+)(\n.*  2\nENTITIES\n)(.*)",
+        text,
+        re.DOTALL,
+    )
+    if space is None or parts is None:
+        raise ValueError("skeleton.dxf has no model space: regenerate it.")
+    return space[1], int(parts[4], 16), (*parts.groups()[:3], *parts.groups()[4:])
 
 
 def skeleton_text() -> str:

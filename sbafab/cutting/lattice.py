@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property, reduce
+from itertools import cycle, product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab.cutting.placements import TURNS, Turn, placed
@@ -204,13 +204,12 @@ class _Rows:
         key = low, high, round(right % low.pitch, 9)
         if key not in self._known:
             heights = []
-            for a in low.copies:
-                for b in high.copies:
-                    offset = b.x - a.x + right
-                    first = math.ceil((-self.reach[0] - offset) / low.pitch)
-                    last = math.floor((self.reach[0] - offset) / low.pitch)
-                    offsets = np.array([offset + k * low.pitch for k in range(first, last + 1)])
-                    heights += (self.above(a.half, b.half, offsets) + (a.y - b.y)).tolist()
+            for a, b in product(low.copies, high.copies):
+                offset = b.x - a.x + right
+                first = math.ceil((-self.reach[0] - offset) / low.pitch)
+                last = math.floor((self.reach[0] - offset) / low.pitch)
+                offsets = np.array([offset + k * low.pitch for k in range(first, last + 1)])
+                heights += (self.above(a.half, b.half, offsets) + (a.y - b.y)).tolist()
             self._known[key] = max(heights, default=-math.inf)
         return self._known[key]
 
@@ -218,26 +217,23 @@ class _Rows:
         """Return about what ``climb`` does, for arrays of rows."""
         best = np.full(np.shape(right), -math.inf)
         reach = math.ceil(self.reach[0] / np.min(low.pitch))
-        for a in low.copies:
-            for b in high.copies:
-                places, heights = self._table[a.half, b.half]
-                offset = (b.x - a.x + right) % low.pitch
-                for times in range(-reach, reach + 1):
-                    height = np.interp(offset + times * low.pitch, places, heights, NEVER, NEVER)
-                    best = np.maximum(best, height + a.y - b.y)
+        places, table = self._table
+        for a, b in product(low.copies, high.copies):
+            offset, heights = (b.x - a.x + right) % low.pitch, table[a.half, b.half]
+            for times in range(-reach, reach + 1):
+                height = np.interp(offset + times * low.pitch, places, heights, NEVER, NEVER)
+                best = np.maximum(best, height + a.y - b.y)
         return best
 
     @cached_property
-    def _table(self) -> dict[tuple[int, int], tuple[Numbers, Numbers]]:
-        """The least height of one copy above another, by its offset to the right."""
+    def _table(self) -> tuple[Numbers, dict[tuple[int, int], Numbers]]:
+        """Offsets to the right, and the least heights of one copy above another there."""
         width = self.reach[0] - 1e-6
         places = np.linspace(-width, width, TABLE)
-        halves = (0,) if self.is_symmetric else (0, 1)
-        return {
-            (a, b): (places, self.above(a, b, places) if (a, b) != (1, 1) else places)
-            for a in halves
-            for b in halves
-        } | ({} if self.is_symmetric else {(1, 1): (places, self.above(0, 0, places))})
+        alike = self.above(0, 0, places)
+        unlike = () if self.is_symmetric else ((0, 1), (1, 0))
+        heights = {both: self.above(*both, places) for both in unlike}
+        return places, {(0, 0): alike, (1, 1): alike, **heights}
 
     # The patterns that are tried.
 
@@ -311,43 +307,32 @@ class _Rows:
 
     def _laid(self, pattern: _Pattern, box: tuple[float, float]) -> list[tuple[Turn, Point]]:
         """Return the copies of a pattern that lie in a box from the origin."""
-        rows, steps = pattern.rows, pattern.steps
         copies: list[tuple[Turn, Point]] = []
-        right, up = 0.0, -min(copy.y for copy in rows[0].copies)
+        right, up = 0.0, -min(copy.y for copy in pattern.rows[0].copies)
         below: list[tuple[_Row, float, float]] = []
-        number = 0
-        while True:
-            row = rows[number % len(rows)]
+        for row, step in zip(cycle(pattern.rows), cycle(pattern.steps), strict=False):
             for row_below, other_right, other_up in below[-3:]:
                 up = max(up, other_up + self.climb(row_below, row, right - other_right))
             in_row = list(self._in_row(row, (right, up), box))
             if not in_row:
-                return copies
+                break
             copies += in_row
             below.append((row, right, up))
-            right += steps[number % len(steps)]
-            number += 1
+            right += step
+        return copies
 
     def _in_row(
         self, row: _Row, start: Point, box: tuple[float, float]
     ) -> Iterator[tuple[Turn, Point]]:
-        width, height = (
-            side - 2 * half + ROUNDING
-            for side, half in zip(box, (self.half_width, self.half_height), strict=True)
-        )
+        half_width, half_height = self.half_width, self.half_height
+        width, height = box[0] - 2 * half_width + ROUNDING, box[1] - 2 * half_height + ROUNDING
         for copy in row.copies:
             y, (centre_x, centre_y) = start[1] + copy.y, self.centres[copy.half]
-            if not -ROUNDING <= y <= height:
-                continue
             first = (start[0] + copy.x + LEVEL) % row.pitch
-            for times in range(math.floor((width - first) / row.pitch) + 1):
-                yield (
-                    self.turns[copy.half],
-                    (
-                        self.half_width + first + times * row.pitch - centre_x,
-                        self.half_height + y - centre_y,
-                    ),
-                )
+            count = math.floor((width - first) / row.pitch) + 1 if -ROUNDING <= y <= height else 0
+            for times in range(count):
+                x = half_width + first + times * row.pitch - centre_x
+                yield self.turns[copy.half], (x, half_height + y - centre_y)
 
 
 def _member(family: _Pattern, number: int) -> _Pattern:
@@ -366,8 +351,7 @@ def _member(family: _Pattern, number: int) -> _Pattern:
 # Envelopes of polygons.
 
 
-@dataclass(frozen=True)
-class _Sides:
+class _Sides(NamedTuple):
     """Front and back of a polygon along an axis, as straight pieces between levels across it."""
 
     levels: Numbers
@@ -390,13 +374,9 @@ def _sides(polygon: Numbers) -> _Sides:
         np.maximum(starts, ends)[:, 1] > middle[:, None]
     )
     levels = np.stack([low + LEVEL, high - LEVEL], axis=1)
-    sides = []
-    for edges in (
-        np.where(spans, along, -math.inf).argmax(axis=1),
-        np.where(spans, along, math.inf).argmin(axis=1),
-    ):
-        chosen = edges[:, None]
-        sides.append(starts[chosen, 0] + (levels - starts[chosen, 1]) * slopes[chosen])
+    front = np.where(spans, along, -math.inf).argmax(axis=1)[:, None]
+    back = np.where(spans, along, math.inf).argmin(axis=1)[:, None]
+    sides = (starts[e, 0] + (levels - starts[e, 1]) * slopes[e] for e in (front, back))
     return _Sides(levels.ravel(), *(side.ravel() for side in sides))
 
 

@@ -7,7 +7,7 @@ change along the normal there, which is linear in every cutting error, shift and
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from sbafab.design.records import Design
@@ -69,16 +69,16 @@ Owners = tuple[Owner, Owner]
 
 
 class Places(NamedTuple):
-    """Places from an edge to another, in the order of detection.
+    """Places from an edge of one owner to an edge of another.
 
-    ``columns`` has a column for each place: mm apart, x and y of its start and of its end, and of
-    the unit vector from one to the other. ``between`` is the number of both edges' owners among
-    ``owners``.
+    ``numbers`` are their places among all of an interface, in the order of detection. ``columns``
+    has a column for each place: mm apart, x and y of its start and of its end, and of the unit
+    vector from one to the other.
     """
 
+    owners: Owners
+    numbers: Indices
     columns: Floats
-    between: Indices
-    owners: Sequence[Owners]
 
     @property
     def nominal(self) -> Floats:
@@ -93,30 +93,19 @@ class Places(NamedTuple):
     def normal(self) -> Floats:
         return self.columns[5:]
 
-    def at(self, numbers: Indices) -> Places:
-        return Places(self.columns[:, numbers], self.between[numbers], self.owners)
+    def at(self, chosen: Bools | Indices) -> Places:
+        return Places(self.owners, self.numbers[chosen], self.columns[:, chosen])
 
-    def joined(self, more: Places) -> Places:
-        """These places, then others."""
-        columns = np.concatenate([self.columns, more.columns], axis=1)
-        between = np.concatenate([self.between, more.between + len(self.owners)])
-        return Places(columns, between, [*self.owners, *more.owners])
-
-    def middle(self, number: int) -> Point:
+    def middle(self, column: int) -> Point:
         start, end = self.ends
-        x, y = ((start[:, number] + end[:, number]) / 2).tolist()
+        x, y = ((start[:, column] + end[:, column]) / 2).tolist()
         return x, y
 
 
-class MarginGroup(NamedTuple):
-    """Interfaces of equal profiles and equal freedoms, and the narrow places of the first."""
-
-    interfaces: tuple[Interface, ...]
-    places: Mapping[MarginKind, Places]
-
-    @property
-    def first(self) -> Interface:
-        return self.interfaces[0]
+Equal = tuple[Interface, ...]
+"""Interfaces of equal profiles and equal freedoms."""
+Narrow = tuple[Equal, MarginKind, Places]
+"""Narrow places of the first of equal interfaces."""
 
 
 def seated(interface: Interface) -> tuple[int, ...]:
@@ -148,9 +137,7 @@ def pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
 # Groups of equal interfaces, and their narrow places.
 
 
-def group_interfaces(
-    laminate: Laminate, facing: Iterable[Facing], moves: Freedoms
-) -> list[tuple[Interface, ...]]:
+def group_interfaces(laminate: Laminate, facing: Iterable[Facing], moves: Freedoms) -> list[Equal]:
     """Return interfaces grouped by equal profiles and equal freedoms.
 
     Films that face each other past a smaller balloon count as a separate interface;
@@ -196,7 +183,7 @@ def bond_places(
     widest: float,
     profiles: tuple[Region, ...],
     layers: int,
-) -> Places:
+) -> list[Places]:
     """Return a bond's places at most ``slack`` mm wider than its narrowest.
 
     ``widest`` is the largest slack of any interface with the same bond; ``profiles`` are those of
@@ -213,25 +200,36 @@ def bond_places(
     return _without_necks(_owned(columns, seats, seats), layers)
 
 
-def _without_necks(places: Places, layers: int) -> Places:
+def _without_necks(places: list[Places], layers: int) -> list[Places]:
     """Places without those at which two seams cross at both ends, and that either may narrow.
 
     How far the seams may be moved there is measured by their overlap.
     """
-    seams = [tuple(o.seat for o in both if o.seat >= layers) for both in places.owners]
-    if not any(len(set(both)) == 2 for both in seams):
+    seams = [tuple(o.seat for o in both.owners if o.seat >= layers) for both in places]
+    ends = [list(map(tuple, both.columns[1:5].T.tolist())) for both in places]
+    there = {
+        (end, both)
+        for rows, both in zip(ends, seams, strict=True)
+        if len(set(both)) == 2
+        for end in rows
+    }
+    if not there:
         return places
-    ends = map(tuple, places.columns[1:5].T.tolist())
-    rows = [(end, seams[n]) for end, n in zip(ends, places.between.tolist(), strict=True)]
-    there = {(end, both) for end, both in rows if len(set(both)) == 2}
-    numbers = [n for n, (end, both) in enumerate(rows) if (end, both[::-1]) not in there]
-    return places.at(np.array(numbers, dtype=np.intp))
+    left = [
+        of_owners.at(np.array([(end, both[::-1]) not in there for end in rows]))
+        for of_owners, rows, both in zip(places, ends, seams, strict=True)
+    ]
+    return _with_places(left)
+
+
+def _with_places(places: Iterable[Places]) -> list[Places]:
+    return [of_owners for of_owners in places if len(of_owners.numbers)]
 
 
 @cached
 def overhang_places(
     mask: Region, free: tuple[tuple[Edge, Reach], ...], slack: float, profiles: tuple[Region, ...]
-) -> Places:
+) -> list[Places]:
     """Return places from films' edges to masks', at most ``slack`` mm wider than the nearest.
 
     Each edge's own reach comes first, then its samples. ``profiles`` are of two films and masks.
@@ -250,65 +248,63 @@ def overhang_places(
     order = np.concatenate([np.arange(len(near)), rays.edge.take(ray)]).argsort(kind="stable")
     seats = list(enumerate(profiles))
     places = _owned(columns[:, order], seats[:2], seats[2:])
-    (nearest,) = (places.nominal <= places.nominal.min(initial=math.inf) + slack).nonzero()
-    return places.at(nearest)
+    nearest = min((float(each.nominal.min()) for each in places), default=math.inf)
+    return _with_places(each.at(each.nominal <= nearest + slack) for each in places)
 
 
-def overlap_places(interface: Interface, overlaps: Sequence[Overlap]) -> Places:
-    """Return overlaps of seams as places of bonds: as wide as they are deep, moved as a whole."""
+def overlap_places(
+    interface: Interface, overlaps: Sequence[Overlap], after: int
+) -> Iterator[Places]:
+    """Yield overlaps of seams as places of bonds: as wide as they are deep, moved as a whole.
+
+    They are numbered from ``after`` on.
+    """
     first = 2 + len(interface.masks)
-    owners = [
-        (Owner(first + overlap.seam, UNCUT, 0), Owner(first + overlap.other, UNCUT, 0))
-        for overlap in overlaps
-    ]
-    depth = np.array([overlap.depth for overlap in overlaps])
-    way = columns_of([overlap.way for overlap in overlaps], 2)
-    middle = columns_of([overlap.at for overlap in overlaps], 2)
-    start, end = (middle + side * depth * way for side in (-0.5, 0.5))
-    return Places(np.concatenate([[depth], start, end, way]), np.arange(len(owners)), owners)
+    for number, overlap in enumerate(overlaps, after):
+        owners = Owner(first + overlap.seam, UNCUT, 0), Owner(first + overlap.other, UNCUT, 0)
+        (x, y), (u, v), half = overlap.at, overlap.way, overlap.depth / 2
+        ends = x - half * u, y - half * v, x + half * u, y + half * v
+        column = np.array([overlap.depth, *ends, u, v])
+        yield Places(owners, np.array([number]), column[:, None])
 
 
 def narrow_places(
-    groups: Sequence[tuple[Interface, ...]],
+    groups: Sequence[Equal],
     bonds: Sequence[Width | None],
     reaches: Sequence[Sequence[tuple[Edge, Reach]]],
     overlaps: Sequence[Sequence[Overlap]],
     pins: tuple[Pin, ...],
     design: Design,
     moves: Freedoms,
-) -> list[MarginGroup]:
-    """Return all margins that could become the least under the tolerances, or fall short of a
-    limit, of the first of each group of interfaces: its bond's least width, the masks' reaches
-    past film edges, and the overlaps of its seams.
+) -> Iterator[Narrow]:
+    """Yield all margins that could become the least under the tolerances, or fall short of a
+    limit, of the first of each group of interfaces: its bond's least width and the overlaps of its
+    seams, then the masks' reaches past film edges.
     """
-    firsts = [group[0] for group in groups]
-    losses = [most_loss(first, design, moves) for first in firsts]
+    losses = [most_loss(first, design, moves) for first, *_ in groups]
     # Of one bond all interfaces ask for the same places.
     widest: dict[Region, float] = {}
-    for first, loss, bond in zip(firsts, losses, bonds, strict=True):
+    for (first, *_), loss, bond in zip(groups, losses, bonds, strict=True):
         slack = 0.0 if bond is None else loss
         widest[first.whole_bond] = max(slack, widest.get(first.whole_bond, 0.0))
-    margin_groups = []
-    for number, first in enumerate(firsts):
-        places: dict[MarginKind, Places] = {}
+    rows = zip(groups, losses, bonds, reaches, overlaps, strict=True)
+    for group, loss, bond, reached, overlapping in rows:
+        first, whole, of_bond = group[0], group[0].whole_bond, list[Places]()
         films = tuple(layer.profile for layer in (first.below, first.above, *first.masks))
-        bond, loss = bonds[number], losses[number]
         if bond is not None and not first.contact.is_empty:
-            whole = first.whole_bond
             profiles = (*films, *(seam.region for seam in bonding_seams(first)))
-            places["bond"] = bond_places(whole, bond, loss, widest[whole], profiles, len(films))
-        if overlaps[number]:
-            ends = overlap_places(first, overlaps[number])
-            places["bond"] = places["bond"].joined(ends) if "bond" in places else ends
+            of_bond += bond_places(whole, bond, loss, widest[whole], profiles, len(films))
+        last = max((int(places.numbers[-1]) for places in of_bond), default=-1)
+        of_bond += overlap_places(first, overlapping, last + 1)
+        yield from ((group, "bond", places) for places in of_bond)
         free = tuple(
             (edge, reach)
-            for edge, reach in reaches[number]
+            for edge, reach in reached
             if holds(reach.value, design.rules.mask_overhang) or not pin_at(edge, pins)
         )
         if free and not first.contact.is_empty:
-            places["overhang"] = overhang_places(first.mask, free, loss, films)
-        margin_groups.append(MarginGroup(groups[number], places))
-    return margin_groups
+            for places in overhang_places(first.mask, free, loss, films):
+                yield group, "overhang", places
 
 
 # Owners of the edges at both ends of places.
@@ -323,8 +319,8 @@ Seats = Sequence[tuple[int, Region]]
 """Profiles with their seats."""
 
 
-def _owned(columns: Floats, at_start: Seats, at_end: Seats) -> Places:
-    """Places with the owners of their edges, one for each pair of owners."""
+def _owned(columns: Floats, at_start: Seats, at_end: Seats) -> list[Places]:
+    """Places by the owners of their edges, once for each pair of owners."""
     start, end, normal = columns[1:3], columns[3:5], columns[5:]
     ours, first, firsts = _owners(start, normal, at_start)
     theirs, last, lasts = _owners(end, normal, at_end)
@@ -334,9 +330,12 @@ def _owned(columns: Floats, at_start: Seats, at_end: Seats) -> Places:
     rows = ours.repeat(repeats)
     within = np.arange(len(rows)) - (repeats.cumsum() - repeats).repeat(repeats)
     pairs = first.repeat(repeats) * len(lasts) + last.take(begins.take(rows) + within)
-    names = sorted(set(pairs.tolist()))
-    owners = [(firsts[name // len(lasts)], lasts[name % len(lasts)]) for name in names]
-    return Places(columns[:, rows], np.searchsorted(names, pairs), owners)
+    # Numbered in this order, before they are parted by owners.
+    return [
+        Places((firsts[name // len(lasts)], lasts[name % len(lasts)]), own, columns[:, rows[own]])
+        for name in sorted(set(pairs.tolist()))
+        for own in [np.flatnonzero(pairs == name)]
+    ]
 
 
 def _owners(p: Floats, normal: Floats, seats: Seats) -> tuple[Indices, Indices, list[Owner]]:
@@ -443,37 +442,32 @@ def _on(edges: EdgeTable, q: Floats) -> Bools:
 
 
 class Margins(NamedTuple):
-    """The margins of a group of interfaces between the edges of the same two owners.
+    """The margins of equal interfaces between the edges of the same two owners.
 
-    ``numbers`` are their places in the group's; ``nominal`` (mm), ``normal`` (2 rows) and
-    ``levers`` have a column for each. ``moves`` are the freedoms that only one of both parts has,
-    with their sign: 1 if it moves the end. ``levers`` has a row for each of these: the signed mm
-    per radian of a turn, 0 for a shift.
+    ``moves`` are the freedoms that only one of both parts has, with their sign: 1 if it moves the
+    end. ``levers`` has a row for each of these and a column for each place: the signed mm per
+    radian of a turn, 0 for a shift.
     """
 
-    group: MarginGroup
+    interfaces: Equal
     quantity: MarginKind
-    owners: Owners
-    numbers: Indices
-    nominal: Floats
-    normal: Floats
+    places: Places
     moves: Sequence[tuple[Freedom, float]]
     levers: Floats
 
     @property
     def cut_edges(self) -> int:
         """The number of cut edges of each margin: 2, or 0 for an overlap of seams."""
-        return sum(owner.is_cut for owner in self.owners)
+        return sum(owner.is_cut for owner in self.places.owners)
 
     @property
     def costs(self) -> Floats:
         """The most that each move takes from each margin, mm: a row a move."""
-        levers = [
-            np.ones(len(self.numbers)) if freedom.centre is None else np.abs(lever)
-            for (freedom, _), lever in zip(self.moves, self.levers, strict=True)
+        rows = [
+            np.full(len(lever), way.most) if way.centre is None else way.most * np.abs(lever)
+            for (way, _), lever in zip(self.moves, self.levers, strict=True)
         ]
-        rows = [way.most * lever for (way, _), lever in zip(self.moves, levers, strict=True)]
-        return np.array(rows).reshape(len(self.moves), len(self.numbers))
+        return np.array(rows).reshape(self.levers.shape)
 
     @property
     def pinned_loss(self) -> float:
@@ -481,30 +475,16 @@ class Margins(NamedTuple):
         return sum([freedom.most for freedom, _ in self.moves if not freedom.by_hand], 0.0)
 
 
-def margins_of(groups: Sequence[MarginGroup], moves: Freedoms) -> list[Margins]:
-    """Return the margins of all groups, bonds before overhangs, by the owners of their edges."""
-    return [
-        _between(group, quantity, number, moves)
-        for group in groups
-        for quantity, places in group.places.items()
-        for number in range(len(places.owners))
-        if (places.between == number).any()
-    ]
-
-
-def _between(group: MarginGroup, quantity: MarginKind, number: int, moves: Freedoms) -> Margins:
-    places, layers = group.places[quantity], seated(group.first)
-    (numbers,) = (places.between == number).nonzero()
-    between, owners = places.at(numbers), places.owners[number]
-    acting = list(relative_freedoms(owners, layers, moves))
-    levers = np.zeros((len(acting), len(numbers)))
-    for row, (freedom, sign) in enumerate(acting):
-        if freedom.centre is not None:
-            (x, y), p = freedom.centre, between.ends[sign > 0]
-            levers[row] = sign * ((p[0] - x) * between.normal[1] - (p[1] - y) * between.normal[0])
-    return Margins(
-        group, quantity, owners, numbers, between.nominal, between.normal, acting, levers
-    )
+def margins_of(narrow: Iterable[Narrow], moves: Freedoms) -> Iterator[Margins]:
+    """Yield the margins at narrow places."""
+    for interfaces, quantity, places in narrow:
+        acting = list(relative_freedoms(places.owners, seated(interfaces[0]), moves))
+        levers = np.zeros((len(acting), len(places.numbers)))
+        for row, (freedom, sign) in enumerate(acting):
+            if freedom.centre is not None:
+                (x, y), p = freedom.centre, places.ends[sign > 0]
+                levers[row] = sign * ((p[0] - x) * places.normal[1] - (p[1] - y) * places.normal[0])
+        yield Margins(interfaces, quantity, places, acting, levers)
 
 
 def relative_freedoms(

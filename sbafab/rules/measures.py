@@ -18,8 +18,9 @@ from sbafab.rules.boundary import Facing, Reach, edges_along, facing_films, outw
 from sbafab.rules.finding import Place
 from sbafab.rules.margins import (
     SHARP,
-    MarginGroup,
+    Equal,
     Margins,
+    Narrow,
     group_interfaces,
     margins_of,
     narrow_places,
@@ -50,8 +51,7 @@ class Measures:
         Places that are narrow with the rougher hand include every narrow place of a steadier one.
         """
         steadier = Measures(self.laminate, design, self.pause)
-        steadier.groups, steadier.laid = self.groups, self.laid
-        steadier.seam_ends = self.seam_ends
+        steadier.equal, steadier.narrow, steadier.laid = self.equal, self.narrow, self.laid
         return steadier
 
     @cached_property
@@ -89,33 +89,34 @@ class Measures:
         return lay_up(self.laminate)
 
     @cached_property
-    def _equal_interfaces(self) -> list[tuple[Interface, ...]]:
+    def equal(self) -> list[Equal]:
+        """Interfaces by equal profiles and freedoms."""
         return group_interfaces(self.laminate, self.facing, self.moves)
 
     @cached_property
     def seam_ends(self) -> list[SeamEnds]:
         """Seam ends in the first interface of each set of equal interfaces."""
-        first = [interfaces[0] for interfaces in self._equal_interfaces]
+        first = [interfaces[0] for interfaces in self.equal]
         return seam_ends(self.laminate, first, self.design.registration.error_of_seam)
 
     @cached_property
-    def groups(self) -> list[MarginGroup]:
-        """Equal interfaces, with their narrow places."""
-        interfaces = self._equal_interfaces
-        return narrow_places(
-            interfaces,
-            [self.bond(first) for first, *_ in interfaces],
-            [self.reaches(first) for first, *_ in interfaces],
+    def narrow(self) -> list[Narrow]:
+        """The narrow places of equal interfaces."""
+        places = narrow_places(
+            self.equal,
+            [self.bond(first) for first, *_ in self.equal],
+            [self.reaches(first) for first, *_ in self.equal],
             [ends.overlaps for ends in self.seam_ends],
             self.laminate.pins,
             self.design,
             self.moves,
         )
+        return list(places)
 
     @cached_property
     def margins(self) -> list[Margins]:
         """The margins of all interfaces, as linear forms."""
-        return margins_of(self.groups, self.moves)
+        return list(margins_of(self.narrow, self.moves))
 
 
 def _bond(bond: Region) -> Width | None:

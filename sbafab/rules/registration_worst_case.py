@@ -50,12 +50,11 @@ class Remaining(NamedTuple):
 
     @property
     def interfaces(self) -> tuple[Interface, ...]:
-        return self.margins.group.interfaces
+        return self.margins.interfaces
 
     @property
     def middle(self) -> Point:
-        places = self.margins.group.places[self.quantity]
-        return places.middle(int(self.margins.numbers[self.number]))
+        return self.margins.places.middle(self.number)
 
     @property
     def is_overlap(self) -> bool:
@@ -75,7 +74,7 @@ class Remaining(NamedTuple):
 
 def least_remaining(measures: Measures) -> list[Remaining]:
     """Return the worst place of every group of equal interfaces, for bond and overhang."""
-    runs = groupby(measures.margins, key=lambda margins: (id(margins.group), margins.quantity))
+    runs = groupby(measures.margins, key=lambda margins: (id(margins.interfaces), margins.quantity))
     return [_least([*run], measures.design) for _, run in runs]
 
 
@@ -87,15 +86,17 @@ def _least(run: Sequence[Margins], design: Design) -> Remaining:
     rows: list[tuple[float, int, float, Margins, int]] = []
     for margins in run:
         # Both edges are cut: two contours, or one that is off on either side.
-        cut = margins.nominal - margins.cut_edges * design.registration.cutting_error
-        counted = (margins.nominal >= drawn) | (margins.cut_edges == 0)
+        cut = margins.places.nominal - margins.cut_edges * design.registration.cutting_error
+        counted = (margins.places.nominal >= drawn) | (margins.cut_edges == 0)
         firm = cut[counted] - margins.pinned_loss
         pinned = min(pinned, float(firm.min(initial=math.inf)))
         worst = cut - margins.costs.sum(axis=0)
         (near,) = (worst <= worst.min() + SAME).nonzero()
         for number in near.tolist():
             value = float(worst[number])
-            rows.append((round(value, 9), int(margins.numbers[number]), value, margins, number))
+            rows.append(
+                (round(value, 9), int(margins.places.numbers[number]), value, margins, number)
+            )
     _, _, value, margins, number = min(rows, key=lambda row: row[:2])
     return Remaining(value, pinned, margins, number)
 
@@ -139,7 +140,7 @@ def _finding(
     pinned, interface = least_pinned.pinned, worst.interfaces[0]
     facts = {
         "rest": _mm(worst.worst),
-        "nominal": float(worst.margins.nominal[worst.number]),
+        "nominal": float(worst.margins.places.nominal[worst.number]),
         "what": _what(worst),
         "where": DistinctInterface(interface, len(worst.interfaces)).name,
         "cause": _cause(worst, measures.design),
@@ -187,7 +188,7 @@ def _what(worst: Remaining) -> Clause:
         return say(f"{NAME}.{worst.quantity}")
     interface = worst.interfaces[0]
     seams, first = bonding_seams(interface), 2 + len(interface.masks)
-    of, on = (seams[owner.seat - first].name for owner in worst.margins.owners)
+    of, on = (seams[owner.seat - first].name for owner in worst.margins.places.owners)
     return say(f"{NAME}.overlap", of=of, on=on)
 
 

@@ -152,25 +152,21 @@ class ShortMargins(NamedTuple):
 
 def short_margins(margins: Margins, design: Design) -> ShortMargins | None:
     """Return the margins that can fall short with every error at its worst; None if none can."""
-    rules, is_bond = design.rules, margins.quantity == "bond"
-    room = margins.nominal - (rules.worst_bond_width if is_bond else rules.worst_mask_overhang)
+    rules, is_bond, places = design.rules, margins.quantity == "bond", margins.places
+    room = places.nominal - (rules.worst_bond_width if is_bond else rules.worst_mask_overhang)
     cut = margins.cut_edges * design.registration.cutting_error
     (short,) = (room - cut - margins.costs.sum(axis=0) < -TOLERANCE).nonzero()
     if not len(short):
         return None
-    layers = seated(margins.group.first)
-    cuts = [CutContour(layers[owner.seat], owner.contour) for owner in margins.owners]
+    layers = seated(margins.interfaces[0])
+    cuts = [CutContour(layers[owner.seat], owner.contour) for owner in places.owners]
     # More film widens a bond, more mask an overhang; no cut moves an overlap of seams.
     a, b = (
         (1.0 if owner.is_film == is_bond else -1.0) if owner.is_cut else 0.0
-        for owner in margins.owners
+        for owner in places.owners
     )
-    of_short = margins._replace(
-        numbers=margins.numbers[short],
-        nominal=margins.nominal[short],
-        normal=margins.normal[:, short],
-        levers=margins.levers[:, short],
-    )
+    levers = margins.levers[:, short]
+    of_short = margins._replace(places=places.at(short), levers=levers)
     errors: list[Error] = [*cuts, *(freedom for freedom, _ in margins.moves)]
     return ShortMargins(of_short, room[short], errors, (a, b))
 
@@ -183,40 +179,43 @@ def short_builds(
     ``first`` are the numbers of the first row of each error, a column for each interface;
     ``numbers`` are from 0 to 1, a row for each error and a column for each build.
     """
-    room, (margins, _, _, signs) = short.room, short
+    margins, room, _, signs = short
     moves = list(zip(margins.moves, margins.levers, first[2:], strict=True))
+    shifts = [(way.most, row) for (way, _), _, row in moves if way.centre is None]
+    turns = [way.most * abs(lever) for (way, _), lever, _ in moves if way.centre is not None]
+    # Most builds keep their limits by their cuts alone, and others however the shifts point,
+    # whatever turns.
+    least = ROUNDING - TOLERANCE - float((room - sum(turns)).min())
+    there = first[:2]
+    off = sum(2 * sign * cutting * numbers[row] for sign, row in zip(signs, there, strict=True))
+    shifted = sum(most for most, _ in shifts)
+    may = np.flatnonzero(off < least + shifted + cutting * sum(signs))
+    place, build = np.divmod(may, numbers.shape[1])
     cuts = sum(
-        sign * cutting * (2 * numbers[row] - 1) for sign, row in zip(signs, first, strict=False)
+        sign * cutting * (2 * numbers[row[place], build] - 1)
+        for sign, row in zip(signs, there, strict=True)
     )
-    # Most builds keep their limits however the shifts point and whatever turns.
-    is_turn = [freedom.centre is not None for (freedom, _), _, _ in moves]
-    farthest, least = 0.0, room
-    for turns, ((freedom, _), lever, row) in zip(is_turn, moves, strict=True):
-        if turns:
-            least = least - freedom.most * abs(lever)
-        else:
-            farthest = farthest + freedom.most * np.sqrt(numbers[row])
-    interfaces, builds = np.nonzero(cuts - farthest + least.min() < ROUNDING - TOLERANCE)
-    is_short = np.zeros(len(builds), dtype=bool)
+    farthest = sum(most * np.sqrt(numbers[row[place], build]) for most, row in shifts)
+    (near,) = np.nonzero(cuts - farthest < least)
+    place, build, cuts = place[near], build[near], cuts[near]
+    is_short = np.zeros(len(build), dtype=bool)
     step = max(1, AT_ONCE // len(room))
-    for begin in range(0, len(builds), step):
-        some = slice(begin, begin + step)
-        place, build = interfaces[some], builds[some]
-        remaining = room[:, None] + cuts[place, build]
-        moved = np.zeros((2, len(build)))
-        for turns, ((freedom, sign), lever, row) in zip(is_turn, moves, strict=True):
-            number = numbers[row[place], build]
-            if turns:
+    for some in (slice(begin, begin + step) for begin in range(0, len(build), step)):
+        remaining = room[:, None] + cuts[some]
+        moved = np.zeros((2, remaining.shape[1]))
+        for (freedom, sign), lever, row in moves:
+            number = numbers[row[place[some]], build[some]]
+            if freedom.centre is not None:
                 remaining += lever[:, None] * (freedom.most * (2 * number - 1))
             else:
-                angle = math.tau * numbers[row[place] + 1, build]
+                angle = math.tau * numbers[row[place[some]] + 1, build[some]]
                 way = np.array([np.cos(angle), np.sin(angle)])
                 moved += sign * freedom.most * np.sqrt(number) * way
         # Not a matrix product, which would round differently on another machine.
-        for normal, move in zip(margins.normal, moved, strict=True):
+        for normal, move in zip(margins.places.normal, moved, strict=True):
             remaining += normal[:, None] * move
         is_short[some] = (remaining < -TOLERANCE).any(axis=0)
-    return interfaces[is_short], builds[is_short]
+    return place[is_short], build[is_short]
 
 
 def simulate(
@@ -224,22 +223,25 @@ def simulate(
 ) -> Yield:
     """Return the yield of random builds of a laminate; the same seed gives the same shares."""
     measures = measures or Measures(laminate, design)
-    indices = sorted({gap.index for group in measures.groups for gap in group.interfaces})
+    indices = sorted({gap.index for equal in measures.equal for gap in equal})
     shortfalls, drawn_rows = _drawn(measures)
     total = first_builds = design.rules.yield_builds or _quick_number(len(indices))
     short_of = np.zeros(len(indices), dtype=np.intp)
     whole = drawn_builds = 0
     generator = np.random.default_rng(seed)
+    numbers = np.empty((drawn_rows, 0))
     while drawn_builds < total:
         measures.pause()
         builds = min(BATCH, total - drawn_builds)
-        numbers = generator.random((drawn_rows, builds))
+        if numbers.shape[1] != builds:
+            numbers = np.empty((drawn_rows, builds))
+        generator.random(out=numbers)
         is_short = np.zeros((len(indices), builds), dtype=bool)
         for margins, first in shortfalls:
             interface, build = short_builds(
                 margins, first, design.registration.cutting_error, numbers
             )
-            of_group = [gap.index for gap in margins.margins.group.interfaces]
+            of_group = [gap.index for gap in margins.margins.interfaces]
             is_short[np.searchsorted(indices, of_group)[interface], build] = True
         short_of += np.count_nonzero(is_short, axis=1)
         whole += int(np.count_nonzero(is_short.any(axis=0)))
@@ -259,15 +261,16 @@ def _drawn(measures: Measures) -> tuple[list[tuple[ShortMargins, Indices]], int]
     rows: dict[Error, int] = {}
     count = 0
     drawn: list[tuple[ShortMargins, Indices]] = []
-    for group in measures.groups:
+    for equal in measures.equal:
         candidates = (
-            short_margins(m, measures.design) for m in measures.margins if m.group is group
+            short_margins(m, measures.design) for m in measures.margins if m.interfaces is equal
         )
         every = sorted(
-            filter(None, candidates), key=lambda s: (s.margins.quantity, s.margins.numbers[0])
+            filter(None, candidates),
+            key=lambda s: (s.margins.quantity, s.margins.places.numbers[0]),
         )
         errors = list(dict.fromkeys(error for short in every for error in short.errors))
-        felt = [_renamed(errors, group.first, gap, measures.moves) for gap in group.interfaces]
+        felt = [_renamed(errors, equal[0], gap, measures.moves) for gap in equal]
         for error in (error for errors_felt in felt for error in errors_felt):
             if rows.setdefault(error, count) == count:
                 count += 2 if isinstance(error, Freedom) and error.centre is None else 1

@@ -190,9 +190,10 @@ def test_builds_that_come_short_are_those_of_plain_sums(
         drawn = np.random.default_rng(5).random((2 * len(short.errors), FEW))
         first = 2 * np.arange(len(short.errors))[:, None]
         interface, builds = short_builds(short, first, cutting, drawn)
-        room, normal = margins.nominal - bond, margins.normal
+        places = margins.places
+        room, normal = places.nominal - bond, places.normal
         if margins.quantity == "overhang":
-            room = margins.nominal - asked.rules.worst_mask_overhang
+            room = places.nominal - asked.rules.worst_mask_overhang
         left = room[:, None] + sum(
             sign * cutting * (2 * drawn[2 * k] - 1) for k, sign in enumerate(short.signs)
         )
@@ -214,18 +215,16 @@ def test_builds_that_come_short_are_those_of_plain_sums(
 def test_forms_lose_what_their_moves_cost(good: Good) -> None:
     """A shift costs its most; a turn its angle times the lever of the end or the start it moves."""
     measures = Measures(good("3dof-15mm", "stack.balloons=2"), PAPER)
-    assert sum(len(m.numbers) for m in measures.margins) == sum(
-        places.columns.shape[1] for group in measures.groups for places in group.places.values()
-    )
     for margins in measures.margins:
-        start, end = margins.group.places[margins.quantity].at(margins.numbers).ends
+        start, end = margins.places.ends
+        normal = margins.places.normal
         costs = zip(margins.moves, margins.costs, strict=True)
         for (freedom, sign), cost in costs:
             if freedom.centre is None:
                 assert cost == pytest.approx(freedom.most)
                 continue
             p, (x, y) = end if sign > 0 else start, freedom.centre
-            lever = (p[0] - x) * margins.normal[1] - (p[1] - y) * margins.normal[0]
+            lever = (p[0] - x) * normal[1] - (p[1] - y) * normal[0]
             assert cost == pytest.approx(freedom.most * abs(lever))
         held = [freedom.most for freedom, _ in margins.moves if not freedom.by_hand]
         assert margins.pinned_loss == pytest.approx(sum(held))
