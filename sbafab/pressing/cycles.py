@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from sbafab.design.records import Design
 from sbafab.documents import Document, PlainNumber, attribute
@@ -114,13 +115,10 @@ def runs_of(
 
 def design_runs(design: Design, laminate: Laminate) -> Runs:
     """Return the runs of a design's order."""
-    press, order = design.press, design.order
-    return runs_of(
-        laminate,
-        order.quantity,
-        press.platen,
-        _copies_by_hours(design, laminate) if order.at_once is None else order.at_once,
-    )
+    order, most = design.order, design.order.at_once
+    if most is None:
+        most = _copies_by_hours(design, laminate)
+    return runs_of(laminate, order.quantity, design.press.platen, most)
 
 
 def _copies_by_hours(design: Design, laminate: Laminate) -> int:
@@ -145,8 +143,7 @@ def _grid(room: tuple[float, float], size: tuple[float, float]) -> tuple[int, in
     return columns, rows
 
 
-@dataclass(frozen=True)
-class BatchTimes:
+class BatchTimes(NamedTuple):
     """Minutes of a batch: in the press, by hand, and both in sequence; None if not stated."""
 
     press: float | None
@@ -206,11 +203,10 @@ def batch_entry(design: Design, laminate: Laminate, schedule: Schedule) -> Batch
     """Return the entry of ``press.json`` for a batch of several copies."""
     runs = design_runs(design, laminate)
     times = batch_times(runs, schedule)
-    platen = design.press.platen_width, design.press.platen_length
     patterns = laminate.patterns.items()
     return BatchEntry.read(
         runs,
-        at_once_at_most=most_together(laminate, platen),
+        at_once_at_most=most_together(laminate, design.press.platen),
         serials=[serial(runs, n + 1, design.order.batch) for n in range(runs.copies)],
         press_minutes=times.press,
         hands_minutes=times.hands,

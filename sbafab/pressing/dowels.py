@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import chain
 from typing import Literal, NamedTuple
 
 from sbafab.errors import DesignError
@@ -104,8 +105,7 @@ class PinSetting:
     tolerance_mm: float
 
 
-@dataclass(frozen=True)
-class PinHole:
+class PinHole(NamedTuple):
     """The hole of one pin in the base plate, mm.
 
     It is reamed from above down to a shoulder at ``depth`` +- ``tolerance``, on which the pin
@@ -156,15 +156,9 @@ def lengths_sold(
     """
     if stock:
         return tuple(sorted(stock))
-    low, high = next(
-        (span for sold, span in RANGES[standard].items() if abs(sold - diameter) < ROUNDING),
-        (SERIES[0], SERIES[-1]),
-    )
+    spans = (span for sold, span in RANGES[standard].items() if abs(sold - diameter) < ROUNDING)
+    low, high = next(spans, (SERIES[0], SERIES[-1]))
     return tuple(float(length) for length in SERIES if low <= length <= high)
-
-
-def least_seat(diameter: float) -> float:
-    return max(LEAST_SEAT, SEAT * diameter)
 
 
 def settings_by_step(
@@ -194,8 +188,15 @@ def settings_by_step(
         )
         for diameter, heights in tops.items()
     }
-    thickness = _thickness(choices, plate)
-    chosen = {diameter: _best(every, thickness) for diameter, every in choices.items()}
+    thickness = _thickness(choices, plate) - FLOOR + ROUNDING
+    # Of the depths that fit the plate the one at which the pins stand out least.
+    chosen = {
+        diameter: min(
+            (choice for choice in every if choice.depth <= thickness),
+            key=lambda choice: (choice.out, choice.depth),
+        )
+        for diameter, every in choices.items()
+    }
     return [
         tuple(_setting(pin, height, chosen[pin.diameter]) for pin in pins) for height, pins in steps
     ]
@@ -226,7 +227,7 @@ def _choices(
 ) -> list[_Choice]:
     """Return depths with which some pin stands no higher than it must over a stack."""
     needs = {top: top + chamfer(diameter) for top in tops}
-    seat = least_seat(diameter)
+    seat = max(LEAST_SEAT, SEAT * diameter)
     depths = {
         _rounded_down(length - length_tolerance(length) - depth_tolerance(length) - need)
         for need in needs.values()
@@ -234,15 +235,11 @@ def _choices(
     }
     choices = []
     for depth in sorted(depth for depth in depths if depth >= seat - ROUNDING):
-        lengths = {
-            top: length
-            for top, need in needs.items()
-            for length in [_shortest(sold, depth, need)]
-            if length is not None
-        }
-        if len(lengths) == len(needs):
-            out = max(length - depth - top for top, length in lengths.items())
-            choices.append(_Choice(depth, lengths, round(out, 6)))
+        lengths = {top: _shortest(sold, depth, need) for top, need in needs.items()}
+        known = {top: length for top, length in lengths.items() if length is not None}
+        if len(known) == len(needs):
+            out = max(length - depth - top for top, length in known.items())
+            choices.append(_Choice(depth, known, round(out, 6)))
     if not choices:
         highest = max(needs.values())
         raise DesignError(
@@ -284,28 +281,22 @@ def _thickness(choices: Mapping[float, Sequence[_Choice]], thickness: float | No
     return thickness
 
 
-def _best(choices: Sequence[_Choice], plate: float) -> _Choice:
-    """Return the depth, among those that fit the plate, at which the pins stand out least."""
-    fitting = [choice for choice in choices if choice.depth + FLOOR <= plate + ROUNDING]
-    return min(fitting, key=lambda choice: (choice.out, choice.depth))
-
-
 def pin_holes(settings: Sequence[Sequence[PinSetting]]) -> dict[str, PinHole]:
     """Return the plate's hole of every pin that some step uses, by the pin's name."""
     used: dict[str, list[PinSetting]] = {}
-    for step in settings:
-        for pin in step:
-            used.setdefault(pin.pin, []).append(pin)
+    for pin in chain.from_iterable(settings):
+        used.setdefault(pin.pin, []).append(pin)
     return {
         name: PinHole(
             name,
-            pins[0].diameter_mm,
-            pins[0].seat_mm,
-            depth_tolerance(pins[0].seat_mm),
-            push_out(pins[0].diameter_mm),
-            tuple(sorted({pin.length_mm for pin in pins})),
+            pin.diameter_mm,
+            pin.seat_mm,
+            depth_tolerance(pin.seat_mm),
+            push_out(pin.diameter_mm),
+            tuple(sorted({each.length_mm for each in every})),
         )
-        for name, pins in used.items()
+        for name, every in used.items()
+        for pin in every[:1]
     }
 
 
@@ -318,7 +309,7 @@ def hole_notes(
     a plate needs just a reamed hole, wherever it is.
     """
     sizes = dict.fromkeys(
-        (pin.diameter, replace(holes[pin.name], pin="") if pin.name in holes else None)
+        (pin.diameter, holes[pin.name]._replace(pin="") if pin.name in holes else None)
         for pin in sorted(pins, key=lambda pin: pin.diameter)
     )
     making = HOLE_PROCESSES[machine]

@@ -65,20 +65,19 @@ class Heating:
 
     def line(self, minutes: float | None) -> tuple[HeatPoint, ...]:
         """Return melting point, start and end of the clock of a step that lasts ``minutes``."""
-        points = []
-        if self.melting_c is not None:
-            points.append(self._point(MELTING, self.melting_c))
         start = self._point(START, self.clock_c)
-        end = None
+        end = edge = None
         if minutes is not None and start.after_minutes is not None:
             end = start.after_minutes + minutes
-        edge = None if end is None else self.edge_after(end)
-        after = None if end is None else round(end, 2)
-        return (
-            *points,
-            start,
-            HeatPoint(END, None if edge is None else round(edge, 1), None, after),
+            edge = self.edge_after(end)
+        rounded = HeatPoint(
+            END,
+            None if edge is None else round(edge, 1),
+            None,
+            None if end is None else round(end, 2),
         )
+        melting = [] if self.melting_c is None else [self._point(MELTING, self.melting_c)]
+        return (*melting, start, rounded)
 
     def _point(self, name: str, edge_c: float) -> HeatPoint:
         constants = self.constants_to(edge_c)

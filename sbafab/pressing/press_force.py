@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from sbafab.design.sections import Press
 from sbafab.errors import DesignError
@@ -45,8 +46,7 @@ class BuildUpPart:
     size_mm: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class StackShape:
+class StackShape(NamedTuple):
     """Shape of the stacks under the pad: their height, area and length of rim, mm.
 
     ``below`` is the height of the highest bond above the lowest, due to the masks over the latter.
@@ -58,8 +58,7 @@ class StackShape:
     below: float
 
 
-@dataclass(frozen=True)
-class Pressures:
+class Pressures(NamedTuple):
     """Estimated kPa: over the films, over their outer edge, over the lowest bond, and on the bare
     plate beside them. ``free`` is the width in mm beside the edge where the pad does not reach the
     plate.
@@ -162,14 +161,13 @@ def pad_thickness(press: Press, stacks: Sequence[StackShape]) -> float:
             f"sponge, {HARDEST_SPONGE:g} at most; lower it, or set press.pad_material = "
             '"silicone rubber"'
         )
+    of_pad = f"{press.pad_material} of {press.pad_hardness:g} Shore A"
+    aim = f"press with {press.pressure_kpa:g} kPa"
     if press.pad_thickness is not None:
         reasons = (_refusal(press, press.pad_thickness, under) for under in stacks)
-        why = next((reason for reason in reasons if reason), "")
-        if why:
+        if why := next(filter(None, reasons), ""):
             raise DesignError(
-                f"press.pad_thickness = {press.pad_thickness:g} of {press.pad_material} of "
-                f"{press.pad_hardness:g} Shore A cannot press with {press.pressure_kpa:g} kPa: "
-                f"{why}"
+                f"press.pad_thickness = {press.pad_thickness:g} of {of_pad} cannot {aim}: {why}"
             )
         return press.pad_thickness
     for thickness in (*PADS, *(PADS[-1] * number for number in range(2, 9))):
@@ -181,10 +179,7 @@ def pad_thickness(press: Press, stacks: Sequence[StackShape]) -> float:
             return thickness
     highest = max(stacks, key=lambda under: under.height)
     why = _refusal(press, 8 * PADS[-1], highest) or "it is too uneven; take a softer one"
-    raise DesignError(
-        f"no press pad of {press.pad_material} of {press.pad_hardness:g} Shore A "
-        f"(press.pad_hardness) can press with {press.pressure_kpa:g} kPa: {why}"
-    )
+    raise DesignError(f"no press pad of {of_pad} (press.pad_hardness) can {aim}: {why}")
 
 
 FEWER = "stack fewer balloons (stack.balloons)"
@@ -195,17 +190,15 @@ def _refusal(press: Press, thickness: float, under: StackShape) -> str:
     estimate = pressures(press, thickness, under)
     force = press.pressure_kpa * press.platen_area
     pressed = estimate.plate / pad_modulus(press) + under.height / thickness
+    over = f"over a stack {under.height:.3f} mm high"
+    softer = f"{FEWER}, or make it thicker or softer"
     if estimate.plate <= 0:
         return (
-            f"over a stack {under.height:.3f} mm high it does not reach the base plate, and the "
-            f"films take the whole force, {force / under.area:.0f} kPa; {FEWER}, or make it "
-            "thicker or softer"
+            f"{over} it does not reach the base plate, and the films take the whole force, "
+            f"{force / under.area:.0f} kPa; {softer}"
         )
     if estimate.film > MOST_UNEVEN * press.pressure_kpa:
-        return (
-            f"over a stack {under.height:.3f} mm high the films would get {estimate.film:.0f} kPa; "
-            f"{FEWER}, or make it thicker or softer"
-        )
+        return f"{over} the films would get {estimate.film:.0f} kPa; {softer}"
     if press.pad_material == "silicone sponge" and pressed > LARGEST_COMPRESSION:
         return (
             f"it would be pressed together by {pressed:.0%}, and can be by "

@@ -6,15 +6,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import chain
+from dataclasses import dataclass, replace
+from itertools import chain, groupby
 from typing import NamedTuple
 
 from sbafab.design.records import Design
 from sbafab.design.sections import Press
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
-from sbafab.laminate.films import FIRST, PAPER_PRODUCT, PAPER_THICKNESS, Film
+from sbafab.laminate.films import FIRST, PAPER_PRODUCT, PAPER_THICKNESS
 from sbafab.laminate.joints import PRESS, SeamKind, SeamTool
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.lay_up import (
@@ -57,21 +57,15 @@ def joined_words(words: Sequence[str]) -> str:
 
 def layers_in_words(layers: Sequence[int]) -> str:
     """Return text for layer indices; never 2-3, which a spreadsheet reads as a date."""
-    runs: list[list[int]] = []
-    for index in layers:
-        if runs and index == runs[-1][1] + 1:
-            runs[-1][1] = index
-        else:
-            runs.append([index, index])
+    runs = [
+        [index for _, index in run]
+        for _, run in groupby(enumerate(layers), lambda pair: pair[1] - pair[0])
+    ]
     if not runs:
         return "none"
-    words = [
-        word
-        for first, last in runs
-        for word in (
-            [f"{first} to {last}"] if last > first + 1 else map(str, range(first, last + 1))
-        )
-    ]
+    words: list[str] = []
+    for run in runs:
+        words += [f"{run[0]} to {run[-1]}"] if len(run) > 2 else map(str, run)
     return f"layer{'s' if len(layers) > 1 else ''} {joined_words(words)}"
 
 
@@ -89,54 +83,6 @@ class Caution(NamedTuple):
     def sentence(self) -> str:
         """Warning and remedy, for the designer."""
         return f"{self.words}; {self.remedy}" if self.remedy else self.words
-
-
-def _unstated_minutes(films: Sequence[Film], press: Press) -> Caution:
-    """Return the warning that no minutes are stated for these films."""
-    names = [f'"{film.said}"' for film in films]
-    stated = joined_words(
-        [f"{product}, {thickness:g} mm" for product, thickness in press.timed_films]
-    )
-    return Caution(
-        f"the minutes are blank: they were stated for {stated or 'no film'}, and none for "
-        f"{joined_words(names)}; try the bond on a sample at {press.temperature_c:g} C",
-        "set press.temperature_c, press.pressure_kpa and the press minutes to what held, and name "
-        "the film in press.minutes_for",
-    )
-
-
-STATED_C = 135.0
-"""Temperature that the paper states its minutes for, C (Sec. 2)."""
-
-
-def _minutes_of_another_temperature(
-    laminate: Laminate, press: Press, parts: Sequence[LayUpStep]
-) -> Iterator[Caution]:
-    """Yield the warning that the paper's minutes are used at a temperature other than the paper's.
-
-    The user stated all other minutes, also for films that the paper did not press, and tried them
-    as set.
-    """
-    paper = Press.model_construct()
-    usual = [
-        str(part.number)
-        for part in parts
-        if minutes_closed(press, part.name) == minutes_closed(paper, part.name)
-    ]
-    if press.temperature_c == STATED_C or not (usual and _is_the_papers(laminate)):
-        return
-    some = "" if len(usual) == len(parts) else f" of step{'s' * (len(usual) > 1)} "
-    yield Caution(
-        f"minutes{some}{joined_words(usual) if some else ''} stated for {STATED_C:g} C, the press "
-        f"is set to {press.temperature_c:g} C: nobody stated minutes for that, so try the bond on "
-        "scrap first, and set the press minutes to what held"
-    )
-
-
-def _is_the_papers(laminate: Laminate) -> bool:
-    """Return True if a film is the paper's, so that the paper's press trials apply to it."""
-    films = {layer.film for layer in pressed_layers(laminate)}
-    return any(film.is_a(PAPER_PRODUCT, PAPER_THICKNESS) for film in films)
 
 
 # The steps: layers pressed together, in their order (paper Sec. 2).
@@ -178,8 +124,7 @@ HANDLING_MINUTES = 60.0
 
 def minutes_closed(press: Press, step: StepName) -> float:
     """Return the minutes that the press stays closed in a step; tacking is a flash bond."""
-    minutes: float = getattr(press, STEPS[step][2])
-    return minutes
+    return float(getattr(press, STEPS[step][2]))
 
 
 @dataclass(frozen=True)
@@ -307,48 +252,35 @@ def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,))
     once, one number for each size of cycle, the largest first: they share the force.
     """
     press = design.press
-    refuse_temperature(laminate, press)
+    _refuse_temperature(laminate, press)
     parts = press_steps(laminate)
     under, *smaller = (
         [press_force.footprint(laminate, part.layers, count) for part in parts]
         for count in dict.fromkeys(together)
     )
-    stacks = [*under, *chain.from_iterable(smaller)]
-    pad = press_force.pad_thickness(press, stacks)
-    pins = pins_by_step(laminate, design)
+    pad = press_force.pad_thickness(press, [*under, *chain.from_iterable(smaller)])
+    pins, warming = pins_by_step(laminate, design), heating(laminate, press)
     plate = plate_thickness(press.plate_thickness, pins)
-    warming = heating(laminate, press)
     has_minutes = not films_without_minutes(laminate, press.timed_films)
-    steps = tuple(
-        _step(
-            laminate,
-            part,
-            press,
-            _Setting(
-                pad,
-                plate,
-                stack,
-                step_pins,
-                _underlay(laminate, part, press),
-                warming,
-                minutes_closed(press, part.name) if has_minutes else None,
-            ),
-            f" {SNIP}" if laminate.registration == "ears" and part is parts[-1] else "",
-        )
-        for part, stack, step_pins in zip(parts, under, pins, strict=True)
-    )
+    steps = []
+    for part, stack, step_pins in zip(parts, under, pins, strict=True):
+        minutes = minutes_closed(press, part.name) if has_minutes else None
+        bed = _Bed(pad, plate, _underlay(laminate, part, press), stack, step_pins)
+        steps.append(_step(laminate, part, press, bed, warming.line(minutes), minutes))
+    if laminate.registration == "ears" and steps:
+        steps[-1] = replace(steps[-1], instructions=f"{steps[-1].instructions} {SNIP}")
     total = sum(step.minutes or 0.0 for step in steps) if has_minutes else None
     pressed = "no minutes stated for this film" if total is None else f"{total:g} min"
+    is_timed = not design.form.is_drawn
     by_hand = (
         f"{HANDLING_MINUTES:g} min to cut, lay up, pin and fit the tubing; the latter is assumed "
         "the same for every design (paper: 1.75 h in all)"
+        if is_timed
+        else "a time by hand that nobody measured for drawn layers: no total"
     )
-    is_timed = not design.form.is_drawn
-    if not is_timed:
-        by_hand = "a time by hand that nobody measured for drawn layers: no total"
     has_total = total is not None and is_timed and not laminate.seams
     return Schedule(
-        steps,
+        tuple(steps),
         total,
         (total or 0.0) + HANDLING_MINUTES if has_total else None,
         f"{pressed} in the press and {by_hand}",
@@ -363,15 +295,16 @@ def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,))
 def pins_by_step(laminate: Laminate, design: Design) -> list[tuple[PinSetting, ...]]:
     """Return the pins of every press step. Raises DesignError if pins or plate do not fit."""
     press, registration = design.press, design.registration
-    parts = press_steps(laminate)
-    heights = [press_force.footprint(laminate, part.layers).height for part in parts]
+    on_plate = [
+        press_force.footprint(laminate, part.layers).height
+        + _underlay(laminate, part, press)
+        + press.release_thickness
+        for part in press_steps(laminate)
+    ]
     return settings_by_step(
         [
-            (
-                round(height + _underlay(laminate, part, press) + press.release_thickness, 6),
-                part.pins,
-            )
-            for height, part in zip(heights, parts, strict=True)
+            (round(height, 6), part.pins)
+            for height, part in zip(on_plate, press_steps(laminate), strict=True)
         ],
         registration.pin_standard,
         registration.pin_lengths,
@@ -389,34 +322,30 @@ def _underlay(laminate: Laminate, part: LayUpStep, press: Press) -> float:
     return press.underlay_thickness if is_laid_by_hand(laminate, part) else 0.0
 
 
-class _Setting(NamedTuple):
-    """Set-up of one step: thickness of pad, plate and underlay, mm, its stack and pins, the warming
-    of the plate, and the minutes.
-    """
+class _Bed(NamedTuple):
+    """What a stack is pressed with: thickness of pad, plate and underlay, mm, and its pins."""
 
     pad: float
     plate: float
+    underlay: float
     under: StackShape
     pins: tuple[PinSetting, ...]
-    underlay: float
-    heating: Heating
-    minutes: float | None
 
 
-def _step(laminate: Laminate, part: LayUpStep, press: Press, setting: _Setting, after: str) -> Step:
+def _step(
+    laminate: Laminate,
+    part: LayUpStep,
+    press: Press,
+    bed: _Bed,
+    line: tuple[HeatPoint, ...],
+    minutes: float | None,
+) -> Step:
+    estimate = press_force.pressures(press, bed.pad, bed.under)
+    basis = press_force.pressure_basis(press, bed.pad, bed.under, estimate)
     count = stack_count(laminate, part.layers)
-    estimate = press_force.pressures(press, setting.pad, setting.under)
-    title = STEPS[part.name][count > 1]
-    if part.name == "flash_bottom" and len(part.layers) > 2:
-        title = f"Bottom balloon{'s' * (count > 1)}, {layers_in_words(part.layers)}"
-    words = _instructions(part, count) + after
-    if part.name == "flash_middle" and laminate.middle_first:
-        title = "All layers between base and cap"
-    if part.joining is not None and len(part.layers) < len(laminate.layers):
-        title = f"Press of {layers_in_words(part.layers)}"
     return Step(
         step=part.number,
-        title=title,
+        title=_title(laminate, part, count),
         bond=part.bond,
         layers=part.layers,
         adds=part.adds,
@@ -425,19 +354,28 @@ def _step(laminate: Laminate, part: LayUpStep, press: Press, setting: _Setting, 
         pressure_kpa=press.pressure_kpa,
         force_n=round(press.force_n, 1),
         platen_mm=press.platen,
-        minutes=setting.minutes,
+        minutes=minutes,
         film_kpa=estimate.film,
         edge_kpa=estimate.edge,
         bond_kpa=estimate.bond,
         plate_kpa=estimate.plate,
-        pressure_basis=press_force.pressure_basis(press, setting.pad, setting.under, estimate)
-        + _round_pins(press, setting),
-        build_up=tuple(_items(press, setting, _size(laminate, part))),
-        pin_settings=setting.pins,
-        instructions=words,
-        time_temperature=setting.heating.line(setting.minutes),
+        pressure_basis=basis + _round_pins(press, bed),
+        build_up=tuple(_items(press, bed, _size(laminate, part))),
+        pin_settings=bed.pins,
+        instructions=_instructions(part, count),
+        time_temperature=line,
         reason="" if part.joining is None else part.joining.reason,
     )
+
+
+def _title(laminate: Laminate, part: LayUpStep, count: int) -> str:
+    if part.joining is not None and len(part.layers) < len(laminate.layers):
+        return f"Press of {layers_in_words(part.layers)}"
+    if part.name == "flash_middle" and laminate.middle_first:
+        return "All layers between base and cap"
+    if part.name == "flash_bottom" and len(part.layers) > 2:
+        return f"Bottom balloon{'s' * (count > 1)}, {layers_in_words(part.layers)}"
+    return STEPS[part.name][count > 1]
 
 
 def _size(laminate: Laminate, part: LayUpStep) -> tuple[float, float]:
@@ -447,26 +385,23 @@ def _size(laminate: Laminate, part: LayUpStep) -> tuple[float, float]:
     return round(max(high_x) - min(low_x), 6), round(max(high_y) - min(low_y), 6)
 
 
-def _round_pins(press: Press, setting: _Setting) -> str:
-    beneath = setting.under.height + press.release_thickness + setting.underlay
-    out = max((pin.stands_mm + pin.tolerance_mm - beneath for pin in setting.pins), default=0.0)
-    if not out:
-        return ""
-    free = press_force.unpressed(press, out)
-    return f"; up to {free:.1f} mm round a pin none"
+def _round_pins(press: Press, bed: _Bed) -> str:
+    beneath = bed.under.height + press.release_thickness + bed.underlay
+    out = max((pin.stands_mm + pin.tolerance_mm - beneath for pin in bed.pins), default=0.0)
+    return f"; up to {press_force.unpressed(press, out):.1f} mm round a pin none" if out else ""
 
 
-def _items(press: Press, setting: _Setting, size: tuple[float, float]) -> Iterator[BuildUpPart]:
+def _items(press: Press, bed: _Bed, size: tuple[float, float]) -> Iterator[BuildUpPart]:
     """Yield the build-up from the lower platen up; ``size`` is the size of the films in mm."""
     release = BuildUpPart(RELEASE, press.release_film, press.release_thickness, press.platen)
     pad = f"{press.pad_material}, {press.pad_hardness:g} Shore A"
-    yield BuildUpPart(BASE_PLATE, press.plate_material, setting.plate, press.platen)
-    if setting.underlay:
-        yield BuildUpPart(UNDERLAY, "plain paper, printed", setting.underlay, press.platen)
+    yield BuildUpPart(BASE_PLATE, press.plate_material, bed.plate, press.platen)
+    if bed.underlay:
+        yield BuildUpPart(UNDERLAY, "plain paper, printed", bed.underlay, press.platen)
     yield release
-    yield BuildUpPart(LAMINATE, "films of this step", round(setting.under.height, 6), size)
+    yield BuildUpPart(LAMINATE, "films of this step", round(bed.under.height, 6), size)
     yield release
-    yield BuildUpPart(PAD, pad, setting.pad, press.platen)
+    yield BuildUpPart(PAD, pad, bed.pad, press.platen)
 
 
 def _instructions(part: LayUpStep, count: int) -> str:
@@ -491,14 +426,13 @@ def _instructions(part: LayUpStep, count: int) -> str:
 def seam_steps(laminate: Laminate) -> Iterator[SeamStep]:
     """Yield the seams of a laminate, in the order in which they are made."""
     for step in lay_up_steps(laminate):
-        seam = None if step.joining is None else step.joining.seam
-        if step.joining is None or seam is None:
+        joining = step.joining
+        if joining is None or joining.seam is None:
             continue
-        lower, upper = laminate.layer(seam.below), laminate.layer(seam.above)
-        bond = laminate.bond_of(lower, upper, seam.tool)
+        seam = joining.seam
+        bond = laminate.bond_of(laminate.layer(seam.below), laminate.layer(seam.above), seam.tool)
         laid = f"Lay {layers_in_words(step.adds)} in place by hand. " if step.adds else ""
-        if step.joining.from_below:
-            laid += TURN_OVER
+        turn = TURN_OVER if joining.from_below else ""
         yield SeamStep(
             step=step.number,
             title=f"Seam {seam.name}",
@@ -512,13 +446,11 @@ def seam_steps(laminate: Laminate) -> Iterator[SeamStep]:
             length_mm=round(seam.length, 6),
             temperature_c=None if bond is None else bond.temperature_c,
             speed_mm_s=None,
-            instructions=(
-                f"{laid}{STAND_OUT if seam.kind == 'fin' else ''}Follow the path with the middle "
-                f"of the {seam.tool}, {seam.width:g} mm wide: it bonds layers {seam.below} and "
-                f"{seam.above}."
-            ),
-            reason=step.joining.reason,
-            from_below=step.joining.from_below,
+            instructions=f"{laid}{turn}{STAND_OUT if seam.kind == 'fin' else ''}Follow the path "
+            f"with the middle of the {seam.tool}, {seam.width:g} mm wide: it bonds layers "
+            f"{seam.below} and {seam.above}.",
+            reason=joining.reason,
+            from_below=joining.from_below,
         )
 
 
@@ -534,9 +466,9 @@ STAND_OUT = (
 def fold_steps(laminate: Laminate) -> Iterator[FoldStep]:
     """Yield the folds of a laminate, in order."""
     for step in lay_up_steps(laminate):
-        fold = None if step.joining is None else step.joining.fold
-        if step.joining is None or fold is None:
+        if step.joining is None or step.joining.fold is None:
             continue
+        fold = step.joining.fold
         (x, y), (u, v) = fold.line
         masks = tuple(range(fold.lower + 1, fold.upper))
         laid = f", {layers_in_words(masks)} on its half {fold.lower}" if masks else ""
@@ -545,10 +477,8 @@ def fold_steps(laminate: Laminate) -> Iterator[FoldStep]:
             title=f"Fold of layers {fold.lower} and {fold.upper}",
             layers=(fold.lower, fold.upper),
             line_mm=fold.line,
-            instructions=(
-                f"Lay the film flat{laid}, and fold half {fold.upper} over along the line from "
-                f"x {x:g}, y {y:g} to x {u:g}, y {v:g}."
-            ),
+            instructions=f"Lay the film flat{laid}, and fold half {fold.upper} over along the line "
+            f"from x {x:g}, y {y:g} to x {u:g}, y {v:g}.",
             reason=step.joining.reason,
         )
 
@@ -574,29 +504,27 @@ HOTTEST_TRIED = 150.0
 PRESSURES_TRIED = (70.0, 200.0)
 
 
-def refuse_temperature(laminate: Laminate, press: Press) -> None:
-    parts, pressed = press_steps(laminate), pressed_layers(laminate)
+def _refuse_temperature(laminate: Laminate, press: Press) -> None:
+    """Raise DesignError at a temperature that bonds no films, or is too hot for one or the pad."""
+    pressed = pressed_layers(laminate)
     if not pressed:
         return
+    is_set = f"press.temperature_c = {press.temperature_c:g}"
     for film in dict.fromkeys(layer.film for layer in pressed):
         melts = not film.is_mask and film.softens_above is not None
         if melts and press.temperature_c <= (film.softens_above or 0.0):
             raise DesignError(
-                f"press.temperature_c = {press.temperature_c:g} does not bond {film.product}, "
-                f"which melts at {film.softens_above:g} C; raise it (the paper presses at 135 C)"
+                f"{is_set} does not bond {film.product}, which melts at {film.softens_above:g} C; "
+                "raise it (the paper presses at 135 C)"
             )
-        if film.material == "PTFE" and press.temperature_c >= film.limit:
+        if press.temperature_c >= film.limit and film.material != FIRST[0]:
+            is_ptfe = film.material == "PTFE"
             raise DesignError(
-                f"press.temperature_c = {press.temperature_c:g} reaches the limit of the masks, "
-                f"{film.limit:g} C for {film.product}; lower it, for hotter PTFE gives off toxic "
-                "fumes"
+                f"{is_set} reaches the limit of {'the masks' if is_ptfe else film.material}, "
+                f"{film.limit:g} C for {film.product}; lower it"
+                + (", for hotter PTFE gives off toxic fumes" if is_ptfe else "")
             )
-        if film.material not in FIRST and press.temperature_c >= film.limit:
-            raise DesignError(
-                f"press.temperature_c = {press.temperature_c:g} reaches the limit of "
-                f"{film.material}, {film.limit:g} C for {film.product}; lower it"
-            )
-    _refuse_bonds(laminate, press, parts)
+    _refuse_bonds(laminate, press, is_set)
     for interface in laminate.interfaces:
         below, above = interface.below, interface.above
         if interface.pressed and below.film.stays_solid and above.film.stays_solid:
@@ -608,33 +536,32 @@ def refuse_temperature(laminate: Laminate, press: Press) -> None:
             )
     if press.temperature_c > press_force.PAD_LIMIT_C:
         raise DesignError(
-            f"press.temperature_c = {press.temperature_c:g} is more than the press pad of "
-            f"{press.pad_material} stands, {press_force.PAD_LIMIT_C:g} C; lower it"
+            f"{is_set} is more than the press pad of {press.pad_material} stands, "
+            f"{press_force.PAD_LIMIT_C:g} C; lower it"
         )
 
 
-def _refuse_bonds(laminate: Laminate, press: Press, parts: Sequence[LayUpStep]) -> None:
-    """Raises DesignError if the press is too cold for its bonds, or too hot for seams in it."""
+def _refuse_bonds(laminate: Laminate, press: Press, is_set: str) -> None:
+    """Raise DesignError if the press is too cold for its bonds, or too hot for seams in it."""
+    parts = [set(part.layers) for part in press_steps(laminate)]
     for gap in laminate.interfaces:
-        ends = {gap.below.index, gap.above.index}
-        if not any(ends <= set(part.layers) for part in parts):
+        below, above = gap.below.index, gap.above.index
+        if not any({below, above} <= layers for layers in parts):
             continue
         pressed = laminate.bond_of(gap.below, gap.above, PRESS)
         if pressed is not None and (pressed.temperature_c or 0.0) > press.temperature_c:
             raise DesignError(
-                f"press.temperature_c = {press.temperature_c:g} does not bond layers "
-                f"{gap.below.index} and {gap.above.index}, which face_bonds.{pressed.name} bonds "
-                f"at {pressed.temperature_c:g} C; raise it"
+                f"{is_set} does not bond layers {below} and {above}, which "
+                f"face_bonds.{pressed.name} bonds at {pressed.temperature_c:g} C; raise it"
             )
         for seam in gap.seams if pressed is None else ():
             bond = laminate.bond_of(gap.below, gap.above, seam.tool)
             melts = None if bond is None else bond.temperature_c
             if melts is not None and melts <= press.temperature_c:
                 raise DesignError(
-                    f"press.temperature_c = {press.temperature_c:g} would weld layers "
-                    f"{gap.below.index} and {gap.above.index} all over, which seam {seam.name} "
-                    f"bonds at {melts:g} C and leaves open elsewhere; press before the seam, lower "
-                    "the temperature, or lay a mask between them"
+                    f"{is_set} would weld layers {below} and {above} all over, which seam "
+                    f"{seam.name} bonds at {melts:g} C and leaves open elsewhere; press before the "
+                    "seam, lower the temperature, or lay a mask between them"
                 )
 
 
@@ -645,10 +572,10 @@ def _cautions(
     steps: Sequence[Step],
 ) -> Iterator[Caution]:
     press, registration = design.press, design.registration
-    yield from _unknown_films(laminate, press)
-    yield from _other_temperatures(laminate, press, parts)
+    yield from _of_films(laminate, press, parts)
     low, high = PRESSURES_TRIED
-    if not low <= press.pressure_kpa <= high:
+    is_tried = low <= press.pressure_kpa <= high
+    if not is_tried:
         yield Caution(
             f"{press.pressure_kpa:g} kPa lies outside {low:g} to {high:g} kPa; 110 kPa is "
             "validated, and earlier work pressed at 70 kPa"
@@ -659,8 +586,8 @@ def _cautions(
             f"{laminate.balloons} balloons are more than the {validated} validated; "
             "heat must pass the whole laminate, so try the bond on a sample first"
         )
-    uneven = [step for step in steps if not low <= step.film_kpa <= high]
-    if uneven and low <= press.pressure_kpa <= high:
+    uneven = [step for step in steps if is_tried and not low <= step.film_kpa <= high]
+    if uneven:
         worst = max(uneven, key=lambda step: abs(step.film_kpa - press.pressure_kpa))
         yield Caution(
             f"step {worst.step}: the films get about {worst.film_kpa:.0f} kPa (estimate), outside "
@@ -671,27 +598,17 @@ def _cautions(
         yield Caution(PINS_IN if laminate.pins_in_full_bonds else PINS_OUT)
     if laminate.middle_first and parts[0].name == "flash_middle":
         yield Caution(MIDDLE_FIRST)
-    pads = (
-        item.thickness_mm
-        for step in steps
-        for item in step.build_up
-        if item.part == press_force.PAD
-    )
-    pad = next(pads, 0.0)
+    pad = next((i.thickness_mm for s in steps for i in s.build_up if i.part == PAD), 0.0)
     if (pile := press_force.pad_sheets(pad)) > 1:
         yield Caution(
             f"the press pad is a pile of {pile} sheets, {pad:g} mm high together, which may "
             "slide aside: hold it in a frame, and see whether the press opens so far"
         )
-    unsold = {
-        pin.diameter
-        for pin in laminate.pins
-        if not is_sold(pin.diameter, registration.pin_standard)
-    }
+    diameters = sorted({pin.diameter for pin in laminate.pins})
+    unsold = [f"{d:g}" for d in diameters if not is_sold(d, registration.pin_standard)]
     if unsold and not registration.pin_lengths:
         yield Caution(
-            f"{registration.pin_standard} has no dowel pin of diameter "
-            f"{joined_words([f'{diameter:g}' for diameter in sorted(unsold)])}",
+            f"{registration.pin_standard} has no dowel pin of diameter {joined_words(unsold)}",
             "change the diameter, or make the pins and give their lengths in "
             "registration.pin_lengths",
         )
@@ -702,29 +619,53 @@ def _cautions(
             yield Caution(words, at_step=True)
 
 
-def _unknown_films(laminate: Laminate, press: Press) -> Iterator[Caution]:
-    """Yield warnings of films without stated minutes or melting point."""
-    if films := films_without_minutes(laminate, press.timed_films):
-        yield _unstated_minutes(films, press)
-    for film in dict.fromkeys(layer.film for layer in pressed_layers(laminate)):
+STATED_C = 135.0
+"""Temperature that the paper states its minutes for, C (Sec. 2)."""
+
+
+def _of_films(laminate: Laminate, press: Press, parts: Sequence[LayUpStep]) -> Iterator[Caution]:
+    """Yield warnings of films without stated minutes or melting point, or pressed too hot.
+
+    The paper's minutes are for its temperature. The user stated all other minutes, also for films
+    that the paper did not press, and tried them as set.
+    """
+    heat, pressed = f"{press.temperature_c:g} C", pressed_layers(laminate)
+    untimed = films_without_minutes(laminate, press.timed_films)
+    if untimed:
+        names = joined_words([f'"{film.said}"' for film in untimed])
+        stated = joined_words([f"{product}, {size:g} mm" for product, size in press.timed_films])
+        yield Caution(
+            f"the minutes are blank: they were stated for {stated or 'no film'}, and none for "
+            f"{names}; try the bond on a sample at {heat}",
+            "set press.temperature_c, press.pressure_kpa and the press minutes to what held, and "
+            "name the film in press.minutes_for",
+        )
+    for film in dict.fromkeys(layer.film for layer in pressed):
         if not film.is_mask and film.softens_above is None and not film.stays_solid:
             yield Caution(
                 f"no melting point of {film.product} is known, so nobody has checked that "
-                f"{press.temperature_c:g} C bonds it",
+                f"{heat} bonds it",
                 f"add {film.table}.melting_point, in C",
             )
-
-
-def _other_temperatures(
-    laminate: Laminate, press: Press, parts: Sequence[LayUpStep]
-) -> Iterator[Caution]:
-    """Yield warnings of a temperature without stated minutes, or at which no one has pressed."""
-    if not films_without_minutes(laminate, press.timed_films):
-        yield from _minutes_of_another_temperature(laminate, press, parts)
-    if press.temperature_c > HOTTEST_TRIED and _is_the_papers(laminate):
+    if not any(layer.film.is_a(PAPER_PRODUCT, PAPER_THICKNESS) for layer in pressed):
+        return
+    paper = Press.model_construct()
+    usual = [
+        str(part.number)
+        for part in parts
+        if minutes_closed(press, part.name) == minutes_closed(paper, part.name)
+    ]
+    if usual and not untimed and press.temperature_c != STATED_C:
+        which = f" of step{'s' * (len(usual) > 1)} {joined_words(usual)}"
         yield Caution(
-            f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "
-            "which already over-melted more than 135 C does"
+            f"minutes{which if len(usual) < len(parts) else ''} stated for {STATED_C:g} C, the "
+            f"press is set to {heat}: nobody stated minutes for that, so try the bond on scrap "
+            "first, and set the press minutes to what held"
+        )
+    if press.temperature_c > HOTTEST_TRIED:
+        yield Caution(
+            f"{heat} is hotter than the {HOTTEST_TRIED:g} C of earlier work, which already "
+            "over-melted more than 135 C does"
         )
 
 
