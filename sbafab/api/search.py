@@ -9,7 +9,8 @@ from typing import Any
 from sbafab.api.designs import Source, command, load, numbers
 from sbafab.design.files import Change, changed_keys
 from sbafab.design.records import Design, Free
-from sbafab.search.compare import DesignComparison, ReachedYield, load_compared, write_page
+from sbafab.search.advice import YieldDesign
+from sbafab.search.compare import DesignComparison, load_compared, write_page
 from sbafab.search.compare import compare as run_compare
 from sbafab.search.compare import reach_yield as run_reach_yield
 from sbafab.search.find import FoundDesign
@@ -54,13 +55,13 @@ def find(
 
 
 @command
-def reach_yield(source: Source, *changes: Change, target: float, **tables: Any) -> ReachedYield:
+def reach_yield(source: Source, *changes: Change, target: float, **tables: Any) -> YieldDesign:
     """The design with the least change that reaches a yield, and the cost of that change.
 
     ``reach_yield("3dof-15mm", target=0.95).design`` goes to ``generate``; ``target`` is the share
     of random builds that are good. Order of stacking, bond, overhang, base plate and ears may
     change; keys in ``changes`` and ``tables`` stay. In the result, ``changes`` has both values of
-    each key, ``comparison`` the figures of both designs, ``found.share`` the share; ``design`` is
+    each key, ``comparison`` the figures of both designs, ``share`` the share; ``design`` is
     None if no change reaches the target, and ``sentence`` explains why. Raises DesignError.
     """
     fixed = frozenset(changed_keys([*changes, tables]))

@@ -200,7 +200,7 @@ def _generate_for_yield(
     """Write the folder of a design changed for a yield; exits with 1 if none reaches it."""
     # Both designs are predicted, which a plain run does not do: models load slowly.
     from sbafab.cli.search import print_changes
-    from sbafab.search.compare import reach_yield
+    from sbafab.search.compare import reach_yield, yield_document
 
     with show.progress(request.as_json) as progress:
         fixed = frozenset(changed_keys(request.assignments))
@@ -213,7 +213,7 @@ def _generate_for_yield(
         show.wrapped(reached.sentence)
         show.line("")
 
-    more = {"yield": reached.as_dict()} if request.as_json else {}
+    more = {"yield": yield_document(reached)} if request.as_json else {}
     _run(request, runs.generate, reached.design, before, more, **settings)
 
 

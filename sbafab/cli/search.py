@@ -15,7 +15,6 @@ import click
 from sbafab.actuators import load_design
 from sbafab.cli import options as opt
 from sbafab.cli import show
-from sbafab.cli.exit import print_error
 from sbafab.design.files import changed_keys, name_of, template_names
 from sbafab.errors import DesignError
 from sbafab.laminate.burst import is_near_burst
@@ -24,6 +23,7 @@ from sbafab.models.pneumatics import MOST_PRESSURE
 from sbafab.runtime import Progress
 from sbafab.search import compare as comparing
 from sbafab.search import sweep as sweeping
+from sbafab.search.advice import YieldDesign
 from sbafab.search.find import (
     FoundDesign,
     find_document,
@@ -42,8 +42,8 @@ from sbafab.search.quantities import (
     shown_value,
 )
 from sbafab.search.space import FindRequest, figure_text, read_free
-from sbafab.search.sweep import SweepDocument, SweepRequest, SweepStopped
-from sbafab.search.vary import format_keys, format_value, varied_keys
+from sbafab.search.sweep import SweepDocument, SweepRequest
+from sbafab.search.vary import KeyDifference, format_keys, format_value, varied_keys
 
 Outcome = TypeVar("Outcome")
 FOUND = "found.toml"
@@ -113,12 +113,8 @@ def find(source: str | None, **options: Any) -> None:
     refuse_existing(target)
     if any(_counts_tabs(request) for request in requests.values()):
         show.note(TABS_HINT)
-    try:
-        with show.progress(options["as_json"]) as progress:
-            origin, result = _best_result(requests, progress)
-    except KeyboardInterrupt:
-        print_error("the search was stopped, and no file was written")
-        raise
+    with show.progress(options["as_json"]) as progress:
+        origin, result = _best_result(requests, progress)
     if result.holds:
         name = name_of(target.stem) or origin
         write_found(found_toml(origin, options["assignments"], name, result, target), target)
@@ -352,15 +348,8 @@ def sweep(
     """
     design = load_design(*request.source)
     sweep_request = SweepRequest(design, varied_keys(varied), pressures_kpa=pressures, **settings)
-    try:
-        with show.progress(request.as_json) as progress:
-            swept = sweeping.sweep(sweep_request, request.out, progress)
-    except SweepStopped as stop:
-        print_error(
-            f"{stop.measured} of {stop.designs} designs are computed; run the same command again "
-            "to resume"
-        )
-        raise
+    with show.progress(request.as_json) as progress:
+        swept = sweeping.sweep(sweep_request, request.out, progress)
     if request.as_json:
         show.document(SweepDocument.of(swept))
         return
@@ -437,7 +426,7 @@ def compare(
     )
 
 
-def print_changes(reached: comparing.ReachedYield) -> None:
+def print_changes(reached: YieldDesign) -> None:
     """Print the keys that were changed for a yield, and the figures before and after."""
     if reached.comparison is not None:
         names = ("", *comparing.DESIGNS)
@@ -445,7 +434,7 @@ def print_changes(reached: comparing.ReachedYield) -> None:
         _print_figures(reached.comparison, names)
 
 
-def _print_keys(title: str, names: Sequence[str], rows: Sequence[comparing.KeyDifference]) -> None:
+def _print_keys(title: str, names: Sequence[str], rows: Sequence[KeyDifference]) -> None:
     show.table(title, names, [(row.key, *map(format_value, row.values)) for row in rows])
 
 

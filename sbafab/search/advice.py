@@ -10,7 +10,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from sbafab.actuators import build
 from sbafab.design.records import REGISTRATIONS, Design
@@ -19,6 +19,10 @@ from sbafab.laminate.base_plate import PlateMachine
 from sbafab.rules.deck import run_deck
 from sbafab.rules.registration_yield import SEED, Share, simulate
 from sbafab.runtime import Progress, ignore_progress
+from sbafab.search.vary import KeyDifference
+
+if TYPE_CHECKING:
+    from sbafab.search.compare import DesignComparison
 
 STEP = 0.01
 """mm: bond and overhang are advised in whole steps."""
@@ -112,22 +116,24 @@ def advise(design: Design, target: float, progress: Progress = ignore_progress) 
 
 @dataclass(frozen=True)
 class YieldDesign:
-    """A design for a yield: ``design`` is ``given`` with the ``changes``, by key; None if no
-    change reaches the share ``target``.
+    """A design for a yield: ``design`` is ``given`` with the ``changes``, None if no change reaches
+    the share ``target``, and the given one if that suffices.
 
-    ``share`` is counted on the changed design by another seed, or on the given one if that is
-    enough; ``best`` and ``best_changes`` are the best that was reached where nothing is enough.
-    ``fixed``: keys that were not changed although a change might have helped.
+    ``changes`` are keys with their old and new value. ``share`` is counted on the changed design by
+    another seed, or on the given one if that is enough; ``best`` and ``best_changes`` are the best
+    that was reached where nothing is enough. ``fixed``: keys that were not changed although a
+    change might have helped. ``comparison`` has the figures of both designs, if one was changed.
     """
 
     target: float
     given: Design
     design: Design | None
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    changes: tuple[KeyDifference, ...] = ()
     share: Share | None = None
     best: Share | None = None
-    best_changes: Mapping[str, Any] = field(default_factory=dict)
+    best_changes: tuple[KeyDifference, ...] = ()
     fixed: tuple[str, ...] = ()
+    comparison: DesignComparison | None = field(default=None, repr=False)
 
     @property
     def sentence(self) -> str:
@@ -154,11 +160,11 @@ class YieldDesign:
         )
 
 
-def _format(changes: Mapping[str, Any]) -> str:
-    return ", ".join(f"{key} = {value}" for key, value in changes.items())
+def _format(changes: Iterable[KeyDifference]) -> str:
+    return ", ".join(f"{change.key} = {change.values[1]}" for change in changes)
 
 
-def value_of(design: Design, key: str) -> Any:
+def _value_of(design: Design, key: str) -> Any:
     """Return the value of a dotted key."""
     value: Any = design
     for name in key.split("."):
@@ -182,7 +188,7 @@ def reach_yield(
     """
     targeted = design.with_({TARGET: target})
     free = (key for key in (BOND, OVERHANG) if key not in fixed and targeted.uses(key))
-    start = {key: value_of(targeted, key) for key in free}
+    start = {key: _value_of(targeted, key) for key in free}
     as_given = _Trials(targeted, start, target, progress)
     broken = as_given.broken(AS_GIVEN)
     if broken - {WORST_CASE, PIN_FIT}:
@@ -202,16 +208,18 @@ def reach_yield(
         least = _smallest(trials, most if start else 0)
         if least is not None:
             changes = _changes(targeted, {**trials.lengths(least), **words})
+            changed = targeted.with_({change.key: change.values[1] for change in changes})
             share = trials.share(least, CHECK_SEED)
-            return YieldDesign(target, design, targeted.with_(changes), changes, share)
+            return YieldDesign(target, design, changed, changes, share)
     best, best_changes = _best(targeted, tried.values())
     useful = tuple(key for key in (BOND, OVERHANG, METHOD, SEQUENCE, PLATE) if key in fixed)
     return YieldDesign(target, design, None, best=best, best_changes=best_changes, fixed=useful)
 
 
-def _changes(design: Design, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values that a design does not have."""
-    return {key: value for key, value in values.items() if value != value_of(design, key)}
+def _changes(design: Design, values: Mapping[str, Any]) -> tuple[KeyDifference, ...]:
+    """Return the keys whose values a design does not have."""
+    both = {key: (_value_of(design, key), value) for key, value in values.items()}
+    return tuple(KeyDifference(key, two) for key, two in both.items() if two[0] != two[1])
 
 
 def _ways(design: Design, fixed: Collection[str]) -> Iterator[tuple[dict[str, str], int]]:
@@ -236,7 +244,9 @@ def _ways(design: Design, fixed: Collection[str]) -> Iterator[tuple[dict[str, st
         yield from ((way, MOST_STEPS) for way in group)
 
 
-def _best(design: Design, tried: Iterable[_Trials]) -> tuple[Share | None, Mapping[str, Any]]:
+def _best(
+    design: Design, tried: Iterable[_Trials]
+) -> tuple[Share | None, tuple[KeyDifference, ...]]:
     """Return the best share that passes the other rules, with its changes; of equal ones the
     first.
     """
@@ -249,9 +259,9 @@ def _best(design: Design, tried: Iterable[_Trials]) -> tuple[Share | None, Mappi
     every.sort(key=lambda entry: -entry[0].value)
     for share, trials, steps in every[:MOST_CHECKED]:
         if not trials.broken(steps):
-            words = {key: value_of(trials.design, key) for key in (METHOD, SEQUENCE, PLATE)}
+            words = {key: _value_of(trials.design, key) for key in (METHOD, SEQUENCE, PLATE)}
             return share, _changes(design, {**trials.lengths(steps), **words})
-    return None, {}
+    return None, ()
 
 
 # Bond and overhang by steps, each tried once.

@@ -9,7 +9,8 @@ import csv
 import json
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -20,7 +21,7 @@ from sbafab.design.files import Change, override, shown
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, validated
 from sbafab.documents import Document, PlainNumber, attribute
-from sbafab.errors import DesignError, OutputError
+from sbafab.errors import DesignError, writing
 from sbafab.folders.build import Build, make_build
 from sbafab.folders.swap import replace_text
 from sbafab.laminate.burst import refuse_beyond_burst
@@ -37,10 +38,10 @@ from sbafab.reports.inflated_picture import WHY, PictureRequest, pictures_at_one
 from sbafab.reports.solid_png import solid_png
 from sbafab.runtime import Progress, ignore_progress
 from sbafab.search import advice
-from sbafab.search.advice import YieldDesign, value_of
+from sbafab.search.advice import YieldDesign
 from sbafab.search.sweep_report import CSV, JOURNAL, PageSection, page_html
 from sbafab.search.trials import RuleMargin, margins
-from sbafab.search.vary import NOTHING, format_value, key_values
+from sbafab.search.vary import NOTHING, KeyDifference, format_value, key_values
 from sbafab.version import GENERATOR
 
 FOLDER, PAGE = "compare", "compare.html"
@@ -95,14 +96,6 @@ class ComparedDesign:
 
 
 @dataclass(frozen=True)
-class KeyDifference:
-    """A key that differs, and its two values; None if a design has no such key."""
-
-    key: str
-    values: tuple[Any, Any]
-
-
-@dataclass(frozen=True)
 class RuleDifference:
     """A rule whose verdict or margin differs, or its measured value if it has no limit; None if a
     design has no such finding.
@@ -138,8 +131,7 @@ class FigurePair:
     @property
     def differs(self) -> bool:
         """True if the values differ in the first DIGITS digits, or one is missing."""
-        texts = {figure and f"{figure.value:.{DIGITS}g}" for figure in self.figures}
-        return len(texts) > 1
+        return len({figure and f"{figure.value:.{DIGITS}g}" for figure in self.figures}) > 1
 
 
 @dataclass(frozen=True)
@@ -155,16 +147,14 @@ class DesignComparison:
     @property
     def names(self) -> tuple[str, str]:
         """Names of the designs; if these are equal, their sources."""
-        first, second = self.designs
-        names = first.design.name, second.design.name
-        files = Path(first.source).name, Path(second.source).name
-        sources = first.source, second.source
-        return next((pair for pair in (names, files) if pair[0] != pair[1]), sources)
+        a, b = self.designs
+        pairs = (a.design.name, b.design.name), (Path(a.source).name, Path(b.source).name)
+        return next((pair for pair in pairs if pair[0] != pair[1]), (a.source, b.source))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of ``compare --json``."""
         return CompareDocument.of(
-            self, rules=[*map(_rule_entry, self.rules)], figures=[*map(figure_entry, self.figures)]
+            self, rules=[*map(_rule_entry, self.rules)], figures=[*map(_figure_entry, self.figures)]
         )
 
 
@@ -227,8 +217,7 @@ def _rule_entry(row: RuleDifference) -> RuleEntry:
     )
 
 
-def figure_entry(pair: FigurePair) -> FigureEntry:
-    """Return a figure of both designs as an entry of a document."""
+def _figure_entry(pair: FigurePair) -> FigureEntry:
     each = [figure.as_dict() if figure is not None else None for figure in pair.figures]
     columns = ("value", "interval", "model")
     return FigureEntry.read(pair, **{f"{c}s": [row and row[c] for row in each] for c in columns})
@@ -240,35 +229,33 @@ def load_compared(source: str | Path, changes: Iterable[Change] = ()) -> Design:
     """
     row = _ROW.fullmatch(str(source))
     if row is not None and not Path(source).exists():
-        return _swept(Path(row[1]), int(row[2])).with_(*changes)
+        return _swept(Path(row[1]), row[2]).with_(*changes)
     file = Path(source) / "design.toml"
-    try:
-        is_output = file.is_file()
-    except (OSError, ValueError):
-        is_output = False
-    return load_design(file if is_output else source, changes)
+    with suppress(OSError):  # a text too long for a path
+        source = file if file.is_file() else source
+    return load_design(source, changes)
 
 
-def _swept(table: Path, number: int) -> Design:
+def _swept(table: Path, number: str) -> Design:
     """Return the design of a row of a sweep by row number, from the journal beside the table."""
     journal = table.with_name(JOURNAL)
     try:
         with table.open(encoding="utf-8", newline="") as opened:
-            rows = [row for row in csv.DictReader(opened) if row.get("number") == str(number)]
-        sha256 = rows[0].get("sha256") if rows else None
+            rows = (row for row in csv.DictReader(opened) if row.get("number") == number)
+            sha256 = next(rows, {}).get("sha256")
         if not sha256:
             raise DesignError(f"{table} has no design of number {number}")
         with journal.open(encoding="utf-8") as opened:
             # The last line may be incomplete.
-            lines = [line for line in opened if f'"{sha256}"' in line and line.endswith("}}\n")]
+            whole = (line for line in opened if f'"{sha256}"' in line and line.endswith("}}\n"))
+            line = next(whole, "")
     except (OSError, UnicodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
         message = f"{shown(table)} cannot be read: {reason}; name a sweep's {CSV}"
         raise DesignError(message) from None
-    if not lines:
+    if not line:
         raise DesignError(f"{journal} has no design of number {number}; sweep again")
-    keys = json.loads(lines[0])["row"]["keys"]
-    design = validated(override({}, [keys]), records(), table.parent)
+    design = validated(override({}, [json.loads(line)["row"]["keys"]]), records(), table.parent)
     if design_sha256(design) != sha256:
         raise DesignError(
             f"number {number} of {table} names files that are not beside it, or another version "
@@ -294,28 +281,25 @@ def compare(
     each = []
     for number, (design, source) in enumerate(zip((first, second), sources, strict=True)):
         progress(f"predicting {design.name}", number, 2)
-        checked = make_build(design)
+        made = make_build(design)
         pressures = tuple(pressures_kpa or usual_pressures(design.form)[:1])
-        request = PredictionRequest(pressures, flow_ml_min)
-        prediction = predict(design, request, checked.laminate)
         figures = tuple(
             figure
-            for figure in prediction.figures
+            for figure in predict(
+                design, PredictionRequest(pressures, flow_ml_min), made.laminate
+            ).figures
             if not figure.other or (figure.interval and _is_main(figure.quantity, figure.at))
         )
-        each.append(ComparedDesign(source, checked, margins(checked.findings), figures))
+        each.append(ComparedDesign(source, made, margins(made.findings), figures))
     a, b = each
     keys = _paired(key_values(a.design), key_values(b.design))
-    pairs = _paired(*({(f.quantity, f.at): f for f in comparison.figures} for comparison in each))
+    rules = _paired(a.rules, b.rules)
+    pairs = _paired(*({(f.quantity, f.at): f for f in compared.figures} for compared in each))
     return DesignComparison(
         (a, b),
         tuple(KeyDifference(k, two) for k, two in keys if k != "name" and two[0] != two[1]),
-        tuple(
-            RuleDifference(rule, two)
-            for rule, two in _paired(a.rules, b.rules)
-            if _verdict(two[0]) != _verdict(two[1])
-        ),
-        tuple(FigurePair(quantity, at, two) for (quantity, at), two in pairs),
+        tuple(RuleDifference(k, two) for k, two in rules if _judged(two[0]) != _judged(two[1])),
+        tuple(FigurePair(*figure, two) for figure, two in pairs),
         tuple(pressures_kpa or usual_pressures(first.form)[:1]),
     )
 
@@ -327,7 +311,7 @@ def _paired(
     return [(key, (a.get(key), b.get(key))) for key in dict.fromkeys([*a, *b])]
 
 
-def _verdict(margin: RuleMargin | None) -> tuple[str, float | None] | None:
+def _judged(margin: RuleMargin | None) -> tuple[str, float | None] | None:
     if margin is None:
         return None
     # A yield without a limit still differs by its value.
@@ -345,10 +329,9 @@ def margin_text(margin: RuleMargin | None) -> str:
     """Return verdict and margin of a rule; the measured value if the rule has no limit."""
     if margin is None:
         return NOTHING
-    if margin.margin is None:
-        measured = "" if margin.measured is None else f", {margin.measured:.3g} {margin.unit}"
-        return f"{margin.verdict}{measured}".rstrip()
-    return f"{margin.verdict}, margin {margin.margin:.3g} {margin.unit}".rstrip()
+    value, word = (margin.measured, "") if margin.margin is None else (margin.margin, "margin ")
+    text = "" if value is None else f", {word}{value:.3g} {margin.unit}"
+    return f"{margin.verdict}{text}".rstrip()
 
 
 def reached_text(figure: Figure | None) -> str:
@@ -366,16 +349,11 @@ def write_page(comparison: DesignComparison, out: Path) -> Path:
 
     Raises OutputError if it cannot be written.
     """
-    folder = out / FOLDER
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        replace_text(folder / PAGE, compare_html(comparison))
-    except OSError as error:
-        raise OutputError(
-            f"{folder / PAGE} cannot be written: {error.strerror or error}; choose another folder "
-            "with -o"
-        ) from None
-    return folder
+    page = out / FOLDER / PAGE
+    with writing(page):
+        page.parent.mkdir(parents=True, exist_ok=True)
+        replace_text(page, compare_html(comparison))
+    return page.parent
 
 
 def compare_html(comparison: DesignComparison) -> str:
@@ -392,16 +370,12 @@ def compare_html(comparison: DesignComparison) -> str:
         f"{name}: " + (f"fails {', '.join(each.failed)}" if each.failed else "passes every rule")
         for name, each in zip(names, designs, strict=True)
     ]
+    same = "" if rules else "No verdict or margin differs."
     sections = [
         _flat(comparison),
         _inflated(comparison),
         PageSection("Keys", head=head, rows=keys, note="" if keys else "No key differs."),
-        PageSection(
-            "Rules",
-            head=head,
-            rows=rules,
-            note="" if rules else "No verdict or margin differs.",
-        ),
+        PageSection("Rules", head=head, rows=rules, note=same),
         PageSection("Figures", head=head, rows=figures, grey=grey, note=intervals),
     ]
     first, second = (each.design_sha256[:12] for each in designs)
@@ -431,12 +405,10 @@ def _inflated(comparison: DesignComparison) -> PageSection:
             refuse_beyond_burst(laminate, pressure)
             most = max(MOST_PRESSURE, pressure)
             together = stack(design, laminate, most, factors_of(design), form)
-            rest = together.chambers - 1
-            pose = together.pose((pressure, *(0.0,) * rest))
+            pose = together.pose((pressure, *(0.0,) * (together.chambers - 1)))
+            bodies.append((laminate, together, pose))
         except DesignError as error:
             notes[number] = str(error)
-            continue
-        bodies.append((laminate, together, pose))
     wish = PictureRequest({}, width=SIZE[0], height=SIZE[1])
     drawn = map(_uri, pictures_at_one_scale(bodies, wish))
     uris = ["" if note else next(drawn) for note in notes]
@@ -454,45 +426,6 @@ def _uri(png: bytes) -> str:
 DESIGNS = "as given", "changed"
 
 
-@dataclass(frozen=True)
-class ReachedYield:
-    """The ``design`` for a yield, None if none reaches it; ``found`` describes the changes.
-
-    ``comparison`` holds both designs with their figures; None if nothing was changed.
-    """
-
-    found: YieldDesign
-    comparison: DesignComparison | None
-
-    @property
-    def design(self) -> Design | None:
-        """The changed design; the original if it suffices, None if no change does."""
-        return self.found.design
-
-    @property
-    def sentence(self) -> str:
-        """The changes and the share they reach, or why there are none."""
-        return self.found.sentence
-
-    @property
-    def changes(self) -> tuple[KeyDifference, ...]:
-        """Each changed key, with its old and new value."""
-        return tuple(
-            KeyDifference(key, (value_of(self.found.given, key), value))
-            for key, value in self.found.changes.items()
-        )
-
-    @property
-    def figures(self) -> list[FigureEntry]:
-        """The main figures of both designs."""
-        pairs = self.comparison.figures if self.comparison is not None else ()
-        return [figure_entry(pair) for pair in pairs if pair.is_main]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the entry ``yield`` of ``generate --json``."""
-        return YieldEntry.of(self)
-
-
 class ChangeEntry(Document):
     """A key, and its values as given and as changed."""
 
@@ -504,12 +437,18 @@ class ChangeEntry(Document):
 class YieldEntry(Document):
     """Result of --target-yield; figures as given and as changed."""
 
-    target_yield: PlainNumber = attribute("found.target")
+    target_yield: PlainNumber = attribute("target")
     changes: list[ChangeEntry]
-    measured: float | None = attribute("found.share.value")
-    interval: tuple[float, float] | None = attribute("found.share.interval")
+    measured: float | None = attribute("share.value")
+    interval: tuple[float, float] | None = attribute("share.interval")
     message: str = attribute("sentence")
     figures: list[FigureEntry]
+
+
+def yield_document(reached: YieldDesign) -> dict[str, Any]:
+    """Return the entry ``yield`` of ``generate --json``."""
+    pairs = reached.comparison.figures if reached.comparison is not None else ()
+    return YieldEntry.of(reached, figures=[_figure_entry(pair) for pair in pairs if pair.is_main])
 
 
 def reach_yield(
@@ -517,12 +456,12 @@ def reach_yield(
     target: float,
     fixed: Collection[str] = (),
     progress: Progress = ignore_progress,
-) -> ReachedYield:
+) -> YieldDesign:
     """Return the design that reaches a yield of ``target`` by few changes, and what they cost.
 
     Keys in ``fixed`` do not change. Raises DesignError for a share that is not between 0 and 1.
     """
-    outcome = advice.reach_yield(design, target, fixed, progress)
-    if outcome.design is None or not outcome.changes:
-        return ReachedYield(outcome, None)
-    return ReachedYield(outcome, compare(design, outcome.design, DESIGNS, progress=progress))
+    reached = advice.reach_yield(design, target, fixed, progress)
+    if reached.design is None or not reached.changes:
+        return reached
+    return replace(reached, comparison=compare(design, reached.design, DESIGNS, progress=progress))

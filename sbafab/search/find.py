@@ -22,7 +22,7 @@ from sbafab.design.files import KIT, Change, design_path, kit_names, override, r
 from sbafab.design.kits import kit_path
 from sbafab.design.records import Design, Free
 from sbafab.documents import Document, PlainNumber, attribute
-from sbafab.errors import DesignError, OutputError, SbafabError
+from sbafab.errors import DesignError, OutputError, SbafabError, Stopped, writing
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.balloons import balloons_of, has_balloons
 from sbafab.models.figures import FLAGS, Flag, FlagList
@@ -30,8 +30,8 @@ from sbafab.models.intervals import uncertainty_of
 from sbafab.models.paper import Counterpart, CounterpartEntry
 from sbafab.rules.finding import Place
 from sbafab.runtime import Progress, ignore_progress
+from sbafab.search import space as searching
 from sbafab.search.quantities import (
-    AT_PRESSURE,
     NAMES,
     Goal,
     RequestedQuantity,
@@ -43,16 +43,7 @@ from sbafab.search.quantities import (
     shown_interval,
     shown_value,
 )
-from sbafab.search.space import (
-    FindRequest,
-    GridPoint,
-    SearchSpace,
-    Trial,
-    figure_text,
-    misses,
-    searched,
-    single_steps,
-)
+from sbafab.search.space import FindRequest, GridPoint, SearchSpace, Trial, figure_text, misses
 from sbafab.search.sweep_report import front
 from sbafab.search.vary import format_keys, key_values
 
@@ -93,7 +84,13 @@ class FoundDesign:
     @property
     def without_room(self) -> list[Spare]:
         """Rules on lengths that pass with nothing to spare."""
-        return without_room(self.best)
+        laminate = self.best.laminate
+        return [
+            Spare(rule.rule, rule.measured or 0.0, rule.unit, place_text(laminate, rule.where))
+            for rule in (self.best.rules or {}).values()
+            if laminate is not None and rule.verdict == "pass" and rule.rule in TIGHT
+            if rule.share is not None and abs(rule.share) < LITTLE
+        ]
 
     @property
     def missed(self) -> list[str]:
@@ -106,38 +103,84 @@ class FoundDesign:
         return shown_interval(interval) if interval and self.best.value(subject) >= 0 else ""
 
 
+@dataclass(frozen=True)
+class Binding:
+    """A step of one key that would improve the design, and what it breaks."""
+
+    key: str
+    value: Any
+    breaks: str
+
+
+@dataclass(frozen=True)
+class Spare:
+    """A rule whose worst value, ``measured`` in ``unit``, has nothing to spare, and its place."""
+
+    rule: str
+    measured: float
+    unit: str
+    place: str
+
+
+@dataclass(frozen=True)
+class RangeEnd:
+    """A key at the end of its range that would be better beyond, ``above`` or below: ``low`` to
+    ``high`` in steps of ``step``, in mm or balloons, depending on the key.
+    """
+
+    key: str
+    value: Any
+    low: float
+    high: float
+    step: float
+    above: bool
+
+    @property
+    def wider(self) -> tuple[float, float]:
+        """Ends of a range twice as wide, and at least a step wider, in the better direction."""
+        span = max(self.high - self.low, self.step)
+        if self.above:
+            return self.low, self.high + span
+        return max(self.low - span, min(self.step, self.low - self.step)), self.high
+
+
 def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDesign:
     """Return the best design, or the nearest miss. Raises DesignError for an impossible request."""
     if request.tries < LEAST_TRIES:
         raise DesignError(f"tries = {request.tries} must be at least {LEAST_TRIES}")
-    space = searched(request, free_keys(request), progress)
+    try:
+        space = searching.searched(request, free_keys(request), progress)
+    except KeyboardInterrupt as stop:
+        raise Stopped("the search was stopped, and no file was written", *stop.args) from stop
     point, best = space.best()
     if best.refused:
         # The most common reason, in the words of the nearest candidate that has it.
         refused = sorted(space.trials.values(), key=lambda trial: trial.rank)
         counts = Counter(trial.refused_at for trial in refused)
         nearest = max(refused, key=lambda trial: counts[trial.refused_at])
-        count = counts[nearest.refused_at]
         raise DesignError(
-            f"no design could be made: {nearest.refused} ({count} of the {len(refused)} tried)"
+            f"no design could be made: {nearest.refused} ({counts[nearest.refused_at]} of the "
+            f"{len(refused)} tried)"
         )
-    front, count = pareto_front(space, best) if best.holds else ([], 0)
+    shown_front, count = pareto_front(space, best) if best.holds else ([], 0)
     outcome = FoundDesign(
         request,
         best,
         tuple(bindings(space, point, best)),
         tuple(range_ends(space, point, best)),
-        tuple(front),
+        tuple(shown_front),
         count,
         len(space.trials),
         request.tries <= len(space.trials) < space.size,
         space.free,
     )
-    return outcome if best.laminate is None else _with_trust(outcome, best.laminate)
+    if best.laminate is not None:
+        _add_trust(outcome, best.laminate)
+    return outcome
 
 
-def _with_trust(outcome: FoundDesign, laminate: Laminate) -> FoundDesign:
-    """Return the result with intervals, flags and measured values of its best design."""
+def _add_trust(outcome: FoundDesign, laminate: Laminate) -> None:
+    """Add intervals, flags and measured values of the best design to a result."""
     request = outcome.request
     subject = request.subject(request.design.with_(dict(outcome.best.values)), laminate)
     for quantity in request.quantities:
@@ -149,10 +192,15 @@ def _with_trust(outcome: FoundDesign, laminate: Laminate) -> FoundDesign:
         with suppress(DesignError):
             if (interval := subject.interval(quantity)) is not None:
                 outcome.intervals[label] = interval
-    return outcome
 
 
 # The free keys of a request, and what no search could answer.
+
+
+OF_FILMS = ("films.", "layup.")
+"""Prefixes of keys that change a design's films."""
+KNOWN_BY_FILM = ("mass", "burst", "reference_stroke")
+"""Quantities whose availability depends only on a design's films, and quick to evaluate."""
 
 
 def free_keys(request: FindRequest) -> tuple[Free, ...]:
@@ -182,12 +230,6 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
     return narrowed
 
 
-OF_FILMS = ("films.", "layup.")
-"""Prefixes of keys that change a design's films."""
-KNOWN_BY_FILM = ("mass", "burst", "reference_stroke")
-"""Quantities whose availability depends only on a design's films, and quick to evaluate."""
-
-
 def _refuse_unknown_films(request: FindRequest) -> None:
     """Raises DesignError if a quantity is unknown for a design's films at any size: no candidate
     could be evaluated.
@@ -200,13 +242,12 @@ def _refuse_unknown_films(request: FindRequest) -> None:
     subject = Subject(design, laminate)
     has_modulus = all(layer.film.elastic for layer in laminate.tpe_layers)
     for quantity in request.quantities:
-        is_moved = quantity.name in AT_PRESSURE or quantity.name == "time"
         try:
             if quantity.name in KNOWN_BY_FILM:
                 subject.value(quantity, math.nan)
             elif quantity.share:
                 subject.value(read_quantity("reference_stroke"))
-            if is_moved and has_balloons(design.form) and not has_modulus:
+            if quantity.is_moved and has_balloons(design.form) and not has_modulus:
                 balloons_of(design, laminate)
         except DesignError as error:
             raise DesignError(f"{quantity.label}: {error}") from None
@@ -223,14 +264,14 @@ def _refuse_unsure(request: FindRequest, sure: float) -> None:
             f'"{design.models.calibration}"; name one such as "paper", or leave sure out'
         )
     for quantity in (requirement.quantity for requirement in request.requirements):
-        name = NAMES.get(quantity.name)
-        is_exact = quantity.key is not None or quantity.name == "burst"
-        is_exact = is_exact or (name is not None and name.is_drawn)
+        is_drawn = quantity.name in NAMES and NAMES[quantity.name].is_drawn
+        is_exact = is_drawn or quantity.key is not None or quantity.name == "burst"
         if not is_exact and group_of(quantity, design.form) is None:
-            instead = "; ask for stroke@10kPa" if quantity.name == "reference_stroke" else ""
+            is_reference = quantity.name == "reference_stroke"
+            instead = "ask for stroke@10kPa" if is_reference else "leave sure out"
             raise DesignError(
                 f"sure = {sure:g}: no calibrated model gives {quantity.label} of {design.name}, so "
-                f"that its probability is not known{instead or '; leave sure out'}"
+                f"that its probability is not known; {instead}"
             )
 
 
@@ -297,65 +338,12 @@ LITTLE = 0.005
 """Largest share of a limit that counts as nothing to spare."""
 
 
-@dataclass(frozen=True)
-class Binding:
-    """A step of one key that would improve the design, and what it breaks."""
-
-    key: str
-    value: Any
-    breaks: str
-
-
-@dataclass(frozen=True)
-class Spare:
-    """A rule whose worst value, ``measured`` in ``unit``, has nothing to spare, and its place."""
-
-    rule: str
-    measured: float
-    unit: str
-    place: str
-
-
-@dataclass(frozen=True)
-class RangeEnd:
-    """A key at the end of its range that would be better beyond, ``above`` or below: ``low`` to
-    ``high`` in steps of ``step``, in mm or balloons, depending on the key.
-    """
-
-    key: str
-    value: Any
-    low: float
-    high: float
-    step: float
-    above: bool
-
-    @property
-    def wider(self) -> tuple[float, float]:
-        """Ends of a range twice as wide, and at least a step wider, in the better direction."""
-        span = max(self.high - self.low, self.step)
-        if self.above:
-            return self.low, self.high + span
-        return max(self.low - span, min(self.step, self.low - self.step)), self.high
-
-
-def without_room(best: Trial) -> list[Spare]:
-    """Return the rules on lengths that pass without margin."""
-    if best.laminate is None:
-        return []
-    return [
-        Spare(rule.rule, rule.measured or 0.0, rule.unit, place_text(best.laminate, rule.where))
-        for rule in (best.rules or {}).values()
-        if rule.verdict == "pass" and rule.rule in TIGHT
-        if rule.share is not None and abs(rule.share) < LITTLE
-    ]
-
-
 def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[Binding]:
     """Yield the binding constraints: what each improving single step breaks.
 
     For the nearest miss: the steps to designs that cannot be made, or that no model covers.
     """
-    for axis, neighbour in single_steps(point):
+    for axis, neighbour in searching.single_steps(point):
         if not space.holds(axis, neighbour):
             continue
         trial = space.peek(neighbour)
@@ -375,7 +363,7 @@ def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[Bind
 
 def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[RangeEnd]:
     """Yield the keys whose range alone prevents a better design, or a nearer miss."""
-    for axis, neighbour in single_steps(point):
+    for axis, neighbour in searching.single_steps(point):
         free = space.free[axis]
         if space.holds(axis, neighbour) or free.choices or space.is_excluded(axis, neighbour):
             continue
@@ -392,11 +380,11 @@ def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
     The best is first, also if another one equals it in the goal; the rest are in the order of the
     goal. If they are many, the ends and some between are returned.
     """
-    request = space.request
+    goal = space.request.goal.quantity
     sides = [
         requirement
-        for requirement in request.requirements
-        if requirement.quantity.key is None and requirement.quantity != request.goal.quantity
+        for requirement in space.request.requirements
+        if requirement.quantity.key is None and requirement.quantity != goal
     ]
     passing = [trial for trial in space.trials.values() if trial.holds]
     more = [False, *(requirement.at_least for requirement in sides)]
@@ -412,9 +400,6 @@ def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
         if all(passing[number].holds for number in order):
             return [passing[number] for number in order], len(numbers)
         passing = [trial for trial in passing if trial.holds]
-
-
-# The place of a finding in an actuator, as text.
 
 
 RING = 1.0
@@ -508,7 +493,6 @@ def find_document(outcome: FoundDesign, origin: str, target: Path) -> dict[str, 
     rows = [
         RequirementEntry.read(
             row,
-            sense=row.sense,
             median=best.value(row),
             bound=best.judged(row) if row.quantity.label in best.intervals else None,
             holds=best.meets(row),
@@ -545,18 +529,16 @@ def found_toml(
     data = override(read_toml(design_path(source)), changes)
     data = override(data, [_paths_beside(target, data, request.design)])
     first = {key: value for key, value in data.items() if not isinstance(value, dict)}
-
-    def interval(subject: Requirement | Goal) -> str:
-        ends = outcome.interval_text(subject)
-        return f"; 90 % interval {ends}" if ends else ""
-
     head = [f"Found by sbafab find, from {Path(source).name}: {format_keys(best.values)}."]
-    for row in request.requirements:
-        value = figure_text(request, best, row)
-        head.append(f"{row.quantity.label} = {value} ({row.bound}{interval(row)})")
     goal = request.goal
-    value = shown_value(goal.quantity, best.value(goal))
-    head.append(f"{goal.quantity.label} = {value} (the goal{interval(goal)})")
+    told: list[tuple[Requirement | Goal, str, str]] = [
+        (row, figure_text(request, best, row), row.bound) for row in request.requirements
+    ]
+    told.append((goal, shown_value(goal.quantity, best.value(goal)), "the goal"))
+    for subject, value, what in told:
+        ends = outcome.interval_text(subject)
+        interval = f"; 90 % interval {ends}" if ends else ""
+        head.append(f"{subject.quantity.label} = {value} ({what}{interval})")
     head += [f"{name}: {measured.sentence()}" for name, measured in outcome.measured.items()]
     head += [f"{name}: {FLAGS[flag]}" for name, flags in outcome.flags.items() for flag in flags]
     comments = "".join(f"# {line}".rstrip() + "\n" for line in head)
@@ -582,11 +564,7 @@ def _paths_beside(target: Path, data: Mapping[str, Any], design: Design) -> dict
 
 def write_found(text: str, target: Path) -> None:
     """Raises OutputError if it cannot be written, also if a file appeared meanwhile."""
-    try:
+    with writing(target):
         target.parent.mkdir(parents=True, exist_ok=True)
         with target.open("x", encoding="utf-8", newline="\n") as opened:
             opened.write(text)
-    except OSError as error:
-        raise OutputError(
-            f"{target} cannot be written: {error.strerror or error}; name another folder with -o"
-        ) from None

@@ -11,17 +11,17 @@ import difflib
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import permutations
+from string import ascii_letters
 from typing import Any, NamedTuple
 
 from sbafab.design.files import key_paths, listed, shown
 from sbafab.design.records import Design, Form, Slots
 from sbafab.design.units import (
     KILOPASCALS,
-    MEASURED,
     MILLILITRES_PER_MINUTE,
     in_first_unit,
     millimetres,
@@ -30,31 +30,12 @@ from sbafab.design.units import (
 from sbafab.errors import DesignError
 from sbafab.laminate.burst import NOT_BURST, Burst, burst, is_near_burst, refuse_beyond_burst
 from sbafab.laminate.laminate import Laminate, film_mass
+from sbafab.models import elastic, intervals
 from sbafab.models.actuator import Actuator
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
 from sbafab.models.calibrated import SHARE
-from sbafab.models.elastic import (
-    blocked_force,
-    free_rise,
-    held_stretch,
-    moved_stack,
-    refuse_stretched,
-    shut_stiffness,
-    time_to_fill,
-)
 from sbafab.models.figures import NEAR_BURST, Factors, Flag
-from sbafab.models.intervals import (
-    GROUP_BY_UNIT,
-    PAPER_3DOF,
-    Uncertainty,
-    burst_uncertainty,
-    factors_of,
-    farther,
-    flags_at,
-    sizes_of,
-    uncertainty_of,
-)
 from sbafab.models.mechanisms import ASKED, mechanism_value
 from sbafab.models.paper import FULL_KPA, HEIGHTS, WATER_FLOW, Counterpart, counterpart
 from sbafab.models.pneumatics import refuse_pressure, seconds
@@ -181,6 +162,16 @@ class RequestedQuantity:
         """The design key that the quantity stands for, or None."""
         return self.name if "." in self.name else KEYS.get(self.name)
 
+    @property
+    def is_moved(self) -> bool:
+        """True for what inflated chambers do."""
+        return self.name in AT_PRESSURE or self.name == "time"
+
+    @property
+    def gauge_kpa(self) -> float | None:
+        """The gauge pressure in kPa, of a time the one that it ends at; None without one."""
+        return FULL_KPA if self.name == "time" else self.kpa
+
 
 def read_quantity(
     text: str, kpa: float | None = None, flow_ml_min: float = WATER_FLOW
@@ -193,7 +184,7 @@ def read_quantity(
     if name in AT_PRESSURE:
         return _with_pressure(name, places, text, kpa)
     if name == "time":
-        return _with_flow(places, text, flow_ml_min)
+        return RequestedQuantity(name, "s", flow=_flow(places, text, flow_ml_min))
     if places:
         named = f"{', '.join(AT_PRESSURE[:-1])} and {AT_PRESSURE[-1]}"
         raise DesignError(f"{shown(text)}: only {named} take a pressure; {HOW}")
@@ -212,22 +203,24 @@ def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:
 
 
 def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -> RequestedQuantity:
+    is_vacuum = name in UNDER_VACUUM
     read: dict[str, Any] = {}
-    for place in places:
-        try:
-            key, value = _place(place, name)
-        except ValueError as error:
-            raise DesignError(f"{shown(text)}: {shown(place)} {error}") from None
-        if key == "kpa" and key in read:
-            raise DesignError(f"{shown(text)} names two pressures; name one")
-        read[key] = value
+    try:
+        for place in places:
+            field, value = _place(place, name)
+            if field == "kpa" and field in read:
+                raise DesignError(f"{shown(text)} names two pressures; name one")
+            read[field] = value
+    except ValueError as error:
+        if isinstance(error, DesignError):
+            raise
+        raise DesignError(f"{shown(text)}: {shown(place)} {error}") from None
     if len({"stroke", "share"} & read.keys()) != (name == "force"):
         raise DesignError(
             f"{shown(text)}: a force needs one stroke, and only a force takes one; {HOW}"
         )
-    is_vacuum = name in UNDER_VACUUM
-    usual = -USUAL_KPA if is_vacuum else USUAL_KPA
-    read.setdefault("kpa", kpa if kpa is not None and (kpa < 0) == is_vacuum else usual)
+    usual = kpa if kpa is not None and (kpa < 0) == is_vacuum else USUAL_KPA * (1 - 2 * is_vacuum)
+    read.setdefault("kpa", usual)
     try:
         refuse_pressure(read["kpa"], is_vacuum)
     except DesignError as error:
@@ -260,15 +253,15 @@ def _place(place: str, name: str) -> tuple[str, float]:
         raise ValueError(f"is neither a pressure nor a length; {HOW}") from None
 
 
-def _with_flow(places: list[str], text: str, flow_ml_min: float) -> RequestedQuantity:
-    """Return the time to 10 kPa with water at a flow. Raises DesignError."""
+def _flow(places: list[str], text: str, flow_ml_min: float) -> float:
+    """Return the flow of water of a time in ml/min. Raises DesignError."""
     for place in places:
-        match = MEASURED.fullmatch(place)
-        if len(places) > 1 or match is None or match[2] not in MILLILITRES_PER_MINUTE:
+        read = in_first_unit(place, {"": math.nan, **MILLILITRES_PER_MINUTE})
+        if len(places) > 1 or read is None or math.isnan(read):
             raise DesignError(f"{shown(text)}: a time takes one flow, such as time@35ml/min")
-        flow_ml_min = float(match[1]) * MILLILITRES_PER_MINUTE[match[2]]
+        flow_ml_min = read
     seconds(0.0, flow_ml_min)
-    return RequestedQuantity("time", NAMES["time"].unit, flow=flow_ml_min)
+    return flow_ml_min
 
 
 def _kilopascals(place: str) -> float | None:
@@ -276,12 +269,12 @@ def _kilopascals(place: str) -> float | None:
 
     MPa and mPa are not the same: an ambiguous unit is rejected.
     """
-    match = MEASURED.fullmatch(place)
-    written = match[2] if match else ""
-    units = [unit for unit in KILOPASCALS if unit.lower() == written.lower()]
-    if match is None or not units or (units == ["MPa"] and written != "MPa"):
-        return None
-    return float(match[1]) * KILOPASCALS[units[0]]
+    number = place.rstrip(ascii_letters)
+    unit = place[len(number) :]
+    for known in KILOPASCALS:
+        if unit.lower() == known.lower() and (known != "MPa" or unit == known):
+            return in_first_unit(number + known, KILOPASCALS)
+    return None
 
 
 def read_limit(quantity: RequestedQuantity, text: str) -> float:
@@ -450,44 +443,39 @@ class Subject:
     origin: Subject | None = None
     most_kpa: float = MOST_PRESSURE
 
-    @cached_property
-    def _sizes(self) -> Mapping[str, float]:
-        return sizes(self.design, self.laminate, self.factors)
-
     def value(self, quantity: RequestedQuantity, good: float | None = None) -> float:
         """Return the value of a quantity in its unit; ``good`` is the share of good builds.
 
         Raises DesignError if the design has no such quantity, or no model covers it.
         """
-        name, kpa = quantity.name, kpa_of(quantity)
-        if kpa is not None:
-            refuse_beyond_burst(self.laminate, kpa)
+        name, form = quantity.name, self.design.form
+        if quantity.gauge_kpa is not None:
+            refuse_beyond_burst(self.laminate, quantity.gauge_kpa)
         if name in ASKED:
-            mechanism = self.design.form.mechanism
-            return mechanism_value(mechanism, self.laminate, name, kpa or USUAL_KPA)
-        if name in AT_PRESSURE:
-            return self._moved(quantity, kpa or 0.0)
-        value: Any
-        match name:
-            case "yield":
-                value = good
-            case "mass":
-                value = film_mass(self.laminate)
-            case "height":
-                value = self._actuator.thickness
-            case "reference_stroke":
-                value = self._actuator.known_stroke
-            case "burst":
-                value = self._burst.kpa
-            case "time":
-                value = self._time(quantity.flow or WATER_FLOW)
-            case "lumen":
-                value = self.design.form.lumen
-            case _:
-                value = (key_values(self.design) if "." in name else self._sizes).get(name)
+            return mechanism_value(form.mechanism, self.laminate, name, quantity.kpa or USUAL_KPA)
+        kpa = quantity.kpa or 0.0
+        values: Mapping[str, Callable[[], Any]] = {
+            "yield": lambda: good,
+            "mass": lambda: film_mass(self.laminate),
+            "height": lambda: self._actuator.thickness,
+            "reference_stroke": lambda: self._actuator.known_stroke,
+            "burst": lambda: self._burst.kpa,
+            "time": lambda: self._time(quantity.flow or WATER_FLOW),
+            "lumen": lambda: form.lumen,
+            "stroke": lambda: self._stroke(kpa),
+            "bend": lambda: self._bend(quantity.chambers, kpa),
+            "force": lambda: self._force(self._stroke_of(quantity), kpa),
+            "lateral_stiffness": lambda: elastic.shut_stiffness(self._stack, kpa)[0],
+        }
+        others = key_values(self.design) if "." in name else self._sizes
+        value = values[name]() if name in values else others.get(name)
         if isinstance(value, int | float):
             return float(value)
         raise DesignError(f"{self.design.name} has no {name} that is a number")
+
+    @cached_property
+    def _sizes(self) -> Mapping[str, float]:
+        return sizes(self.design, self.laminate, self.factors)
 
     @property
     def _burst(self) -> Burst:
@@ -498,30 +486,21 @@ class Subject:
 
     def flags(self, quantity: RequestedQuantity) -> tuple[Flag, ...]:
         """Return the limits to trust in the quantity's figure, as in ``predict``."""
-        group, kpa = group_of(quantity, self.design.form), kpa_of(quantity)
-        missed = 0.0
+        form, kpa = self.design.form, quantity.gauge_kpa
+        group, missed = group_of(quantity, form), 0.0
         if quantity.name == "burst":
-            missed = burst_uncertainty(self._burst)[1]
+            missed = intervals.burst_uncertainty(self._burst)[1]
         elif quantity.name == "reference_stroke" and self._actuator.radii:
-            missed = farther(sizes_of(self.design.form, self.laminate), PAPER_3DOF, False)
+            own = intervals.sizes_of(form, self.laminate)
+            missed = intervals.farther(own, intervals.PAPER_3DOF, False)
         elif group is not None and self.uncertainty is not None:
             missed = self.uncertainty.farther(group)
         near = kpa is not None and is_near_burst(self.laminate, kpa)
-        return (*flags_at(missed), *((NEAR_BURST,) if near else ()))
+        return (*intervals.flags_at(missed), *((NEAR_BURST,) if near else ()))
 
     def _time(self, flow_ml_min: float) -> float:
-        time, _ = time_to_fill(self._stack, flow_ml_min, FULL_KPA)
+        time, _ = elastic.time_to_fill(self._stack, flow_ml_min, FULL_KPA)
         return time + self.factors.water_delay
-
-    def _moved(self, quantity: RequestedQuantity, kpa: float) -> float:
-        """Return a stroke, bend, lateral stiffness or force."""
-        if quantity.name == "stroke":
-            return self._stroke(kpa)
-        if quantity.name == "bend":
-            return self._bend(quantity.chambers, kpa)
-        if quantity.name == "lateral_stiffness":
-            return shut_stiffness(self._stack, kpa)[0]
-        return self._force(self._stroke_of(quantity), kpa)
 
     def _stroke_of(self, quantity: RequestedQuantity) -> float:
         """Return the stroke in mm at which a force is blocked; a share is relative to the reference
@@ -537,12 +516,12 @@ class Subject:
     @cached_property
     def factors(self) -> Factors:
         """The factors of the design's calibration, or the given ones."""
-        return self.given or factors_of(self.design)
+        return self.given or intervals.factors_of(self.design)
 
     @cached_property
-    def uncertainty(self) -> Uncertainty | None:
+    def uncertainty(self) -> intervals.Uncertainty | None:
         """The calibration of the design; None without one."""
-        return uncertainty_of(self.design, laminate=self.laminate)
+        return intervals.uncertainty_of(self.design, laminate=self.laminate)
 
     @cached_property
     def _others(self) -> dict[Factors, Subject]:
@@ -562,19 +541,16 @@ class Subject:
         Raises DesignError if other factors of the calibration lead out of the model's range.
         """
         if quantity.name == "burst":
-            return burst_uncertainty(self._burst, share)[0]
+            return intervals.burst_uncertainty(self._burst, share)[0]
         group = group_of(quantity, self.design.form)
-        if self.uncertainty is None or group is None:
+        is_unmolten = quantity.name == "height" and not self._actuator.folded.molten
+        if self.uncertainty is None or group is None or is_unmolten:
             return None
-        if quantity.name == "height" and not self._actuator.folded.molten:
-            return None
-
-        is_force = quantity.name == "force" and self.value(quantity) > 0
+        # Below 0 a force is only a distance from one, for the search.
+        least = 0.0 if quantity.name == "force" and self.value(quantity) > 0 else -math.inf
 
         def value_at(factors: Factors) -> float:
-            value = self._at(factors).value(quantity)
-            # Below 0 a force is only a distance from one, for the search.
-            return max(value, 0.0) if is_force else value
+            return max(self._at(factors).value(quantity), least)
 
         delay = "water_delay" if quantity.name == "time" else ""
         return self.uncertainty.interval_of(group, value_at, share, delay)[1]
@@ -585,11 +561,11 @@ class Subject:
 
     @cached_property
     def _stack(self) -> Stack:
+        moved = None
         if self.origin is not None:
-            moved = moved_stack(self.origin._stack, self.origin._actuator, self.factors)
-            if moved is not None:
-                return moved
-        return stack(self.design, self.laminate, self.most_kpa, self.factors)
+            origin = self.origin
+            moved = elastic.moved_stack(origin._stack, origin._actuator, self.factors)
+        return moved or stack(self.design, self.laminate, self.most_kpa, self.factors)
 
     def _stroke(self, kpa: float) -> float:
         if isinstance(self.design.form.pockets, Slots):
@@ -616,14 +592,14 @@ class Subject:
                 return first.largest_stroke - stroke
             return form.pushing * kpa * float(first.rate(stroke)) / 1000
         kinds = balloons_of(self.design, self.laminate, self.factors)
-        push = float(blocked_force(self._stack, kpa, stroke))
+        push = float(elastic.blocked_force(self._stack, kpa, stroke))
         if push <= 0:
             maps = self._stack.maps
             free = sum(float(maps[level].free_height(kpa)) for level in self._stack.levels)
             # The shortfall of stroke, as the force for that much of it.
             least = min(kind.pocket for kind in kinds)
             return -kpa / 1000 * math.pi * least**2 * max(stroke / max(free, 1e-6) - 1, 0.0)
-        refuse_stretched(float(held_stretch(kinds, [kpa], [stroke])[0]))
+        elastic.refuse_stretched(float(elastic.held_stretch(kinds, [kpa], [stroke])[0]))
         return form.pushing * push
 
     def counterpart(self, quantity: RequestedQuantity) -> Counterpart | None:
@@ -638,53 +614,43 @@ class Subject:
         """Return the figure in ``predict`` and its model; None if the paper has no such
         measurement.
         """
-        kpa = quantity.kpa or 0.0
-        if quantity.name == "height":
-            folded = self._actuator.folded
-            is_pressed = folded.molten > 0 and folded.factor != 1
-            return None if is_pressed else (Quantity.FOLDED_HEIGHT, ANYWHERE, ModelId.FILMS)
-        if group_of(quantity, self.design.form) is None:
-            return None
+        at = Conditions(kpa=quantity.gauge_kpa)
         match quantity.name:
+            case _ if group_of(quantity, self.design.form) is None:
+                return None
+            case "height":
+                folded = self._actuator.folded
+                is_pressed = folded.molten > 0 and folded.factor != 1
+                return None if is_pressed else (Quantity.FOLDED_HEIGHT, ANYWHERE, ModelId.FILMS)
             case "stroke":
-                return Quantity.FREE_STROKE, Conditions(kpa=kpa), ModelId.ELASTIC_BALLOON
+                return Quantity.FREE_STROKE, at, ModelId.ELASTIC_BALLOON
             case "bend":
-                at = Conditions(kpa=kpa, chambers=quantity.chambers)
+                at = at._replace(chambers=quantity.chambers)
                 return Quantity.BEND, at, ModelId.ELASTIC_STACK
             case "time":
-                at = Conditions(kpa=FULL_KPA, flow=quantity.flow or WATER_FLOW)
+                at = at._replace(flow=quantity.flow or WATER_FLOW)
                 return Quantity.WATER_TIME, at, ModelId.STACK_IN_TIME
             case "lateral_stiffness":
-                return Quantity.SHUT_STIFFNESS, Conditions(kpa=kpa), ModelId.STACK_SHUT
+                return Quantity.SHUT_STIFFNESS, at, ModelId.STACK_SHUT
         # The nearest of the three heights at which forces were measured.
         share = self._stroke_of(quantity) / self._actuator.reference_stroke
         near = min(HEIGHTS, key=lambda height: abs(height - share))
-        return Quantity.BLOCKED_FORCE, Conditions(kpa=kpa, share=near), ModelId.ELASTIC_STACK
-
-
-def kpa_of(quantity: RequestedQuantity) -> float | None:
-    """Return the gauge pressure in kPa of a quantity; None without one."""
-    if quantity.name == "time":
-        return FULL_KPA
-    return quantity.kpa if quantity.name in AT_PRESSURE else None
+        return Quantity.BLOCKED_FORCE, at._replace(share=near), ModelId.ELASTIC_STACK
 
 
 def group_of(quantity: RequestedQuantity, form: Form) -> str | None:
     """Return the group of a quantity's discrepancy; None if no calibrated model gives it."""
     if quantity.name == "height":
-        return "flat height"
-    if quantity.name in ASKED:
+        return intervals.FLAT
+    if quantity.name in ASKED or not quantity.is_moved or isinstance(form.pockets, Slots):
         return None
-    is_moved = quantity.name in AT_PRESSURE or quantity.name == "time"
-    if not is_moved or isinstance(form.pockets, Slots):
-        return None
-    return GROUP_BY_UNIT.get(quantity.unit, "motion")
+    return intervals.GROUP_BY_UNIT.get(quantity.unit, "motion")
 
 
 @lru_cache(maxsize=4096)
 def free_height(kind: Balloon, kpa: float) -> float:
     """Free height (mm) of a balloon. Raises BeyondError if its film does not stand it."""
-    return free_rise(Counter([kind]), kpa).stroke
+    return elastic.free_rise(Counter([kind]), kpa).stroke
 
 
 def refuse_unknown_key(quantity: RequestedQuantity, design: Design) -> None:

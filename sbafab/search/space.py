@@ -13,8 +13,8 @@ import math
 import random
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 from sbafab.actuators import build
@@ -33,7 +33,6 @@ from sbafab.search.quantities import (
     RequestedQuantity,
     Requirement,
     Subject,
-    kpa_of,
     shown_value,
 )
 from sbafab.search.trials import RuleMargin, margins
@@ -64,8 +63,8 @@ class FindRequest:
 
     def subject(self, design: Design, laminate: Laminate) -> Subject:
         """Return a candidate to evaluate, up to the highest pressure of the quantities."""
-        pressures = [kpa for each in self.quantities if (kpa := kpa_of(each)) is not None]
-        return Subject(design, laminate, most_kpa=max(MOST_PRESSURE, *pressures, 0.0))
+        most = max(each.gauge_kpa or 0.0 for each in self.quantities)
+        return Subject(design, laminate, most_kpa=max(MOST_PRESSURE, most))
 
 
 # One candidate: its figures against the requirements, its rules by their margins.
@@ -138,50 +137,42 @@ class Trial:
 
 def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
     """Return the candidate with these values; without rules, only requirements count: quicker."""
+    rules: Mapping[str, RuleMargin] | None = None
     try:
         design = request.design.with_(dict(values))
         laminate = build(design)
-        rules = None
         if with_rules or any(quantity.name == "yield" for quantity in request.quantities):
-            findings = run_deck(laminate, design)
-            rules = margins(findings)
-            checked = Build(design, laminate, findings)
-            if not checked.failed:
-                refuse_undoable([checked])
+            made = Build(design, laminate, run_deck(laminate, design))
+            rules = margins(made.findings)
+            if not made.failed:
+                refuse_undoable([made])
         subject = request.subject(design, laminate)
         share = rules[YIELD].measured if rules and YIELD in rules else None
         figures = {each.label: subject.value(each, share) for each in request.quantities}
-        intervals = {} if request.sure is None else _intervals(request, subject, request.sure)
+        intervals = _intervals(request, subject)
     except (DesignError, GeometryError) as error:
         excess = error.excess if isinstance(error, BeyondError) else IMPOSSIBLE
         *_, (frame, line) = traceback.walk_tb(error.__traceback__)
-        return Trial(
-            values,
-            missed=IMPOSSIBLE + excess,
-            refused=" ".join(str(error).split()),
-            refused_at=f"{frame.f_code.co_filename}:{line}",
-        )
+        reason, place = " ".join(str(error).split()), f"{frame.f_code.co_filename}:{line}"
+        return Trial(values, missed=IMPOSSIBLE + excess, refused=reason, refused_at=place)
     trial = Trial(values, figures, rules, laminate=laminate, intervals=intervals)
-    margin = [row.margin(trial.judged(row)) + CLOSE for row in request.requirements]
+    missed = [-min(0.0, row.margin(trial.judged(row)) + CLOSE) for row in request.requirements]
     # The share by which each failing rule misses its limit.
-    short = [
-        max(1e-3, -(rule.share or 0.0)) for rule in (rules or {}).values() if rule.verdict == "fail"
-    ]
-    try:
+    failed = (rule for rule in (rules or {}).values() if rule.verdict == "fail")
+    missed += [max(1e-3, -(rule.share or 0.0)) for rule in failed]
+    mass = 0.0  # a tie-breaker, without the density of a film
+    with suppress(DesignError):
         mass = film_mass(laminate)
-    except DesignError:
-        mass = 0.0  # a tie-breaker, without the density of a film
-    missed = sum(-min(0.0, each) for each in margin) + sum(short)
     cost = request.goal.cost(trial.value(request.goal))
-    return replace(trial, missed=missed, cost=cost, mass=mass)
+    return replace(trial, missed=sum(missed), cost=cost, mass=mass)
 
 
-def _intervals(
-    request: FindRequest, subject: Subject, sure: float
-) -> dict[str, tuple[float, float]]:
+def _intervals(request: FindRequest, subject: Subject) -> dict[str, tuple[float, float]]:
     """Return intervals whose ends a measured value passes with a probability of ``1 - sure``."""
+    if request.sure is None:
+        return {}
     quantities = dict.fromkeys(row.quantity for row in request.requirements)
-    each = {of.label: subject.interval(of, 2 * sure - 1) for of in quantities}
+    each = {of.label: subject.interval(of, 2 * request.sure - 1) for of in quantities}
     return {label: interval for label, interval in each.items() if interval is not None}
 
 
@@ -287,8 +278,9 @@ def _free_of(text: str) -> Free:
 class SearchSpace:
     """The candidates evaluated so far, each once, by the steps of their free keys.
 
-    ``lows`` and ``highs`` are the least and the largest step of each key. At most ``tries``
-    candidates are evaluated; the current stage ends at ``limit``.
+    ``lows`` and ``highs`` are the least and the largest step of each key, ``start`` the starting
+    design's point, or the nearest to it. At most ``tries`` candidates are evaluated; the current
+    stage ends at ``limit``.
     """
 
     def __init__(self, request: FindRequest, free: tuple[Free, ...], progress: Progress) -> None:
@@ -300,6 +292,7 @@ class SearchSpace:
         self.trials: dict[GridPoint, Trial] = {}
         self._tell = progress
         self._keys = key_values(request.design)
+        self.start = self.inside([_step_of(key, self._keys.get(key.key)) for key in free])
 
     @property
     def is_over(self) -> bool:
@@ -330,34 +323,17 @@ class SearchSpace:
 
         A list, such as the diameters of a tapered stack, is scaled as a whole.
         """
-        values: dict[str, Any] = {}
-        for axis, free in enumerate(self.free):
-            value = self.number(axis, point)
-            is_whole = free.low == int(free.low) and free.step == int(free.step)
-            listed = numbers_of(self._keys.get(free.key))
-            if free.choices:
-                # Beyond its range a word stays the last one.
-                last = len(free.choices) - 1
-                values[free.key] = free.choices[min(max(point[axis], 0), last)]
-            elif listed:
-                values[free.key] = [round(value * number / max(listed), 2) for number in listed]
-            else:
-                values[free.key] = int(value) if is_whole else value
-        return values
+        return {free.key: self._value(axis, point) for axis, free in enumerate(self.free)}
 
-    @cached_property
-    def start(self) -> GridPoint:
-        """The starting design's point, or the nearest to it in the space that was asked for."""
-        steps = []
-        for free in self.free:
-            value: Any = self._keys.get(free.key)
-            if free.choices:
-                steps.append(free.choices.index(value) if value in free.choices else 0)
-                continue
-            at = max(numbers_of(value), default=value)
-            at = at if isinstance(at, int | float) else (free.low + free.high) / 2
-            steps.append(round((at - free.low) / free.step))
-        return self.inside(steps)
+    def _value(self, axis: int, point: GridPoint) -> Any:
+        free, number = self.free[axis], self.number(axis, point)
+        if free.choices:
+            # Beyond its range a word stays the last one.
+            return free.choices[min(max(point[axis], 0), len(free.choices) - 1)]
+        listed = numbers_of(self._keys.get(free.key))
+        if listed:
+            return [round(value * number / max(listed), 2) for value in listed]
+        return int(number) if free.low == int(free.low) and free.step == int(free.step) else number
 
     def inside(self, steps: Sequence[int]) -> GridPoint:
         """Return the point, or the nearest to it within the keys' ranges."""
@@ -371,8 +347,9 @@ class SearchSpace:
     def is_excluded(self, axis: int, point: GridPoint) -> bool:
         """Return True if a requirement on the key itself excludes its value at the point."""
         key, at = self.free[axis].key, self.number(axis, point)
-        rows = (row for row in self.request.requirements if row.quantity.key == key)
-        return any(not row.holds(at) for row in rows)
+        return any(
+            row.quantity.key == key and not row.holds(at) for row in self.request.requirements
+        )
 
     def trial(self, point: GridPoint, checks_rules: bool = True) -> Trial:
         """Return the candidate at a point; its rules are checked if it would be the best so far.
@@ -381,7 +358,7 @@ class SearchSpace:
         """
         if point not in self.trials:
             self._tell("trying designs", len(self.trials), self.request.tries)
-            candidate = self._evaluated(point)
+            candidate = self.peek(point)
             ranks = [trial.rank for trial in self.trials.values() if trial.rules]
             if checks_rules and all(candidate.rank < rank for rank in ranks):
                 candidate = self.with_rules(candidate)
@@ -390,9 +367,8 @@ class SearchSpace:
 
     def peek(self, point: GridPoint) -> Trial:
         """Return the candidate at a point, also out of range; it does not count as a try."""
-        return self.trials.get(point) or self._evaluated(point)
-
-    def _evaluated(self, point: GridPoint) -> Trial:
+        if point in self.trials:
+            return self.trials[point]
         changes = zip(self.free, point, self.start, strict=True)
         words = sum(free.choices != () and step != start for free, step, start in changes)
         return replace(evaluated(self.request, self.values(point)), words=words)
@@ -409,10 +385,20 @@ class SearchSpace:
         """
         while True:
             best = min(self.trials, key=lambda point: self.trials[point].rank)
-            trial = self.trials[best]
-            if trial.rules is not None or trial.refused:
+            trial = self.with_rules(self.trials[best])
+            if trial is self.trials[best]:
                 return best, trial
-            self.trials[best] = self.with_rules(trial)
+            self.trials[best] = trial
+
+
+def _step_of(free: Free, value: Any) -> int:
+    """Return the step of a key's value; of a list its largest number."""
+    if free.choices:
+        return free.choices.index(value) if value in free.choices else 0
+    at = max(numbers_of(value), default=value)
+    return round(
+        ((at if isinstance(at, int | float) else (free.low + free.high) / 2) - free.low) / free.step
+    )
 
 
 # Strategies: coarse grid, local searches, wider ranges.

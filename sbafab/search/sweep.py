@@ -6,8 +6,8 @@ import hashlib
 import json
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -18,8 +18,8 @@ from sbafab.design.files import KIT, OUTLINE, kit_names
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, plain_tables
 from sbafab.documents import Document, attribute
-from sbafab.errors import OutputError
-from sbafab.folders.swap import MANIFEST
+from sbafab.errors import OutputError, Stopped, writing
+from sbafab.folders.swap import MANIFEST, replace_text
 from sbafab.markup import data_frame
 from sbafab.models.intervals import factors_of
 from sbafab.models.pneumatics import refuse_pressure, usual_pressures
@@ -30,7 +30,6 @@ from sbafab.search.sweep_report import (
     PAGE,
     Table,
     refuse_foreign,
-    replacing,
     stale_designs,
     sweep_html,
     write_tables,
@@ -120,15 +119,6 @@ class SweepDocument(Document, schema="sbafab/sweep@1"):
     """files in the folder"""
 
 
-class SweepStopped(KeyboardInterrupt):
-    """An interrupt with the number of ``designs`` and of those ``measured``."""
-
-    def __init__(self, measured: int, designs: int, *signal: object) -> None:
-        super().__init__(*signal)
-        self.measured = measured
-        self.designs = designs
-
-
 def designs_of(request: SweepRequest) -> list[Values]:
     """The values of every design, in the tables' order. Raises DesignError."""
     varied = [_from_here(varied_key) for varied_key in request.varied]
@@ -148,39 +138,32 @@ def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress
     folder = out / f"{request.design.name}-sweep"
     with _locked(folder):
         refuse_foreign(folder / CSV)
-        journal = Journal(folder / JOURNAL, request.seconds)
-        try:
+        with closing(Journal(folder / JOURNAL, request.seconds)) as journal:
             keys = _keys(request, values)
-            missing = [number for number, key in enumerate(keys) if key not in journal]
-            _measure(request, values, keys, missing, journal, progress)
-        except KeyboardInterrupt as stop:
-            measured = sum(key in journal for key in keys)
-            raise SweepStopped(measured, len(keys), *stop.args) from stop
-        finally:
-            journal.close()
+            missing = {
+                key: each for key, each in zip(keys, values, strict=True) if key not in journal
+            }
+            try:
+                _measure(request, missing, journal, progress)
+            except KeyboardInterrupt as stop:
+                done = sum(key in journal for key in keys)
+                sentence = f"{done} of {len(keys)} designs are computed; run the same command again"
+                raise Stopped(f"{sentence} to resume", *stop.args) from stop
         progress("writing tables", 0, 1)
         is_calibrated = bool(factors_of(request.design).calibration)
         settings = (values, request.pressures_kpa, request.all_columns, is_calibrated)
-        table = Table(lambda: journal.rows(iter(keys)), *settings)
+        table = Table(lambda: journal.rows(keys), *settings)
         gone = stale_designs(folder / CSV, table)
-        files = write_tables(table, folder)
-        page = sweep_html(request.design, request.varied, table)
-        with replacing(folder / PAGE) as opened:
-            opened.write(page)
+        files = (*write_tables(table, folder), PAGE, JOURNAL)
+        replace_text(folder / PAGE, sweep_html(request.design, request.varied, table))
     outcomes = Counter(row["outcome"] for row in table.rows())
-    return SweptDesigns(
-        folder, len(values), len(missing), dict(outcomes), (*files, PAGE, JOURNAL), table, gone
-    )
+    return SweptDesigns(folder, len(values), len(missing), dict(outcomes), files, table, gone)
 
 
 def _measure(
-    request: SweepRequest,
-    values: Sequence[Values],
-    keys: Sequence[str],
-    missing: Sequence[int],
-    journal: Journal,
-    progress: Progress,
+    request: SweepRequest, missing: Mapping[str, Values], journal: Journal, progress: Progress
 ) -> None:
+    """Measure the values of each key and add their rows to the journal."""
     if not missing:
         return
     base: MeasureJob = {
@@ -189,22 +172,16 @@ def _measure(
         "folder": str(request.design.folder.absolute()),
         "pressures": list(request.pressures_kpa),
     }
-    done = 0
-
-    def note(key: str, row: SweepRow) -> None:
-        nonlocal done
-        journal.add(key, row)
-        done += 1
-        still()
-
-    def still() -> None:
-        progress(MEASURED, done, len(missing))
-
-    still()
     pool = local_pool(request.workers) if request.dask is None else dask_pool(request.dask)
-    jobs = ((keys[number], {**base, "values": dict(values[number])}) for number in missing)
-    with pool as workers:
-        run_jobs(workers, jobs, request.seconds, note, still)
+    jobs = ((key, {**base, "values": dict(values)}) for key, values in missing.items())
+    done = 0
+    progress(MEASURED, done, len(missing))
+    with pool as workers, closing(run_jobs(workers, jobs, request.seconds)) as rows:
+        for measured in rows:
+            if measured is not None:
+                journal.add(*measured)
+                done += 1
+            progress(MEASURED, done, len(missing))
 
 
 def _keys(request: SweepRequest, values: Sequence[Values]) -> list[str]:
@@ -240,25 +217,20 @@ def _from_here(varied: Varied) -> Varied:
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
     """Create and lock the folder. Raises OutputError."""
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         if (folder / MANIFEST).exists():
             raise OutputError(
                 f"{folder} holds a design of that name; choose another folder with -o"
             )
-        with FileLock(folder / ".lock", timeout=0):
-            yield
-    except Timeout:
-        raise OutputError(
-            f"another sweep is writing {folder}; wait for it to end or choose another folder "
-            "with -o"
-        ) from None
-    except OutputError:
-        raise
-    except OSError as error:
-        raise OutputError(
-            f"{folder} cannot be written: {error.strerror or error}; choose another folder with -o"
-        ) from None
+        try:
+            with FileLock(folder / ".lock", timeout=0):
+                yield
+        except Timeout:
+            raise OutputError(
+                f"another sweep is writing {folder}; wait for it to end or choose another folder "
+                "with -o"
+            ) from None
 
 
 # The journal: one line per measured design, append-only, from which a sweep resumes.
@@ -273,27 +245,18 @@ class Journal:
 
     def __init__(self, path: Path, seconds: float) -> None:
         self.path = path
-        self._seconds = seconds
         self._places: dict[str, int] = {}
-        try:
+        with writing(path):
             self._file: IO[bytes] = path.open("a+b")
-            self._read()
-        except OSError as error:
-            raise OutputError(
-                f"{path} cannot be written: {error.strerror or error}; choose another folder "
-                "with -o"
-            ) from None
-
-    def _read(self) -> None:
-        self._file.seek(0)
-        at, line = 0, b""
-        for line in self._file:
-            key = self._key(line)
-            if key is not None:
-                self._places[key] = at
-            at += len(line)
-        if line and not line.endswith(b"\n"):
-            self._file.write(b"\n")
+            self._file.seek(0)
+            at, line = 0, b""
+            for line in self._file:
+                key = _key_of(line, seconds)
+                if key is not None:
+                    self._places[key] = at
+                at += len(line)
+            if line and not line.endswith(b"\n"):
+                self._file.write(b"\n")
 
     def __contains__(self, key: str) -> bool:
         return key in self._places
@@ -308,7 +271,7 @@ class Journal:
         self._file.write(line.encode() + b"\n")
         self._file.flush()
 
-    def rows(self, keys: Iterator[str]) -> Iterator[SweepRow]:
+    def rows(self, keys: Iterable[str]) -> Iterator[SweepRow]:
         """The rows of these keys, in order, one in memory at a time."""
         with self.path.open("rb") as opened:
             for key in keys:
@@ -321,13 +284,14 @@ class Journal:
         os.fsync(self._file.fileno())
         self._file.close()
 
-    def _key(self, line: bytes) -> str | None:
-        """The key of a complete line that need not be measured again."""
-        try:
-            entry = json.loads(line)
-            key, row = entry["key"], entry["row"]
-            was_short = row["outcome"] == "too long" and row["seconds"] < self._seconds
-        except (ValueError, KeyError, TypeError):
-            return None
-        is_whole = line.endswith(b"\n") and isinstance(key, str)
-        return key if is_whole and not was_short else None
+
+def _key_of(line: bytes, seconds: float) -> str | None:
+    """The key of a complete line that need not be measured again."""
+    try:
+        entry = json.loads(line)
+        key, row = entry["key"], entry["row"]
+        was_short = row["outcome"] == "too long" and row["seconds"] < seconds
+    except (ValueError, KeyError, TypeError):
+        return None
+    is_whole = line.endswith(b"\n") and isinstance(key, str)
+    return key if is_whole and not was_short else None

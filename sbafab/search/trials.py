@@ -15,10 +15,10 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
-from functools import cache, lru_cache
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import IO, Any, Literal, NamedTuple
@@ -27,7 +27,6 @@ import sbafab
 from sbafab.actuators import records
 from sbafab.design.files import checked as checked_record
 from sbafab.design.identity import design_sha256
-from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError, SbafabError
 from sbafab.folders.build import make_build, refuse_undoable
 from sbafab.models.figures import PredictionRequest
@@ -57,44 +56,35 @@ def measured(
     Relative paths start at ``folder``; ``pressures``, kPa, are for forces and strokes.
     """
     row: SweepRow = {"outcome": "refused", "reason": ""}
-    try:
-        design = _base(json.dumps(tables), folder).with_(dict(values))
-        row["keys"] = key_values(design)
-        row["sha256"] = design_sha256(design)
-        _measure(design, pressures, row)
-    except SbafabError as error:
-        row["reason"] = " ".join(str(error).split())
-    return row
-
-
-@lru_cache(maxsize=4)
-def _base(tables: str, folder: str) -> Design:
-    data = json.loads(tables)
     families = records()
-    return checked_record(families[data["family"]], data, families).placed(Path(folder))
-
-
-def _measure(design: Design, pressures: Sequence[float], row: SweepRow) -> None:
-    checked = make_build(design)
-    worst = margins(checked.findings)
-    row["rules"] = {
-        name: [rule.verdict, rule.margin, rule.measured, rule.limit, rule.unit]
-        for name, rule in worst.items()
-    }
-    row["yield"] = next(
-        ([each.measured, *each.interval] for each in checked.findings if each.interval), []
-    )
-    # Figures have no intervals here: with the factors given, none are computed.
-    request = PredictionRequest(tuple(pressures), calibration=factors_of(design))
-    prediction = predict(design, request, checked.laminate)
-    row["figures"] = {str(figure.key): figure.as_dict()["value"] for figure in prediction.figures}
-    if checked.failed:
+    try:
+        base = checked_record(families[tables["family"]], tables, families).placed(Path(folder))
+        design = base.with_(dict(values))
+        row |= {"keys": key_values(design), "sha256": design_sha256(design)}
+        made = make_build(design)
+        worst = margins(made.findings)
+        row["rules"] = {
+            name: [rule.verdict, rule.margin, rule.measured, rule.limit, rule.unit]
+            for name, rule in worst.items()
+        }
+        shares = ([each.measured, *each.interval] for each in made.findings if each.interval)
+        row["yield"] = next(shares, [])
+        # Figures have no intervals here: with the factors given, none are computed.
+        request = PredictionRequest(tuple(pressures), calibration=factors_of(design))
+        figures = predict(design, request, made.laminate).figures
+        row["figures"] = {str(figure.key): figure.as_dict()["value"] for figure in figures}
         failed = {name: rule.message for name, rule in worst.items() if rule.verdict == "fail"}
-        row["outcome"], row["failed"] = "fails", failed
-        row["reason"] = " | ".join(f"{name}: {message}" for name, message in failed.items())
-        return
-    refuse_undoable([checked])
-    row["outcome"] = "passes"
+        if failed:
+            reason = " | ".join(f"{name}: {message}" for name, message in failed.items())
+            return row | {"outcome": "fails", "failed": failed, "reason": reason}
+        refuse_undoable([made])
+        return row | {"outcome": "passes"}
+    except SbafabError as error:
+        return row | {"reason": _one_line(error)}
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
 
 
 # The margin of each rule: its findings as one verdict and one margin.
@@ -125,11 +115,6 @@ class RuleMargin(NamedTuple):
             return None
         return self.margin / self.limit if self.limit else self.margin
 
-    @property
-    def severity(self) -> tuple[int, float]:
-        """Sort key: the worse, the smaller."""
-        return ORDER.index(self.verdict), self.share or 0.0
-
 
 def margin_of(finding: Finding) -> float | None:
     """Margin of a finding to its limit, in its unit."""
@@ -143,16 +128,15 @@ def margins(findings: Iterable[Finding]) -> dict[str, RuleMargin]:
     """The worst of each rule, in the deck's order; findings waived by the rule itself are
     ignored.
     """
-    worst: dict[str, RuleMargin] = {}
-    for finding in findings:
-        if finding.verdict == "waived" and not finding.by_user:
-            continue
-        values = {name: getattr(finding, name) for name in RuleMargin._fields if name != "margin"}
-        margin = RuleMargin(**values, margin=margin_of(finding))
-        before = worst.get(finding.rule)
-        if before is None or margin.severity < before.severity:
-            worst[finding.rule] = margin
-    return worst
+    each: dict[str, list[RuleMargin]] = {}
+    for f in findings:
+        if f.verdict != "waived" or f.by_user:
+            found = f.rule, f.verdict, margin_of(f), f.measured, f.limit, f.unit, f.where, f.message
+            each.setdefault(f.rule, []).append(RuleMargin(*found))
+    return {
+        name: min(found, key=lambda rule: (ORDER.index(rule.verdict), rule.share or 0.0))
+        for name, found in each.items()
+    }
 
 
 # The exact version of the program: rows of different versions are never mixed.
@@ -187,8 +171,7 @@ def main() -> None:
     jobs: queue.SimpleQueue[str] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(sys.stdin, jobs), daemon=True).start()
     while True:
-        job = json.loads(jobs.get())
-        answers.write(json.dumps(_answer(job)) + "\n")
+        answers.write(json.dumps(_answer(json.loads(jobs.get()))) + "\n")
         answers.flush()
 
 
@@ -198,17 +181,20 @@ def _read(lines: IO[str], jobs: queue.SimpleQueue[str]) -> None:
     os._exit(0)
 
 
-def _answer(job: dict[str, Any]) -> dict[str, Any]:
+def _answer(job: dict[str, Any]) -> SweepRow:
     if job.pop("program") != fingerprint():
         return {"outcome": "unlike", "reason": fingerprint()}
     began = time.perf_counter()
     try:
         row = measured(**job)
     except Exception as error:
-        message = " ".join(str(error).split())
-        row = {"outcome": "crashed", "reason": f"{type(error).__name__}: {message}"}
-    row["seconds"] = round(time.perf_counter() - began, 4)
-    return row
+        row = _crashed(error)
+    return row | {"seconds": round(time.perf_counter() - began, 4)}
+
+
+def _crashed(error: Exception | str) -> SweepRow:
+    reason = error if isinstance(error, str) else f"{type(error).__name__}: {_one_line(error)}"
+    return {"outcome": "crashed", "reason": reason, "seconds": 0.0}
 
 
 # Jobs in parallel, in threads of this machine or on a Dask cluster: an executor either way.
@@ -260,26 +246,21 @@ def dask_pool(address: str) -> Iterator[Pool]:
     try:
         client: Any = Client(address, timeout=CONNECT)
     except (OSError, ValueError) as error:
-        message = " ".join(str(error).split())
         raise OutputError(
-            f"no Dask scheduler answers at {address} ({message}); start one with `dask scheduler`, "
-            "or name its address, such as tcp://127.0.0.1:8786"
+            f"no Dask scheduler answers at {address} ({_one_line(error)}); start one with `dask "
+            "scheduler`, or name its address, such as tcp://127.0.0.1:8786"
         ) from None
     with client:
         yield client.get_executor(), max(1, sum(client.nthreads().values()))
 
 
 def run_jobs(
-    pool: Pool,
-    jobs: Iterable[tuple[str, MeasureJob]],
-    seconds: float,
-    done: Callable[[str, SweepRow], None],
-    waiting: Callable[[], None],
-) -> None:
-    """Run every job once and pass its key and row to ``done`` as soon as it ends, in any order.
+    pool: Pool, jobs: Iterable[tuple[str, MeasureJob]], seconds: float
+) -> Generator[tuple[str, SweepRow] | None, None, None]:
+    """Run every job once and yield its key and row as soon as it ends, in any order; and None in
+    every second in which no job ends.
 
-    Few jobs are pending at any time, so that memory does not grow with their number. ``waiting`` is
-    called in every second in which no job ends.
+    Few jobs are pending at any time, so that memory does not grow with their number.
     """
     executor, size = pool
     remaining = iter(jobs)
@@ -292,9 +273,9 @@ def run_jobs(
                 return
             ended, _ = wait(running, timeout=POLL, return_when=FIRST_COMPLETED)
             if not ended:
-                waiting()
+                yield None
             for future in ended:
-                done(running.pop(future), _row(future))
+                yield running.pop(future), _row(future)
     finally:
         for future in running:
             future.cancel()
@@ -305,8 +286,7 @@ def _row(future: Future[SweepRow]) -> SweepRow:
         row = future.result()
     except Exception as error:
         # A cluster gives up a job after its workers died several times.
-        message = " ".join(str(error).split())[:300]
-        row = {"outcome": "crashed", "reason": f"{type(error).__name__}: {message}", "seconds": 0.0}
+        return _crashed(error)
     if row["outcome"] == "unlike":
         raise OutputError(
             f"a worker runs sbafab {row['reason']} and this is {fingerprint()}; install the same "
@@ -340,6 +320,7 @@ def guarded(job: MeasureJob, seconds: float) -> SweepRow:
 def _child() -> subprocess.Popen[str]:
     """Start a process that measures."""
     alone = {name: os.environ.get(name, "1") for name in ONE_THREAD}
+    path = os.pathsep.join(filter(None, sys.path))
     with _lock:
         if not _may_start.is_set():
             raise RuntimeError("no process is started any more")
@@ -347,9 +328,8 @@ def _child() -> subprocess.Popen[str]:
             COMMAND,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            text=True,
             encoding="utf-8",
-            env={**os.environ, **alone, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            env={**os.environ, **alone, "PYTHONPATH": path},
         )
         _children.add(child)
     return child
@@ -376,7 +356,7 @@ def _measured_by(child: subprocess.Popen[str], job: MeasureJob, seconds: float) 
     if is_late:
         reason = f"stopped after {seconds:g} s; --timeout gives it longer"
         return {"outcome": "too long", "reason": reason, "seconds": seconds}
-    return {"outcome": "crashed", "reason": _exit_reason(child.returncode), "seconds": 0.0}
+    return _crashed(_exit_reason(child.returncode))
 
 
 def close_all() -> None:

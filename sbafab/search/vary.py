@@ -38,6 +38,14 @@ class Varied:
         return not self.values
 
 
+@dataclass(frozen=True)
+class KeyDifference:
+    """A key that differs, and its two values; None if a design has no such key."""
+
+    key: str
+    values: tuple[Any, Any]
+
+
 def key_values(design: Design) -> dict[str, Any]:
     """Return the value of every key of a design."""
     return {key: value for key, value, _ in keys_of(design)}

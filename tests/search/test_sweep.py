@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -36,12 +36,12 @@ def _rows(found: SweptDesigns, name: str = "sweep.csv") -> list[dict[str, str]]:
 
 
 def _here(
-    pool: object, jobs: Iterable[tuple[str, MeasureJob]], seconds: float, done: Any, waiting: object
-) -> None:
+    pool: object, jobs: Iterable[tuple[str, MeasureJob]], seconds: float
+) -> Iterator[tuple[str, dict[str, Any]]]:
     """Measures in this process, which begins no other: the long tests do."""
     for key, job in jobs:
         del job["program"]
-        done(key, {**measured(**job), "seconds": 0.5})
+        yield key, {**measured(**job), "seconds": 0.5}
 
 
 @pytest.fixture(scope="module")

@@ -69,30 +69,26 @@ def test_what_takes_too_long_is_killed_and_not_tried_again() -> None:
 def test_a_pool_does_every_job_once_and_leaves_no_process(tmp_path: Path) -> None:
     jobs: dict[str, MeasureJob] = {str(number): {"do": "answer"} for number in range(20)}
     jobs["7"] = {"do": "die", "mark": str(tmp_path / "died")}
-    found: list[tuple[str, str]] = []
     with local_pool(2) as pool:
-        run_jobs(
-            pool, jobs.items(), 60, lambda k, row: found.append((k, row["outcome"])), lambda: None
-        )
+        rows = [row for row in run_jobs(pool, jobs.items(), 60) if row is not None]
+    found = [(key, row["outcome"]) for key, row in rows]
     assert sorted(key for key, _ in found) == sorted(jobs)
     assert [outcome for key, outcome in found if key == "7"] == ["crashed"]
     assert not pool_module._children
 
 
 def test_stopped_half_way_it_leaves_no_process() -> None:
-    def stop(key: str, row: object) -> None:
-        raise KeyboardInterrupt
-
     jobs: list[tuple[str, MeasureJob]] = [
         ("0", {"do": "answer"}),
         *((str(n), {"do": "hang"}) for n in "12"),
     ]
     with pytest.raises(KeyboardInterrupt), local_pool(2) as pool:
-        run_jobs(pool, jobs, 60, stop, lambda: None)
+        next(run_jobs(pool, jobs, 60))
+        raise KeyboardInterrupt
     assert not pool_module._children
 
 
 def test_another_program_is_told_apart() -> None:
     jobs: list[tuple[str, MeasureJob]] = [("0", {"do": "answer", "outcome": "unlike"})]
     with pytest.raises(OutputError, match="install the same"), local_pool(1) as pool:
-        run_jobs(pool, jobs, 60, lambda key, row: None, lambda: None)
+        list(run_jobs(pool, jobs, 60))
