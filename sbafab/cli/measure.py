@@ -27,7 +27,6 @@ from sbafab.lab.coupon import (
     read_measurements,
 )
 from sbafab.lab.cut_sheet import read_cut_sheet
-from sbafab.lab.edges import Reference
 from sbafab.lab.inspection import (
     Inspection,
     InspectionDocument,
@@ -37,6 +36,7 @@ from sbafab.lab.inspection import (
     sizes_csv,
 )
 from sbafab.lab.picture import ScanPicture, read_picture
+from sbafab.lab.registration import Reference
 
 MOST_LINES = 20
 """Pieces amiss that are printed; the files have all."""

@@ -36,10 +36,8 @@ from sbafab.geometry.region import Region, rectangle, union
 from sbafab.laminate.films import PTFE_WARNING
 from sbafab.spreadsheet import csv_text, table_rows
 
-MOST_DEGREES = 200
-"""Degrees of freedom from which on Student's t is taken as if there were no more."""
-LARGEST = 1.0
-"""mm; a wider kerf is a mistake in the table."""
+MOST_DEGREES = 200  # degrees of freedom from which on Student's t is taken as if there were no more
+LARGEST = 1.0  # mm; a wider kerf is a mistake in the table
 WORST_SCALE = 0.1
 """Bounds of measured over nominal size: a larger deviation means another unit, not the machine."""
 LARGEST_SLIP = 0.25
@@ -56,8 +54,7 @@ FREE = 4
 """Degrees of freedom that a difference between x and y must leave: Student's t is 2.8 there."""
 RESOLUTIONS = {"calliper": 0.01, "scanner": 25.4 / 2400, "microscope": 0.001}
 """mm: the least step of each instrument; a scanner's is for 2400 dots per inch."""
-UNNAMED = RESOLUTIONS["calliper"]
-"""mm: the least step of an unnamed instrument."""
+UNNAMED = RESOLUTIONS["calliper"]  # mm: the least step of an unnamed instrument
 Kind = Literal["outer", "window"]
 Axis = Literal["x", "y"]
 
@@ -337,8 +334,7 @@ def student_t(degrees: int) -> float:
 # which makes both larger, from kerf; several sizes tell a scale from both.
 
 
-SIZE = 60.0
-"""Side in mm of the film that the piece needs."""
+SIZE = 60.0  # side in mm of the film that the piece needs
 COLUMNS = ("feature", "axis", "nominal_mm", "measured_mm")
 HINTS = (
     "# Cut coupon.dxf with kerf offset 0; measure each size in the middle of the side; "
@@ -439,11 +435,9 @@ def _labels() -> tuple[Stroke, ...]:
 # The coupon's filled-in table.
 
 
-LONGEST = 10_000.0
-"""mm."""
+LONGEST = 10_000.0  # mm
 NUMBERS = ("nominal_mm", "measured_mm")
-INSTRUMENT = "instrument"
-"""An optional column: the instrument of the measurement."""
+INSTRUMENT = "instrument"  # an optional column: the instrument of the measurement
 KINDS: dict[str, Kind] = {"outer": "outer", "window": "window", "piece": "outer"}
 """Last words of a feature; a piece fell out of a window."""
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)", re.ASCII)

@@ -16,8 +16,7 @@ from sbafab.folders.manifest import JobManifest, Manifest, read_design_index, re
 from sbafab.geometry.edges import Bounds
 from sbafab.geometry.region import Region
 
-SPACING = 1.0
-"""Default distance between cuts, for a file without one, mm."""
+SPACING = 1.0  # default distance between cuts, for a file without one, mm
 SAME_SIZE, SAME_EDGE = 1e-4, 2e-3
 """Largest difference of congruent pieces in area, mm2, and of their edges, mm."""
 

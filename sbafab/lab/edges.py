@@ -24,37 +24,25 @@ from sbafab.errors import DesignError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, left_turn
 from sbafab.geometry.region import Region, disc, polygon
-from sbafab.lab.cut_sheet import DrawnSheet
-from sbafab.lab.picture import PictureOutline, ScanPicture
-from sbafab.lab.registration import SMALLEST, Location, PointArray, Warp
+from sbafab.lab.picture import ScanPicture
+from sbafab.lab.registration import MILLIMETRES, SMALLEST, Location, PointArray, Scan, Warp, xy
 
 FloatArray = NDArray[np.float64]
 
-STEP = 0.2
-"""Spacing of samples, mm."""
+STEP = 0.2  # spacing of samples, mm
 MOST_SAMPLES = 60_000
-CORNER = 0.35
-"""Distance of samples from corners, which the beam and blur round off, mm."""
-TURN = 0.1
-"""Smaller angles are not corners, rad."""
-SHARPEST = 0.3
-"""Arcs of a smaller radius are corners, not edges, mm."""
+CORNER = 0.35  # distance of samples from corners, which the beam and blur round off, mm
+TURN = 0.1  # smaller angles are not corners, rad
+SHARPEST = 0.3  # arcs of a smaller radius are corners, not edges, mm
 REACHES = (0.9, 0.45, 0.45, 0.45)
 """Search range on both sides of the drawn edge, round by round, mm."""
-SMOOTH = 1.4
-"""Smoothing length of a profile, in steps of half a pixel."""
-LEAST_CONTRAST = 0.4
-"""Least contrast, as a share of the usual difference between film and paper."""
-TOLERANCE = 0.1
-"""Largest distance of an edge that belongs to its piece, after displacement, mm."""
-NEIGHBOURS = 10
-"""Samples along an edge with correlated errors: they count as one."""
-ROUNDS = 8
-"""Rounds of reweighting."""
-FEW = 4
-"""Fewer pieces give no uncertainty from their scatter."""
-LOOSE, TIGHT = 0.3, 0.004
-"""Displacement of pieces, at the first guess and at least, mm."""
+SMOOTH = 1.4  # smoothing length of a profile, in steps of half a pixel
+LEAST_CONTRAST = 0.4  # least contrast, as a share of the usual difference between film and paper
+TOLERANCE = 0.1  # largest distance of an edge that belongs to its piece, after displacement, mm
+NEIGHBOURS = 10  # samples along an edge with correlated errors: they count as one
+ROUNDS = 8  # rounds of reweighting
+FEW = 4  # fewer pieces give no uncertainty from their scatter
+LOOSE, TIGHT = 0.3, 0.004  # displacement of pieces, at the first guess and at least, mm
 
 
 @dataclass(frozen=True)
@@ -87,8 +75,7 @@ class Samples:
         spin = np.exp(1j * turns)
         points = middles + dx + 1j * dy + spin * (self.points @ (1, 1j) - middles)
         normals = spin * (self.normals @ (1, 1j))
-        both = (np.column_stack([each.real, each.imag]) for each in (points, normals))
-        return replace(self, **dict(zip(("points", "normals"), both, strict=True)))
+        return replace(self, points=xy(points), normals=xy(normals))
 
 
 def samples_of(regions: Sequence[Region], is_skeleton: bool) -> Samples:
@@ -217,11 +204,11 @@ class EdgeFit:
         return self.outside - self.offset
 
 
-def fitted(picture: ScanPicture, sheet: DrawnSheet, location: Location, is_camera: bool) -> EdgeFit:
+def fitted(scan: Scan, location: Location) -> EdgeFit:
     """Return the fit of the edges in a picture with a roughly known location."""
-    is_skeleton = location.content == "skeleton"
-    samples = samples_of([place.region for place in sheet.places], is_skeleton)
-    degree = 3 if is_camera and len(sheet.places) >= 6 else 1
+    sheet = scan.sheet
+    samples = samples_of([place.region for place in sheet.places], location.is_skeleton)
+    degree = 3 if scan.is_camera and len(sheet.places) >= 6 else 1
     empty = np.zeros(((degree + 1) * (degree + 2) // 2, 2))
     warp = replace(location.warp, degree=degree, coefficients=empty)
     displacements = np.zeros((len(sheet.places), 3))
@@ -229,7 +216,7 @@ def fitted(picture: ScanPicture, sheet: DrawnSheet, location: Location, is_camer
     for reach in REACHES:
         laid = samples.moved(displacements)
         within = min(reach, 0.9 * sheet.spacing)
-        outside, blur = crossings(picture, warp, laid, within, offset)
+        outside, blur = crossings(scan.picture, warp, laid, within, offset)
         fit = _solved(laid, warp, outside, displacements, looseness)
         warp, offset, displacements = fit.warp, fit.offset, fit.displacements
         looseness = max(TIGHT, 1.5 * float(np.median(np.abs(displacements[:, :2]))))
@@ -312,15 +299,10 @@ def _of_offset(influence: FloatArray, pull: FloatArray, laid: Samples) -> tuple[
 # An independent length gives the true length of that millimetre.
 
 
-MILLIMETRES = 25.4
-"""An inch, mm."""
-NEAR_LENGTH = 0.05
-"""Largest relative error of a bar's length before it is measured."""
-BAR_FILL = 0.9
-"""Least share of its box that a bar fills."""
+NEAR_LENGTH = 0.05  # largest relative error of a bar's length before it is measured
+BAR_FILL = 0.9  # least share of its box that a bar fills
 LEAST_PINS = 2
-SEARCH = 0.45
-"""Search range around a drawn edge, mm."""
+SEARCH = 0.45  # search range around a drawn edge, mm
 
 
 @dataclass(frozen=True)
@@ -332,36 +314,15 @@ class Scale:
     reference: str
 
 
-@dataclass(frozen=True)
-class Reference:
-    """``dpi`` along the picture's rows and columns; a ``bar`` of this length, mm; the ``pins``.
-
-    The first of bar, pins and dpi that is given is used; without any, the scale is 1.
-    """
-
-    dpi: tuple[float, float] | None = None
-    bar: float | None = None
-    pins: bool = False
-
-    @property
-    def pixels_per_mm(self) -> float | None:
-        return None if self.dpi is None else math.sqrt(self.dpi[0] * self.dpi[1]) / MILLIMETRES
-
-
-def scale_of(
-    picture: ScanPicture,
-    sheet: DrawnSheet,
-    fit: EdgeFit,
-    measured: Sequence[PictureOutline],
-    reference: Reference,
-) -> Scale:
+def scale_of(scan: Scan, fit: EdgeFit) -> Scale:
     """Return the film's scale by the reference. Raises DesignError if that is not visible."""
+    reference = scan.reference
     if reference.bar is not None:
-        scale = _by_bar(picture, sheet, fit, measured, reference.bar)
+        scale = _by_bar(scan, fit, reference.bar)
         return Scale(scale, scale, f"the bar of {reference.bar:g} mm")
     if reference.pins:
-        scale = _by_pins(picture, sheet, fit)
-        return Scale(scale, scale, f"{len(sheet.pins)} pins")
+        scale = _by_pins(scan, fit)
+        return Scale(scale, scale, f"{len(scan.sheet.pins)} pins")
     if reference.dpi is None:
         return Scale(1.0, 1.0, "none: taken from the cut file")
     x, y = np.hypot(*(fit.warp.axes / np.array(reference.dpi) * MILLIMETRES).T)
@@ -369,15 +330,9 @@ def scale_of(
     return Scale(float(x), float(y), f"{dpi} dpi")
 
 
-def _by_bar(
-    picture: ScanPicture,
-    sheet: DrawnSheet,
-    fit: EdgeFit,
-    measured: Sequence[PictureOutline],
-    length: float,
-) -> float:
-    parts = shapely.box(*sheet.bounds)
-    for outline in measured:
+def _by_bar(scan: Scan, fit: EdgeFit, length: float) -> float:
+    parts = shapely.box(*scan.sheet.bounds)
+    for outline in scan.outlines:
         bar = shapely.transform(outline.polygon, fit.warp.inverse)
         box = shapely.minimum_rotated_rectangle(bar)
         a, b, c, d = shapely.get_coordinates(box)[:4]
@@ -386,7 +341,7 @@ def _by_bar(
         is_bar = abs(math.dist(a, b) / length - 1) < NEAR_LENGTH and bar.area > BAR_FILL * box.area
         if is_bar and not parts.contains(bar.centroid):
             samples = samples_of([polygon([(float(x), float(y)) for x, y in (a, b, c, d)])], False)
-            outside, _ = crossings(picture, fit.warp, samples, SEARCH)
+            outside, _ = crossings(scan.picture, fit.warp, samples, SEARCH)
             axis = (b - a) / math.dist(a, b)
             towards = samples.normals @ axis
             along = samples.points @ axis + towards * outside
@@ -402,14 +357,15 @@ def _by_bar(
     )
 
 
-def _by_pins(picture: ScanPicture, sheet: DrawnSheet, fit: EdgeFit) -> float:
-    if len(sheet.pins) < LEAST_PINS:
+def _by_pins(scan: Scan, fit: EdgeFit) -> float:
+    pins = scan.sheet.pins
+    if len(pins) < LEAST_PINS:
         raise DesignError(
-            f"--pins needs {LEAST_PINS} pins of {sheet.name} or more, and it has "
-            f"{len(sheet.pins)}; give --dpi or --bar"
+            f"--pins needs {LEAST_PINS} pins of {scan.sheet.name} or more, and it has "
+            f"{len(pins)}; give --dpi or --bar"
         )
-    drawn = np.array([(x, y) for x, y, _ in sheet.pins])
-    measured = np.array([_pin(picture, fit, pin) for pin in sheet.pins])
+    drawn = np.array([(x, y) for x, y, _ in pins])
+    measured = np.array([_pin(scan.picture, fit, pin) for pin in pins])
     return math.sqrt(float(drawn.var(axis=0).sum() / measured.var(axis=0).sum()))
 
 

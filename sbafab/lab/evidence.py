@@ -85,8 +85,7 @@ def _id(text: str) -> str:
     return re.sub(r"[^A-Za-z0-9._-]+", "-", text).lstrip("-._")[:64] or "lab"
 
 
-RECORDS = (".sqlite", ".db")
-"""File suffixes of a lab's build records."""
+RECORDS = (".sqlite", ".db")  # file suffixes of a lab's build records
 
 
 def load_source(source: str | Path) -> Evidence:

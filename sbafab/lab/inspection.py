@@ -20,19 +20,16 @@ from sbafab.errors import DesignError
 from sbafab.geometry.region import coord
 from sbafab.lab.coupon import COLUMNS, INSTRUMENT, Value, student_t
 from sbafab.lab.cut_sheet import DrawnSheet
-from sbafab.lab.edges import EdgeFit, Reference, Scale, fitted, scale_of
-from sbafab.lab.picture import ScanPicture, outlines
+from sbafab.lab.edges import EdgeFit, Scale, fitted, scale_of
+from sbafab.lab.picture import ScanPicture
 from sbafab.lab.pieces import PieceFinding, piece_findings
-from sbafab.lab.registration import SMALLEST, Content, Location, locate
+from sbafab.lab.registration import SMALLEST, Content, Location, Reference, Scan, locate
 from sbafab.reports.drawing import TEXT, box, document, line, text
 from sbafab.spreadsheet import csv_text
 
-FEWEST = 100
-"""Least number of samples for a kerf."""
-FINEST = 0.02
-"""Standard uncertainty of an edge from grey levels and their rounding, in pixels."""
-LARGEST_KERF = 1.0
-"""Shown in mm."""
+FEWEST = 100  # least number of samples for a kerf
+FINEST = 0.02  # standard uncertainty of an edge from grey levels and their rounding, in pixels
+LARGEST_KERF = 1.0  # shown in mm
 HARMLESS = ("sound", "moved", "turned")
 
 
@@ -105,17 +102,16 @@ def inspect_picture(
     ``is_camera``: taken with perspective. ``is_light``: film is lighter than its background. Raises
     DesignError if the picture does not show the sheet, or too little of it.
     """
-    measured = outlines(picture)
-    size = picture.pixels.shape[0], picture.pixels.shape[1]
-    location = locate(sheet, measured, size, reference.pixels_per_mm, is_light, is_camera)
-    fit = fitted(picture, sheet, location, is_camera)
+    scan = Scan(picture, sheet, reference, is_camera, is_light)
+    location = locate(scan)
+    fit = fitted(scan, location)
     known = fit.weights > 0
     if known.sum() < FEWEST:
         raise DesignError(
             f"{picture.path.name} shows {int(known.sum())} places on edges of {sheet.name}, and "
             f"{FEWEST} are needed; scan at a higher resolution, or more of the sheet"
         )
-    scale = scale_of(picture, sheet, fit, measured, reference)
+    scale = scale_of(scan, fit)
     pixel = 1 / fit.warp.pixels_per_mm
     residuals = np.abs(fit.residuals[known])
     return Inspection(
@@ -128,7 +124,7 @@ def inspect_picture(
         rms=math.sqrt(float((residuals**2).mean())),
         within_95=float(np.percentile(residuals, 95)),
         pixel=pixel,
-        pieces=tuple(piece_findings(picture, sheet, location, fit, measured)),
+        pieces=tuple(piece_findings(scan, location, fit)),
     )
 
 
@@ -146,8 +142,7 @@ def _kerf(picture: ScanPicture, fit: EdgeFit, pixel: float) -> Value:
     return Value(kerf, uncertainty, half)
 
 
-MOST_NOTE = 400
-"""Most characters of a note in a lab's file."""
+MOST_NOTE = 400  # most characters of a note in a lab's file
 
 
 def history(inspection: Inspection) -> dict[str, Any]:
@@ -171,8 +166,7 @@ def history(inspection: Inspection) -> dict[str, Any]:
 # The table of sizes for ``sbafab kerf``.
 
 
-FACING = 0.985
-"""Cosine of the largest angle between a side and the axis that it bounds."""
+FACING = 0.985  # cosine of the largest angle between a side and the axis that it bounds
 
 
 def sizes_csv(inspection: Inspection) -> str:
@@ -211,12 +205,9 @@ def _gain(fit: EdgeFit, contour: int, axis: int, ends: tuple[float, float]) -> f
 # The picture with deviations.
 
 
-SHOWN_SIDE, PAGE = 1600, 240.0
-"""Longer side of the picture in the drawing, pixels and mm."""
-LEGEND = 230.0
-"""Least width of the page, mm: the legend's."""
-STEPS = (-0.05, -0.02, -0.01, 0.01, 0.02, 0.05)
-"""Step between the colours, mm."""
+SHOWN_SIDE, PAGE = 1600, 240.0  # longer side of the picture in the drawing, pixels and mm
+LEGEND = 230.0  # least width of the page, mm: the legend's
+STEPS = (-0.05, -0.02, -0.01, 0.01, 0.02, 0.05)  # step between the colours, mm
 COLOURS = ("#2166ac", "#67a9cf", "#b9d9ea", "#4daf4a", "#fdcf9c", "#ef8a62", "#b2182b")
 """From film too small to film too large, distinct for the colour blind too."""
 UNSEEN, AMISS = "#ff00ff", "#e6007e"

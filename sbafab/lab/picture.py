@@ -19,16 +19,11 @@ Pixels = NDArray[np.float32]
 MOST_BYTES = 2_000_000_000
 MOST_PIXELS = 400_000_000
 LEAST_SIDE = 100
-COARSE = 1600
-"""Longer side of the reduced picture, pixels."""
-SPARSE = 4
-"""Step at which the local light is sampled, reduced pixels."""
-ROUNDS = 3
-"""Iterations in which the threshold follows uneven light."""
-LEAST_CONTRAST = 12.0
-"""Least difference in grey levels between film and paper."""
-FLATBED_DPI = range(150, 9601)
-"""Credible resolutions of a scan: cameras write 72 or 96."""
+COARSE = 1600  # longer side of the reduced picture, pixels
+SPARSE = 4  # step at which the local light is sampled, reduced pixels
+ROUNDS = 3  # iterations in which the threshold follows uneven light
+LEAST_CONTRAST = 12.0  # least difference in grey levels between film and paper
+FLATBED_DPI = range(150, 9601)  # credible resolutions of a scan: cameras write 72 or 96
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import shapely
 
+from sbafab.geometry.edges import Bounds
 from sbafab.geometry.region import Region
-from sbafab.lab.cut_sheet import DrawnSheet, SheetShape
+from sbafab.lab.cut_sheet import SheetShape
 from sbafab.lab.edges import TOLERANCE, EdgeFit
-from sbafab.lab.picture import PictureOutline, ScanPicture
-from sbafab.lab.registration import SMALLEST, Complexes, Location, PointArray, polyline
+from sbafab.lab.registration import SMALLEST, Complexes, Location, Scan, polyline, xy
 
 PieceVerdict = Literal[
     "sound",
@@ -30,27 +30,18 @@ PieceVerdict = Literal[
 ]
 """States of a place; "covered": another piece lies on it or touches it."""
 
-SOUND_SHARE = 0.9
-"""Least share of samples on a contour that are within TOLERANCE."""
+SOUND_SHARE = 0.9  # least share of samples on a contour that are within TOLERANCE
 SAME_AREA = 0.08
 """Largest relative difference in area between a piece and its shape, in addition to the kerf."""
-SAME_SHAPE = 0.2
-"""Largest 95th percentile of the distance between an outline and its shape, mm."""
-AS_GOOD = 0.02
-"""Difference in fit below which the expected shape is chosen, mm."""
+SAME_SHAPE = 0.2  # largest 95th percentile of the distance between an outline and its shape, mm
+AS_GOOD = 0.02  # difference in fit below which the expected shape is chosen, mm
 ANGLE_STEP = 5
-TURNED = 5.0
-"""Angle from which a piece counts as turned, not askew, degrees."""
-COVERED_SHARE = 0.6
-"""Least share of a piece's edges that must be visible if others cover the rest."""
-REACH = 40.0
-"""Search range for edges around a place, mm."""
-STRAY = 0.5
-"""Displacement that is reported, mm."""
-NEAR = 1.0
-"""Largest distance between an edge and a covered piece that is fitted to it, mm."""
-HOLE_PLACE = 0.6
-"""Largest distance between a hole and its place, mm."""
+TURNED = 5.0  # angle from which a piece counts as turned, not askew, degrees
+COVERED_SHARE = 0.6  # least share of a piece's edges that must be visible if others cover the rest
+REACH = 40.0  # search range for edges around a place, mm
+STRAY = 0.5  # displacement that is reported, mm
+NEAR = 1.0  # largest distance between an edge and a covered piece that is fitted to it, mm
+HOLE_PLACE = 0.6  # largest distance between a hole and its place, mm
 
 
 @dataclass(frozen=True)
@@ -88,34 +79,21 @@ class Match(NamedTuple):
     misfit: float
 
 
-def piece_findings(
-    picture: ScanPicture,
-    sheet: DrawnSheet,
-    location: Location,
-    fit: EdgeFit,
-    measured: Sequence[PictureOutline],
-) -> list[PieceFinding]:
+def piece_findings(scan: Scan, location: Location, fit: EdgeFit) -> list[PieceFinding]:
     """Return a finding for each place of the sheet."""
-    judge = _Judge(picture, sheet, location, fit, measured)
-    return [judge.finding(number, place) for number, place in enumerate(sheet.places)]
+    judge = _Judge(scan, location, fit)
+    return [judge.finding(number, place) for number, place in enumerate(scan.sheet.places)]
 
 
 class _Judge:
     """The visible pieces, or windows of a skeleton, as polygons with holes, mm of the sheet."""
 
-    def __init__(
-        self,
-        picture: ScanPicture,
-        sheet: DrawnSheet,
-        location: Location,
-        fit: EdgeFit,
-        measured: Sequence[PictureOutline],
-    ) -> None:
-        self.picture, self.sheet, self.fit = picture, sheet, fit
-        self.is_skeleton = location.content == "skeleton"
+    def __init__(self, scan: Scan, location: Location, fit: EdgeFit) -> None:
+        self.picture, self.sheet, self.fit = scan.picture, scan.sheet, fit
+        self.is_skeleton = location.is_skeleton
         in_mm = [
-            ((outline.is_light == location.is_light) != self.is_skeleton, polygon)
-            for outline in measured
+            ((outline.is_light == scan.is_light) != self.is_skeleton, polygon)
+            for outline in scan.outlines
             for polygon in [shapely.transform(outline.polygon, fit.warp.inverse)]
             if polygon.area > SMALLEST
         ]
@@ -133,22 +111,20 @@ class _Judge:
         """Return the blob in each place, assigned by the nearest pairs first."""
         pairs = []
         for number, place in enumerate(self.sheet.places):
-            middle, half = _middle(place.region), _half(place.region) + 1.0
+            low_x, low_y, high_x, high_y = box = place.region.bounds
             outer = sum(contour.area for contour in place.region.outers)
             for k, blob in enumerate(self.blobs):
-                low_x, low_y, high_x, high_y = blob.bounds
-                off = complex((low_x + high_x) / 2, (low_y + high_y) / 2) - middle
-                is_near = abs(off.real) < half[0] and abs(off.imag) < half[1]
+                off = _middle(blob.bounds) - _middle(box)
+                is_near = abs(off.real) < (high_x - low_x) / 2 + 1
+                is_near = is_near and abs(off.imag) < (high_y - low_y) / 2 + 1
                 # Dust is not a piece.
                 if is_near and shapely.Polygon(blob.exterior).area > 0.1 * outer:
                     pairs.append((abs(off), number, k))
-        holders: dict[int, shapely.Polygon] = {}
-        used: set[int] = set()
+        holders: dict[int, int] = {}
         for _, number, k in sorted(pairs):
-            if number not in holders and k not in used:
-                holders[number] = self.blobs[k]
-                used.add(k)
-        return holders
+            if number not in holders and k not in holders.values():
+                holders[number] = k
+        return {number: self.blobs[k] for number, k in holders.items()}
 
     def finding(self, number: int, place: SheetShape) -> PieceFinding:
         """Return the finding for a place of the sheet."""
@@ -156,10 +132,17 @@ class _Judge:
         if self._is_sound(number) and not (blob and self._strange_holes(place, blob)):
             return self._sound(number, place)
         # A blob that covers another place's middle is more than one piece.
-        middles = [_middle(p.region) for p in self.sheet.places if p is not place]
+        middles = [_middle(p.region.bounds) for p in self.sheet.places if p is not place]
         if blob is None or any(_holds(blob, middle) for middle in middles):
             return self._crowded(place)
-        return self._identified(place, blob)
+        match = self._best_match(place, blob)
+        if match is None:
+            return _finding(place, "unknown", self._unknown(place, blob))
+        shut = self._shut_holes(place, blob)
+        at = " and ".join(f"x {hole.real:.1f}, y {hole.imag:.1f}" for hole in shut)
+        more = f", or the hole at {at} is not open" if 0 < len(shut) <= 2 else ""
+        doubt: tuple[PieceVerdict, str] = "unknown", self._unknown(place, blob)
+        return _recognised(place, match, TOLERANCE, more, "", doubt)
 
     def _is_sound(self, piece: int) -> bool:
         """Return True if every contour of a piece is visible at its drawn position."""
@@ -173,15 +156,11 @@ class _Judge:
         residuals = np.abs(fit.residuals[(fit.samples.pieces == number) & (fit.weights > 0)])
         shift = math.hypot(*fit.displacements[number, :2])
         turn = math.degrees(fit.displacements[number, 2])
-        more = {
-            "rms": math.sqrt(float((residuals**2).mean())) if len(residuals) else None,
-            "largest": float(residuals.max()) if len(residuals) else None,
-        }
-        if abs(turn) > TURNED:
-            return _turned(place, shift, turn, **more)
-        if shift > STRAY:
-            return _moved(place, shift, turn, **more)
-        return _finding(place, "sound", "", shift=shift, turn=turn, **more)
+        verdict, message = _displaced(shift, turn, STRAY) or ("sound", "")
+        rms, largest = None, None
+        if len(residuals):
+            rms, largest = math.sqrt(float((residuals**2).mean())), float(residuals.max())
+        return _finding(place, verdict, message, shift, turn, rms, largest)
 
     def _crowded(self, place: SheetShape) -> PieceFinding:
         """Return the finding for a place without a blob: no piece, or others cover or touch it."""
@@ -190,7 +169,7 @@ class _Judge:
         rows, columns = self.picture.pixels.shape
         if (pixels < 1).any() or (pixels > (columns - 2, rows - 2)).any():
             return _finding(place, "not in picture", "reaches out of the picture; scan all of it")
-        middle = _middle(place.region)
+        middle = _middle(place.region.bounds)
         if not any(_holds(blob, middle) for blob in self.blobs):
             message = "is still in the sheet" if self.is_skeleton else "is missing"
             return _finding(place, "missing", message)
@@ -202,38 +181,9 @@ class _Judge:
         best = max(matches, key=lambda m: (round(m.share, 2), m.name == place.name), default=None)
         if best is None or best.share < COVERED_SHARE:
             return _finding(place, "unknown", "cannot be told from the pieces that it touches")
-        if best.name != place.name:
-            message = f"{best.name} lies in its place, and touches others"
-            return _finding(place, "other piece", message)
-        where = {"shift": best.shift, "turn": best.turn}
-        if best.is_mirrored:
-            return _finding(place, "turned over", "is turned over, and touches others", **where)
-        if abs(best.turn) > TURNED:
-            message = f"is turned by {best.turn:.0f} degrees, and touches others"
-            return _finding(place, "turned", message, **where)
-        message = "is covered in part by another piece, or touches it"
-        return _finding(place, "covered", message, **where)
-
-    def _identified(self, place: SheetShape, blob: shapely.Polygon) -> PieceFinding:
-        """Return the finding for a blob that is not the piece in its place as drawn."""
-        match = self._best_match(place, blob)
-        if match is None:
-            return _finding(place, "unknown", self._unknown(place, blob))
-        if match.name != place.name:
-            over = ", turned over," if match.is_mirrored else ""
-            shut = self._shut_holes(place, blob)
-            at = " and ".join(f"x {hole.real:.1f}, y {hole.imag:.1f}" for hole in shut)
-            shut_text = f", or the hole at {at} is not open" if 0 < len(shut) <= 2 else ""
-            message = f"{match.name}{over} lies in its place{shut_text}"
-            return _finding(place, "other piece", message)
-        where = {"shift": match.shift, "turn": match.turn}
-        if match.is_mirrored:
-            return _finding(place, "turned over", "is turned over", **where)
-        if abs(match.turn) > TURNED:
-            return _turned(place, match.shift, match.turn)
-        if match.shift > TOLERANCE:
-            return _moved(place, match.shift, match.turn)
-        return _finding(place, "unknown", self._unknown(place, blob), **where)
+        touches = ", and touches others"
+        covered = "is covered in part by another piece, or touches it"
+        return _recognised(place, best, math.inf, touches, touches, ("covered", covered))
 
     def _unknown(self, place: SheetShape, blob: shapely.Polygon) -> str:
         shut, strange = self._shut_holes(place, blob), self._strange_holes(place, blob)
@@ -301,24 +251,23 @@ class _Judge:
         """
         from scipy.spatial import cKDTree
 
-        tree, start = cKDTree(_xy(edges)), _middle(place.region)
-        reach = NEAR if blob is None else math.inf
-        outer = [polyline(contour, 0.2) @ (1, 1j) for contour in shape.region.outers]
+        tree, start = cKDTree(xy(edges)), _middle(place.region.bounds)
+        reach, aim, anchor = NEAR, start, 0j
+        outer = [polyline(contour, 0.2) for contour in shape.region.outers]
         holes = [] if self.is_skeleton else _holes(shape.region)
-        drawn = np.concatenate([*outer, *holes]) - _middle(shape.region)
-        centroid = _centroid(shapely.Polygon(_xy(outer[0]))) - _middle(shape.region)
+        drawn = np.concatenate([*outer, *holes]) - _middle(shape.region.bounds)
+        if blob is not None:
+            reach, aim = math.inf, _centroid(shapely.Polygon(blob.exterior))
+            anchor = _centroid(shapely.Polygon(xy(outer[0]))) - _middle(shape.region.bounds)
         for is_mirrored in (False, True):
             arms = -drawn.conj() if is_mirrored else drawn
-            anchor, aim = 0j, start
-            if blob is not None:
-                aim = _centroid(shapely.Polygon(blob.exterior))
-                anchor = -centroid.conjugate() if is_mirrored else centroid
+            anchor = -anchor.conjugate() if is_mirrored else anchor
             best: Match | None = None
             for guess in _turns(tree, _sparse(arms), reach, anchor, aim):
                 spin, shift = _aligned(tree, edges, arms, (guess, aim - guess * anchor), reach)
                 laid = arms * spin + shift
-                distances = [tree.query(_xy(laid))[0]]
-                distances += [] if blob is None else [cKDTree(_xy(laid)).query(_xy(edges))[0]]
+                distances = [tree.query(xy(laid))[0]]
+                distances += [] if blob is None else [cKDTree(xy(laid)).query(xy(edges))[0]]
                 misfit = max(float(np.percentile(each, 95)) for each in distances)
                 share = float((distances[0] < SAME_SHAPE).mean())
                 # Of equally good turns, the smallest.
@@ -330,21 +279,44 @@ class _Judge:
 
 
 def _finding(
-    place: SheetShape, verdict: PieceVerdict, message: str, **more: float | None
+    place: SheetShape, verdict: PieceVerdict, message: str, *measured: float | None
 ) -> PieceFinding:
-    middle = _middle(place.region)
+    middle = _middle(place.region.bounds)
     x, y = round(middle.real, 3), round(middle.imag, 3)
-    return PieceFinding(place.name, x, y, verdict, message, **more)
+    return PieceFinding(place.name, x, y, verdict, message, *measured)
 
 
-def _turned(place: SheetShape, shift: float, turn: float, **more: float | None) -> PieceFinding:
-    message = f"is turned by {turn:.0f} degrees"
-    return _finding(place, "turned", message, shift=shift, turn=turn, **more)
+def _recognised(
+    place: SheetShape,
+    match: Match,
+    least: float,
+    after_other: str,
+    after: str,
+    otherwise: tuple[PieceVerdict, str],
+) -> PieceFinding:
+    """Return the finding for a piece that was recognised; ``otherwise`` if it is the place's own
+    and less than ``least`` mm off. ``after_other`` and ``after`` end messages on another piece and
+    on the place's own.
+    """
+    if match.name != place.name:
+        over = ", turned over," if match.is_mirrored else ""
+        message = f"{match.name}{over} lies in its place{after_other}"
+        return _finding(place, "other piece", message)
+    verdict, message = _displaced(match.shift, match.turn, least, after) or otherwise
+    if match.is_mirrored:
+        verdict, message = "turned over", f"is turned over{after}"
+    return _finding(place, verdict, message, match.shift, match.turn)
 
 
-def _moved(place: SheetShape, shift: float, turn: float, **more: float | None) -> PieceFinding:
-    message = f"lies {shift:.1f} mm off its place, turned by {turn:.1f} degrees"
-    return _finding(place, "moved", message, shift=shift, turn=turn, **more)
+def _displaced(
+    shift: float, turn: float, least: float, after: str = ""
+) -> tuple[PieceVerdict, str] | None:
+    """Return verdict and message for a piece that is turned, or ``least`` mm or more off."""
+    if abs(turn) > TURNED:
+        return "turned", f"is turned by {turn:.0f} degrees{after}"
+    if shift > least:
+        return "moved", f"lies {shift:.1f} mm off its place, turned by {turn:.1f} degrees"
+    return None
 
 
 def _turns(
@@ -356,7 +328,7 @@ def _turns(
     angles = np.deg2rad(np.arange(-180, 180, ANGLE_STEP))
     spins = np.exp(1j * angles)
     laid = (arms - anchor) * spins[:, None] + aim
-    distances = tree.query(_xy(laid.ravel()))[0].reshape(laid.shape)
+    distances = tree.query(xy(laid.ravel()))[0].reshape(laid.shape)
     costs = np.minimum(distances, reach).mean(axis=1)
     order = np.lexsort([np.abs(angles), np.maximum(costs, costs.min() + AS_GOOD)])
     return [complex(spins[k]) for k in order[:3]]
@@ -368,7 +340,7 @@ def _aligned(
     """Return turn and shift from points to their nearest edges within ``reach`` mm, by turns."""
     spin, shift = guess
     for _ in range(12):
-        distance, nearest = tree.query(_xy(arms * spin + shift))
+        distance, nearest = tree.query(xy(arms * spin + shift))
         near = distance < reach
         if near.sum() < 8:
             break
@@ -382,14 +354,9 @@ def _aligned(
 # Points as complex numbers, mm.
 
 
-def _middle(piece: Region) -> complex:
-    low_x, low_y, high_x, high_y = piece.bounds
+def _middle(box: Bounds) -> complex:
+    low_x, low_y, high_x, high_y = box
     return complex((low_x + high_x) / 2, (low_y + high_y) / 2)
-
-
-def _half(piece: Region) -> PointArray:
-    low_x, low_y, high_x, high_y = piece.bounds
-    return np.array([high_x - low_x, high_y - low_y]) / 2
 
 
 def _holds(blob: shapely.Polygon, point: complex) -> bool:
@@ -408,7 +375,7 @@ def _inner(blob: shapely.Polygon) -> list[complex]:
 
 def _holes(piece: Region, least: float = SMALLEST) -> list[Complexes]:
     """Return points along the holes of a piece that are larger than ``least`` mm2."""
-    return [polyline(hole, 0.2) @ (1, 1j) for hole in piece.holes if -hole.area > least]
+    return [polyline(hole, 0.2) for hole in piece.holes if -hole.area > least]
 
 
 def _apart(middles: Sequence[complex], there: Sequence[complex]) -> list[complex]:
@@ -422,7 +389,3 @@ def _centroid(polygon: shapely.Polygon) -> complex:
 
 def _sparse(points: Complexes) -> Complexes:
     return points[:: max(1, len(points) // 150)]
-
-
-def _xy(points: Complexes) -> PointArray:
-    return np.column_stack([points.real, points.imag])

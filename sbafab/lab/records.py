@@ -36,10 +36,8 @@ NUMBERS = {
     "proof_kpa": "kPa",
 }
 """Measured once per attempt, with their units; see ``docs/recording.md``."""
-ERRORS = ("offset_mm", "turn_deg", "cut_mm")
-"""Measured any number of times; unsigned."""
-READINGS = ("kerf_mm", "temperature_c", "press_force_n", "minutes")
-"""Numbers of a history entry."""
+ERRORS = ("offset_mm", "turn_deg", "cut_mm")  # measured any number of times; unsigned
+READINGS = ("kerf_mm", "temperature_c", "press_force_n", "minutes")  # numbers of a history entry
 _UNWRITABLE = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 _DECIMAL = re.compile(r"\d+(?:[.,]\d*)?|[.,]\d+", re.ASCII)
 

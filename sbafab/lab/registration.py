@@ -7,9 +7,10 @@ matching outlines is refined to an affine map (scanner) or a homography (camera)
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations
+from functools import cached_property
+from itertools import combinations, product
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from sbafab.errors import DesignError
 from sbafab.geometry.contour import Contour
 from sbafab.lab.cut_sheet import DrawnSheet
-from sbafab.lab.picture import PictureOutline
+from sbafab.lab.picture import PictureOutline, ScanPicture, outlines
 
 PointArray = NDArray[np.float64]
 """x and y, (n, 2)."""
@@ -28,23 +29,54 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 Content = Literal["pieces", "skeleton"]
 """The content of the picture: pieces without the waste, or the sheet that they fell out of."""
 
-ANCHORS = 8
-"""Most pairs of contours to search."""
-FEW = 6
-"""Up to this many contours all pairs are searched."""
+ANCHORS = 8  # most pairs of contours to search
+FEW = 6  # up to this many contours all pairs are searched
 MOST_POSES = 6000
 SAME_AREA = 0.25
 """Largest relative difference of matching areas, kerf included; twice as much for a camera."""
-SAME_SCALE = 0.125
-"""Largest relative difference from the scale by the resolution."""
-LEAST_SHARE = 0.5
-"""Least share of outlines that a picture of the sheet must show."""
-ENOUGH = 0.97
-"""Share of matched outlines at which the search for a better pose ends."""
-SCALE_STEP = 0.01
-"""Scale steps in which poses are ranked."""
-SMALLEST = 0.2
-"""Least area of a hole to search, mm2."""
+SAME_SCALE = 0.125  # largest relative difference from the scale by the resolution
+LEAST_SHARE = 0.5  # least share of outlines that a picture of the sheet must show
+ENOUGH = 0.97  # share of matched outlines at which the search for a better pose ends
+SCALE_STEP = 0.01  # scale steps in which poses are ranked
+SMALLEST = 0.2  # least area of a hole to search, mm2
+
+
+MILLIMETRES = 25.4  # an inch, mm
+
+
+@dataclass(frozen=True)
+class Reference:
+    """``dpi`` along the picture's rows and columns; a ``bar`` of this length, mm; the ``pins``.
+
+    The first of bar, pins and dpi that is given is used; without any, the scale is 1.
+    """
+
+    dpi: tuple[float, float] | None = None
+    bar: float | None = None
+    pins: bool = False
+
+    @property
+    def pixels_per_mm(self) -> float | None:
+        return None if self.dpi is None else math.sqrt(self.dpi[0] * self.dpi[1]) / MILLIMETRES
+
+
+@dataclass(frozen=True)
+class Scan:
+    """A picture of a sheet and how it was taken.
+
+    ``is_camera``: with perspective. ``is_light``: film is lighter than its background.
+    """
+
+    picture: ScanPicture
+    sheet: DrawnSheet
+    reference: Reference
+    is_camera: bool = False
+    is_light: bool = True
+
+    @cached_property
+    def outlines(self) -> list[PictureOutline]:
+        """The outlines in the picture, largest first."""
+        return outlines(self.picture)
 
 
 @dataclass(frozen=True)
@@ -102,52 +134,44 @@ class Location:
     """``warp`` from the sheet to the picture, the picture's content, and the share of the drawn
     outlines that match: ``matched`` of ``targets``.
 
-    ``from_below``: True if the sheet appears mirrored. ``is_light``: True if film is lighter than
-    paper.
+    ``from_below``: True if the sheet appears mirrored.
     """
 
     warp: Warp
     content: Content
     from_below: bool
-    is_light: bool
     matched: int
     targets: int
 
+    @property
+    def is_skeleton(self) -> bool:
+        return self.content == "skeleton"
 
-def polyline(contour: Contour, step: float) -> PointArray:
+
+def polyline(contour: Contour, step: float) -> Complexes:
     """Return points along a contour, at most ``step`` mm apart."""
     counts = [max(1, math.ceil(edge.length / step)) for edge in contour.edges]
     edges = zip(contour.edges, counts, strict=True)
-    return np.array([edge.at(k / count) for edge, count in edges for k in range(count)])
+    return np.array([edge.at(k / count) for edge, count in edges for k in range(count)]) @ (1, 1j)
 
 
-def locate(
-    sheet: DrawnSheet,
-    measured: Sequence[PictureOutline],
-    size: tuple[int, int],
-    pixels_per_mm: float | None,
-    is_light: bool,
-    is_camera: bool,
-) -> Location:
-    """Return the sheet's location in a picture of ``size``, rows and columns.
+def xy(points: Complexes) -> PointArray:
+    return np.column_stack([points.real, points.imag])
 
-    ``is_light``: film is lighter than paper. ``is_camera``: with perspective. Raises DesignError if
-    the picture does not show the sheet.
-    """
+
+def locate(scan: Scan) -> Location:
+    """Return the sheet's location in a picture. Raises DesignError if it is not visible."""
     contents: tuple[Content, ...] = ("pieces", "skeleton")
-    locations = [
-        location
-        for content in contents
-        for finder in [_Finder(sheet, content, measured, size, pixels_per_mm, is_light, is_camera)]
-        if (location := finder.location()) is not None
-    ]
-    best = max(locations, key=lambda at: round(at.matched / at.targets, 9), default=None)
+    locations = [_Finder(scan, content).location() for content in contents]
+    best = max(
+        filter(None, locations), key=lambda at: round(at.matched / at.targets, 9), default=None
+    )
     if best is None or best.matched < LEAST_SHARE * best.targets:
         shown = "none" if best is None else f"{best.matched} of {best.targets}"
         raise DesignError(
-            f"the picture does not show {sheet.name}: {shown} of its outlines match; check --sheet"
-            f"{', --dpi' if pixels_per_mm else ''} and --paper, and that the waste is lifted off, "
-            "or the pieces are"
+            f"the picture does not show {scan.sheet.name}: {shown} of its outlines match; check "
+            f"--sheet{', --dpi' if scan.reference.dpi else ''} and --paper, and that the waste is "
+            "lifted off, or the pieces are"
         )
     return best
 
@@ -180,38 +204,28 @@ class _Pose(NamedTuple):
 class _Finder:
     """Matches of the outlines of a picture with the contours that it shows of a sheet."""
 
-    def __init__(
-        self,
-        sheet: DrawnSheet,
-        content: Content,
-        measured: Sequence[PictureOutline],
-        size: tuple[int, int],
-        pixels_per_mm: float | None,
-        is_light: bool,
-        is_camera: bool,
-    ) -> None:
-        self.sheet, self.content, self.size, self.scale = sheet, content, size, pixels_per_mm
-        self.is_light, self.is_camera = is_light, is_camera
+    def __init__(self, scan: Scan, content: Content) -> None:
+        self.scan, self.content, self.scale = scan, content, scan.reference.pixels_per_mm
         is_pieces = content == "pieces"
         # A skeleton shows no holes of pieces.
         contours = [
             contour
-            for place in sheet.places
+            for place in scan.sheet.places
             for contour in place.region.contours
             if not contour.is_hole or (is_pieces and -contour.area > SMALLEST)
         ]
-        drawn = shapely.centroid([shapely.Polygon(polyline(c, 0.05)) for c in contours])
+        drawn = shapely.centroid([shapely.Polygon(xy(polyline(c, 0.05))) for c in contours])
         self.places = shapely.get_coordinates(drawn) @ (1, 1j)
         self.areas = np.array([abs(contour.area) for contour in contours])
         self.is_film = np.array([contour.is_hole != is_pieces for contour in contours])
-        polygons = [outline.polygon for outline in measured]
+        polygons = [outline.polygon for outline in scan.outlines]
         self.seen = shapely.get_coordinates(shapely.centroid(polygons)) @ (1, 1j)
         self.seen_areas = shapely.area(polygons)
-        self.seen_film = np.array([outline.is_light == is_light for outline in measured])
+        self.seen_film = np.array([each.is_light == scan.is_light for each in scan.outlines])
         spread = float(np.abs(self.places - self.places.mean()).max())
         # Residual of a similarity due to perspective, or tilt and unequal scales.
-        self.reach = max(0.5, (0.035 if is_camera else 0.006) * spread)
-        self.same_area = SAME_AREA * (2 if is_camera else 1)
+        self.reach = max(0.5, (0.035 if scan.is_camera else 0.006) * spread)
+        self.same_area = SAME_AREA * (2 if scan.is_camera else 1)
 
     def location(self) -> Location | None:
         """Return the sheet's location with this content; None if no outline fits."""
@@ -231,7 +245,7 @@ class _Finder:
 
     def _outside(self, pixels: Complexes) -> int:
         """Return the number of places outside the picture."""
-        (rows, columns), x, y = self.size, pixels.real, pixels.imag
+        (rows, columns), x, y = self.scan.picture.pixels.shape, pixels.real, pixels.imag
         return int(((x < 0) | (y < 0) | (x > columns) | (y > rows)).sum())
 
     def _poses(self) -> Iterator[_Pose]:
@@ -265,12 +279,11 @@ class _Finder:
                 fits &= np.abs(areas / self.areas[contour] / stretch**2 - 1) < self.same_area
         if self.scale is not None:
             fits &= np.abs(stretch / self.scale - 1) < SAME_SCALE
-        for i, j in zip(*np.nonzero(fits), strict=True):
-            for from_below in (False, True):
-                turn = _Pose(1 + 0j, 0j, from_below)
-                scale_turn = complex(apart[i, j] / turn(across))
-                shift = complex(self.seen[i] - scale_turn * turn(self.places[first]))
-                yield _Pose(scale_turn, shift, from_below)
+        for (i, j), from_below in product(zip(*np.nonzero(fits), strict=True), (False, True)):
+            turn = _Pose(1 + 0j, 0j, from_below)
+            scale_turn = complex(apart[i, j] / turn(across))
+            shift = complex(self.seen[i] - scale_turn * turn(self.places[first]))
+            yield _Pose(scale_turn, shift, from_below)
 
     def _single_poses(self) -> Iterator[_Pose]:
         """Yield upright poses of a sheet with a single outline, on outlines of that tone."""
@@ -294,27 +307,19 @@ class _Finder:
 
     def _refined(self, pose: _Pose) -> Location:
         """Return the location by an affine map or a homography of matched centroids."""
-        low_x, low_y, high_x, high_y = self.sheet.bounds
+        low_x, low_y, high_x, high_y = self.scan.sheet.bounds
         centre = (low_x + high_x) / 2, (low_y + high_y) / 2
         size = max(high_x - low_x, high_y - low_y) / 2
         warp = Warp(pose.matrix, centre, size, 0, np.zeros((1, 2)))
-        points = np.column_stack([self.places.real, self.places.imag])
+        points = xy(self.places)
         matches = self._matches(self.reach, pose(self.places), abs(pose.scale_turn))
         for reach in (self.reach, self.reach, 0.5 * self.reach, max(0.4, 0.25 * self.reach)):
-            is_matched, places_seen = matches >= 0, self.seen[matches[matches >= 0]]
-            base = self._fitted(
-                points[is_matched], np.column_stack([places_seen.real, places_seen.imag])
-            )
+            is_matched = matches >= 0
+            base = self._fitted(points[is_matched], xy(self.seen[matches[is_matched]]))
             warp = warp if base is None else replace(warp, base=base)
             matches = self._matches(reach, warp(points) @ (1, 1j), warp.pixels_per_mm)
-        return Location(
-            warp=warp,
-            content=self.content,
-            from_below=pose.from_below,
-            is_light=self.is_light,
-            matched=int((matches >= 0).sum()),
-            targets=len(self.places),
-        )
+        matched = int((matches >= 0).sum())
+        return Location(warp, self.content, pose.from_below, matched, len(self.places))
 
     def _fitted(self, points: PointArray, pixels: PointArray) -> NDArray[np.float64] | None:
         """Return the map of points to pixels by least squares; None for points along a line."""
@@ -325,6 +330,6 @@ class _Finder:
         arms = points - points.mean(axis=0)
         if np.linalg.matrix_rank(arms, tol=0.02 * np.ptp(points, axis=0).max()) < 2:
             return None
-        kind = "projective" if self.is_camera and len(points) >= 6 else "affine"
+        kind = "projective" if self.scan.is_camera and len(points) >= 6 else "affine"
         estimate_transform: Any = transform.estimate_transform
         return np.asarray(estimate_transform(kind, points, pixels).params)

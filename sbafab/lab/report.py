@@ -207,8 +207,7 @@ def _comparisons(
             )
 
 
-RECENT = 20
-"""Number of actuators in the moving share."""
+RECENT = 20  # number of actuators in the moving share
 MOST_DRAWN = 400
 """Most points of a curve; with more actuators only every second, third ... is drawn."""
 

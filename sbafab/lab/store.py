@@ -24,8 +24,7 @@ from sbafab.lab.builds import RecordedDesign
 from sbafab.lab.records import HistoryEntry, LabRow, Record, Row, row_of, standing
 
 APPLICATION, VERSION = 0x5BAFAB, 4
-PATIENCE = 10.0
-"""Timeout for other writers, s."""
+PATIENCE = 10.0  # timeout for other writers, s
 KINDS: tuple[type[LabRow], ...] = (Record, HistoryEntry)
 _SCHEMA = (
     "CREATE TABLE design (sha256 TEXT NOT NULL, generator TEXT NOT NULL, content TEXT NOT NULL, "
@@ -267,8 +266,7 @@ _BUILD = TypeAdapter(RecordedDesign)
 # Photographs: files named by their content, in a folder beside the lab's file.
 
 
-MOST_PHOTOGRAPH = 20_000_000
-"""Largest photograph, bytes."""
+MOST_PHOTOGRAPH = 20_000_000  # largest photograph, bytes
 _PICTURE = re.compile(
     rb"(?P<jpg>\xff\xd8\xff)|(?P<png>\x89PNG\r\n\x1a\n)|(?P<webp>RIFF.{4}WEBP)", re.DOTALL
 )

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import NamedTuple
 
 from sbafab.cutting.fixture import whole_plate
@@ -78,6 +78,12 @@ class PdfPage:
 
     def lines(self, look: str, *ends: tuple[Point, Point]) -> None:
         self._drawn += [look, *(f"{_at(start)} m {_at(end)} l S" for start, end in ends)]
+
+    def centred(self, box: Bounds, foot: float) -> Point:
+        """Return the offset that centres a box between the head and a foot of a page to work on."""
+        low_x, low_y, high_x, high_y = box
+        x = self.width / 2 - (low_x + high_x) / 2
+        return x, foot + (self.height - HEAD - foot - low_y - high_y) / 2
 
     def text(self, at: Point, words: str, size: float, bold: bool = False) -> None:
         """Words that begin at a point, ``size`` mm."""
@@ -238,23 +244,29 @@ class Leaf:
     is_plate: bool = False
 
 
-@dataclass(frozen=True)
-class Guide:
-    """An outline to align to: contours of films or masks, its patterns, the steps."""
+class Guide(NamedTuple):
+    """An outline to align to, the layers that have it, and the steps that lay them."""
 
     region: Region
-    is_mask: bool
-    films: tuple[str, ...]
-    patterns: tuple[str, ...]
-    steps: tuple[int, ...]
+    layers: list[Layer]
+    steps: list[int]
+
+    @property
+    def patterns(self) -> list[str]:
+        return list(dict.fromkeys(layer.pattern for layer in self.layers))
+
+    @property
+    def pen(self) -> str:
+        return edge_pen(self.layers[0].is_mask)
 
     @property
     def words(self) -> str:
-        materials = joined_words(self.films) + (", dashed" if self.is_mask else "")
-        return (
-            f"{joined_words(self.patterns)} ({materials}): outer edge, press step"
-            f"{'s' if len(self.steps) > 1 else ''} {joined_words([str(n) for n in self.steps])}"
-        )
+        films = joined_words(list(dict.fromkeys(layer.film.material for layer in self.layers)))
+        dashed = ", dashed" if self.layers[0].is_mask else ""
+        many = "s" if len(self.steps) > 1 else ""
+        steps = joined_words([str(number) for number in self.steps])
+        patterns = joined_words(self.patterns)
+        return f"{patterns} ({films}{dashed}): outer edge, press step{many} {steps}"
 
 
 def underlay_pdf(
@@ -270,23 +282,25 @@ def underlay_pdf(
     """
     outlines = guides(laminate)
     spread = leaves(laminate, places, platen)
-    named = [(edge_pen(guide.is_mask), guide.words) for guide in outlines]
-    foot = _foot(len(outlines) + len(NOTES))
     pages = []
     for number, leaf in enumerate(spread, 1):
-        notes = NOTES if leaf.is_plate else (TRIM, *NOTES)
         which = f", page {number} of {len(spread)}" if len(spread) > 1 else ""
         title = f"{laminate.name}: alignment underlay{which}, seen from above, 1:1"
-        legend = [*named, *(("", note) for note in notes)]
-        page = _work_page(leaf.size, title, USE, legend, foot, design_sha256)
+        notes = NOTES if leaf.is_plate else (TRIM, *NOTES)
+        legend = [*((each.pen, each.words) for each in outlines), *(("", note) for note in notes)]
+        page = _work_page(leaf.size, title, USE, legend, _foot_of(outlines), design_sha256)
         _draw_leaf(page, laminate, outlines, places, leaf)
         pages.append(page)
     return pdf(pages, f"{laminate.name}: alignment underlay") if pages else None
 
 
+def _foot_of(outlines: Sequence[Guide]) -> float:
+    return _foot(len(outlines) + len(NOTES))
+
+
 def leaves(
     laminate: Laminate, places: Sequence[Point], platen: tuple[float, float] = PLATEN
-) -> tuple[Leaf, ...]:
+) -> list[Leaf]:
     """Return the places on each page, in whole rows and columns; empty without a guide.
 
     A laminate larger than the paper gets a page that fits it. No page reaches past the base plate,
@@ -294,51 +308,46 @@ def leaves(
     """
     outlines = guides(laminate)
     if not outlines:
-        return ()
+        return []
     box = box_round([guide.region.bounds for guide in outlines])
     edge = whole_plate(laminate, platen, places).outers[0]
-    margins = 2 * SIDE, HEAD + _foot(len(outlines) + len(NOTES))
+    margins = 2 * SIDE, HEAD + _foot_of(outlines)
     room = PAPER[0] - margins[0], PAPER[1] - margins[1]
     columns, rows = (
-        _tiles({place[axis] for place in places}, box, edge.bounds, room[axis], axis)
+        [*_tiles(sorted({place[axis] for place in places}), box, edge.bounds, room[axis], axis)]
         for axis in (0, 1)
     )
-    has_room = all(edge.bounds[axis + 2] - edge.bounds[axis] <= room[axis] for axis in (0, 1))
-    is_plate = len(rows) * len(columns) == 1 and has_room
+    low_x, low_y, high_x, high_y = edge.bounds
+    is_plate = len(rows) * len(columns) == 1 and high_x - low_x <= room[0]
+    is_plate = is_plate and high_y - low_y <= room[1]
     spread = []
-    for ys, length, low, top in rows:
-        for xs, width, left, right in columns:
-            numbers = tuple(n for n, (x, y) in enumerate(places, 1) if x in xs and y in ys)
-            size = max(PAPER[0], width + margins[0]), max(PAPER[1], length + margins[1])
-            frame = rectangle((left, low), (right, top)).outers[0]
-            if numbers:
-                spread.append(Leaf(size, numbers, edge if is_plate else frame, is_plate))
-    return tuple(spread)
+    for (ys, length, low, top), (xs, width, left, right) in product(rows, columns):
+        numbers = tuple(n for n, (x, y) in enumerate(places, 1) if x in xs and y in ys)
+        size = max(PAPER[0], width + margins[0]), max(PAPER[1], length + margins[1])
+        frame = rectangle((left, low), (right, top)).outers[0]
+        if numbers:
+            spread.append(Leaf(size, numbers, edge if is_plate else frame, is_plate))
+    return spread
 
 
 def _tiles(
-    steps: Iterable[float], box: Bounds, plate: Bounds, room: float, axis: int
-) -> list[tuple[Sequence[float], float, float, float]]:
-    """Return rows or columns per page, as even as possible, the length that they take, and the ends
+    steps: Sequence[float], box: Bounds, plate: Bounds, room: float, axis: int
+) -> Iterator[tuple[Sequence[float], float, float, float]]:
+    """Yield rows or columns per page, as even as possible, the length that they take, and the ends
     of the paper, mm: midway to the next page; at an end beyond the cross, if the plate has room.
     """
-    every = sorted(steps)
     low, high = box[axis], box[axis + 2]
-    pitch = every[1] - every[0] if len(every) > 1 else 0.0
-    spare = room - 2 * BEYOND - (high - low)
-    most = max(1, int(spare / pitch + 1 + 1e-9)) if pitch else 1
-    pages = -(-len(every) // most)
-    each = -(-len(every) // pages)
+    pitch = steps[1] - steps[0] if len(steps) > 1 else 0.0
+    most = max(1, int((room - 2 * BEYOND - (high - low)) / pitch + 1 + 1e-9)) if pitch else 1
+    each = -(-len(steps) // -(-len(steps) // most))
     half = (pitch - (high - low)) / 2
-    tiles: list[tuple[Sequence[float], float, float, float]] = []
-    for first in range(0, len(every), each):
-        here = every[first : first + each]
+    for first in range(0, len(steps), each):
+        here = steps[first : first + each]
         start, end = here[0] + low, here[-1] + high
         before = half if first else min(BEYOND, max(start - plate[axis], 0.0))
-        is_last = here[-1] == every[-1]
+        is_last = here[-1] == steps[-1]
         after = min(BEYOND, max(plate[axis + 2] - end, 0.0)) if is_last else half
-        tiles.append((here, end - start + 2 * BEYOND, start - before, end + after))
-    return tiles
+        yield here, end - start + 2 * BEYOND, start - before, end + after
 
 
 def _draw_leaf(
@@ -352,9 +361,7 @@ def _draw_leaf(
     the cross through the axis, the pins and the lines of each.
     """
     low_x, low_y, high_x, high_y = box_round([guide.region.bounds for guide in outlines])
-    foot = _foot(len(outlines) + len(NOTES))
-    left, low, right, top = leaf.trim.bounds
-    by = page.width / 2 - (left + right) / 2, foot + (page.height - HEAD - foot - low - top) / 2
+    by = page.centred(leaf.trim.bounds, _foot_of(outlines))
     for number in leaf.places:
         x, y = at = by[0] + places[number - 1][0], by[1] + places[number - 1][1]
         level = (low_x - BEYOND + x, y), (high_x + BEYOND + x, y)
@@ -362,43 +369,34 @@ def _draw_leaf(
         for pin in laminate.pins:
             page.contours(GREY, disc(pin.centre, pin.diameter / 2).contours, at)
         for guide in outlines:
-            page.contours(edge_pen(guide.is_mask), guide.region.contours, at)
+            page.contours(guide.pen, guide.region.contours, at)
         if len(places) > 1:
             page.text((x + low_x, y + low_y - 2.3), f"{number}", SMALL)
     page.contours(TRIM_LINE, [leaf.trim], by)
 
 
-def guides(laminate: Laminate) -> tuple[Guide, ...]:
+def guides(laminate: Laminate) -> list[Guide]:
     """Return everything laid by hand in any step, equal outlines once, in order of steps."""
-    shapes: dict[tuple[object, bool], tuple[Region, list[Layer], list[int]]] = {}
+    shapes: dict[tuple[object, bool], Guide] = {}
     parts = press_steps(laminate)
     # A whole stack that is laid down again has no edge to align to.
     for step in (part for part in parts if part.adds):
         for layer in (layer for bed in beds(parts, step) for layer in _loose(laminate, step, bed)):
             outline = Region(tuple(layer.profile.outers))
-            key = outline.key, layer.is_mask
-            _, laid, steps = shapes.setdefault(key, (outline, [], []))
-            laid.append(layer)
-            steps.append(step.number)
-    return tuple(
-        Guide(
-            region,
-            is_mask,
-            tuple(dict.fromkeys(layer.film.material for layer in laid)),
-            tuple(dict.fromkeys(layer.pattern for layer in laid)),
-            tuple(dict.fromkeys(steps)),
-        )
-        for (_, is_mask), (region, laid, steps) in shapes.items()
-    )
+            guide = shapes.setdefault((outline.key, layer.is_mask), Guide(outline, [], []))
+            guide.layers.append(layer)
+            if step.number not in guide.steps:
+                guide.steps.append(step.number)
+    return list(shapes.values())
 
 
 def _loose(laminate: Laminate, step: LayUpStep, bed: Bed) -> Iterator[Layer]:
-    """The layers with visible edges where a part without a pin lies in the step."""
+    """Yield the layers with visible edges where a part without a pin lies in the step."""
     layers = distinct_layers(laminate, bed.layers)
-    pinned = [layer for layer in layers if set(step.pins) & set(laminate.pins_holding(layer))]
+    loose = [layer for layer in layers if not {*step.pins} & {*laminate.pins_holding(layer)}]
     if bed.made_in is None:
-        yield from (layer for layer in layers if layer not in pinned)
-    elif not pinned:
+        yield from loose
+    elif len(loose) == len(layers):
         yield max(layers, key=lambda layer: sum(contour.area for contour in layer.profile.outers))
 
 
@@ -420,10 +418,10 @@ def seams_pdf(
     """Return pages of seam paths at 1:1, one for all seams of the same films; None without a seam.
     Paths are at the seams, also for tools with ``offsets``, which a line of text says.
     """
-    steps: dict[tuple[int, ...], list[tuple[int, Seam]]] = {}
+    steps: dict[tuple[int, ...], dict[int, Seam]] = {}
     for step in lay_up_steps(laminate):
         if step.joining is not None and step.joining.seam is not None:
-            steps.setdefault(step.layers, []).append((step.number, step.joining.seam))
+            steps.setdefault(step.layers, {})[step.number] = step.joining.seam
     pages = [
         _seam_page(laminate, layers, seams, design_sha256, offsets or {})
         for layers, seams in steps.items()
@@ -434,32 +432,33 @@ def seams_pdf(
 def _seam_page(
     laminate: Laminate,
     layers: Sequence[int],
-    seams: Sequence[tuple[int, Seam]],
+    seams: Mapping[int, Seam],
     sha256: str,
     offsets: Mapping[str, Point],
 ) -> PdfPage:
     films = union([laminate.layer(index).profile for index in layers])
-    low_x, low_y, high_x, high_y = box_round(
-        [films.bounds, *(seam.region.bounds for _, seam in seams)]
-    )
-    tools = [tool for tool in dict.fromkeys(seam.tool for _, seam in seams) if tool in offsets]
+    box = box_round([films.bounds, *(seam.region.bounds for seam in seams.values())])
+    tools = dict.fromkeys(seam.tool for seam in seams.values())
     words = [
-        f"step {step}: seam {seam.name}, {seam.tool}, {seam.width:g} mm wide, layers "
-        f"{seam.below} and {seam.above}; begins at its circle"
-        for step, seam in seams
+        *(
+            f"step {step}: seam {seam.name}, {seam.tool}, {seam.width:g} mm wide, layers "
+            f"{seam.below} and {seam.above}; begins at its circle"
+            for step, seam in seams.items()
+        ),
+        *(f"As made: the {shift_words(tool, offsets[tool])}." for tool in tools if tool in offsets),
+        f"Blue: edges of {layers_in_words(layers)}. Black: the middle of the tool. Dashed: its "
+        "width.",
+        "",
     ]
-    words += [f"As made: the {shift_words(tool, offsets[tool])}." for tool in tools]
-    edges = f"Blue: edges of {layers_in_words(layers)}."
-    words += [f"{edges} Black: the middle of the tool. Dashed: its width.", ""]
     foot = _foot(len(words))
-    width = max(PAPER[0], high_x - low_x + 2 * SIDE)
-    height = max(PAPER[1], high_y - low_y + HEAD + foot)
+    width = max(PAPER[0], box[2] - box[0] + 2 * SIDE)
+    height = max(PAPER[1], box[3] - box[1] + HEAD + foot)
     title = f"{laminate.name}: paths of seams, from above, 1:1"
     legend = [("", line) for line in words]
     page = _work_page((width, height), title, SEAM_USE, legend, foot, sha256)
-    at = (width - low_x - high_x) / 2, foot + (height - HEAD - foot - low_y - high_y) / 2
+    at = page.centred(box, foot)
     page.contours(edge_pen(is_mask=False), films.contours, at)
-    for step, seam in seams:
+    for step, seam in seams.items():
         x, y = seam.path[0][0].start
         page.contours(edge_pen(is_mask=True), seam.region.contours, at)
         page.chains(BLACK, seam.path, at)
@@ -587,10 +586,7 @@ def _in_rows(parts: Sequence[TrayPart], width: float) -> Iterator[list[TrayPart]
 
 def _place_words(runs: Runs, place: int, batch: str | None) -> str:
     """Return the laminates that use a page, as text; empty for a single one."""
-    if runs.copies == 1:
-        return ""
-    last = runs.copies + 1
-    names = [serial(runs, copy, batch) for copy in range(place, last, runs.together)]
+    names = [serial(runs, copy, batch) for copy in range(place, runs.copies + 1, runs.together)]
     if len(names) > MOST_NAMED:
         names = [names[0], "...", names[-1]]
-    return f", place {place} ({', '.join(names)})"
+    return "" if runs.copies == 1 else f", place {place} ({', '.join(names)})"

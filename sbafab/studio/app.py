@@ -135,10 +135,8 @@ def design_in(link: str) -> str:
 STATIC = Path(__file__).parent / "static"
 JOBS = ("live", "elastic", "motion")
 LIVE_SECONDS, MAKE_SECONDS = 60.0, 900.0
-LOOK_EVERY = 0.4
-"""Polling interval for the file on disk, s."""
-MOST_MADE = 6
-"""Number of run folders kept; the oldest is deleted first."""
+LOOK_EVERY = 0.4  # polling interval for the file on disk, s
+MOST_MADE = 6  # number of run folders kept; the oldest is deleted first
 
 
 @dataclass
@@ -425,8 +423,7 @@ def _entry(line: Mapping[str, Any]) -> dict[str, Any]:
 # Start of the studio: design, port and link.
 
 
-PORT = 8417
-"""Tried first, so that a saved link finds the studio again."""
+PORT = 8417  # tried first, so that a saved link finds the studio again
 
 
 def opened(source: str | None) -> tuple[Path, dict[str, str]]:

@@ -18,8 +18,7 @@ from sbafab import api
 from sbafab.errors import DesignError, OutputError
 
 MOST_LISTED = 200
-MOST_BYTES = 2_000_000
-"""Largest design file, bytes."""
+MOST_BYTES = 2_000_000  # largest design file, bytes
 MOST_NAME = 240
 """Longest name of a design file, bytes: systems allow 255, and saving uses a longer name first."""
 REFERRING = ("outline", "kit", "design", "file", "calibration")
@@ -176,8 +175,7 @@ def _hash(content: bytes) -> str:
 # Folders written by runs, as the page shows and serves them.
 
 
-DAY_ONE = (1980, 1, 1, 0, 0, 0)
-"""The date of every file in a zip: equal runs give equal zips."""
+DAY_ONE = (1980, 1, 1, 0, 0, 0)  # the date of every file in a zip: equal runs give equal zips
 
 
 def file_in(folder: Path, path: str) -> Path | None:

@@ -41,8 +41,7 @@ from sbafab.studio.moving import (
 StudioJob = dict[str, Any]
 Answer = dict[str, Any]
 _FILLINGS: dict[str, Filling] = {}
-MOST_FILLINGS = 8
-"""Number of tabs whose actuators can inflate at the same time."""
+MOST_FILLINGS = 8  # number of tabs whose actuators can inflate at the same time
 
 
 def live(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:

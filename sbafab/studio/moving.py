@@ -5,23 +5,24 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sbafab import api
-from sbafab.api.records import Assembled, Design, Motion, PlacedPart, Pose, Stack
 from sbafab.errors import DesignError
 from sbafab.studio.model import flat, of, packed, remembered
 
-CURVE = 25
-"""Points of the curves beside the view."""
-LONGEST_STEP = 0.2
-"""Longest time spanned by one step of a motion, s."""
+if TYPE_CHECKING:
+    from sbafab.assemblies.build import Assembled, PlacedPart
+    from sbafab.design.records import Design
+    from sbafab.models.stack import Motion, Pose, Stack
+
+CURVE = 25  # points of the curves beside the view
+LONGEST_STEP = 0.2  # longest time spanned by one step of a motion, s
 MOST_STACKS = 6
 _STACKS: dict[str, Stack] = {}
-MOST_LOAD = 0.5
-"""Largest force of the user's pull on the tip, N."""
+MOST_LOAD = 0.5  # largest force of the user's pull on the tip, N
 
 
 def stack_of(design: Design) -> Stack:
@@ -148,8 +149,7 @@ def numbers(values: Any) -> Any:
 # parts, and loads on tips, come from the prediction.
 
 
-PRESSURE_KPA, LOAD_G = 10.0, 1.2
-"""Defaults of the prediction's request, as in the command."""
+PRESSURE_KPA, LOAD_G = 10.0, 1.2  # defaults of the prediction's request, as in the command
 MOST_PRESSURE, MOST_LOAD_G = 110.0, 1000.0
 
 

@@ -22,14 +22,10 @@ from sbafab import api
 from sbafab.errors import SbafabError
 from sbafab.runtime import processors
 
-END = b""
-"""The last message of a job."""
-READY = 0
-"""The number that means the process accepts jobs; jobs count from 1."""
-MOST_WAITING = 24
-"""Most waiting jobs of a pool."""
-PATIENCE = 2.0
-"""Time for a cancelled job to reach its next step, s; then its process is replaced."""
+END = b""  # the last message of a job
+READY = 0  # the number that means the process accepts jobs; jobs count from 1
+MOST_WAITING = 24  # most waiting jobs of a pool
+PATIENCE = 2.0  # time for a cancelled job to reach its next step, s; then its process is replaced
 Key = tuple[str, str]
 """A tab and its kind of job; a newer job with the same key replaces the older one."""
 

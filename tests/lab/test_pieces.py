@@ -11,9 +11,9 @@ import shapely
 from shapely import affinity
 
 from sbafab.lab.cut_sheet import read_cut_sheet
-from sbafab.lab.edges import Reference
 from sbafab.lab.inspection import Inspection, inspect_picture
 from sbafab.lab.picture import read_picture
+from sbafab.lab.registration import Reference
 from sbafab.lab.pieces import PieceFinding
 from tests.lab.scans import Camera, pieces_of, render, save
 from tests.lab.test_scans import inspected

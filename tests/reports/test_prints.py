@@ -162,9 +162,13 @@ def test_a_cycle_larger_than_the_paper_is_tiled_edge_to_edge() -> None:
 
 def test_it_shows_what_a_hand_lays_in_films_by_their_names() -> None:
     # Base and cap; a 1-DoF separator, whose hole is wider than the pin, in step 3 as well.
-    one = {guide.patterns[0]: guide.steps for guide in guides(build(load_design("1dof-5mm")))}
+    one = {
+        guide.patterns[0]: tuple(guide.steps) for guide in guides(build(load_design("1dof-5mm")))
+    }
     assert one == {"P01": (2, 4), "P04": (3, 4), "P07": (4,)}
-    three = {guide.patterns[0]: guide.steps for guide in guides(build(load_design("3dof-15mm")))}
+    three = {
+        guide.patterns[0]: tuple(guide.steps) for guide in guides(build(load_design("3dof-15mm")))
+    }
     assert three == {"P01": (2, 4), "P04": (4,), "P07": (4,)}
     assert underlay_pdf(build(load_design("1dof-5mm", ["registration.method=ears"])), SHA) is None
     film = 'kind="mask", product="PTFE", thickness=0.05, density=2200, temperature_limit=250'
