@@ -83,7 +83,7 @@ def record_history(
     return recording.record(Lab(Path(lab)), built, lines, again)
 
 
-def record_sheet(source: Source, *changes: Change) -> tuple[RecordTable, ...]:
+def record_sheet(source: Source, *changes: Change) -> list[RecordTable]:
     """Return the tables of the record page of a design: materials, steps, tests.
 
     Raises DesignError.

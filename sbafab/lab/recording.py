@@ -65,10 +65,10 @@ def record(
     return lab.add(sha256, build, rows, is_again)
 
 
-def record_sheet(built: Design | Assembled) -> tuple[RecordTable, ...]:
+def record_sheet(built: Design | Assembled) -> list[RecordTable]:
     """Return the tables of the record page of a design; for an assembly, its tests."""
     if not isinstance(built, Design):
-        return (TESTS_TABLE,)
+        return [TESTS_TABLE]
     laminate = laminate_of(built)
     return record_tables(built, laminate, schedule(laminate, built))
 

@@ -187,7 +187,7 @@ def app(studio: Studio) -> Starlette:
         routes=[
             *(editing if studio.address == ADDRESS else ()),
             # The record page, the only routes for a phone.
-            Route("/record", record_page),
+            Route("/record", partial(static_file, "record.html")),
             Route("/api/record", record_choices),
             Route("/api/record", partial(recorded, _stored), methods=["POST"]),
             Route("/api/record/sheet", partial(recorded, _sheet), methods=["POST"]),
@@ -199,6 +199,10 @@ def app(studio: Studio) -> Starlette:
     )
     application.state.studio = studio
     return application
+
+
+async def static_file(name: str, _: Request) -> Response:
+    return FileResponse(STATIC / name)
 
 
 def _studio(request: Request) -> Studio:
@@ -235,11 +239,9 @@ async def opened_file(request: Request) -> Response:
 async def save(request: Request) -> Response:
     table = await _request_table(request)
     path = design_files.design_file(_studio(request).folder, str(table.get("name", "")))
-    expected = table.get("seen")
-    sha = design_files.save(
-        path, str(table.get("text", "")), None if expected is None else str(expected)
-    )
-    return JSONResponse({"sha": sha})
+    seen = table.get("seen")
+    expected = None if seen is None else str(seen)
+    return JSONResponse({"sha": design_files.save(path, str(table.get("text", "")), expected)})
 
 
 async def watch(request: Request) -> Response:
@@ -334,16 +336,11 @@ async def _request_table(request: Request) -> dict[str, Any]:
 # The record page: entries of a device's history from a form on a phone.
 
 
-async def record_page(_: Request) -> Response:
-    return FileResponse(STATIC / "record.html")
-
-
 async def record_choices(request: Request) -> Response:
     """The designs that may be recorded, and the lab's file."""
     folder = _studio(request).folder
-    lab = str(_lab_file(folder))
     designs = {"files": design_files.listed(folder), "templates": api.templates()}
-    return JSONResponse({**designs, "lab": lab})
+    return JSONResponse({**designs, "lab": str(_lab_file(folder))})
 
 
 async def recorded(
@@ -360,20 +357,12 @@ def _lab_file(folder: Path) -> Path:
 
 def _sheet(folder: Path, request: Mapping[str, Any]) -> dict[str, Any]:
     """Return the tables of the record page of the named design."""
-    tables = api.record_sheet(_recorded_design(folder, request))
-    return {
-        "tables": [
-            {
-                "title": table.title,
-                "fields": [field._asdict() for field in table.fields],
-                "rows": [
-                    {"values": dict(row), "nominal": nominal}
-                    for row, nominal in zip(table.rows, table.nominal, strict=True)
-                ],
-            }
-            for table in tables
-        ]
-    }
+    tables = []
+    for title, fields, rows in api.record_sheet(_recorded_design(folder, request)):
+        first = fields[0].name
+        lines = [{"values": {first: item}, "nominal": set_to} for item, set_to in rows.items()]
+        tables.append({"title": title, "fields": [f._asdict() for f in fields], "rows": lines})
+    return {"tables": tables}
 
 
 def _stored(folder: Path, request: Mapping[str, Any]) -> dict[str, Any]:
@@ -387,15 +376,13 @@ def _stored(folder: Path, request: Mapping[str, Any]) -> dict[str, Any]:
         lab=_lab_file(folder),
         again=request.get("again") is True,
     )
-    warnings = [
+    expired = [
         f"{entry.item} lot {entry.lot} expired on {entry.expires}"
         for entry in entries
         if entry.is_expired
     ]
-    return {
-        "entries": [f"e{entry.id}" for entry in entries],
-        "warnings": list(dict.fromkeys(warnings)),
-    }
+    numbers = [entry.number for entry in entries]
+    return {"entries": numbers, "warnings": list(dict.fromkeys(expired))}
 
 
 def _recorded_design(folder: Path, request: Mapping[str, Any]) -> str | Path:

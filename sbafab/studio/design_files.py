@@ -45,12 +45,8 @@ def design_file(folder: Path, name: str) -> Path:
 
 def listed(folder: Path) -> list[str]:
     """Names of the design files directly in the folder."""
-    names = sorted(path.name for path in folder.glob("*.toml") if _is_listed(path, folder))
-    return names[:MOST_LISTED]
-
-
-def _is_listed(path: Path, folder: Path) -> bool:
-    return _lies_in(path, folder) and path.is_file()
+    files = (path for path in folder.glob("*.toml") if _lies_in(path, folder) and path.is_file())
+    return sorted(path.name for path in files)[:MOST_LISTED]
 
 
 def read(path: Path) -> tuple[str, str]:
@@ -69,8 +65,8 @@ def content_of(path: Path, most: int | None = None) -> bytes:
 
     Raises DesignError for other than regular files and for more than ``most`` bytes, and OSError.
     """
-    # A pipe without a writer would block whoever opens it, and with it the whole server.
     about = path.stat()
+    # A pipe without a writer would block whoever opens it, and with it the whole server.
     if not stat.S_ISREG(about.st_mode):
         raise DesignError(f"{path.name} is not a regular file; choose another one")
     if most is not None and about.st_size > most:

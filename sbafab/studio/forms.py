@@ -74,12 +74,8 @@ def cards(schema: JsonSchema) -> dict[str, dict[str, str]]:
 
 def summaries() -> dict[str, str]:
     """The templates, each with the first sentence of its file."""
-    return {name: _first_comment(api.template(name)) for name in api.templates()}
-
-
-def _first_comment(text: str) -> str:
-    first = text.partition("\n")[0]
-    return first.lstrip("# ") if first.startswith("#") else ""
+    first = {name: api.template(name).partition("\n")[0] for name in api.templates()}
+    return {name: line.lstrip("# ") if line[:1] == "#" else "" for name, line in first.items()}
 
 
 def assembly(schema: JsonSchema) -> dict[str, Any]:
@@ -107,10 +103,8 @@ def keys(schema: JsonSchema) -> set[str]:
 
 
 def _rank(field: FormField) -> int:
-    section = field["key"].partition(".")[0] if "." in field["key"] else ""
-    if not section:
-        return -1
-    return FIRST.index(section) if section in FIRST else len(FIRST)
+    section, dot, _ = field["key"].partition(".")
+    return (FIRST.index(section) if section in FIRST else len(FIRST)) if dot else -1
 
 
 def _fields(table: JsonSchema, schema: JsonSchema) -> Iterator[FormField]:
@@ -129,11 +123,12 @@ def _field(key: str, rule: JsonSchema) -> FormField:
     number = next((way for way in ways if way.get("type") in {"number", "integer"}), None)
     is_length = number is not None and any("mm" in way.get("pattern", "") for way in ways)
     choices = next((way["enum"] for way in ways if "enum" in way), None)
+    unit = next((unit for pattern, unit in UNITS if pattern.search(key)), "")
     field: FormField = {
         "key": key,
         "meaning": " ".join(rule.get("description", "").split()),
         "default": rule.get("default"),
-        "unit": "mm" if is_length else _unit(key),
+        "unit": "mm" if is_length else unit,
         "kind": _kind(kinds, choices),
         "list": "array" in kinds,
         "optional": "null" in kinds,
@@ -151,19 +146,9 @@ def _field(key: str, rule: JsonSchema) -> FormField:
 
 
 def _kind(kinds: list[str | None], choices: object) -> str:
-    if choices:
-        return "choice"
-    if "boolean" in kinds:
-        return "switch"
-    if "integer" in kinds:
-        return "whole"
-    if "number" in kinds:
-        return "number"
-    return "list" if "array" in kinds else "text"
-
-
-def _unit(key: str) -> str:
-    return next((unit for pattern, unit in UNITS if pattern.search(key)), "")
+    names = {"boolean": "switch", "integer": "whole", "number": "number", "array": "list"}
+    named = [name for kind, name in names.items() if kind in kinds]
+    return "choice" if choices else next(iter(named), "text")
 
 
 def _named(reference: str, schema: JsonSchema) -> JsonSchema:

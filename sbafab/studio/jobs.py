@@ -7,36 +7,38 @@ needed. Files are only searched in ``folder``.
 from __future__ import annotations
 
 import sys
+import tomllib
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, MutableMapping, MutableSequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import tomlkit
+import tomlkit.items
+from tomlkit.exceptions import TOMLKitError
+
 from sbafab import api
-from sbafab.api.records import Assembled, Assembly, Design, Laminate
+from sbafab.api.records import Assembled, Design, Laminate
 from sbafab.errors import DesignError, SbafabError
 from sbafab.studio import design_files
-from sbafab.studio.editing import MOST_EDITS, edited
-from sbafab.studio.forms import keys
-from sbafab.studio.model import (
+from sbafab.studio.answers import (
     CancelCheck,
+    Filling,
     finding_model,
     laminate_model,
+    movers,
     nets_model,
+    part_poses,
     parts_model,
+    poses,
     remembered,
     shapes_model,
-)
-from sbafab.studio.moving import (
-    Filling,
-    moving_parts,
-    part_poses,
-    poses,
     stack_model,
     stack_of,
     whole_prediction,
 )
+from sbafab.studio.forms import keys
 
 StudioJob = dict[str, Any]
 Answer = dict[str, Any]
@@ -56,7 +58,8 @@ def live(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
     if design.family == "assembly":
         yield from _assembly(source, job, pause)
         return
-    yield {"kind": "design", "name": design.name, "family": design.family, **_values(design)}
+    facts = {"name": design.name, "family": design.family, "values": api.resolved(design)}
+    yield {"kind": "design", **facts}
     pause()
     has = frozenset(job.get("has", ()))
     drawn = design.drawn_shapes()
@@ -80,14 +83,10 @@ def live(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
     yield {"kind": "checked"}
 
 
-def _values(design: Design | Assembly) -> Answer:
-    return {"values": api.resolved(design)}
-
-
 def _assembly(source: _Source, job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
     """An assembly's keys, its parts in place, and what the rules find in and between them."""
     assembly = _read(source)
-    yield {"kind": "assembly", "name": assembly.name, **_values(assembly)}
+    yield {"kind": "assembly", "name": assembly.name, "values": api.resolved(assembly)}
     pause()
     assembled = _assembled(source)
     yield parts_model(assembled, frozenset(job.get("has", ())))
@@ -129,16 +128,10 @@ def generate(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
         tell({"kind": "progress", "what": stage, "done": done, "total": total})
 
     run = api.generate(_read(_source(_text(job), job)), out=job["out"], progress=progress)
-    yield {
-        "kind": "made",
-        "name": run.folder.name,
-        "failed": run.failed,
-        "kept": run.kept,
-        "files": sorted(
-            [*run.manifest.get("files", ()), *(["manifest.json"] * bool(run.manifest))]
-        ),
-        "findings": [finding_model(finding) for finding in run.findings],
-    }
+    files = sorted([*run.manifest.get("files", ()), "manifest.json"]) if run.manifest else []
+    findings = [finding_model(finding) for finding in run.findings]
+    facts = {"failed": run.failed, "kept": run.kept, "files": files, "findings": findings}
+    yield {"kind": "made", "name": run.folder.name, **facts}
 
 
 def motion(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
@@ -152,7 +145,10 @@ def motion(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
     if design.family == "assembly":
         assembled = _assembled(source)
         pause()
-        yield part_poses(assembled, pose) if "parts" in pose else moving_parts(assembled)
+        if "parts" in pose:
+            yield part_poses(assembled, pose)
+        else:
+            yield {"kind": "movers", "movers": list(movers(assembled))}
         return
     stack = stack_of(design)
     pause()
@@ -234,20 +230,20 @@ def answers(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
         yield refusal(str(error))
     except MemoryError:
         yield {"kind": "error", "message": "the design takes more memory than there is"}
-    except Exception:
+    except Exception as error:
         traceback.print_exc(file=sys.stderr)
-        yield {"kind": "defect", "message": _defect()}
+        what = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        message = (
+            f"this is a defect of sbafab ({what}); go back with Undo, and report the design file"
+        )
+        yield {"kind": "defect", "message": message}
 
 
 def refusal(sentence: str) -> Answer:
     """The refusing answer, with the first key of a design file named in its sentence."""
     words = (word.strip(",;:()[]'\"") for word in sentence.split())
-    field = next((word for word in words if _is_key(word)), None)
-    return {"kind": "error", "message": sentence, **({"field": field} if field else {})}
-
-
-def _is_key(word: str) -> bool:
-    return word.startswith(("parts.", "shapes.")) or word in design_keys()
+    named = [w for w in words if w.startswith(("parts.", "shapes.")) or w in design_keys()]
+    return {"kind": "error", "message": sentence, **({"field": named[0]} if named else {})}
 
 
 @lru_cache(maxsize=1)
@@ -256,10 +252,116 @@ def design_keys() -> frozenset[str]:
     return frozenset(keys(api.schema()))
 
 
-def _defect() -> str:
-    kind, error = sys.exc_info()[:2]
-    name = kind.__name__ if kind else "error"
-    return (
-        f"this is a defect of sbafab ({name}: {' '.join(str(error).split())[:200]}); go back with "
-        "Undo, and report the design file"
-    )
+# Change keys of a design's text one by one; comments and order are kept.
+
+
+Edit = tuple[str, str | None]
+"""A dotted key and its value as TOML writes it; None removes the key.
+
+An integer in a key is the index of a list's row, from 0: ``layers.2.shape``.
+"""
+MOST_EDITS = 200
+
+
+def edited(text: str, edits: Iterable[Edit]) -> str:
+    """The text with every key changed. Raises DesignError if text or value is not TOML."""
+    try:
+        document = tomlkit.parse(text)
+    except (TOMLKitError, ValueError, RecursionError) as error:
+        raise DesignError(f"the text is not valid TOML ({error}); mend it first") from None
+    for key, value in edits:
+        parts = key.split(".")
+        if value is None:
+            _take_out(document, parts)
+            continue
+        if _has_table(document, parts):
+            _put(document, parts, _value(key, value))
+            continue
+        before = tomlkit.dumps(document)
+        _put(document, parts, _value(key, value))
+        if not _holds(document, parts):
+            # A table of dotted keys cannot contain a header; it gets another dotted key.
+            document = tomlkit.parse(before)
+            _put(document, parts, _value(key, value), dotted=True)
+            if not _holds(document, parts):
+                raise DesignError(f"{key} cannot be put in here; change it in the text")
+    return tomlkit.dumps(document)
+
+
+def _has_table(table: Any, parts: list[str]) -> bool:
+    """Return True if the table of the key exists."""
+    for part in parts[:-1]:
+        table = _inner(table, part)
+    return isinstance(table, MutableMapping)
+
+
+def _inner(table: Any, part: str) -> Any:
+    """Return a table's value by name, or a list's by index; None if there is none."""
+    if isinstance(table, MutableMapping):
+        return table.get(part)
+    is_row = isinstance(table, MutableSequence) and part.isdecimal() and int(part) < len(table)
+    return table[int(part)] if is_row else None
+
+
+def _holds(document: tomlkit.TOMLDocument, parts: list[str]) -> bool:
+    """Return True if the written text has the document's value at the key."""
+    try:
+        written: Any = tomllib.loads(tomlkit.dumps(document))
+        intended: Any = document.unwrap()
+        for part in parts:
+            written, intended = _inner(written, part), _inner(intended, part)
+    except tomllib.TOMLDecodeError:
+        return False
+    return intended is not None and bool(written == intended)
+
+
+def _value(key: str, text: str) -> Any:
+    try:
+        return tomlkit.value(text)
+    except (TOMLKitError, ValueError, RecursionError, IndexError):
+        raise DesignError(f"{key} = {text[:60]} is not a value; write a number or a text") from None
+
+
+def _put(
+    document: tomlkit.TOMLDocument, parts: list[str], value: Any, dotted: bool = False
+) -> None:
+    *above, last = parts
+    table: Any = document
+    for depth, part in enumerate(above):
+        inner = _inner(table, part)
+        if inner is None and dotted and isinstance(table, tomlkit.items.Table):
+            table.append(tomlkit.key(parts[depth:]), value)
+            return
+        if inner is None and isinstance(table, MutableMapping):
+            within = isinstance(table, tomlkit.items.InlineTable)
+            table[part] = tomlkit.inline_table() if within else tomlkit.table()
+            inner = table[part]
+        if not isinstance(inner, MutableMapping | MutableSequence):
+            missing = "is not there" if inner is None else "is a value, not a table"
+            raise DesignError(f"{'.'.join(parts)}: {part} {missing}; change it in the text")
+        table = inner
+    if not isinstance(table, MutableMapping):
+        raise DesignError(f"{'.'.join(parts)} is not a key of a table; change it in the text")
+    old = table.get(last)
+    if old is not None and hasattr(old, "trivia") and hasattr(value, "trivia"):
+        _comment_like(old, value)
+    if isinstance(table, tomlkit.items.InlineTable) and last not in table:
+        table.append(last, value)
+    else:
+        table[last] = value
+
+
+def _comment_like(old: Any, value: Any) -> None:
+    """Gives the value the old one's comment, in the same column."""
+    trivia = value.trivia
+    trivia.comment, trivia.trail = old.trivia.comment, old.trivia.trail
+    column = len(old.as_string()) + len(old.trivia.comment_ws)
+    trivia.comment_ws = " " * max(1, column - len(value.as_string())) if trivia.comment else ""
+
+
+def _take_out(table: MutableMapping[str, Any], parts: list[str]) -> None:
+    inner: Any = table
+    for part in parts[:-1]:
+        inner = _inner(inner, part)
+    if isinstance(inner, MutableMapping):
+        inner.pop(parts[-1], None)

@@ -57,9 +57,8 @@ class WaitingJob:
 class WorkerPool:
     """Processes and the jobs that wait for them. All methods belong to the event loop.
 
-    ``seconds`` is the time limit of a job, ``processes`` the most that run at once (0: by
-    the machine), and
-    ``patience`` the seconds for a cancelled job to end.
+    ``seconds`` is the time limit of a job, ``processes`` the most that run at once (0: by the
+    machine), and ``patience`` the seconds for a cancelled job to end.
     """
 
     def __init__(
@@ -258,7 +257,9 @@ def serve(pipe: Connection, cancelled: Any, warm: bool) -> None:
         pipe.send((READY, END))
         while True:
             number, job = pipe.recv()
-            send = _sender(pipe, number)
+
+            def send(answer: dict[str, Any], current: int = number) -> None:
+                pipe.send((current, json.dumps(answer, separators=(",", ":")).encode()))
 
             def pause(current: int = number) -> None:
                 if cancelled.value == current:
@@ -267,13 +268,6 @@ def serve(pipe: Connection, cancelled: Any, warm: bool) -> None:
             for answer in answers({**job, "tell": send}, pause):
                 send(answer)
             pipe.send((number, END))
-
-
-def _sender(pipe: Connection, number: int) -> Any:
-    def send(answer: dict[str, Any]) -> None:
-        pipe.send((number, json.dumps(answer, separators=(",", ":")).encode()))
-
-    return send
 
 
 def _warm_up() -> None:

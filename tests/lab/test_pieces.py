@@ -13,8 +13,8 @@ from shapely import affinity
 from sbafab.lab.cut_sheet import read_cut_sheet
 from sbafab.lab.inspection import Inspection, inspect_picture
 from sbafab.lab.picture import read_picture
-from sbafab.lab.registration import Reference
 from sbafab.lab.pieces import PieceFinding
+from sbafab.lab.registration import Reference
 from tests.lab.scans import Camera, pieces_of, render, save
 from tests.lab.test_scans import inspected
 from tests.quick import few

@@ -14,8 +14,8 @@ STATES = {
     "models/inverse_kinematics.py": {"Nearest"},
     "folders/artefacts.py": {"DesignFolder"},
     "rules/voids.py": {"VoidGraph"},
+    "studio/answers.py": {"AnswerShapes"},
     "studio/app.py": {"Studio"},
-    "studio/model.py": {"AnswerShapes"},
     "studio/workers.py": {"WaitingJob"},
 }
 """Dataclasses that gather or step, by module. Edges keep their lengths and boxes; as frozen records

@@ -17,8 +17,7 @@ from sbafab.errors import DesignError
 from sbafab.models import balloon_map
 from sbafab.studio import jobs
 from sbafab.studio.app import design_in
-from sbafab.studio.editing import edited
-from sbafab.studio.jobs import JOBS, SupersededError, refusal
+from sbafab.studio.jobs import JOBS, SupersededError, edited, refusal
 from tests.studio.asking import packed
 from tests.studio.worked import answers, job
 

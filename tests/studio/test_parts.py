@@ -15,9 +15,8 @@ from sbafab import api
 from sbafab.assemblies.records import KINDS, Assembly
 from sbafab.assemblies.shapes import placed_surface
 from sbafab.errors import DesignError
-from sbafab.studio.editing import edited
 from sbafab.studio.forms import assembly
-from sbafab.studio.jobs import JOBS, refusal
+from sbafab.studio.jobs import JOBS, edited, refusal
 from tests.studio.worked import EnoughError, given_up_at, job
 
 BASE = """

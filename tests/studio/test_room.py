@@ -21,7 +21,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from sbafab import api
-from sbafab.studio.editing import edited
+from sbafab.studio.jobs import edited
 from tests.quick import few
 from tests.studio.browsing import served
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from sbafab import api
-from sbafab.studio.editing import edited
+from sbafab.studio.jobs import edited
 from sbafab.studio.workers import MOST_WAITING, BusyError, WaitingJob, WorkerPool
 from tests.studio.worked import job
 

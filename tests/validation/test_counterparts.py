@@ -31,8 +31,8 @@ from sbafab.models.paper import (
 )
 from sbafab.models.pneumatics import seconds
 from sbafab.models.quantity import Conditions, FigureKey, Quantity
+from sbafab.studio.answers import stack_model
 from sbafab.studio.jobs import elastic
-from sbafab.studio.moving import stack_model
 from tests.shared import shared
 from tests.studio.worked import job
 from tests.validation.commands import run_predict

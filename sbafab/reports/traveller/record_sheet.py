@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from sbafab.design.identity import adhesive_for
@@ -48,20 +48,16 @@ DEVICE = "step decision reason photograph note initials"
 
 
 class RecordTable(NamedTuple):
-    """A table of the record page: title, fields, and rows with their printed text.
-
-    ``rows`` have the text of each row by field; ``nominal`` the set values of a row.
+    """A table of the record page: its title and fields, and a row for each item of the first field,
+    with the values that are set.
     """
 
     title: str
-    fields: tuple[HistoryField, ...]
-    rows: tuple[Mapping[str, str], ...]
-    nominal: tuple[str, ...]
+    fields: list[HistoryField]
+    rows: Mapping[str, str]
 
 
-def record_tables(
-    design: Design, laminate: Laminate, schedule: Schedule
-) -> tuple[RecordTable, ...]:
+def record_tables(design: Design, laminate: Laminate, schedule: Schedule) -> list[RecordTable]:
     """Return the tables of a design's record page: materials, press steps, tests."""
     films = {layer.film.material: layer.film for layer in laminate.layers}
     products = {m: "" if film.written == m else film.product for m, film in films.items()}
@@ -70,15 +66,12 @@ def record_tables(
     unsorted: list[Step | SeamStep] = [*schedule.steps, *schedule.seams]
     steps = {str(step.step): _set_values(step) for step in sorted(unsorted, key=lambda s: s.step)}
     tables = _table("Materials", MATERIAL, products), _table("Steps", PRESS, steps), TESTS_TABLE
-    return tuple(table for table in tables if table.rows)
+    return [table for table in tables if table.rows]
 
 
 def _table(title: str, names: str, rows: Mapping[str, str]) -> RecordTable:
-    """Return a table with rows of the first field, each with its set values."""
     fields = {field.name: field for field in HISTORY_FIELDS}
-    columns: Sequence[HistoryField] = [fields[name] for name in names.split()]
-    cells = tuple({columns[0].name: value} for value in rows)
-    return RecordTable(title, tuple(columns), cells, tuple(rows.values()))
+    return RecordTable(title, [fields[name] for name in names.split()], rows)
 
 
 def _set_values(step: Step | SeamStep) -> str:
@@ -90,5 +83,5 @@ def _set_values(step: Step | SeamStep) -> str:
     return f"{heat}, {step.force_n:.0f} N{time}"
 
 
+# The part of the record page common to all devices.
 TESTS_TABLE = _table("Tests", DEVICE, dict.fromkeys(TESTS, ""))
-"""The part of the record page common to all devices."""

@@ -1,22 +1,200 @@
-"""Poses of the fast stack of a design, and of the actuators of an assembly, for the page."""
+"""Laminates, findings, assemblies and their poses as data for the page: numbers and text.
+
+A contour is a flat list of x, y and bulge (mm; the DXF convention), so arcs stay arcs on screen. A
+shape is sent once under its key, and never to a page that names it as present.
+"""
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
 from sbafab import api
+from sbafab.api.records import (
+    Assembled,
+    Design,
+    Finding,
+    FindingEntry,
+    Laminate,
+    Motion,
+    NetMap,
+    PlacedPart,
+    Pose,
+    Region,
+    Stack,
+    Surface,
+)
 from sbafab.errors import DesignError
-from sbafab.studio.model import flat, of, packed, remembered
 
-if TYPE_CHECKING:
-    from sbafab.assemblies.build import Assembled, PlacedPart
-    from sbafab.design.records import Design
-    from sbafab.models.stack import Motion, Pose, Stack
+Kept = TypeVar("Kept")
+CancelCheck = Callable[[], None]
+"""Called between steps of work; raises if the answer is not needed any longer."""
+
+
+def of(record: object, *names: str) -> dict[str, Any]:
+    """Return these attributes of a record by name."""
+    return {name: getattr(record, name) for name in names}
+
+
+@dataclass
+class AnswerShapes:
+    """The shapes of one answer; shapes that the page ``has`` are only named."""
+
+    has: Collection[str]
+    new: dict[str, list[list[float]]] = field(default_factory=dict)
+
+    def key(self, region: Region) -> str:
+        """The name of a region, which is sent along if the page lacks it."""
+        key = region.key[:24]
+        if key not in self.has and key not in self.new:
+            self.new[key] = [flat(contour.vertices) for contour in region.contours]
+        return key
+
+
+def flat(vertices: Iterable[tuple[float, float, float]]) -> list[float]:
+    """A contour as the page reads it; its bulges are exact enough to write arcs back to a
+    design.
+    """
+    rounded = ((round(x, 6), round(y, 6), round(bulge, 12)) for x, y, bulge in vertices)
+    return [number for vertex in rounded for number in vertex]
+
+
+def laminate_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:
+    """Layers, patterns and their positions; plan, section and solid are drawn from it."""
+    shapes = AnswerShapes(has)
+    patterns = {
+        name: {
+            "shape": shapes.key(group[0].profile),
+            "layers": [layer.index for layer in group],
+            "area": round(group[0].profile.area, 4),
+            "bounds": group[0].profile.bounds,
+            "marks": [asdict(mark) for mark in api.dimensions(laminate, group[0])],
+        }
+        for name, group in laminate.patterns.items()
+    }
+    layers = [
+        {
+            **of(layer, "index", "role", "balloon", "pattern", "z"),
+            **of(layer.film, "material", "shade", "thickness"),
+            "mask": layer.is_mask,
+        }
+        for layer in laminate.layers
+    ]
+    lists = ("chambers", "bores", "inlets", "pins")
+    names = ("name", "family", "thickness", "balloons", "lumen", "bounds", "registration", "notes")
+    return {
+        "kind": "laminate",
+        **of(laminate, *names),
+        **{name: [asdict(row) for row in getattr(laminate, name)] for name in lists},
+        "layers": layers,
+        "patterns": patterns,
+        "shapes": shapes.new,
+    }
+
+
+def shapes_model(drawn: Mapping[str, Region | None], has: Collection[str]) -> dict[str, Any]:
+    """The shapes that a design file names, each with the key of its region or None."""
+    shapes = AnswerShapes(has)
+    named = {name: region and shapes.key(region) for name, region in drawn.items()}
+    return {"kind": "shapes", "named": named, "shapes": shapes.new}
+
+
+def nets_model(laminate: Laminate, nets: NetMap, has: Collection[str]) -> dict[str, Any]:
+    """Voids with their nets by gap, the gaps of films, ports, and faults with their places."""
+    shapes = AnswerShapes(has)
+    gaps = [
+        {"interface": gap.index, "layers": gap.layer_indices, "contact": shapes.key(gap.contact)}
+        for gap in laminate.interfaces
+    ]
+    areas = [
+        {**of(area, "nets", "interface", "colour"), "shape": shapes.key(area.region)}
+        for area in nets.areas
+    ]
+    ports = [
+        {"name": port.name, "layers": (port.below, port.above), "at": port.at}
+        for port in laminate.ports
+    ]
+    names = ("kind", "nets", "interface", "layers", "at", "message")
+    return {
+        "kind": "nets",
+        "declared": bool(laminate.nets),
+        "colours": nets.colours,
+        "gaps": gaps,
+        "areas": areas,
+        "ports": ports,
+        "faults": [of(fault, *names) for fault in nets.faults],
+        "shapes": shapes.new,
+    }
+
+
+def finding_model(finding: Finding) -> dict[str, Any]:
+    """A finding as in ``checks.json``, its design, whose name the message omits, and its parts."""
+    entry = FindingEntry.of(replace(finding, design=""))
+    design = {"design": finding.design} if finding.design else {}
+    return {**entry, **design, **of(finding, "by_user", "parts")}
+
+
+# Assemblies: the surface of each part once, in the part's own frame, and its place.
+
+
+PLACED_BY = {"on", "at", "angle", "along", "offset", "glue", "note", "design", "set"}
+"""Keys of a part that do not change its own surface; an actuator's depends on its laminate."""
+
+
+def parts_model(assembled: Assembled, has: Collection[str]) -> dict[str, Any]:
+    """Parts with their places, in order of support, and surfaces that the page lacks."""
+    surfaces: dict[str, dict[str, str]] = {}
+    parts = []
+    for placed in assembled.parts:
+        key = _key(placed)
+        if key not in has and key not in surfaces:
+            surfaces[key] = packed(api.solid(placed))
+        design = None
+        if placed.made is not None:
+            values = api.resolved(placed.made.design)
+            design = {**of(placed.made.design, "name", "family"), "values": values}
+        part = {**of(placed.part, "kind", "on", "at"), **of(placed.pose, "rows", "shift")}
+        parts.append({**part, "name": placed.name, "design": design, "surface": key})
+    return {"kind": "parts", "parts": parts, "surfaces": surfaces}
+
+
+def _key(placed: PlacedPart) -> str:
+    """Names a surface by everything that determines it."""
+    decisive: list[Any] = [placed.turn, placed.radius]
+    if placed.made is None:
+        decisive.append(placed.part.model_dump(mode="json", exclude=PLACED_BY))
+    else:
+        layers = placed.made.laminate.layers
+        decisive += [
+            (layer.profile.key, layer.z, layer.film.thickness, layer.is_mask) for layer in layers
+        ]
+    return hashlib.sha256(repr(decisive).encode()).hexdigest()[:24]
+
+
+def remembered(kept: dict[str, Kept], key: str, make: Callable[[], Kept], most: int) -> Kept:
+    """Return the value of a key, made if it is missing; the oldest of over ``most`` is dropped."""
+    if key not in kept:
+        kept[key] = make()
+        while len(kept) > most:
+            del kept[next(iter(kept))]
+    return kept[key]
+
+
+def packed(surface: Surface) -> dict[str, str]:
+    """Points and faces of a surface as the page unpacks them."""
+    arrays = {"points": surface.points.astype("<f4"), "faces": surface.faces.astype("<u4")}
+    return {name: base64.b64encode(rows.tobytes()).decode() for name, rows in arrays.items()}
+
+
+# Poses of the fast stack of a design.
+
 
 CURVE = 25  # points of the curves beside the view
 LONGEST_STEP = 0.2  # longest time spanned by one step of a motion, s
@@ -67,9 +245,8 @@ def poses(stack: Stack, request: dict[str, Any]) -> Iterator[dict[str, Any]]:
         except DesignError:
             break
         rows.append((share * most, pose.height, pose.bend, float(sum(pose.volumes))))
-    names = ("pressure", "height", "bend", "volume")
-    columns = zip(*rows, strict=True)
-    by_name = {name: numbers(column) for name, column in zip(names, columns, strict=False)}
+    columns = zip(("pressure", "height", "bend", "volume"), zip(*rows, strict=True), strict=False)
+    by_name = {name: numbers(column) for name, column in columns}
     yield {"kind": "curves", "holds": stack.within(final), **by_name}
 
 
@@ -153,12 +330,8 @@ PRESSURE_KPA, LOAD_G = 10.0, 1.2  # defaults of the prediction's request, as in 
 MOST_PRESSURE, MOST_LOAD_G = 110.0, 1000.0
 
 
-def moving_parts(assembled: Assembled) -> dict[str, Any]:
-    """Return the stack or the grip of each actuator, or the reason why it does not move."""
-    return {"kind": "movers", "movers": list(_movers(assembled))}
-
-
-def _movers(assembled: Assembled) -> Iterator[dict[str, Any]]:
+def movers(assembled: Assembled) -> Iterator[dict[str, Any]]:
+    """Yield the stack or the grip of each actuator, or the reason why it does not move."""
     for placed in assembled.parts:
         if placed.made is None:
             continue
@@ -177,11 +350,13 @@ def _movers(assembled: Assembled) -> Iterator[dict[str, Any]]:
             continue
         walls = [layers for layers in laminate.patterns.values() if layers[0].role == "wall"]
         wall = max(walls, key=len)[0].profile if walls else laminate.outline
+        # Rows that map the part's own frame to the assembly's.
+        corners = placed.upright(np.concatenate([np.zeros((1, 3)), np.eye(3)]))
         yield {
             **stack_model(placed.made.design.name, stack),
             **actuator,
             "is": "stack",
-            "frame": numbers(_frame(placed)),
+            "frame": numbers(np.column_stack([*(corners[1:] - corners[0]), corners[0]])),
             "wall": [flat(contour.vertices) for contour in wall.contours],
             "lumen": laminate.lumen,
         }
@@ -194,7 +369,7 @@ def part_poses(assembled: Assembled, request: dict[str, Any]) -> dict[str, Any]:
     for placed in assembled.parts:
         if placed.made is None or placed.name not in pressures_of:
             continue
-        stack: Stack = stack_of(placed.made.design)
+        stack = stack_of(placed.made.design)
         pressures = finite_numbers(pressures_of[placed.name], stack.chambers, "pressures")
         poses_of[placed.name] = pose_model(stack.pose(pressures))
     return {"kind": "poses", "poses": poses_of}
@@ -234,9 +409,3 @@ def _within(value: Any, most: float, name: str, unit: str) -> float:
     if not isinstance(value, int | float) or not math.isfinite(value) or not 0 <= value <= most:
         raise DesignError(f"{name} must be from 0 to {most:g} {unit}")
     return float(value)
-
-
-def _frame(placed: PlacedPart) -> Any:
-    """Rows (3, 4) that map a part's own frame to the assembly's."""
-    corners = placed.upright(np.concatenate([np.zeros((1, 3)), np.eye(3)]))
-    return np.column_stack([*(corners[1:] - corners[0]), corners[0]])
