@@ -16,7 +16,7 @@ from sbafab.actuators import load_design
 from sbafab.errors import DesignError
 from sbafab.models import paper
 from sbafab.models.balloon_map import balloon_map
-from sbafab.models.calibrated import load_calibration
+from sbafab.models.calibration import load_calibration
 from sbafab.models.elastic import blocked_force, pose_bent_by
 from sbafab.models.figures import Factors
 from sbafab.models.stack import Plate, Pose, Stack, stack

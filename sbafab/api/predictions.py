@@ -13,8 +13,8 @@ from sbafab.design.files import Change
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Surface
+from sbafab.models.calibration import factors_of
 from sbafab.models.figures import Prediction, PredictionRequest
-from sbafab.models.intervals import factors_of
 from sbafab.models.pneumatics import FLUIDS, Line, usual_pressures
 from sbafab.models.prediction import predict as predict_design
 from sbafab.models.stack import MOST_PRESSURE, Motion, Stack

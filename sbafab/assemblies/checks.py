@@ -16,8 +16,8 @@ from sbafab.design.records import Design, Discs
 from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.laminate import outline_diameter
 from sbafab.meshing.surface import Surface, Vector
+from sbafab.models.calibration import factors_of
 from sbafab.models.closed_forms import LOBES, folded_diameter
-from sbafab.models.intervals import factors_of
 from sbafab.models.sizes import deflated_diameter
 from sbafab.models.sizes import sizes as sizes_of
 from sbafab.rules.finding import Finding, Place, Verdict, judged, marked

@@ -17,7 +17,7 @@ from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
 from sbafab.folders.swap import replace_text
 from sbafab.lab.evidence import load_source
-from sbafab.models.calibrated import NONE, UNKNOWNS, load_calibration, shipped_names
+from sbafab.models.calibration import NONE, UNKNOWNS, load_calibration, shipped_names
 from sbafab.validation.comparison import ComparisonDocument, compare, table_lines
 from sbafab.validation.evidence import shipped_evidence
 from sbafab.validation.fit import Fit, HeldOutPoint, calibration_text, fit

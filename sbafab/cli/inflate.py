@@ -16,7 +16,7 @@ from sbafab.errors import DesignError
 from sbafab.laminate.burst import refuse_beyond_burst
 from sbafab.models.actuator import model_form, near_discs
 from sbafab.models.balloons import has_balloons
-from sbafab.models.intervals import factors_of
+from sbafab.models.calibration import factors_of
 from sbafab.models.map_files import FORMATS, map_text
 from sbafab.models.pneumatics import refuse_pressure
 from sbafab.models.stack import MOST_PRESSURE, stack

@@ -34,8 +34,8 @@ from sbafab.folders.checks_json import Checks, checks
 from sbafab.folders.manifest import as_json
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.mesh_files import MeshFile, write_meshes
-from sbafab.models.calibrated import FILE as CALIBRATION_FILE
-from sbafab.models.calibrated import NONE, load_calibration, shipped_names
+from sbafab.models.calibration import FILE as CALIBRATION_FILE
+from sbafab.models.calibration import NONE, load_calibration, shipped_names
 from sbafab.models.figures import Prediction, PredictionDocument
 from sbafab.pressing.cycles import batch_entry
 from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json

@@ -26,14 +26,11 @@ import math
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sbafab.models.closed_forms import inverse, last_positive, within
+from sbafab.models.film_elements import Array
 
-MOTOR = "pouch motor"
-HINGE = "pouch hinge"
-BEAM = "inflated beam"
-JAMMING = "laminar jamming"
 LARGEST_CONTRACTION = 1 - 2 / math.pi
 """Share of the flat length: both arcs are then half circles."""
 SLENDER = 5.0
@@ -42,38 +39,38 @@ SHALLOW = 1e-4
 """Half angle below which series are exact to 1e-9."""
 
 
-def contraction(angle: ArrayLike) -> NDArray[np.float64]:
+def contraction(angle: ArrayLike) -> Array:
     """Return by what share of its length a pouch is shorter at half angles up to pi/2."""
-    t = within(angle, math.pi / 2, "half angle", "rad", MOTOR)
+    t = within(angle, math.pi / 2, "half angle", "rad", "pouch motor")
     safe = np.maximum(t, SHALLOW)
     return np.asarray(np.where(t > SHALLOW, 1 - np.sin(safe) / safe, t**2 / 6))
 
 
-def half_angle(share: ArrayLike) -> NDArray[np.float64]:
+def half_angle(share: ArrayLike) -> Array:
     """Return the half angle at a contraction, a share. Raises DesignError out of range."""
-    shares = within(share, LARGEST_CONTRACTION, "contraction", "of its length", MOTOR)
+    shares = within(share, LARGEST_CONTRACTION, "contraction", "of its length", "pouch motor")
     return inverse(contraction, shares, math.pi / 2)
 
 
-def section(angle: ArrayLike) -> NDArray[np.float64]:
+def section(angle: ArrayLike) -> Array:
     """Return the area between two arcs of this half angle over half the square of their length."""
     t = np.asarray(angle, dtype=float)
     safe = np.maximum(t, SHALLOW)
     return np.where(t > SHALLOW, (safe - np.sin(safe) * np.cos(safe)) / safe**2, 2 * t / 3)
 
 
-def volume(share: ArrayLike, length: float, width: float) -> NDArray[np.float64]:
+def volume(share: ArrayLike, length: float, width: float) -> Array:
     """Return the volume in ul at a contraction."""
     return np.asarray(width * length**2 / 2 * section(half_angle(share)))
 
 
-def pull(pressure: float, share: ArrayLike, length: float, width: float) -> NDArray[np.float64]:
+def pull(pressure: float, share: ArrayLike, length: float, width: float) -> Array:
     """Return the pull in N at contractions above 0: flat it grows beyond every limit."""
     t = half_angle(share)
     return np.asarray(pressure / 1000 * width * length * np.cos(t) / t)
 
 
-def tension(pressure: float, angle: ArrayLike, length: float) -> NDArray[np.float64]:
+def tension(pressure: float, angle: ArrayLike, length: float) -> Array:
     """Return the tension in N/mm of an arc of this length and half angle."""
     return np.asarray(pressure / 1000 * length / (2 * np.asarray(angle, dtype=float)))
 
@@ -81,15 +78,15 @@ def tension(pressure: float, angle: ArrayLike, length: float) -> NDArray[np.floa
 # The hinge: plates of half the pouch's length on both sides of the joint.
 
 
-def bent(angle: ArrayLike) -> NDArray[np.float64]:
+def bent(angle: ArrayLike) -> Array:
     """Return the bend in rad at which the free film's half angle is ``angle``."""
     return np.asarray(2 * np.arccos(1 - contraction(angle)))
 
 
-def moment(pressure: float, bend: ArrayLike, length: float, width: float) -> NDArray[np.float64]:
+def moment(pressure: float, bend: ArrayLike, length: float, width: float) -> Array:
     """Return the moment in N mm that bends the hinge on, at bends up to the free one."""
-    b = within(bend, free_bend(), "bend of a hinge", "rad", HINGE)
-    t = _angle_at(b)
+    b = within(bend, free_bend(), "bend of a hinge", "rad", "pouch hinge")
+    t = half_angle(1 - np.cos(b / 2))
     safe = np.maximum(t, SHALLOW)
     lever = np.where(t > SHALLOW, np.sin(safe + b / 2) / safe, 1 + 1 / math.sqrt(3))
     return np.asarray(pressure / 1000 * width * length**2 / 4 * (lever - 0.5))
@@ -100,10 +97,6 @@ def free_bend() -> float:
     """Return the bend in rad at which the moment is 0: of any pouch, at any pressure."""
     pull = last_positive(lambda t: math.sin(t + float(bent(t)) / 2) - t / 2, 1.0, math.pi / 2)
     return float(bent(pull))
-
-
-def _angle_at(bend: NDArray[np.float64]) -> NDArray[np.float64]:
-    return half_angle(1 - np.cos(bend / 2))
 
 
 # The beam: a tube of film.

@@ -21,6 +21,14 @@ from sbafab.laminate.burst import NOT_BURST, burst, is_near_burst, refuse_beyond
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models import elastic, paper
 from sbafab.models.actuator import NOT_MEASURED, Actuator, NearDiscs, near_discs, why_no_disc
+from sbafab.models.calibration import (
+    PAPER_3DOF,
+    burst_uncertainty,
+    factors_of,
+    flags_at,
+    sizes_of,
+    uncertainty_of,
+)
 from sbafab.models.closed_forms import (
     LOBES,
     ClosedForm,
@@ -50,15 +58,6 @@ from sbafab.models.figures import (
     chosen,
 )
 from sbafab.models.film_elements import Array
-from sbafab.models.intervals import (
-    PAPER_3DOF,
-    burst_uncertainty,
-    factors_of,
-    farther,
-    flags_at,
-    sizes_of,
-    uncertainty_of,
-)
 from sbafab.models.mechanisms import LEFT_OUT, mechanism_figures
 from sbafab.models.paper import Measured, counterpart
 from sbafab.models.pneumatics import refuse_pressure, seconds
@@ -398,7 +397,7 @@ def _strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[FigureI
         model, flags = Model(ModelId.LARGEST_VOLUME, first.name, first.trust), tuple[Flag, ...]()
         if actuator.radii:
             at = sizes_of(actuator.form, actuator.laminate)
-            model, flags = MODELS["scaled-height"], flags_at(farther(at, PAPER_3DOF, False))
+            model, flags = MODELS["scaled-height"], flags_at(at.farther(PAPER_3DOF))
         yield Figure(Quantity.REFERENCE_STROKE, stroke, model, flags=flags)
         yield Figure(Quantity.REFERENCE_HEIGHT, actuator.reference_height, model, flags=flags)
         for each in actuator.pockets:

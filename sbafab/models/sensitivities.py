@@ -19,10 +19,10 @@ import numpy as np
 from sbafab.actuators import build
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
+from sbafab.models.calibration import factors_of
 from sbafab.models.derivatives import Linearised, Rates, linearised
 from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
-from sbafab.models.intervals import factors_of
 from sbafab.models.stack import MOST_PRESSURE, Pose, Stack, stack
 from sbafab.models.stack_loads import WALL_POINTS, Load, loaded_energy
 

@@ -10,9 +10,9 @@ from sbafab.laminate.laminate import (
     outline_diameter,
     overall_diameter,
 )
+from sbafab.models.calibration import factors_of
 from sbafab.models.closed_forms import LOBES, cylinder_height, lens
 from sbafab.models.figures import Factors
-from sbafab.models.intervals import factors_of
 from sbafab.models.paper import BALLOONS, counterpart
 from sbafab.models.quantity import ANYWHERE, ModelId, Quantity
 

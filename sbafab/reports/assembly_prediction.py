@@ -18,9 +18,9 @@ from sbafab.design.records import Discs, Slots
 from sbafab.laminate.burst import is_near_burst, refuse_beyond_burst
 from sbafab.meshing.surface import Surface
 from sbafab.models.balloons import balloons_of
+from sbafab.models.calibration import factors_of
 from sbafab.models.closed_forms import cylinder_height, lens
 from sbafab.models.elastic import free_rise
-from sbafab.models.intervals import factors_of
 from sbafab.models.paper import counterpart
 from sbafab.models.quantity import ANYWHERE, Conditions, ModelId, Quantity
 from sbafab.models.sizes import is_the_papers_3dof, sizes

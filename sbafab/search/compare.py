@@ -27,9 +27,8 @@ from sbafab.folders.swap import replace_text
 from sbafab.laminate.burst import refuse_beyond_burst
 from sbafab.models.actuator import model_form
 from sbafab.models.balloons import has_balloons
-from sbafab.models.calibrated import Ends
+from sbafab.models.calibration import Ends, factors_of
 from sbafab.models.figures import Figure, PredictionRequest
-from sbafab.models.intervals import factors_of
 from sbafab.models.pneumatics import usual_pressures
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity

@@ -25,8 +25,8 @@ from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError, OutputError, SbafabError, Stopped, writing
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.balloons import balloons_of, has_balloons
+from sbafab.models.calibration import uncertainty_of
 from sbafab.models.figures import FLAGS, Flag, FlagList
-from sbafab.models.intervals import uncertainty_of
 from sbafab.models.paper import Counterpart, CounterpartEntry
 from sbafab.rules.finding import Place
 from sbafab.runtime import Progress, ignore_progress

@@ -30,11 +30,11 @@ from sbafab.design.units import (
 from sbafab.errors import DesignError
 from sbafab.laminate.burst import NOT_BURST, Burst, burst, is_near_burst, refuse_beyond_burst
 from sbafab.laminate.laminate import Laminate, film_mass
-from sbafab.models import elastic, intervals
+from sbafab.models import calibration, elastic
 from sbafab.models.actuator import Actuator
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
-from sbafab.models.calibrated import SHARE
+from sbafab.models.calibration import SHARE
 from sbafab.models.figures import NEAR_BURST, Factors, Flag
 from sbafab.models.mechanisms import ASKED, mechanism_value
 from sbafab.models.paper import FULL_KPA, HEIGHTS, WATER_FLOW, Counterpart, counterpart
@@ -489,14 +489,14 @@ class Subject:
         form, kpa = self.design.form, quantity.gauge_kpa
         group, missed = group_of(quantity, form), 0.0
         if quantity.name == "burst":
-            missed = intervals.burst_uncertainty(self._burst)[1]
+            missed = calibration.burst_uncertainty(self._burst)[1]
         elif quantity.name == "reference_stroke" and self._actuator.radii:
-            own = intervals.sizes_of(form, self.laminate)
-            missed = intervals.farther(own, intervals.PAPER_3DOF, False)
+            sizes = calibration.sizes_of(form, self.laminate)
+            missed = sizes.farther(calibration.PAPER_3DOF)
         elif group is not None and self.uncertainty is not None:
             missed = self.uncertainty.farther(group)
         near = kpa is not None and is_near_burst(self.laminate, kpa)
-        return (*intervals.flags_at(missed), *((NEAR_BURST,) if near else ()))
+        return (*calibration.flags_at(missed), *((NEAR_BURST,) if near else ()))
 
     def _time(self, flow_ml_min: float) -> float:
         time, _ = elastic.time_to_fill(self._stack, flow_ml_min, FULL_KPA)
@@ -516,12 +516,12 @@ class Subject:
     @cached_property
     def factors(self) -> Factors:
         """The factors of the design's calibration, or the given ones."""
-        return self.given or intervals.factors_of(self.design)
+        return self.given or calibration.factors_of(self.design)
 
     @cached_property
-    def uncertainty(self) -> intervals.Uncertainty | None:
+    def uncertainty(self) -> calibration.Uncertainty | None:
         """The calibration of the design; None without one."""
-        return intervals.uncertainty_of(self.design, laminate=self.laminate)
+        return calibration.uncertainty_of(self.design, laminate=self.laminate)
 
     @cached_property
     def _others(self) -> dict[Factors, Subject]:
@@ -541,7 +541,7 @@ class Subject:
         Raises DesignError if other factors of the calibration lead out of the model's range.
         """
         if quantity.name == "burst":
-            return intervals.burst_uncertainty(self._burst, share)[0]
+            return calibration.burst_uncertainty(self._burst, share)[0]
         group = group_of(quantity, self.design.form)
         is_unmolten = quantity.name == "height" and not self._actuator.folded.molten
         if self.uncertainty is None or group is None or is_unmolten:
@@ -641,10 +641,10 @@ class Subject:
 def group_of(quantity: RequestedQuantity, form: Form) -> str | None:
     """Return the group of a quantity's discrepancy; None if no calibrated model gives it."""
     if quantity.name == "height":
-        return intervals.FLAT
+        return calibration.FLAT
     if quantity.name in ASKED or not quantity.is_moved or isinstance(form.pockets, Slots):
         return None
-    return intervals.GROUP_BY_UNIT.get(quantity.unit, "motion")
+    return calibration.GROUP_BY_UNIT.get(quantity.unit, "motion")
 
 
 @lru_cache(maxsize=4096)

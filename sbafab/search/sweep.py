@@ -21,7 +21,7 @@ from sbafab.documents import Document, attribute
 from sbafab.errors import OutputError, Stopped, writing
 from sbafab.folders.swap import MANIFEST, replace_text
 from sbafab.markup import data_frame
-from sbafab.models.intervals import factors_of
+from sbafab.models.calibration import factors_of
 from sbafab.models.pneumatics import refuse_pressure, usual_pressures
 from sbafab.runtime import Progress, ignore_progress
 from sbafab.search.sweep_report import (

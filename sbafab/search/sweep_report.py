@@ -22,7 +22,7 @@ from sbafab.design.records import Design
 from sbafab.design.sections import rule_names
 from sbafab.errors import OutputError
 from sbafab.markup import environment
-from sbafab.models.intervals import factors_of
+from sbafab.models.calibration import factors_of
 from sbafab.models.paper import CALIBRATED_MODELS, counterpart
 from sbafab.models.quantity import ANYWHERE, Conditions, FigureKey, Quantity
 from sbafab.reports.charts import ChartBars, ChartCurve, ChartSpecks, Panel, chart_svg

@@ -29,8 +29,8 @@ from sbafab.design.files import checked as checked_record
 from sbafab.design.identity import design_sha256
 from sbafab.errors import DesignError, OutputError, SbafabError
 from sbafab.folders.build import make_build, refuse_undoable
+from sbafab.models.calibration import factors_of
 from sbafab.models.figures import PredictionRequest
-from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
 from sbafab.plugins import FAMILIES, RULES, installed
 from sbafab.rules.deck import AT_MOST

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 
 from sbafab.documents import Document, Short, attribute
 from sbafab.errors import DesignError
-from sbafab.models.calibrated import SHARE, Ends, ModelCalibration, deviations
+from sbafab.models.calibration import SHARE, Ends, ModelCalibration, Uncertainty, deviations
 from sbafab.models.figures import Factors
-from sbafab.models.intervals import ActuatorSizes, Uncertainty, for_film
 from sbafab.validation.evidence import Evidence, MeasuredCurve
 from sbafab.validation.fit import GROUP_OF, MIDDLES, relative_errors, term_of
 from sbafab.validation.model_values import ModelledActuator, ModelValues, NoModel, model_values
@@ -92,13 +91,13 @@ def _compared(
 def uncertainty_for(curve: MeasuredCurve, calibration: ModelCalibration) -> Uncertainty:
     """Return a calibration as it holds for the actuator that was measured."""
     if not curve.is_described:
-        return Uncertainty(calibration, {})
+        return Uncertainty(calibration)
     of = ModelledActuator(curve, Factors(**MIDDLES))
     try:
-        subject = ActuatorSizes.of(of.design.form, of.laminate, calibration.film)
+        film, form, laminate = of.design.films.tpe.product, of.design.form, of.laminate
     except DesignError:
-        return Uncertainty(calibration, {})
-    return Uncertainty(for_film(calibration, of.design.films.tpe.product), {}, subject)
+        return Uncertainty(calibration)
+    return Uncertainty(calibration.for_film(film), {}, laminate, form)
 
 
 def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends | None] | None:

@@ -14,10 +14,9 @@ import numpy as np
 import tomli_w
 
 from sbafab.errors import DesignError
-from sbafab.models.calibrated import GROUPS, SHARE, UNKNOWNS, ModelCalibration, SizeRange
+from sbafab.models.calibration import GROUPS, SHARE, UNKNOWNS, ModelCalibration, SizeRange, sizes_of
 from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
-from sbafab.models.intervals import sizes_of
 from sbafab.runtime import Progress
 from sbafab.validation.evidence import QUANTITIES, Evidence, MeasuredCurve
 from sbafab.validation.model_values import ModelledActuator, ModelValues, NoModel, model_values
@@ -274,7 +273,7 @@ def as_calibration(
         "discrepancy": {
             group: round(each, DIGITS) for group, each in posterior.discrepancy.items()
         },
-        "sizes": {group: each._asdict() for group, each in sizes.items()},
+        "sizes": {group: each.model_dump(exclude_none=True) for group, each in sizes.items()},
         "held_out": {"points": len(points), "inside": sum(point.is_inside for point in points)},
         "sentences": list(correlated(posterior.covariance)),
     }

@@ -22,7 +22,7 @@ from sbafab.models.actuator import Actuator
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
-from sbafab.models.calibrated import UNKNOWNS
+from sbafab.models.calibration import UNKNOWNS
 from sbafab.models.closed_forms import modulus, second_moments
 from sbafab.models.figures import Factors, Figure, PredictionRequest
 from sbafab.models.film_elements import Array

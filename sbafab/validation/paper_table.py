@@ -24,7 +24,7 @@ from sbafab.laminate.lay_up import FoldedHeight
 from sbafab.markup import environment
 from sbafab.models import paper
 from sbafab.models.balloons import balloons_of
-from sbafab.models.calibrated import UNKNOWNS, ModelCalibration, load_calibration
+from sbafab.models.calibration import UNKNOWNS, ModelCalibration, load_calibration
 from sbafab.models.closed_forms import eq_4, eqs_1_to_3, modulus
 from sbafab.models.elastic import air_time, pose_bent_by, time_to_fill
 from sbafab.models.figures import Factors, Prediction, PredictionRequest

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.calibrated import GROUPS, UNKNOWNS
+from sbafab.models.calibration import GROUPS, UNKNOWNS
 from sbafab.models.film_elements import Array
 
 SHARED = 0.5

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.models.calibrated import read_calibration
+from sbafab.models.calibration import read_calibration
 from tests.cli.conftest import Run
 
 LAB = """curve,quantity,design,x_name,x,y,error,pressure_kpa,tip,fluid,error_source

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.models.calibrated import load_calibration
+from sbafab.models.calibration import load_calibration
 from sbafab.reports.traveller.page import record_text
 from tests.cli.conftest import Run
 from tests.site.formats import hold

@@ -9,7 +9,7 @@ import pytest
 
 import sbafab
 from sbafab.cli import show
-from sbafab.models.intervals import factors_of
+from sbafab.models.calibration import factors_of
 from tests.cli.conftest import Run
 
 QUICK = "--set rules.yield_builds=100"

@@ -15,7 +15,7 @@ from sbafab.errors import DesignError
 from sbafab.models.actuator import Actuator
 from sbafab.models.balloon import inflate
 from sbafab.models.balloons import balloons_of
-from sbafab.models.calibrated import load_calibration
+from sbafab.models.calibration import load_calibration
 from sbafab.models.closed_forms import eq_4, eqs_1_to_3, lens
 from sbafab.models.figures import Factors, Prediction
 from sbafab.models.prediction import FLAT_PLATES, workspace_relation

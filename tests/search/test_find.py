@@ -19,9 +19,8 @@ import sbafab
 from sbafab.cli import app
 from sbafab.design.records import Free
 from sbafab.errors import DesignError
-from sbafab.models.calibrated import UNKNOWNS
+from sbafab.models.calibration import UNKNOWNS, calibration_of
 from sbafab.models.figures import Factors
-from sbafab.models.intervals import calibration_of
 from sbafab.search import space as module
 from sbafab.search.find import FoundDesign, RangeEnd, find, free_keys
 from sbafab.search.quantities import QUANTITIES, read_all, read_quantity

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.models.calibrated import GROUPS, UNKNOWNS
+from sbafab.models.calibration import GROUPS, UNKNOWNS
 from sbafab.validation.posterior import (
     NODE_COORDINATES,
     SCALE_MIDDLE,

@@ -11,8 +11,8 @@ import sbafab
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.checks import run_checks
 from sbafab.assemblies.files import load_assembly
+from sbafab.models.calibration import factors_of
 from sbafab.models.figures import Factors
-from sbafab.models.intervals import factors_of
 from sbafab.models.sizes import sizes
 
 

@@ -14,15 +14,17 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import balloon_map
-from sbafab.models.calibrated import (
+from sbafab.models.calibration import (
     UNKNOWNS,
     ModelCalibration,
+    Uncertainty,
+    calibration_of,
     deviations,
+    factors_of,
     load_calibration,
     read_calibration,
 )
 from sbafab.models.figures import Factors
-from sbafab.models.intervals import Uncertainty, calibration_of, factors_of
 
 
 @pytest.fixture(scope="module")

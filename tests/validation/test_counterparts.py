@@ -19,7 +19,7 @@ import sbafab
 from docs.scripts.gallery import figures_of
 from sbafab.cli import app
 from sbafab.models import paper
-from sbafab.models.calibrated import load_calibration
+from sbafab.models.calibration import load_calibration
 from sbafab.models.closed_forms import modulus
 from sbafab.models.figures import Figure, Prediction
 from sbafab.models.paper import (

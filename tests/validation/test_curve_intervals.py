@@ -6,9 +6,8 @@ import math
 
 import pytest
 
-from sbafab.models.calibrated import ModelCalibration, load_calibration
+from sbafab.models.calibration import ModelCalibration, Uncertainty, load_calibration
 from sbafab.models.figures import Factors
-from sbafab.models.intervals import Uncertainty
 from sbafab.validation.comparison import curve_intervals, uncertainty_for, widened
 from sbafab.validation.evidence import MeasuredCurve, Setup, StatedError
 from sbafab.validation.model_values import ModelValues

@@ -9,7 +9,7 @@ import pytest
 from docs.scripts import held_out
 from docs.scripts.measured import FOLDER, record
 from docs.scripts.tables import Table
-from sbafab.models.calibrated import load_calibration
+from sbafab.models.calibration import load_calibration
 from sbafab.validation.evidence import shipped_evidence
 from sbafab.validation.fit import GROUP_OF
 

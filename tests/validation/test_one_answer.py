@@ -22,8 +22,8 @@ from sbafab.design.files import template_names
 from sbafab.design.records import Design
 from sbafab.laminate.burst import burst
 from sbafab.laminate.lay_up import pressed_layers
+from sbafab.models.calibration import factors_of
 from sbafab.models.figures import Figure, Prediction
-from sbafab.models.intervals import factors_of
 from sbafab.models.sizes import size_phrases, sizes
 from sbafab.search.quantities import Subject, read_quantity
 from sbafab.studio.jobs import elastic, motion

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from docs.scripts.measured import FOLDER, record
-from sbafab.models.calibrated import GROUPS, UNKNOWNS
+from sbafab.models.calibration import GROUPS, UNKNOWNS
 from sbafab.validation.fit import correlated
 from sbafab.validation.posterior import (
     NODE_COORDINATES,

@@ -8,7 +8,7 @@ import pytest
 
 from docs.scripts.tables import table
 from docs.scripts.validate import PATH, validation
-from sbafab.models.calibrated import UNKNOWNS, load_calibration
+from sbafab.models.calibration import UNKNOWNS, load_calibration
 from sbafab.models.closed_forms import eq_4, eqs_1_to_3
 from sbafab.validation.evidence import load_evidence
 

@@ -1,0 +1,598 @@
+"""A calibration: the posterior of the models' unknowns with the discrepancy that remains, as a file
+that designs and kits name; the factors of a design, and the 90 % intervals of its predictions.
+
+Unknowns have a normal posterior in their coordinates. A prediction is linear in them: its
+logarithm, or the prediction itself where it may be 0 or below, changes by its slope times the
+change of each unknown. What the models miss beyond that is a relative discrepancy, one standard
+deviation for each group of quantities; farther from the evidence of a group, in size, film or
+number of balloons, more is assumed to be missed.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property, reduce
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from sbafab.design.files import checked, listed, read_toml, shown
+from sbafab.design.records import Design, Discs, Form
+from sbafab.design.toml_table import Section
+from sbafab.errors import DesignError
+from sbafab.laminate.burst import RADIUS, Burst
+from sbafab.laminate.films import PAPER_BURST, PAPER_THICKNESS
+from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.lay_up import folded_height
+from sbafab.models.figures import EXTRAPOLATION, Factors, Figure, FigureItem, Flag
+from sbafab.models.paper import BALLOONS, CALIBRATED_MODELS
+from sbafab.models.quantity import Quantity
+
+FOLDER = Path(__file__).parent / "calibrations"
+NONE: Literal["none"] = "none"
+"""The name for using no calibration: films as drawn and bought, without intervals."""
+FILE = "calibration.toml"
+"""A calibration's copy in the output folder of a design."""
+FLAT = "flat height"
+"""The group of folded heights."""
+GROUPS = ("force", "motion", FLAT, "time", "work", "stiffness", "loss")
+"""Groups of quantities, each with its discrepancy."""
+SHARE = 0.9
+"""Probability that an interval holds the measured value."""
+
+
+Ends = tuple[float, float]
+"""Least and largest value."""
+
+
+class Unknown(NamedTuple):
+    """One unknown of the models; ``field`` names the field of ``Factors``.
+
+    The prior is normal in the coordinate, which is the logarithm of the value (``is_log``) or the
+    value itself: ``middle`` is the value at its mean, ``spread`` its standard deviation in the
+    coordinate, and ``source`` its reason. Values lie from ``least`` to ``most``.
+    """
+
+    field: str
+    title: str
+    unit: str
+    is_log: bool
+    middle: float
+    spread: float
+    least: float
+    most: float
+    source: str
+
+    def coordinate(self, value: float) -> float:
+        """Return the coordinate of a value."""
+        return math.log(value) if self.is_log else value
+
+    def value(self, coordinate: float) -> float:
+        """Return the value at a coordinate, within its bounds."""
+        value = math.exp(coordinate) if self.is_log else coordinate
+        return min(max(value, self.least), self.most)
+
+    def shown(self, value: float) -> str:
+        """Return a value to three digits, with its unit."""
+        return f"{value:.3g} {self.unit}".rstrip()
+
+
+def _priors() -> Iterator[Unknown]:
+    with Path(__file__).with_name("priors.csv").open(encoding="utf-8", newline="") as opened:
+        for name, title, unit, is_log, *numbers, source in list(csv.reader(opened))[1:]:
+            middle, spread, least, most = map(float, numbers)
+            yield Unknown(name, title, unit, is_log == "yes", middle, spread, least, most, source)
+
+
+UNKNOWNS = tuple(_priors())
+"""What calibration estimates, in the order of a calibration's mean and covariance."""
+DESIGN_UNKNOWNS = 3
+"""The first of UNKNOWNS, which change an actuator; the others change its supply."""
+FIELDS = [unknown.field for unknown in UNKNOWNS]
+
+
+# Off the evidence. From d = 5 to 10 the elastic balloon comes to differ from finite elements by up
+# to 19 % in stroke, and the paper's forces of a chamber differ by 10 to 34 % between two actuators
+# of the same pockets; nothing was measured elsewhere. So these are assumptions, ours: standard
+# deviations of the logarithm, which add up as independent ones.
+
+
+PER_DOUBLING = {"diameters": 0.15, "thicknesses": 0.15, "balloons": 0.05}
+"""For each doubling beyond the evidence."""
+OTHER_FILM = 0.2
+"""For a film of another product."""
+OTHER_SHAPE = 0.2
+"""For the burst of pockets that are not round."""
+FAR = 0.25
+"""Limit above which a figure is an extrapolation: a factor of 1.5 either way by assumption."""
+_Size = Annotated[int | float, Field(gt=0)]
+_Range = Annotated[tuple[_Size, _Size], Field(strict=False)]
+_Row = Annotated[tuple[float, ...], Field(strict=False)]
+_Texts = Annotated[tuple[str, ...], Field(strict=False)]
+
+
+class SizeRange(Section):
+    """Least and largest diameter of round pockets and thickness of films that bond, mm, and number
+    of balloons in a stack: of an actuator, or of several.
+    """
+
+    diameters: _Range | None = None
+    thicknesses: _Range
+    balloons: _Range
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        for name, ends in self:
+            if ends is not None and ends[0] > ends[1]:
+                raise ValueError(f"has {name} that are not in order; give the least one first")
+        return self
+
+    @classmethod
+    def of(cls, diameters: Sequence[float], thicknesses: Sequence[float], balloons: int) -> Self:
+        """Return the sizes of an actuator with these pockets and films."""
+        return cls.model_construct(
+            diameters=(min(diameters), max(diameters)) if diameters else None,
+            thicknesses=(min(thicknesses), max(thicknesses)),
+            balloons=(balloons, balloons),
+        )
+
+    def joined(self, other: SizeRange) -> SizeRange:
+        """Return the sizes of both."""
+        ends: dict[str, Any] = {}
+        for name, mine in self:
+            both = [each for each in (mine, getattr(other, name)) if each is not None]
+            ends[name] = (min(a for a, _ in both), max(b for _, b in both)) if both else None
+        return SizeRange.model_construct(**ends)
+
+    def farther(self, evidence: SizeRange, is_other_film: bool = False) -> float:
+        """Return the relative standard deviation that is assumed for sizes off the evidence."""
+        missed = [OTHER_FILM if is_other_film else 0.0]
+        for name, rate in PER_DOUBLING.items():
+            of, known = getattr(self, name), getattr(evidence, name)
+            if of is not None and known is not None:
+                missed.append(rate * math.log2(max(known[0] / of[0], of[1] / known[1], 1.0)))
+        return math.hypot(*missed)
+
+
+PAPER_3DOF = SizeRange.of([5.0], [PAPER_THICKNESS], BALLOONS)
+"""The actuator from which the reference stroke is scaled."""
+
+
+def sizes_of(form: Form, laminate: Laminate) -> SizeRange:
+    """Return the sizes of an actuator of this form."""
+    thick = [layer.film.thickness for layer in laminate.tpe_layers]
+    diameters = form.pockets.diameters if isinstance(form.pockets, Discs) else ()
+    return SizeRange.of(diameters, thick, laminate.balloons)
+
+
+def flags_at(missed: float) -> tuple[Flag, ...]:
+    """Return the flags of a figure with this assumed standard deviation."""
+    return (EXTRAPOLATION,) if missed > FAR else ()
+
+
+def burst_uncertainty(estimate: Burst, share: float = SHARE) -> tuple[Ends, float]:
+    """Return the interval in kPa that holds the burst pressure with a probability of ``share``, and
+    the relative standard deviation that is assumed in it.
+    """
+    evidence = SizeRange.of([2 * RADIUS], [PAPER_THICKNESS], 1)
+    sizes = SizeRange.of([2 * estimate.radius], [estimate.thickness], 1)
+    missed = math.hypot(sizes.farther(evidence), 0.0 if estimate.is_round else OTHER_SHAPE)
+    measured, error = PAPER_BURST
+    factor = math.exp(deviations(share) * math.hypot(error / measured, missed))
+    return (estimate.kpa / factor, estimate.kpa * factor), missed
+
+
+# The file.
+
+
+class _HeldOut(Section):
+    points: int = Field(ge=0)
+    inside: int = Field(ge=0)
+
+
+class ModelCalibration(Section):
+    """A posterior: ``mean`` and ``covariance`` (n, n) of the coordinates of ``unknowns``, and
+    ``discrepancy``, the relative standard deviation that the models miss, by group.
+
+    ``film`` is the product of the evidence, ``evidence`` the sources that it was fitted to,
+    ``sizes`` those of its actuators by group of quantities; ``held_out`` says how many
+    left-out points lay in their intervals. ``sentences`` state what the evidence cannot
+    distinguish.
+    """
+
+    schema_name: Literal["sbafab/calibration@2"] = Field(alias="schema")
+    name: str
+    about: str
+    film: str
+    evidence: _Texts
+    unknowns: _Texts
+    mean: _Row
+    covariance: Annotated[tuple[_Row, ...], Field(strict=False)]
+    sentences: _Texts
+    discrepancy: dict[str, Annotated[float, Field(ge=0, le=10)]]
+    sizes: dict[str, SizeRange]
+    held_out: _HeldOut
+
+    @model_validator(mode="after")
+    def _agrees_with_itself(self) -> Self:
+        count = len(FIELDS)
+        if list(self.unknowns) != FIELDS:
+            raise ValueError(f"has other unknowns than {listed(FIELDS)}, in this order")
+        if len(self.mean) != count:
+            raise ValueError(f"has a mean of {len(self.mean)} numbers; it must be {count}")
+        if {len(self.covariance), *map(len, self.covariance)} != {count}:
+            raise ValueError(f"has a covariance that is not {count} by {count}")
+        covariance = np.array(self.covariance)
+        if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance).min() <= 0:
+            raise ValueError("has a covariance that is not symmetric and positive definite")
+        for unknown, coordinate in zip(UNKNOWNS, self.mean, strict=True):
+            low, high = unknown.coordinate(unknown.least or 1e-9), unknown.coordinate(unknown.most)
+            if not low - 1e-9 <= coordinate <= high + 1e-9:
+                of = " (a logarithm)" if unknown.is_log else ""
+                raise ValueError(
+                    f"has a mean of {unknown.field}{of} of {coordinate:.3g}; it must be from "
+                    f"{low:.3g} to {high:.3g}"
+                )
+        if set(self.discrepancy) != set(GROUPS) or not set(self.sizes) <= set(GROUPS):
+            raise ValueError(f"must have a discrepancy, and may have sizes, of {listed(GROUPS)}")
+        if self.held_out.inside > self.held_out.points:
+            raise ValueError("has more held-out points inside than there are")
+        return self
+
+    @cached_property
+    def values(self) -> dict[str, Any]:
+        """Median of each unknown, by field of ``Factors``."""
+        return {u.field: u.value(z) for u, z in zip(UNKNOWNS, self.mean, strict=True)}
+
+    @cached_property
+    def factors(self) -> Factors:
+        """The factors at the median."""
+        return self._factors_at(self.values)
+
+    def _factors_at(self, values: dict[str, Any]) -> Factors:
+        return replace(Factors(**values), press_film=self.film)
+
+    def bounds(self, field: str) -> tuple[float, float]:
+        """Return the 90 % interval of an unknown."""
+        row = FIELDS.index(field)
+        unknown, half = UNKNOWNS[row], deviations(SHARE) * math.sqrt(self.covariance[row][row])
+        return unknown.value(self.mean[row] - half), unknown.value(self.mean[row] + half)
+
+    def shifted(self) -> list[tuple[float, Factors]]:
+        """Return the factors with one design unknown after the other moved by about a standard
+        deviation, and by how much its coordinate has moved.
+        """
+        moved = []
+        for row in range(DESIGN_UNKNOWNS):
+            unknown, step = UNKNOWNS[row], math.sqrt(self.covariance[row][row])
+            # Downwards where the upper end is near: a press factor is at most 1.
+            value = unknown.value(self.mean[row] + step)
+            if abs(unknown.coordinate(value) - self.mean[row]) < step / 2:
+                value = unknown.value(self.mean[row] - step)
+            start = unknown.coordinate(self.values[unknown.field])
+            change = unknown.coordinate(value) - start
+            moved.append((change, self._factors_at({**self.values, unknown.field: value})))
+        return moved
+
+    def variance(self, slopes: Sequence[float]) -> float:
+        """Return the variance by the unknowns of a quantity with these slopes (n,) by their
+        coordinates; left-out ones at the end are 0.
+        """
+        rates = np.zeros(len(UNKNOWNS))
+        rates[: len(slopes)] = slopes
+        return float(rates @ np.array(self.covariance) @ rates)
+
+    def interval(
+        self,
+        group: str,
+        value: float,
+        slopes: Sequence[float],
+        is_log: bool,
+        share: float = SHARE,
+        farther: float = 0.0,
+    ) -> tuple[float, float]:
+        """Return the interval that holds the measured value with a probability of ``share``.
+
+        ``slopes`` are the slopes of the logarithm of the value (``is_log``) or of the value, by
+        coordinate; ``farther`` is the relative standard deviation assumed off the evidence.
+        """
+        missed = math.hypot(self.discrepancy[group], farther) * (1.0 if is_log else abs(value))
+        half = deviations(share) * math.sqrt(self.variance(slopes) + missed**2)
+        if is_log:
+            return value * math.exp(-half), value * math.exp(half)
+        return value - half, value + half
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the tables of the file."""
+        return self.model_dump(mode="json", by_alias=True, exclude_none=True)
+
+    def for_film(self, product: str) -> ModelCalibration:
+        """Return the calibration adapted to a film; for a film other than the evidence's the
+        modulus ratio is 1, with the prior's uncertainty, and the share of work lost is the
+        prior's.
+        """
+        if product == self.film:
+            return self
+        mean, covariance = np.array(self.mean), np.array(self.covariance)
+        for name, middle in (("modulus_ratio", 1.0), ("loss_share", None)):
+            row = FIELDS.index(name)
+            unknown = UNKNOWNS[row]
+            mean[row] = unknown.coordinate(unknown.middle if middle is None else middle)
+            covariance[row] = covariance[:, row] = 0.0
+            covariance[row, row] = unknown.spread**2
+        changed = {"mean": mean.tolist(), "covariance": covariance.tolist()}
+        return ModelCalibration.model_validate({**self.as_dict(), **changed})
+
+
+@cache
+def deviations(share: float) -> float:
+    """Return the half width of the middle ``share`` of a normal distribution, in deviations."""
+    low, high = 0.0, 40.0
+    for _ in range(80):
+        middle = (low + high) / 2
+        low, high = (middle, high) if math.erf(middle / math.sqrt(2)) < share else (low, middle)
+    return (low + high) / 2
+
+
+@cache
+def shipped_names() -> list[str]:
+    """Return the names of the calibrations that ship."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+def load_calibration(
+    name: object, folder: Path | None = None, key: str = "models.calibration"
+) -> ModelCalibration | None:
+    """Return the calibration of a name, or of a file in ``folder``; None for "none". ``key`` is
+    the key that gives the name.
+
+    Raises DesignError with one sentence for an unknown name or a faulty file.
+    """
+    if not isinstance(name, str):
+        raise DesignError(
+            f"{key} = {shown(name)} must be a text in quotes: a calibration's name or its file"
+        )
+    if name == NONE:
+        return None
+    if name in shipped_names():
+        return _shipped(name)
+    path = (folder or Path()) / name
+    try:
+        is_there = path.is_file()
+    except (OSError, ValueError):
+        is_there = False
+    if not is_there:
+        raise DesignError(
+            f'{key} = {shown(name)} is neither "none", nor one that ships '
+            f"({', '.join(shipped_names())}), nor a file"
+            + (" beside the design" if folder else "")
+            + "; sbafab calibrate writes one"
+        )
+    return read_calibration(path)
+
+
+@cache
+def _shipped(name: str) -> ModelCalibration:
+    return read_calibration(FOLDER / f"{name}.toml")
+
+
+def read_calibration(path: Path) -> ModelCalibration:
+    """Return the calibration of a file. Raises DesignError with one sentence for a fault in it."""
+    try:
+        return checked(ModelCalibration, read_toml(path), {}, file="calibration")
+    except DesignError as error:
+        message = str(error).strip().removeprefix(f"{path} ")
+        raise DesignError(f"{path}: {message}; write it again with sbafab calibrate") from None
+
+
+# Factors and intervals of a design.
+
+
+TERMS = {Quantity.LOST_WORK: "loss_share", Quantity.WATER_TIME: "water_delay"}
+"""Fields of the unknowns that figures have as a term."""
+CLEARANCES = (Quantity.RIM_ROOM, Quantity.CHAMBER_CLEARANCE)
+LOG_RANGE = 3.0
+"""A value that changes by more than this factor is not near enough to linear in its logarithm."""
+GROUP_BY_UNIT = {"N": "force", "mJ": "work", "s": "time", "N/mm": "stiffness"}
+
+
+def discrepancy_group(figure: Figure) -> str | None:
+    """Return the group of a figure's discrepancy; None if no calibrated model gives it."""
+    if figure.model.id not in CALIBRATED_MODELS:
+        return None
+    named = {Quantity.FOLDED_HEIGHT: FLAT, Quantity.LOST_WORK: "loss"}
+    return named.get(figure.quantity) or GROUP_BY_UNIT.get(figure.unit, "motion")
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """A calibration with the user's own values (``overrides``, by field of ``Factors``), which are
+    exact, in place of its values; for a ``laminate`` of a ``form``, by default like its evidence.
+    """
+
+    calibration: ModelCalibration
+    overrides: Mapping[str, float | None] = field(default_factory=dict)
+    laminate: Laminate | None = None
+    form: Form | None = None
+
+    def farther(self, group: str) -> float:
+        """Return the relative standard deviation assumed for a group of quantities, off what the
+        calibration's evidence has of it. Folded heights take no diameter.
+        """
+        known = self.calibration.sizes
+        if self.laminate is None or self.form is None or not known:
+            return 0.0
+        evidence = known.get(group) or reduce(SizeRange.joined, known.values())
+        sizes = sizes_of(self.form, self.laminate)
+        if group == FLAT:
+            return sizes.model_copy(update={"diameters": None}).farther(evidence)
+        products = {layer.film.product for layer in self.laminate.tpe_layers}
+        return sizes.farther(evidence, products != {self.calibration.film})
+
+    @cached_property
+    def factors(self) -> Factors:
+        """The factors at the median."""
+        return self._with_overrides(self.calibration.factors)
+
+    def shifted(self) -> list[tuple[float, Factors]]:
+        """Return factors moved in one design unknown each; by 0 where the user gave it."""
+        return [
+            (0.0 if name in self._given else change, self._with_overrides(factors))
+            for name, (change, factors) in zip(FIELDS, self.calibration.shifted(), strict=False)
+        ]
+
+    @property
+    def moved(self) -> list[Factors]:
+        """The factors of ``shifted`` that differ from the median."""
+        return [factors for change, factors in self.shifted() if change]
+
+    @cached_property
+    def _given(self) -> dict[str, Any]:
+        """The user's values by field, a modulus in place of its ratio included."""
+        given = given_factors(self.overrides)
+        return {"modulus_ratio": 1.0, **given} if "modulus_mpa" in given else given
+
+    def _with_overrides(self, factors: Factors) -> Factors:
+        label = self.calibration.name
+        if "press_factor" in self._given:
+            factors = replace(factors, press_film="")
+        if self._given:
+            label += " but " + ", ".join(
+                f"{name.removesuffix('_mpa').replace('_', ' ')} {value:g}"
+                for name, value in self._given.items()
+                if name != "modulus_ratio"
+            )
+        return replace(factors, calibration=label, **self._given)
+
+    def interval_of(
+        self,
+        group: str,
+        value_at: Callable[[Factors], float],
+        share: float = SHARE,
+        term: str = "",
+    ) -> tuple[float, Ends]:
+        """Return a value at the median, and the interval that holds what would be measured with a
+        probability of ``share``; ``value_at`` gives the value with other factors. ``term`` is the
+        field of an unknown that is one summand of the value, such as the delay of a time.
+        """
+        value = value_at(self.factors)
+        moved = [
+            (change, value if change == 0 else value_at(factors))
+            for change, factors in self.shifted()
+        ]
+        return value, self._interval(group, value, moved, self._terms(value, term), share)
+
+    def bounded(
+        self, items: Sequence[FigureItem], moved: Iterable[Sequence[FigureItem]]
+    ) -> list[FigureItem]:
+        """Return the items with the intervals of figures that the calibration covers; ``moved`` are
+        the same figures at each of the ``moved`` factors. A figure that one of them lacks has no
+        interval.
+        """
+        others = [
+            {item.key: item.value for item in each if isinstance(item, Figure)} for each in moved
+        ]
+        return [
+            self._bounded(item, [values.get(item.key, math.nan) for values in others])
+            if isinstance(item, Figure)
+            else item
+            for item in items
+        ]
+
+    def _bounded(self, figure: Figure, moved: Sequence[float]) -> Figure:
+        """Return a figure with its interval, from its values at each of the ``moved`` factors."""
+        group, value = discrepancy_group(figure), figure.value
+        if group is None or not all(map(math.isfinite, moved)):
+            return figure
+        if group == FLAT and all(each == value for each in moved):
+            return figure
+        values = iter(moved)
+        pairs = [(change, next(values) if change else value) for change, _ in self.shifted()]
+        terms = self._terms(
+            value / (100 if figure.unit == "%" else 1), TERMS.get(figure.quantity, "")
+        )
+        is_signed = figure.quantity in CLEARANCES
+        interval = self._interval(group, value, pairs, terms, SHARE, is_signed)
+        flags = (*figure.flags, *flags_at(self.farther(group)))
+        return replace(figure, interval=interval, flags=flags)
+
+    def _interval(
+        self,
+        group: str,
+        value: float,
+        moved: Sequence[tuple[float, float]],
+        terms: Sequence[float],
+        share: float,
+        may_be_negative: bool = False,
+    ) -> Ends:
+        """Return the interval of a value, from changes of the design unknowns, each with the value
+        that it gives, and the slopes by the others (``terms``). A clearance, which may be negative,
+        is linear in them; so is a value that has almost vanished with other factors, such as a
+        force near the end of the stroke.
+        """
+        values = [value, *(each for _, each in moved)]
+        least, most = min(values), max(values)
+        is_log = (
+            not may_be_negative and least > 0 and most < LOG_RANGE * value < LOG_RANGE**2 * least
+        )
+        slopes = [
+            (math.log(each / value) if is_log else each - value) / change if change else 0.0
+            for change, each in moved
+        ]
+        low, high = self.calibration.interval(
+            group, value, [*slopes, *terms], is_log, share, self.farther(group)
+        )
+        if group == FLAT and self.laminate is not None:
+            # From all films flown away to the films as bought.
+            folded = folded_height(self.laminate, 1.0, self.calibration.film)
+            return max(low, folded.solid), min(high, folded.nominal)
+        return (max(low, 0.0) if value >= 0 and not may_be_negative else low), high
+
+    def _terms(self, value: float, term: str) -> list[float]:
+        """Return slopes of a value's logarithm by the logarithms of the unknowns that change no
+        design; one of them may be a ``term`` of it. 0 without one, or if the user gave it.
+        """
+        slope = 0.0 if not term or term in self._given else self.calibration.values[term] / value
+        return [slope if name == term else 0.0 for name in FIELDS[DESIGN_UNKNOWNS:]]
+
+
+def given_factors(overrides: Mapping[str, float | None]) -> dict[str, Any]:
+    """Return the values that a user gave, by field of ``Factors``."""
+    return {name: value for name, value in overrides.items() if value is not None}
+
+
+def calibration_of(design: Design) -> ModelCalibration | None:
+    """Return the calibration of a design, adapted to its film. Raises DesignError if it is
+    unknown.
+    """
+    calibration = load_calibration(design.models.calibration, design.folder)
+    return calibration and calibration.for_film(design.films.tpe.product)
+
+
+def uncertainty_of(
+    design: Design,
+    overrides: Mapping[str, float | None] | None = None,
+    laminate: Laminate | None = None,
+    form: Form | None = None,
+) -> Uncertainty | None:
+    """Return the calibration of a design with the user's own values; None without one. Intervals
+    apply to its ``laminate``; ``form`` replaces the design's.
+    """
+    calibration = calibration_of(design)
+    if calibration is None:
+        return None
+    return Uncertainty(calibration, overrides or {}, laminate, form or design.form)
+
+
+def factors_of(design: Design, overrides: Mapping[str, float | None] | None = None) -> Factors:
+    """Return the factors of a design's calibration, replaced by the user's values where given.
+
+    Raises DesignError if the calibration is unknown, or for values out of range.
+    """
+    uncertainty = uncertainty_of(design, overrides)
+    return uncertainty.factors if uncertainty else Factors(**given_factors(overrides or {}))
