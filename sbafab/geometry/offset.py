@@ -206,13 +206,15 @@ def beam_path(region: Region, kerf: Kerf) -> tuple[Region, Lost | None]:
     return path, _lost(region.contours, wide.contours, grown, reach)
 
 
-Run = Sequence[Edge]
+SmoothRun = Sequence[Edge]
 """A line, or arcs that go on from each other smoothly."""
-Fit = Callable[[Curve, float, float], list[Edge]]
+EdgeFit = Callable[[Curve, float, float], list[Edge]]
 """Edges along a curve between two parameters; none if they would stray from it."""
 
 
-def _stretched(contours: Sequence[Sequence[Run]], sx: float, sy: float, fit: Fit) -> Region:
+def _stretched(
+    contours: Sequence[Sequence[SmoothRun]], sx: float, sy: float, fit: EdgeFit
+) -> Region:
     """Return a region stretched along x and y, with edges fitted to the images of arcs.
 
     Raises GeometryError for arcs that cannot be followed.
@@ -229,7 +231,7 @@ def _stretched(contours: Sequence[Sequence[Run]], sx: float, sy: float, fit: Fit
     return Region(tuple(images))
 
 
-def _pieces(run: Run, sx: float, sy: float, fit: Fit) -> list[Edge]:
+def _pieces(run: SmoothRun, sx: float, sy: float, fit: EdgeFit) -> list[Edge]:
     start, end = ((p[0] * sx, p[1] * sy) for p in (run[0].start, run[-1].end))
     arcs = [edge for edge in run if isinstance(edge, Arc)]
     if not arcs or (len(arcs) == 1 and math.dist(start, end) < 2 * SAME):
