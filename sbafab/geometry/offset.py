@@ -208,12 +208,12 @@ def beam_path(region: Region, kerf: Kerf) -> tuple[Region, Lost | None]:
 
 SmoothRun = Sequence[Edge]
 """A line, or arcs that go on from each other smoothly."""
-EdgeFit = Callable[[Curve, float, float], list[Edge]]
+ArcFit = Callable[[Curve, float, float], list[Edge]]
 """Edges along a curve between two parameters; none if they would stray from it."""
 
 
 def _stretched(
-    contours: Sequence[Sequence[SmoothRun]], sx: float, sy: float, fit: EdgeFit
+    contours: Sequence[Sequence[SmoothRun]], sx: float, sy: float, fit: ArcFit
 ) -> Region:
     """Return a region stretched along x and y, with edges fitted to the images of arcs.
 
@@ -231,7 +231,7 @@ def _stretched(
     return Region(tuple(images))
 
 
-def _pieces(run: SmoothRun, sx: float, sy: float, fit: EdgeFit) -> list[Edge]:
+def _pieces(run: SmoothRun, sx: float, sy: float, fit: ArcFit) -> list[Edge]:
     start, end = ((p[0] * sx, p[1] * sy) for p in (run[0].start, run[-1].end))
     arcs = [edge for edge in run if isinstance(edge, Arc)]
     if not arcs or (len(arcs) == 1 and math.dist(start, end) < 2 * SAME):
