@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal
+from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge
 from sbafab.geometry.lazy_numpy import np
 
 if TYPE_CHECKING:
@@ -28,6 +29,11 @@ def dot(a: Floats, b: Floats) -> Floats:
     return product
 
 
+def length_of(vector: Floats) -> Floats:
+    length: Floats = np.sqrt(dot(vector, vector))
+    return length
+
+
 def columns_of(rows: Iterable[Iterable[float]], width: int) -> Floats:
     """Return rows of ``width`` numbers as columns; faster than ``np.array``."""
     return np.fromiter(chain.from_iterable(rows), dtype=float).reshape(-1, width).T
@@ -39,8 +45,6 @@ class EdgeTable:
     ``turn`` is 1 for an arc that runs counter-clockwise, -1 for one that runs clockwise, 0 for a
     line, whose centre is its start. All attributes are rows of ``columns``.
     """
-
-    __slots__ = ("box", "centre", "columns", "end", "radius", "start", "turn")
 
     def __init__(self, columns: Floats) -> None:
         self.columns = columns
@@ -80,6 +84,22 @@ class EdgeTable:
         length = np.sqrt(x * x + y * y)
         length[length == 0] = 1.0
         return np.array([x / length, y / length])
+
+    @cached_property
+    def half_turn(self) -> Floats:
+        """Half of the angles that edges turn through."""
+        a, b = self.start - self.centre, self.end - self.centre
+        turn = np.arctan2(self.turn * (a[0] * b[1] - a[1] * b[0]), dot(a, b))
+        half: Floats = np.where(turn < -1e-9, turn + math.tau, np.maximum(turn, 0.0)) / 2
+        return np.where(self.turn == 0, 0.0, half)
+
+    @cached_property
+    def middle(self) -> Floats:
+        """The points half way."""
+        a, turn = self.start - self.centre, self.turn * self.half_turn
+        c, s = np.cos(turn), np.sin(turn)
+        on_arc = self.centre + np.array([a[0] * c - a[1] * s, a[0] * s + a[1] * c])
+        return np.where(self.turn == 0, (self.start + self.end) / 2, on_arc)
 
     def faces(self, p: Floats, room: float = 0.0) -> Bools:
         """Return True for each arc whose own point lies within its sweep, seen from the centre.
@@ -153,120 +173,3 @@ def crossings(
     distances = np.array([np.where(straight, t, along), along - half, along + half])
     there = np.array([np.where(straight, ~parallel, touches), both & ~straight, both & ~straight])
     return distances, there
-
-
-# The sides of boundaries, which have the material on their left.
-
-
-ALONGSIDE = 1e-3
-"""Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
-
-
-BESIDE = 1e-5
-"""mm by which an edge may miss another's normals because of rounding."""
-
-
-class Foot(NamedTuple):
-    """A point of an edge, and the unit normal into the material there."""
-
-    point: Point
-    normal: Point
-
-
-class BoundarySide:
-    """An edge of a boundary with values that the search uses repeatedly.
-
-    ``half`` is the distance of its ends from its middle, ``lean`` the sine of its half turn.
-    """
-
-    __slots__ = ("box", "edge", "half", "half_turn", "lean", "middle", "normal")
-
-    def __init__(
-        self, edge: Edge, box: Bounds, middle: Point, half_turn: float, half: float
-    ) -> None:
-        self.edge = edge
-        self.box = box
-        self.middle = middle
-        self.normal = left_normal(edge, middle)
-        self.half_turn = half_turn
-        self.half = half
-        self.lean = math.sin(min(half_turn, math.pi / 2))
-
-    def feet(self, p: Point) -> list[Foot]:
-        """Return the points of the edge where its normal passes through ``p``."""
-        edge = self.edge
-        if isinstance(edge, Line):
-            x0, y0 = edge.start
-            x1, y1 = edge.end
-            dx, dy = x1 - x0, y1 - y0
-            square = dx * dx + dy * dy
-            t = ((p[0] - x0) * dx + (p[1] - y0) * dy) / square
-            if not -1e-9 <= t <= 1 + 1e-9:
-                return []
-            length = math.sqrt(square)
-            return [Foot((x0 + t * dx, y0 + t * dy), (-dy / length, dx / length))]
-        cx, cy = edge.centre
-        r = edge.radius
-        ux, uy = p[0] - cx, p[1] - cy
-        distance = math.hypot(ux, uy)
-        if distance < 1e-12:
-            return [Foot(self.middle, left_normal(edge, self.middle))]
-        inward = -1.0 if edge.ccw else 1.0
-        mx, my = self.middle[0] - cx, self.middle[1] - cy
-        least = r * (math.cos(self.half_turn) - 1e-9)
-        feet = []
-        for sign in (1.0, -1.0):
-            vx, vy = sign * ux / distance, sign * uy / distance
-            if vx * mx + vy * my >= least:
-                feet.append(Foot((cx + r * vx, cy + r * vy), (inward * vx, inward * vy)))
-        return feet
-
-
-ROOM = 1e-9
-"""Exceeds the rounding of the pairwise tests that follow."""
-
-
-class SideTable:
-    """The sides of a boundary in arrays."""
-
-    def __init__(self, sides: Sequence[BoundarySide]) -> None:
-        self.edges = [side.edge for side in sides]
-        self.table = EdgeTable.of(self.edges, [side.box for side in sides])
-        rows = [
-            (*side.middle, *side.normal, side.half_turn, side.half, side.lean) for side in sides
-        ]
-        columns = columns_of(rows, 7)
-        self.middle, self.normal = columns[0:2], columns[2:4]
-        self.half_turn, self.half, self.lean = columns[4:7]
-
-    def pairs(self, aside: float, within: float) -> tuple[Indices, Indices]:
-        """Return pairs (a, b) of sides that may face each other within a distance, in order.
-
-        ``aside`` is the angle that normals may turn by. Normals of ``b`` may meet ``a``; a pair may
-        come both ways.
-        """
-        boxes, box = self.table.box.copy(), self.table.box
-        boxes[:2] -= within
-        boxes[2:] += within
-        a, b = touching(boxes, box)
-        chosen = self._opposed(a, b, aside) & self._may_hold_feet(b, a, within) & (a != b)
-        return a[chosen], b[chosen]
-
-    def _opposed(self, a: Indices, b: Indices, aside: float) -> Bools:
-        """Return True for pairs with normals opposed somewhere, to within ``aside`` radians."""
-        room = self.half_turn.take(a) + aside + self.half_turn.take(b)
-        facing = dot(self.normal.take(a, axis=1), self.normal.take(b, axis=1))
-        opposed = facing < ROOM - np.cos(room)
-        may_face: Bools = opposed | (room > math.pi)
-        return may_face
-
-    def _may_hold_feet(self, a: Indices, b: Indices, within: float) -> Bools:
-        """True for pairs where normals of sides ``a`` may meet sides ``b`` within a distance."""
-        off, normal = (
-            self.middle.take(b, axis=1) - self.middle.take(a, axis=1),
-            self.normal.take(a, axis=1),
-        )
-        missed = np.abs(off[0] * normal[1] - off[1] * normal[0])
-        half = self.half.take(a) + self.half.take(b)
-        may: Bools = missed <= half + within * self.lean.take(a) + BESIDE + ROOM
-        return may

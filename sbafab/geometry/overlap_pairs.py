@@ -8,20 +8,21 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edge_table import (
-    SideTable,
     boxes_round,
     columns_of,
     crossings,
     dot,
+    length_of,
     touching,
 )
 from sbafab.geometry.edges import Arc, Edge, Point
 from sbafab.geometry.lazy_numpy import np
 from sbafab.geometry.region import Region
-from sbafab.geometry.width import ASIDE, TOUCH, Gathered, Width, boundary_of, least_of, search
+from sbafab.geometry.width import ASIDE, TOUCH, Boundary, Width, boundary_of, joined, least_of
 
 if TYPE_CHECKING:
     from sbafab.geometry.edge_table import Bools, Floats, Indices
+    from sbafab.geometry.width import Segments
 
 STEP = math.radians(15)
 """Largest sample step along an arc: a shift 7.5 degrees off counts 0.99 of its length."""
@@ -80,24 +81,20 @@ def overlap_pairs(
         ends = [] if least is None else [(*least.start, *least.end)]
         columns = columns_of(ends, 4)
         return OverlapPairs(columns[:2], columns[2:], np.zeros(len(ends)))
-    gathered = Gathered(boundary, least.value + slack)
-    search(gathered)
-    offered = columns_of([(*p, *q) for p, q in gathered.offered], 4)
-    start, end = _from_samples(boundary.table, gathered.value)
-    p, q = np.concatenate([offered[:2], start], axis=1), np.concatenate([offered[2:], end], axis=1)
+    within = least.value + slack
+    p, q = joined(boundary.square(within), _from_samples(boundary, within))
     first = _first_of_each(p, q)
     p, q = p.take(first, axis=1), q.take(first, axis=1)
-    clear = _clear(p, q, gathered)
-    return OverlapPairs(p, q, _length(q - p)).at(clear)
+    return OverlapPairs(p, q, length_of(q - p)).at(_clear(p, q, boundary))
 
 
-def _from_samples(sides: SideTable, within: float) -> tuple[Floats, Floats]:
-    """Samples of sides, and the feet of their normals on facing sides ``within`` a distance, mm."""
-    a, b = sides.pairs(ASIDE, within)
-    points, numbers = sampled(sides.edges)
+def _from_samples(boundary: Boundary, within: float) -> Segments:
+    """Samples of edges, and the feet of their normals on facing edges ``within`` a distance, mm."""
+    a, b = boundary.pairs(ASIDE, within)
+    points, numbers = sampled(boundary.edges)
     counts, samples = np.array(numbers), columns_of(points, 2)
     owner = np.arange(len(counts)).repeat(counts)
-    normals = sides.table.at(owner).normal(samples)
+    normals = boundary.table.at(owner).normal(samples)
     # One row per pair and sample of its first side.
     rows_of_pair = counts.take(a)
     starts = (counts.cumsum() - counts).take(a)
@@ -105,48 +102,15 @@ def _from_samples(sides: SideTable, within: float) -> tuple[Floats, Floats]:
         rows_of_pair
     )
     p, n = samples.take(row, axis=1), normals.take(row, axis=1)
-    feet, inward, there = _feet(p, sides, b.repeat(rows_of_pair))
+    feet, inward, there = boundary.feet(p, b.repeat(rows_of_pair))
     # One row per sample, one column per foot.
     p, n = p[:, :, None], n[:, :, None]
     off = feet - p
     square = dot(n, inward) < -math.cos(ASIDE)
     faces = (dot(off, n) > TOUCH) & (dot(off, inward) < -TOUCH)
-    valid = there & square & faces & (_length(off) <= within)
+    valid = there & square & faces & (length_of(off) <= within)
     place, _ = valid.nonzero()
     return p[:, :, 0].take(place, axis=1), feet[:, valid]
-
-
-def _feet(p: Floats, sides: SideTable, numbers: Indices) -> tuple[Floats, Floats, Bools]:
-    """The points of sides whose normals pass through given points, up to two each; the normals."""
-    edges = sides.table.at(numbers)
-    chord, off = edges.end - edges.start, p - edges.start
-    square = dot(chord, chord)
-    t = dot(chord, off) / square
-    length = np.sqrt(square)
-    on_line = edges.start + t * chord
-    aside = np.array([-chord[1] / length, chord[0] / length])
-    out = p - edges.centre
-    distance = _length(out)
-    central = distance < 1e-12
-    unit = out / np.where(central, 1.0, distance)
-    middle = sides.middle.take(numbers, axis=1)
-    least = edges.radius * (np.cos(sides.half_turn.take(numbers)) - 1e-9)
-    ahead = dot(unit, middle - edges.centre)
-    normal = sides.normal.take(numbers, axis=1)
-    line = edges.turn == 0
-    points = []
-    normals = []
-    there = []
-    for sign in (1.0, -1.0):
-        at_middle = central & (sign > 0)
-        on_arc = np.where(at_middle, middle, edges.centre + edges.radius * (sign * unit))
-        inward = np.where(at_middle, normal, -edges.turn * sign * unit)
-        points.append(np.where(line, on_line, on_arc))
-        normals.append(np.where(line, aside, inward))
-        is_on_arc = at_middle | (~central & (sign * ahead >= least))
-        is_on_line = (t >= -1e-9) & (t <= 1 + 1e-9) & (sign > 0)
-        there.append(np.where(line, is_on_line, is_on_arc))
-    return np.stack(points, axis=2), np.stack(normals, axis=2), np.stack(there, axis=1)
 
 
 def _first_of_each(p: Floats, q: Floats) -> Indices:
@@ -162,13 +126,13 @@ def _first_of_each(p: Floats, q: Floats) -> Indices:
     return np.sort(order[is_new])
 
 
-def _clear(p: Floats, q: Floats, gathered: Gathered) -> Bools:
+def _clear(p: Floats, q: Floats, boundary: Boundary) -> Bools:
     """Return True for segments that no edge crosses; doubtful ones are tested one by one."""
-    table = gathered.boundary.table.table
+    table = boundary.table
     segment, number = touching(boxes_round(p, q, NEAR), table.box)
     edges = table.at(number)
     start, off = p.take(segment, axis=1), (q - p).take(segment, axis=1)
-    length = _length(off)
+    length = length_of(off)
     unit = off / length
     along, there = crossings(start, unit, edges, NEAR)
     inner = there & (along > NEAR / 2) & (along < length - NEAR / 2)
@@ -186,10 +150,5 @@ def _clear(p: Floats, q: Floats, gathered: Gathered) -> Bools:
     # Not np.unique, which loads masked arrays.
     for place in sorted(set(segment[doubtful].tolist())):
         (px, py), (qx, qy) = p[:, place].tolist(), q[:, place].tolist()
-        clear[place] = gathered.is_clear((px, py), (qx, qy))
+        clear[place] = boundary.is_clear((px, py), (qx, qy))
     return clear
-
-
-def _length(vector: Floats) -> Floats:
-    length: Floats = np.sqrt(dot(vector, vector))
-    return length

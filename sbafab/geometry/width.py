@@ -8,21 +8,26 @@ these are exact for lines and arcs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from functools import cached_property, partial
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.geometry.cache import cached, stored
 from sbafab.geometry.contour import Contour, run_sweep
-from sbafab.geometry.edge_table import ALONGSIDE, BoundarySide, Foot, SideTable
+from sbafab.geometry.edge_table import (
+    EdgeTable,
+    boxes_round,
+    columns_of,
+    dot,
+    length_of,
+    touching,
+)
 from sbafab.geometry.edges import (
     Arc,
-    Bounds,
     Edge,
     Line,
     Point,
     box_round,
-    left_normal,
     left_turn,
     meeting_points,
 )
@@ -30,6 +35,12 @@ from sbafab.geometry.lazy_numpy import np
 from sbafab.geometry.offset import Kerf, Lost, shrink, widths
 from sbafab.geometry.region import Region, centroid
 from sbafab.geometry.spatial_index import EdgeIndex, widened
+
+if TYPE_CHECKING:
+    from sbafab.geometry.edge_table import Bools, Floats, Indices
+
+    Segments = tuple[Floats, Floats]
+    Found = tuple[Indices, Floats, Floats]
 
 SHORTER = 1e-9
 """mm by which a segment must be shorter than another to be the narrowest."""
@@ -39,6 +50,14 @@ ASIDE = math.acos(0.9)
 """Radians (25 degrees) by which normals of facing samples may deviate."""
 SQUARE = 0.05
 """Like ASIDE, for edges square on each other: an allowance for rounding and parallel edges."""
+ALONGSIDE = 1e-3
+"""Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
+BESIDE = 1e-5
+"""mm by which an edge may miss another's normals because of rounding."""
+FEW = 60
+"""Edges that are all compared at once."""
+ROOM = 1e-9
+"""Exceeds the rounding of the pairwise tests that follow."""
 NOTCH = 15.0
 """Degrees: notches sharper than this do not count as slots."""
 
@@ -82,28 +101,245 @@ def place_of(region: Region, lost: Lost, kerf: Kerf) -> Point:
 
 
 class Boundary:
-    """Contours with the material on their left, prepared for the search."""
+    """The edges of contours in arrays, with the material on their left, and the corner that each
+    starts at: the directions of travel ``into`` and ``out`` of it, and its ``turn``, more than 0 if
+    it is convex.
+    """
 
     def __init__(self, contours: Sequence[Contour], sharp: float) -> None:
-        self.sides = [side for contour in contours for side in stored(contour, "sides", _sides)]
-        self.corners = [
-            corner for contour in contours for corner in stored(contour, "corners", _corners)
-        ]
-        """The corner that each side starts at, if any."""
+        edges = [edge for contour in contours for edge in contour.edges]
+        boxes = [box for contour in contours for box in contour.boxes]
+        self.edges, self.index, self.table = (
+            edges,
+            EdgeIndex(edges, boxes),
+            EdgeTable.of(edges, boxes),
+        )
+        table = self.table
+        self.normal = table.normal(table.middle)
+        counts = np.array([len(contour.edges) for contour in contours], dtype=np.intp)
+        before = np.arange(len(edges)) - 1
+        before[counts.cumsum() - counts] = counts.cumsum() - 1
+        arriving = table.at(before)
+        self.into, self.out = _ahead(arriving, table.start), _ahead(table, table.start)
+        turn = np.arctan2(_cross(self.into, self.out), dot(self.into, self.out))
+        # At a cusp the curvatures decide the side of the material.
+        curved = _curvature(arriving) + _curvature(table)
+        cusp = np.where(curved < 0, math.pi, -math.pi)
+        self.turn = np.where(np.abs(turn) > math.pi - SMOOTH, cusp, turn)
+        self.corners = (np.abs(self.turn) > SMOOTH).nonzero()[0]
         self.ends = [
             ends
             for contour in contours
             for ends in stored(contour, f"ends{sharp}", lambda c: list(tapered_ends(c, sharp)))
         ]
-        self.pinch = pinch(contours, self.corners, sharp)
-        self.index = EdgeIndex(
-            [side.edge for side in self.sides], [side.box for side in self.sides]
-        )
+        self.pinch = self._pinch(sharp)
 
-    @cached_property
-    def table(self) -> SideTable:
-        """The sides in arrays."""
-        return SideTable(self.sides)
+    def _pinch(self, sharp: float) -> Point | None:
+        """Return a corner sharper than allowed, or a point where the boundary meets itself."""
+        angles = np.degrees(math.pi - self.turn[self.corners])
+        for number in self.corners[angles < sharp - ROUNDED].tolist():
+            corner: Point = self.edges[number].start
+            return corner
+        starts: set[Point] = set()
+        for edge in self.edges:
+            if edge.start in starts:
+                return edge.start
+            starts.add(edge.start)
+        return None
+
+    def pairs(self, aside: float, within: float) -> tuple[Indices, Indices]:
+        """Return pairs (a, b) of edges that may face each other within a distance, in order.
+
+        ``aside`` is the angle that normals may turn by. Normals of ``b`` may meet ``a``; a pair may
+        come both ways.
+        """
+        table = self.table
+        a, b = touching(boxes_round(table.box[:2], table.box[2:], within), table.box)
+        room = table.half_turn.take(a) + aside + table.half_turn.take(b)
+        facing = dot(self.normal.take(a, axis=1), self.normal.take(b, axis=1))
+        off = table.middle.take(a, axis=1) - table.middle.take(b, axis=1)
+        missed = np.abs(_cross(off, self.normal.take(b, axis=1)))
+        half = np.maximum(
+            length_of(table.middle - table.start), length_of(table.middle - table.end)
+        )
+        lean = np.sin(np.minimum(table.half_turn, math.pi / 2))
+        reach = half.take(a) + half.take(b) + within * lean.take(b) + BESIDE
+        opposed = (room > math.pi) | (facing < ROOM - np.cos(room))
+        chosen = opposed & (missed <= reach) & (a != b)
+        return a[chosen], b[chosen]
+
+    def feet(self, p: Floats, numbers: Indices) -> tuple[Floats, Floats, Bools]:
+        """Return the points of edges whose normals pass through given points, up to two each, the
+        normals into the material there, and which of them exist.
+        """
+        edges = self.table.at(numbers)
+        chord, off = edges.end - edges.start, p - edges.start
+        t = dot(chord, off) / dot(chord, chord)
+        middle, normal = self.table.middle.take(numbers, axis=1), self.normal.take(numbers, axis=1)
+        out = p - edges.centre
+        distance = length_of(out)
+        central = distance < 1e-12
+        unit = out / np.where(central, 1.0, distance)
+        least = edges.radius * (np.cos(self.table.half_turn.take(numbers)) - 1e-9)
+        ahead = dot(unit, middle - edges.centre)
+        line = edges.turn == 0
+        feet, normals, there = [], [], []
+        for sign in (1.0, -1.0):
+            at_middle = central & (sign > 0)
+            on_arc = np.where(at_middle, middle, edges.centre + edges.radius * (sign * unit))
+            inward = np.where(at_middle, normal, -edges.turn * sign * unit)
+            feet.append(np.where(line, edges.start + t * chord, on_arc))
+            normals.append(np.where(line, normal, inward))
+            is_on_arc = at_middle | (~central & (sign * ahead >= least))
+            is_on_line = (t >= -1e-9) & (t <= 1 + 1e-9) & (sign > 0)
+            there.append(np.where(line, is_on_line, is_on_arc))
+        return np.stack(feet, axis=2), np.stack(normals, axis=2), np.stack(there, axis=1)
+
+    def square(self, within: float) -> Segments:
+        """Return segments up to a length that are square on edges at both ends or join corners."""
+        ahead, count = self.pairs(SQUARE, within), len(self.edges)
+        pairs = sorted(set((np.minimum(*ahead) * count + np.maximum(*ahead)).tolist()))
+        a, b = np.divmod(np.array(pairs, dtype=np.intp), count)
+        point = self.table.start.take(self.corners, axis=1)
+        corner, side = touching(boxes_round(point, point, within), self.table.box)
+        corner = self.corners.take(corner)
+        edges = _in_order(self._alongside(a, b), self._centred(a, b))
+        corners = _in_order(self._at_corners(corner, side), self._between_corners(corner, side))
+        ends = columns_of([(*p, *q) for p, q in self.ends], 4)
+        p, q = joined(edges, corners, (ends[:2], ends[2:]))
+        near = length_of(q - p) <= within
+        return p[:, near], q[:, near]
+
+    def _centred(self, a: Indices, b: Indices) -> Found:
+        """The centre line of a line and an arc, or of two arcs, is square on both."""
+        table = self.table
+        is_arc = table.turn != 0
+        # The first is an arc, if either is.
+        a, b = np.where(is_arc.take(b), b, a), np.where(is_arc.take(b), a, b)
+        centre, other = table.centre.take(a, axis=1), table.centre.take(b, axis=1)
+        both = is_arc.take(b)
+        some = is_arc.take(a) & ~(both & (length_of(centre - other) <= 1e-9))
+        p, normal, here = self.feet(centre, b)
+        target = np.where(both, other, centre + self.normal.take(b, axis=1))
+        q, inward, there = self.feet(target, a)
+        first, second = [0, 0, 1, 1], [0, 1, 0, 1]
+        there = here[:, first] & there[:, second] & some[:, None]
+        p, normal, q, inward = (
+            p[:, :, first],
+            normal[:, :, first],
+            q[:, :, second],
+            inward[:, :, second],
+        )
+        return _facing(np.arange(len(a)), p, normal, q, inward, there)
+
+    def _alongside(self, a: Indices, b: Indices) -> Found:
+        """From middles and ends of edges to parallel lines and concentric arcs."""
+        table = self.table
+        u, v = self.normal.take(a, axis=1), self.normal.take(b, axis=1)
+        parallel = (dot(u, v) < 0) & (np.abs(_cross(u, v)) < ALONGSIDE)
+        off = length_of(table.centre.take(a, axis=1) - table.centre.take(b, axis=1))
+        arcs = np.abs(table.turn.take(a)) + np.abs(table.turn.take(b))
+        pair = np.where(arcs == 0, parallel, (arcs == 2) & (off < ALONGSIDE)).nonzero()[0]
+        a, b = a[pair], b[pair]
+        near, far = np.concatenate([a, a, a, b, b, b]), np.concatenate([b, b, b, a, a, a])
+        ends = table.middle, table.start, table.end
+        p = np.concatenate([each.take(some, axis=1) for some in (a, b) for each in ends], axis=1)
+        normal = table.at(near).normal(p)
+        q, inward, there = self.feet(p, far)
+        return _facing(np.tile(pair, 6), p[:, :, None], normal[:, :, None], q, inward, there)
+
+    def _at_corners(self, corner: Indices, side: Indices) -> Found:
+        """From corners to edges."""
+        starts = self.table.start
+        turn, p = self.turn.take(corner), starts.take(corner, axis=1)
+        reflex = turn < 0
+        # An edge facing a convex corner may be square on neither of its edges.
+        room = self.table.half_turn.take(side) + np.abs(turn) / 2
+        room += np.where(reflex, SQUARE, math.pi / 2)
+        u, v = _left(self.into.take(corner, axis=1)), _left(self.out.take(corner, axis=1))
+        c, s = np.cos(turn / 2), np.sin(turn / 2)
+        halfway = np.array([u[0] * c - u[1] * s, u[0] * s + u[1] * c])
+        facing = dot(halfway, self.normal.take(side, axis=1))
+        may_face = (room > math.pi) | (facing < -np.cos(room))
+        q, inward, there = self.feet(p, side)
+        p, u, v = p[:, :, None], u[:, :, None], v[:, :, None]
+        d, ends = q - p, self.table.at(side)
+        clear = np.minimum(
+            length_of(q - ends.start[:, :, None]), length_of(q - ends.end[:, :, None])
+        )
+        beside = (dot(u, inward) < 0) & (dot(u, d) > 0) | (dot(v, inward) < 0) & (dot(v, d) > 0)
+        convex = (clear > 10 * TOUCH) & beside
+        fits = np.where(reflex[:, None], self._squarely(corner, d), convex)
+        some = there & may_face[:, None] & (dot(d, inward) <= -TOUCH) & fits
+        return some.nonzero()[0], np.broadcast_to(p, q.shape)[:, some], q[:, some]
+
+    def _between_corners(self, corner: Indices, side: Indices) -> Found:
+        """From reflex corners to other ones, which may face each other although no edges do."""
+        turn = np.maximum(self.turn.take(corner), self.turn.take(side))
+        pair = ((side > corner) & (turn < -SMOOTH)).nonzero()[0]
+        corner, side = corner[pair], side[pair]
+        p, q = (self.table.start.take(numbers, axis=1) for numbers in (corner, side))
+        both = self._squarely(corner, q - p) & self._squarely(side, p - q)
+        return pair[both], p[:, both], q[:, both]
+
+    def _squarely(self, corner: Indices, d: Floats) -> Bools:
+        """True if a reflex corner is nearer than its neighbourhood to the end of ``d``."""
+        shape = (2, len(corner)) + (1,) * (d.ndim - 2)
+        into, out = (ways.take(corner, axis=1).reshape(shape) for ways in (self.into, self.out))
+        room = 1e-9 * length_of(d)
+        squarely: Bools = (dot(d, into) >= -room) & (dot(d, out) <= room)
+        return squarely
+
+    def is_clear(self, p: Point, q: Point) -> bool:
+        """Return True if no edge crosses a segment."""
+        segment = Line(p, q)
+        for edge in self.index.touching(widened(segment.bounds, 10 * TOUCH)):
+            for m in meeting_points(segment, edge):
+                if math.dist(m, p) > 10 * TOUCH and math.dist(m, q) > 10 * TOUCH:
+                    return False
+        return True
+
+
+def joined(*segments: Segments) -> Segments:
+    p, q = (np.concatenate(ends, axis=1) for ends in zip(*segments, strict=True))
+    return p, q
+
+
+def _in_order(*found: Found) -> Segments:
+    """Segments of several kinds by the numbers of their pairs."""
+    pair = np.concatenate([numbers for numbers, _, _ in found])
+    p, q = joined(*((p, q) for _, p, q in found))
+    order = pair.argsort(kind="stable")
+    return p.take(order, axis=1), q.take(order, axis=1)
+
+
+def _facing(
+    pair: Indices, p: Floats, normal: Floats, q: Floats, inward: Floats, there: Bools
+) -> Found:
+    """The segments that lie in the material at both ends, each with the number of its pair."""
+    d = q - p
+    some = there & (dot(d, normal) > TOUCH) & (dot(d, inward) < -TOUCH)
+    return pair[some.nonzero()[0]], np.broadcast_to(p, d.shape)[:, some], q[:, some]
+
+
+def _ahead(edges: EdgeTable, p: Floats) -> Floats:
+    """The directions of travel at points of edges."""
+    x, y = edges.normal(p)
+    return np.array([y, -x])
+
+
+def _left(u: Floats) -> Floats:
+    return np.array([-u[1], u[0]])
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    product: Floats = a[0] * b[1] - a[1] * b[0]
+    return product
+
+
+def _curvature(edges: EdgeTable) -> Floats:
+    bend: Floats = edges.turn / np.where(edges.turn == 0, 1.0, edges.radius)
+    return bend
 
 
 @partial(cached, most=16)
@@ -111,250 +347,29 @@ def boundary_of(region: Region, sharp: float) -> Boundary:
     return Boundary(region.contours, sharp)
 
 
-class _Narrowest:
-    """The shortest segment offered, if below a length, that no edge crosses."""
-
-    def __init__(self, boundary: Boundary, below: float) -> None:
-        self.boundary = boundary
-        self.best: Width | None = None
-        self.value = below
-
-    def offer(self, p: Point, q: Point) -> None:
-        value = math.dist(p, q)
-        if value < self.value - SHORTER and self.is_clear(p, q):
-            self.value, self.best = value, Width(value, p, q)
-
-    def offer_facing(self, a: Foot, b: Foot) -> None:
-        px, py = a.point
-        nx, ny = a.normal
-        qx, qy = b.point
-        mx, my = b.normal
-        dx, dy = qx - px, qy - py
-        if dx * nx + dy * ny > TOUCH and dx * mx + dy * my < -TOUCH:
-            self.offer((px, py), (qx, qy))
-
-    def is_clear(self, p: Point, q: Point) -> bool:
-        segment = Line(p, q)
-        box = segment.bounds
-        for edge in self.boundary.index.touching(widened(box, 10 * TOUCH)):
-            for m in meeting_points(segment, edge):
-                if math.dist(m, p) > 10 * TOUCH and math.dist(m, q) > 10 * TOUCH:
-                    return False
-        return True
-
-
-class Gathered(_Narrowest):
-    """The ends of every segment offered that is short enough, crossed by edges or not."""
-
-    def __init__(self, boundary: Boundary, below: float) -> None:
-        super().__init__(boundary, below)
-        self.offered: list[tuple[Point, Point]] = []
-
-    def offer(self, p: Point, q: Point) -> None:
-        if math.dist(p, q) <= self.value:
-            self.offered.append((p, q))
-
-
 def least_of(boundary: Boundary, below: float) -> Width | None:
     if boundary.pinch is not None:
         return Width(0.0, boundary.pinch, boundary.pinch)
-    if not boundary.sides:
+    if not boundary.edges:
         return None
-    # Most edges lie far apart: search far pairs only if no near ones face.
-    low_x, low_y, high_x, high_y = box_round([side.box for side in boundary.sides])
+    # Most of many edges lie far apart: search far pairs only if no near ones face.
+    low_x, low_y, high_x, high_y = box_round([edge.bounds for edge in boundary.edges])
     across = max(high_x - low_x, high_y - low_y)
-    reach = across / math.sqrt(len(boundary.sides))
-    farthest = min(below, 2 * across)
+    farthest, count = min(below, 2 * across), len(boundary.edges)
+    reach = farthest if count <= FEW else across / math.sqrt(count)
     while True:
-        narrowest = _Narrowest(boundary, min(reach, farthest))
-        search(narrowest)
-        if narrowest.best is not None or reach >= farthest:
-            return narrowest.best
+        within = min(reach, farthest)
+        p, q = boundary.square(within)
+        value = length_of(q - p)
+        # Of equal ones the first, however their lengths are rounded.
+        for place in np.rint(value / SHORTER).argsort(kind="stable").tolist():
+            (px, py), (qx, qy) = p[:, place].tolist(), q[:, place].tolist()
+            length = math.dist((px, py), (qx, qy))
+            if length < within - SHORTER and boundary.is_clear((px, py), (qx, qy)):
+                return Width(length, (px, py), (qx, qy))
+        if reach >= farthest:
+            return None
         reach *= 4
-
-
-def search(narrowest: _Narrowest) -> None:
-    """Offer every place where edges or corners face each other."""
-    boundary = narrowest.boundary
-    sides = boundary.sides
-    a, b = boundary.table.pairs(SQUARE, narrowest.value)
-    pairs = zip(np.minimum(a, b).tolist(), np.maximum(a, b).tolist(), strict=True)
-    for i, j in sorted(set(pairs)):
-        _between_edges(sides[i], sides[j], narrowest)
-    _at_corners(boundary.corners, narrowest)
-    for p, q in boundary.ends:
-        narrowest.offer(p, q)
-
-
-def _sides(contour: Contour) -> list[BoundarySide]:
-    return [_side(edge, box) for edge, box in zip(contour.edges, contour.boxes, strict=True)]
-
-
-def _corners(contour: Contour) -> list[Corner | None]:
-    return list(corners_of(contour))
-
-
-def _side(edge: Edge, box: Bounds) -> BoundarySide:
-    middle, half_turn = edge.at(0.5), abs(edge.sweep) / 2 if isinstance(edge, Arc) else 0.0
-    half = max(math.dist(middle, edge.start), math.dist(middle, edge.end))
-    return BoundarySide(edge, box, middle, half_turn, half)
-
-
-def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
-    if isinstance(a.edge, Arc):
-        if _alongside(a.edge, b.edge):
-            _along_each_other(a, b, narrowest)
-        # The centre line of a line and an arc, or of two arcs, is square on both.
-        origin = b.edge.centre if isinstance(b.edge, Arc) else None
-        if origin is None:
-            (cx, cy) = a.edge.centre
-            for foot in b.feet(a.edge.centre):
-                (nx, ny) = foot.normal
-                for opposite in a.feet((cx + nx, cy + ny)):
-                    narrowest.offer_facing(foot, opposite)
-        elif math.dist(origin, a.edge.centre) > 1e-9:
-            for foot in a.feet(origin):
-                for opposite in b.feet(a.edge.centre):
-                    narrowest.offer_facing(foot, opposite)
-    elif isinstance(b.edge, Arc):
-        _between_edges(b, a, narrowest)
-    elif _alongside(a.edge, b.edge):
-        _along_each_other(a, b, narrowest)
-
-
-def _alongside(a: Edge, b: Edge) -> bool:
-    if isinstance(a, Arc) and isinstance(b, Arc):
-        return math.dist(a.centre, b.centre) < ALONGSIDE
-    if isinstance(a, Line) and isinstance(b, Line):
-        u, v = a.direction(a.start), b.direction(b.start)
-        return _dot(u, v) < 0 and abs(u[0] * v[1] - u[1] * v[0]) < ALONGSIDE
-    return False
-
-
-def _along_each_other(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> None:
-    for near, far in ((a, b), (b, a)):
-        for p in (near.middle, near.edge.start, near.edge.end):
-            here = Foot(p, left_normal(near.edge, p))
-            for foot in far.feet(p):
-                narrowest.offer_facing(here, foot)
-
-
-def _at_corners(corners: Sequence[Corner | None], narrowest: _Narrowest) -> None:
-    boundary = narrowest.boundary
-    for i, corner in enumerate(corners):
-        if corner is None:
-            continue
-        near = boundary.index.numbers(widened((*corner.point, *corner.point), narrowest.value))
-        for number in near:
-            side = boundary.sides[number]
-            if corner.may_face(side):
-                for foot in side.feet(corner.point):
-                    _corner_to_edge(corner, side, foot, narrowest)
-            # A corner may face another one although its edges do not.
-            facing = corners[number] if number > i and corner.turn < 0 else None
-            if facing is not None and facing.turn < 0:
-                _between_corners(corner, facing, narrowest)
-
-
-def _between_corners(a: Corner, b: Corner, narrowest: _Narrowest) -> None:
-    d = (b.point[0] - a.point[0], b.point[1] - a.point[1])
-    if a.squarely(d) and b.squarely((-d[0], -d[1])):
-        narrowest.offer(a.point, b.point)
-
-
-def _corner_to_edge(corner: Corner, side: BoundarySide, foot: Foot, narrowest: _Narrowest) -> None:
-    d = (foot.point[0] - corner.point[0], foot.point[1] - corner.point[1])
-    if _dot(d, foot.normal) > -TOUCH:
-        return
-    if corner.turn < 0:
-        if corner.squarely(d):
-            narrowest.offer(corner.point, foot.point)
-        return
-    ends = math.dist(foot.point, side.edge.start), math.dist(foot.point, side.edge.end)
-    if min(ends) > 10 * TOUCH and any(
-        _dot(normal, foot.normal) < 0 < _dot(normal, d) for normal in corner.normals()
-    ):
-        narrowest.offer(corner.point, foot.point)
-
-
-def _dot(a: Point, b: Point) -> float:
-    return a[0] * b[0] + a[1] * b[1]
-
-
-# Corners of contours.
-
-
-class Corner:
-    """A vertex with the directions of travel into and out of it; ``turn`` > 0 is convex.
-
-    ``normal`` is the unit vector halfway between the normals of the two edges.
-    """
-
-    __slots__ = ("arriving", "leaving", "normal", "point", "turn")
-
-    def __init__(self, point: Point, arriving: Point, leaving: Point, turn: float) -> None:
-        self.point = point
-        self.arriving = arriving
-        self.leaving = leaving
-        self.turn = turn
-        ux, uy = arriving
-        half = turn / 2
-        c, s = math.cos(half), math.sin(half)
-        self.normal = (-ux * s - uy * c, ux * c - uy * s)
-
-    def may_face(self, side: BoundarySide) -> bool:
-        """Return True if the normals of a side are somewhere opposed to the corner's.
-
-        An edge facing a convex corner may be square on neither of its edges.
-        """
-        room = side.half_turn + abs(self.turn) / 2 + (SQUARE if self.turn < 0 else math.pi / 2)
-        return room > math.pi or _dot(self.normal, side.normal) < -math.cos(room)
-
-    def squarely(self, d: Point) -> bool:
-        """True if a reflex corner is nearer than its neighbourhood to the end of ``d``."""
-        room = 1e-9 * math.hypot(*d)
-        return _dot(d, self.arriving) >= -room and _dot(d, self.leaving) <= room
-
-    def normals(self) -> tuple[Point, Point]:
-        return _turned_left(self.arriving), _turned_left(self.leaving)
-
-
-def corners_of(contour: Contour) -> Iterator[Corner | None]:
-    """Yield the corner that each edge starts at; None if the path is smooth there."""
-    edges = contour.edges
-    for before, after in zip((edges[-1], *edges), edges, strict=False):
-        u, v = before.direction(after.start), after.direction(after.start)
-        turn = math.atan2(u[0] * v[1] - u[1] * v[0], _dot(u, v))
-        if abs(turn) > math.pi - SMOOTH:
-            # At a cusp the curvatures decide the side of the material.
-            turn = math.pi if _curvature(before) + _curvature(after) < 0 else -math.pi
-        yield Corner(after.start, u, v, turn) if abs(turn) > SMOOTH else None
-
-
-def pinch(
-    contours: Iterable[Contour], corners: Iterable[Corner | None], sharp: float
-) -> Point | None:
-    """Return a corner sharper than allowed, or a point where the boundary meets itself, if any."""
-    for corner in corners:
-        if corner is not None and math.degrees(math.pi - corner.turn) < sharp - ROUNDED:
-            return corner.point
-    starts: set[Point] = set()
-    for contour in contours:
-        for edge in contour.edges:
-            if edge.start in starts:
-                return edge.start
-            starts.add(edge.start)
-    return None
-
-
-def _curvature(edge: Edge) -> float:
-    if isinstance(edge, Line):
-        return 0.0
-    return (1.0 if edge.ccw else -1.0) / edge.radius
-
-
-def _turned_left(u: Point) -> Point:
-    return -u[1], u[0]
 
 
 # Ends of tapered arms: narrow, although no segment is square on both sides there.
