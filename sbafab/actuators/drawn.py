@@ -24,7 +24,7 @@ from sbafab.actuators.stacking import CutFilm, channel_pin, layers, of_every_fam
 from sbafab.design.files import hint, shown
 from sbafab.design.outline import read_drawing
 from sbafab.design.polylines import polyline
-from sbafab.design.records import Design, Drawn, Form, Free, Mechanism, MechanismKind, Wrap, card
+from sbafab.design.records import Design, Drawn, Form, Free, Mechanism, Wrap, card
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.design.toml_table import NamedTables, Section, writable
 from sbafab.design.units import Length, LengthOrZero
@@ -98,19 +98,6 @@ class DrawnPin(Section):
     """Excess of the layers' holes for it over its diameter."""
 
 
-class DrawnTube(Section):
-    """The tube that the finished laminate is wrapped round."""
-
-    outer_diameter: Length
-    """Diameter of the tube."""
-    pitch: Length
-    """Distance between neighbouring stacks of balloons round it."""
-    overlap: LengthOrZero = 0.0
-    """Width by which the ends of the wrapped sheet overlap."""
-    glue: str = Field(min_length=1, max_length=120)
-    """Adhesive or tape that holds the sheet round the tube."""
-
-
 class DrawnSeam(Section):
     """A seam: two films bonded by a moving tool along a path."""
 
@@ -156,28 +143,6 @@ class DrawnFold(Section):
     def _has_a_line(self) -> Self:
         if self.line[0] == self.line[1]:
             raise ValueError("has a line whose ends are one point; move one of them")
-        return self
-
-
-class DrawnMechanism(Section):
-    """Action of the pockets when they fill, for the closed forms of ``predict``; none by
-    default.
-    """
-
-    kind: MechanismKind
-    """"pouch-motor" pulls, "hinge" bends two plates, "beam" bears a load at its end, "jamming"
-    stiffens under a vacuum, "push" presses against a plate."""
-    direction: Angle = 0.0
-    """Degrees from x, counter-clockwise: motors shorten along it; plates and beams lie along it."""
-    friction: float | None = Field(default=None, gt=0, le=2)
-    """Coefficient of friction between the sheets; jamming needs it."""
-
-    @model_validator(mode="after")
-    def _friction_is_of_sheets(self) -> Self:
-        if self.kind == "jamming" and self.friction is None:
-            raise ValueError("is jamming without friction; add it, such as 0.3")
-        if self.kind != "jamming" and self.friction is not None:
-            raise ValueError(f"is a {self.kind}, which has no friction; remove it")
         return self
 
 
@@ -247,11 +212,11 @@ class DrawnDesign(Design):
     """Diameter of the channel through all layers round (0, 0), and of its dowel pin."""
     pins: Annotated[tuple[DrawnPin, ...], Field(strict=False, max_length=200)] | None = None
     """The dowel pins, by default one in every bore, unless there are nets, and in the lumen."""
-    tube: DrawnTube | None = None
+    tube: Wrap | None = None
     """The tube that the laminate is wrapped round; none by default."""
     notes: Annotated[tuple[NoteText, ...], Field(strict=False, max_length=20)] | None = None
     """Sentences that pictures and pages print; none by default."""
-    mechanism: DrawnMechanism | None = None
+    mechanism: Mechanism | None = None
     """Action of its pockets, such as {kind = "pouch-motor", direction = 90}."""
 
     @model_validator(mode="before")
@@ -278,14 +243,8 @@ class DrawnDesign(Design):
     @property
     def form(self) -> Form:
         stacks = max(1, sum(len(chamber.centres) for chamber in self.chambers))
-        tube, asked = self.tube, self.mechanism
-        wrap = mechanism = None
-        if tube is not None:
-            wrap = Wrap(tube.outer_diameter, tube.pitch, tube.glue, tube.overlap)
-        if asked is not None:
-            mechanism = Mechanism(asked.kind, asked.direction, asked.friction)
-        words = "laminate of drawn layers"
-        return Form(words, stacks, Drawn(), self.lumen, self.lumen_pin, wrap, mechanism, True)
+        words, places = "laminate of drawn layers", (self.lumen, self.lumen_pin)
+        return Form(words, stacks, Drawn(), *places, self.tube, self.mechanism, True)
 
     @property
     def lumen_pin(self) -> float | None:

@@ -135,7 +135,8 @@ class RadialDesign(Design):
         drawn = self.chamber.outline is not None
         width, length = sorted(self.pocket)
         pockets = Drawn() if drawn else Slots(width, length - width)
-        wrap = Wrap(self.tube.outer_diameter, self.pitch, self.tube.glue, self.sheet.overlap)
+        tube, sheet = self.tube.model_dump(), self.sheet
+        wrap = Wrap.model_construct(**tube, pitch=self.pitch, overlap=sheet.overlap)
         words = "radial expansion stacked balloon actuator"
         return Form(words, self.chamber.count, pockets, wrap=wrap)
 

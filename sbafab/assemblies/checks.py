@@ -60,8 +60,8 @@ def tube_match(assembled: Assembled) -> Iterator[Finding]:
         outer, both = host.part.outer_diameter, (placed, host)
         wrap = placed.made.design.form.wrap
         if wrap is not None:
-            off = abs(wrap.tube_diameter - outer)
-            facts = {"tube": wrap.tube_diameter, "outer": outer}
+            off = abs(wrap.outer_diameter - outer)
+            facts = {"tube": wrap.outer_diameter, "outer": outer}
             good = holds(tolerance, off)
             yield _judged("tube-match", good, tolerance, off, "made-for", both, **facts)
             continue

@@ -12,9 +12,9 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeVar
 
-from pydantic import ConfigDict, Field, PrivateAttr
+from pydantic import ConfigDict, Field, PrivateAttr, model_validator
 
 from sbafab.design.files import (
     ASSEMBLY,
@@ -59,6 +59,7 @@ from sbafab.design.sections import (
     Stack,
 )
 from sbafab.design.toml_table import Section
+from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError
 from sbafab.geometry.offset import Kerf
 from sbafab.geometry.region import Region
@@ -352,35 +353,42 @@ class Drawn:
 Pockets = Discs | Slots | Drawn
 
 
-@dataclass(frozen=True)
-class Wrap:
-    """A laminate that is wrapped round a tube.
+class Wrap(Section):
+    """The tube that the finished laminate is wrapped round."""
 
-    ``tube_diameter`` is the outer diameter and ``pitch`` the distance between the stacks round it,
-    mm; ``glue`` is the adhesive, and ``overlap`` the width (mm) by which the sheet's ends overlap.
-    """
-
-    tube_diameter: float
-    pitch: float
-    glue: str
-    overlap: float = 0.0
+    outer_diameter: Length
+    """Diameter of the tube."""
+    pitch: Length
+    """Distance between neighbouring stacks of balloons round it."""
+    overlap: LengthOrZero = 0.0
+    """Width by which the ends of the wrapped sheet overlap."""
+    glue: str = Field(min_length=1, max_length=120)
+    """Adhesive or tape that holds the sheet round the tube."""
 
 
 MechanismKind = Literal["pouch-motor", "hinge", "beam", "jamming", "push"]
 
 
-@dataclass(frozen=True)
-class Mechanism:
-    """Action of drawn pockets when they fill, for models that support it.
-
-    ``direction`` in degrees from x, counter-clockwise: along it a pouch motor shortens, the two
-    plates of a hinge lie, and a beam or jammed stack reaches. ``friction`` is the coefficient
-    between jammed sheets.
+class Mechanism(Section):
+    """Action of the pockets when they fill, for the closed forms of ``predict``; none by
+    default.
     """
 
     kind: MechanismKind
-    direction: float = 0.0
-    friction: float | None = None
+    """"pouch-motor" pulls, "hinge" bends two plates, "beam" bears a load at its end, "jamming"
+    stiffens under a vacuum, "push" presses against a plate."""
+    direction: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    """Degrees from x, counter-clockwise: motors shorten along it; plates and beams lie along it."""
+    friction: float | None = Field(default=None, gt=0, le=2)
+    """Coefficient of friction between the sheets; jamming needs it."""
+
+    @model_validator(mode="after")
+    def _friction_is_of_sheets(self) -> Self:
+        if self.kind == "jamming" and self.friction is None:
+            raise ValueError("is jamming without friction; add it, such as 0.3")
+        if self.kind != "jamming" and self.friction is not None:
+            raise ValueError(f"is a {self.kind}, which has no friction; remove it")
+        return self
 
 
 @dataclass(frozen=True)

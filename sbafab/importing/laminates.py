@@ -57,10 +57,7 @@ def import_folder(folder: Path) -> Imported:
         drawings["calibration.toml"] = calibration.read_bytes()
         tables["models"] = {**tables.get("models", {}), "calibration": "calibration.toml"}
     wrap = design.form.wrap
-    tube: dict[str, Any] | None = None
-    if wrap is not None:
-        tube = {"outer_diameter": wrap.tube_diameter, "pitch": wrap.pitch}
-        tube |= {"overlap": wrap.overlap, "glue": wrap.glue}
+    tube = None if wrap is None else wrap.model_dump()
     remarks = []
     if isinstance(design, DrawnDesign) and design.mechanism is not None:
         tables["mechanism"] = plain_tables(design)["mechanism"]

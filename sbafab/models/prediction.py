@@ -600,7 +600,7 @@ def _relations(state: elastic.Inflated, request: PredictionRequest) -> Iterator[
         if reached.lines:
             yield reached
     if actuator.form.wrap is not None:
-        yield _diameter_relation(actuator, actuator.form.wrap.tube_diameter)
+        yield _diameter_relation(actuator, actuator.form.wrap.outer_diameter)
 
 
 def _trace(label: str, x: ArrayLike, y: ArrayLike, model: Model | None = None) -> Trace:

@@ -66,7 +66,7 @@ def deflated_diameter(wrap: Wrap, height: float) -> float:
     """Return the diameter in mm of tube and flat laminate of a height in mm; with the films as
     bought the paper's is 15.33 (Sec. 2.1).
     """
-    return wrap.tube_diameter + 2 * height
+    return wrap.outer_diameter + 2 * height
 
 
 def size_phrases(

@@ -271,7 +271,7 @@ def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
     form, pockets = design.form, design.form.pockets
     if not isinstance(pockets, Slots):
         return None
-    tube = form.wrap.tube_diameter if form.wrap is not None else 2 * (placed.radius or 0.0)
+    tube = form.wrap.outer_diameter if form.wrap is not None else 2 * (placed.radius or 0.0)
     balloons = laminate.balloons
     deflated = tube + 2 * factors_of(design).folded(laminate).height
     pocket, widest = lens(pockets.width, pockets.run), cylinder_height(pockets.width)

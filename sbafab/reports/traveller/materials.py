@@ -108,7 +108,7 @@ def adhesive_words(work: Work) -> str:
 def _wrap(work: Work) -> Iterator[Item]:
     wrap = work.design.form.wrap
     if wrap is not None:
-        words = f"to wrap the sheet round, outer diameter {millimetres(wrap.tube_diameter)}"
+        words = f"to wrap the sheet round, outer diameter {millimetres(wrap.outer_diameter)}"
         yield Item("Tube to wrap", words, str(work.copies), work.copies)
         words = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
         yield Item("Adhesive of the wrap", words)
