@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -134,22 +135,16 @@ def building_order(parts: Mapping[str, AnyPart]) -> tuple[str, ...]:
     for name in order:
         order += [hanging for hanging, part in parts.items() if part.on == name]
     if len(order) < len(parts):
-        circle = _circle(parts, order)
+        # Any part that does not hang on the root leads into a circle.
+        walk = [next(name for name in parts if name not in order)]
+        while (host := str(parts[walk[-1]].on)) not in walk:
+            walk.append(host)
+        circle = walk[walk.index(host) :]
         how = "are fixed on each other in a circle" if circle[1:] else "hangs on itself"
         raise DesignError(
             f"{listed(circle)} {how}; leave out on and at in the part that all others are fixed on"
         )
     return tuple(order)
-
-
-def _circle(parts: Mapping[str, AnyPart], hanging: Iterable[str]) -> list[str]:
-    """Return the parts of one circle among those that do not hang on the root."""
-    name = next(name for name in parts if name not in set(hanging))
-    walk: list[str] = []
-    while name not in walk:
-        walk.append(name)
-        name = str(parts[name].on)
-    return walk[walk.index(name) :]
 
 
 def _check_joint(name: str, part: AnyPart, parts: Mapping[str, AnyPart]) -> None:
@@ -224,13 +219,13 @@ class PlacedPart:
         """Size along its own axis, mm; an SBA's is computed from the nominal films."""
         if self.made is not None:
             return self.made.laminate.thickness
-        part = self.part
-        if isinstance(part, Tube | Line):
-            return part.length
-        if isinstance(part, Magnet | Base):
-            return part.thickness
-        if isinstance(part, Cup):
-            return part.height
+        match self.part:
+            case Tube() | Line():
+                return self.part.length
+            case Magnet() | Base():
+                return self.part.thickness
+            case Cup():
+                return self.part.height
         raise TypeError(f"{self.name} is placed without its design")
 
     def at(self, p: Vector) -> Vector:
@@ -285,13 +280,13 @@ def assemble(assembly: Assembly) -> Assembled:
     placed: dict[str, PlacedPart] = {}
     for name in order:
         part = assembly.parts[name]
-        source = design_of.get(name)
+        made = design_of.get(name)
         if part.on is None:
-            _check_root(name, source)
+            _check_root(name, made)
             pose = LYING if assembly.pose == "lying" else PartPose()
-            placed[name] = _at_pose(name, part, pose, source)
+            placed[name] = _at_pose(name, part, pose, made)
         else:
-            placed[name] = _placed(name, part, source, placed[part.on])
+            placed[name] = _placed(name, part, made, placed[part.on])
     return Assembled(assembly, designs, tuple(placed.values()))
 
 
@@ -307,15 +302,18 @@ def _designs(assembly: Assembly) -> tuple[PartDesign, ...]:
             'an assembly needs a stacked balloon actuator; add a part of kind = "sba"'
         )
     # Some file systems ignore the case of letters.
-    names = [design.name.lower() for design, _ in by_hash.values()]
-    sources = []
+    taken = Counter(design.name.lower() for design, _ in by_hash.values())
+    taken += Counter({*RESERVED, assembly.name.lower()})
+    made = []
     for design, parts in by_hash.values():
-        name_of_design = design.name
-        plain = name_of_design.lower()
-        if names.count(plain) > 1 or plain in RESERVED or plain == assembly.name.lower():
-            name_of_design = f"{name_of_design}-{parts[0]}"
-        sources.append(_build_part(design, name_of_design, parts, assembly))
-    return tuple(sources)
+        name = f"{design.name}-{parts[0]}" if taken[design.name.lower()] > 1 else design.name
+        order = assembly.order.model_copy(update={"copies": len(parts) * assembly.order.copies})
+        named = design.model_copy(update={"name": name, "order": order})
+        try:
+            made.append(PartDesign(named, build(named), tuple(parts)))
+        except (DesignError, GeometryError) as error:
+            raise DesignError(f"parts.{parts[0]}: {error}") from None
+    return tuple(made)
 
 
 def _read_part(assembly: Assembly, name: str, part: Sba) -> Design:
@@ -333,10 +331,8 @@ def _read_part(assembly: Assembly, name: str, part: Sba) -> Design:
             )
         data = override(table, [part.set, assembly.shared])
         data.setdefault("name", path.stem)
-        _keep_outline(data, part, assembly.folder)
-        _keep_kit(data, part, assembly)
-        rules_table = data.get("rules")
-        waived = rules_table.get("waive") if isinstance(rules_table, dict) else None
+        _keep_files(data, part, assembly)
+        waived = data["rules"].get("waive") if isinstance(data.get("rules"), dict) else None
         rules = [r for r in assembly.rules.waive if r in rule_names() and r not in (waived or ())]
         return validated(add_waivers(data, rules), records(), path.parent)
     except DesignError as error:
@@ -348,28 +344,16 @@ def design_source(design: str, folder: Path) -> str | Path:
     return folder / design if Path(design).name != design or "." in design else design
 
 
-def _keep_outline(data: dict[str, Any], part: Sba, folder: Path) -> None:
-    """Resolve an outline that the assembly's file names against its folder, not the design's."""
-    chamber = part.set.get("chamber")
+def _keep_files(data: dict[str, Any], part: Sba, assembly: Assembly) -> None:
+    """Resolve an outline and a kit's file that the assembly's file names against its folder, not
+    the design's.
+    """
+    chamber, kit = part.set.get("chamber"), data.get("kit")
     if isinstance(chamber, dict) and isinstance(chamber.get("outline"), str):
-        data["chamber"]["outline"] = str((folder / chamber["outline"]).absolute())
-
-
-def _keep_kit(data: dict[str, Any], part: Sba, assembly: Assembly) -> None:
-    """Resolve a kit's file that the assembly's file names against its folder, not the design's."""
-    kit = data.get("kit")
+        data["chamber"]["outline"] = str((assembly.folder / chamber["outline"]).absolute())
     is_named_here = assembly.kit is not None or "kit" in part.set
     if is_named_here and isinstance(kit, str) and kit not in kit_names():
         data["kit"] = str((assembly.folder / kit).absolute())
-
-
-def _build_part(design: Design, name: str, parts: list[str], assembly: Assembly) -> PartDesign:
-    order = assembly.order.model_copy(update={"copies": len(parts) * assembly.order.copies})
-    named = design.model_copy(update={"name": name, "order": order})
-    try:
-        return PartDesign(named, build(named), tuple(parts))
-    except (DesignError, GeometryError) as error:
-        raise DesignError(f"parts.{parts[0]}: {error}") from None
 
 
 def _check_root(name: str, source: PartDesign | None) -> None:
@@ -424,9 +408,9 @@ def inlet_of(name: str, line: Line, host: str, laminate: Laminate) -> Inlet:
     """Return the inlet that a line goes into. Raises DesignError if there is none."""
     inlets: Mapping[str, Inlet] = {inlet.chamber: inlet for inlet in laminate.inlets}
     if line.chamber not in inlets:
+        known = ", ".join(inlets)
         raise DesignError(
-            f'parts.{name}.chamber = "{line.chamber}" has no inlet in {host}; it has '
-            f"{', '.join(inlets)}"
+            f'parts.{name}.chamber = "{line.chamber}" has no inlet in {host}; it has {known}'
         )
     return inlets[line.chamber]
 

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sbafab.assemblies.build import Assembled, PlacedPart, about_axis, inlet_of
-from sbafab.assemblies.records import AssemblyRules, Base, Cup, Line, Magnet, Tube
+from sbafab.assemblies.records import AssemblyRules, Base, Cup, Line, Magnet, Seat, Tube
 from sbafab.assemblies.shapes import face, placed_surface
-from sbafab.design.records import Design, Discs
+from sbafab.design.records import Discs
 from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.laminate import outline_diameter
 from sbafab.meshing.surface import Surface, Vector
@@ -43,65 +43,57 @@ def _judged(
     return replace(finding, parts=names)
 
 
-def joints(assembled: Assembled) -> Iterator[tuple[PlacedPart, PlacedPart]]:
-    """Yield each part that is fixed on another, with that host."""
+def joints(assembled: Assembled, *at: Seat) -> Iterator[tuple[PlacedPart, PlacedPart]]:
+    """Yield each part that is fixed on another (at these places, if any is named), and its host."""
     for placed in assembled.parts:
         host = assembled.on(placed)
-        if host is not None:
+        if host is not None and (not at or placed.part.at in at):
             yield placed, host
 
 
 def tube_match(assembled: Assembled) -> Iterator[Finding]:
     """Check that an SBA bent round a tube was made for it, or at least goes round it once."""
     tolerance = assembled.assembly.rules.tube_tolerance
-    for placed, host in joints(assembled):
-        if placed.made is None or placed.radius is None or not isinstance(host.part, Tube):
+    for both in joints(assembled, "outside"):
+        placed, tube = both[0], both[1].part
+        if placed.made is None or not isinstance(tube, Tube):
             continue
-        outer, both = host.part.outer_diameter, (placed, host)
-        wrap = placed.made.design.form.wrap
-        if wrap is not None:
-            off = abs(wrap.outer_diameter - outer)
-            facts = {"tube": wrap.outer_diameter, "outer": outer}
-            good = holds(tolerance, off)
-            yield _judged("tube-match", good, tolerance, off, "made-for", both, **facts)
+        outer, wrap = tube.outer_diameter, placed.made.design.form.wrap
+        if wrap is None:
+            walls = placed.made.laminate.layers[0].profile.turned(placed.turn)
+            width, room = walls.bounds[2] - walls.bounds[0], math.pi * outer
+            yield _judged("tube-match", holds(room, width), room, width, "round", both)
             continue
-        walls = placed.made.laminate.layers[0].profile.turned(placed.turn)
-        width, room = walls.bounds[2] - walls.bounds[0], math.pi * outer
-        yield _judged("tube-match", holds(room, width), room, width, "round", both)
+        off, facts = abs(wrap.outer_diameter - outer), {"tube": wrap.outer_diameter, "outer": outer}
+        good = holds(tolerance, off)
+        yield _judged("tube-match", good, tolerance, off, "made-for", both, **facts)
 
 
 def inlet_match(assembled: Assembled) -> Iterator[Finding]:
     """Check that a line in an inlet fits the opened strip."""
-    for placed, host in joints(assembled):
-        if placed.part.at != "inlet" or not isinstance(placed.part, Line) or host.made is None:
-            continue
-        inlet = inlet_of(placed.name, placed.part, host.name, host.made.laminate)
-        limit, outer = 2 * inlet.width / math.pi, placed.part.outer_diameter
-        facts = {"chamber": inlet.chamber, "width": inlet.width}
-        good, both = holds(limit, outer), (placed, host)
-        yield _judged("inlet-match", good, limit, outer, "opens", both, **facts)
+    for both in joints(assembled, "inlet"):
+        (placed, host), line = both, both[0].part
+        if isinstance(line, Line) and host.made is not None:
+            inlet = inlet_of(placed.name, line, host.name, host.made.laminate)
+            limit, outer = 2 * inlet.width / math.pi, line.outer_diameter
+            facts = {"chamber": inlet.chamber, "width": inlet.width}
+            good = holds(limit, outer)
+            yield _judged("inlet-match", good, limit, outer, "opens", both, **facts)
 
 
 def line_clearance(assembled: Assembled) -> Iterator[Finding]:
     """Check the clearance round a line in the lumen or tube that it runs through."""
     limit = assembled.assembly.rules.line_clearance
-    for placed, host in joints(assembled):
-        if placed.part.at != "lumen" or not isinstance(placed.part, Line):
-            continue
-        lumen = _opening(host)
-        if lumen is None:
-            continue
-        outer, both = placed.part.outer_diameter, (placed, host)
-        facts = {"outer": outer, "lumen": lumen, "most": lumen - limit}
-        good, clearance = holds(lumen - outer, limit), lumen - outer
-        yield _judged("line-clearance", good, limit, clearance, "leaves", both, **facts)
-
-
-def _opening(placed: PlacedPart) -> float | None:
-    """Return the diameter of the lumen of a part, mm; None for a part without lumen."""
-    if isinstance(placed.part, Tube):
-        return placed.part.inner_diameter
-    return placed.made.laminate.lumen if placed.made is not None else None
+    for both in joints(assembled, "lumen"):
+        line, host = both[0].part, both[1]
+        lumen = host.made.laminate.lumen if host.made is not None else None
+        if isinstance(host.part, Tube):
+            lumen = host.part.inner_diameter
+        if isinstance(line, Line) and lumen is not None:
+            clearance = lumen - line.outer_diameter
+            facts = {"outer": line.outer_diameter, "lumen": lumen, "most": lumen - limit}
+            good = holds(clearance, limit)
+            yield _judged("line-clearance", good, limit, clearance, "leaves", both, **facts)
 
 
 def seat(assembled: Assembled) -> Iterator[Finding]:
@@ -112,15 +104,16 @@ def seat(assembled: Assembled) -> Iterator[Finding]:
     """
     limit = assembled.assembly.rules.seat_share
     for placed, host in joints(assembled):
-        if placed.part.at == "lumen":
-            yield _through(placed, host, limit)
-        elif placed.part.at == "outside":
-            yield _around(placed, host, limit)
-        elif placed.part.at != "inlet":
-            lower, under = _lower_face(placed), _face_of(host, placed.part.at)
-            share = (lower & under).area / min(lower.area, under.area)
-            both = placed, host
-            yield _judged("seat", holds(share, limit), limit, share, "glued", both, "")
+        match placed.part.at:
+            case "lumen":
+                yield _through(placed, host, limit)
+            case "outside":
+                yield _around(placed, host, limit)
+            case "top" | "bottom" | "start" | "end":
+                lower, under = _lower_face(placed), _face_of(host, placed.part.at)
+                share = (lower & under).area / min(lower.area, under.area)
+                good = holds(share, limit)
+                yield _judged("seat", good, limit, share, "glued", (placed, host), "")
 
 
 def _through(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
@@ -141,14 +134,13 @@ def _around(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
     low, high = max(y0, -along), min(y1, length - along)
     share = (lower & rectangle((x0, low), (x1, high))).area / lower.area if low < high else 0.0
     verdict: Verdict = "warn"
+    sentence = "overhangs"
     if not holds(share, limit):
         verdict, sentence = "fail", "off-tube"
     elif placed.radius is None:
         sentence, share = "stiff", 0.0
     elif holds(share, 1.0):
         verdict, sentence = "pass", "lies"
-    else:
-        sentence = "overhangs"
     facts = {"along": along, "start": along + y0, "end": along + y1, "length": length}
     return _judged("seat", verdict, limit, share, sentence, (placed, host), "", **facts)
 
@@ -220,22 +212,22 @@ def reach(placed: PlacedPart) -> float:
 def supply_runs(placed: PlacedPart, assembled: Assembled) -> tuple[SupplyRun, ...]:
     """Return the runs along a tube of the supply tubes of an actuator on its end or start."""
     tube = assembled.on(placed)
-    if placed.made is None or tube is None or not isinstance(tube.part, Tube):
+    is_flat = placed.made is not None and placed.radius is None
+    if not is_flat or tube is None or not isinstance(tube.part, Tube):
         return ()
-    if placed.radius is not None:
-        return ()
+    assert placed.made is not None
     around = tube.part.outer_diameter / 2
     covered = list(_covered(tube, assembled))
     supply = []
     for inlet in placed.made.laminate.inlets:
         angle = _angle(tube, placed.at((*inlet.mouth, 0.0)))
         half_tube = math.degrees(inlet.tube_diameter / 2 / around)
-        over = [
+        over = dict.fromkeys(
             name
             for name, middle, half_stack in covered
             if _angle_between(angle, middle) < half_stack + half_tube
-        ]
-        supply.append(SupplyRun(inlet.chamber, angle, tuple(dict.fromkeys(over))))
+        )
+        supply.append(SupplyRun(inlet.chamber, angle, tuple(over)))
     return tuple(supply)
 
 
@@ -255,12 +247,9 @@ def _covered(tube: PlacedPart, assembled: Assembled) -> Iterator[tuple[str, floa
 
 def _angle(tube: PlacedPart, p: Vector) -> float:
     """Return the angle of a point round a tube, degrees anti-clockwise from its marked line."""
-    origin = tube.at((0.0, 0.0, 0.0))
-    x, y = (
-        sum((b - a) * (d - a) for a, b, d in zip(origin, tube.at(unit), p, strict=True))
-        for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    )
-    return math.degrees(math.atan2(y, x)) % 360
+    origin, x, y = np.array([tube.at(at) for at in ((0, 0, 0), (1, 0, 0), (0, 1, 0))])
+    across, up = np.array([x - origin, y - origin]) @ (np.array(p) - origin)
+    return math.degrees(math.atan2(up, across)) % 360
 
 
 def _angle_between(a: float, b: float) -> float:
@@ -278,15 +267,12 @@ def supply_tubes(assembled: Assembled) -> Iterator[Finding]:
             continue
         crossing = [run for run in supply if run.over]
         over = list(dict.fromkeys(name for run in crossing for name in run.over))
-        facts: dict[str, Any] = {"crossing_count": len(crossing), "count": len(supply)}
+        count, parts = len(crossing), (placed, *map(assembled.__getitem__, over))
+        facts: dict[str, Any] = {"crossing_count": count, "count": len(supply)}
         facts["over"] = ", ".join(over)
         if crossing:
             facts["mending"] = _remedy(placed, assembled, supply)
-        sentence, parts = (
-            "crossing" if crossing else "past",
-            [placed, *map(assembled.__getitem__, over)],
-        )
-        count = len(crossing)
+        sentence = "crossing" if crossing else "past"
         yield _judged("supply-tubes", not count, 0, count, sentence, parts, "tubes", **facts)
 
 
@@ -345,28 +331,18 @@ def aperture(assembled: Assembled) -> Iterator[Finding]:
 def _passage(placed: PlacedPart) -> _Passage:
     if placed.made is None:
         size, is_soft = _girth(placed), isinstance(placed.part, Cup)
-        return (
-            _Passage(placed, size, 0.0, "squeezed")
-            if is_soft
-            else _Passage(placed, size, size, "as-it-is")
-        )
+        pressed, how = (0.0, "squeezed") if is_soft else (size, "as-it-is")
+        return _Passage(placed, size, pressed, how)
     design, laminate = placed.made.design, placed.made.laminate
-    if design.form.wrap is not None:
-        size = deflated_diameter(design.form.wrap, laminate.thickness)
+    form = design.form
+    if form.wrap is not None:
+        size = deflated_diameter(form.wrap, laminate.thickness)
         return _Passage(placed, size, size, "deflated")
-    lobe = _lobe_width(design)
-    if lobe is None:
+    if not form.is_parallel or form.stacks != LOBES or not isinstance(form.pockets, Discs):
         return _Passage(placed, outline_diameter(laminate), 0.0, "unfolded")
+    lobe = max(form.pockets.diameters) + 2 * design.bond.width
     folded = folded_diameter(lobe, factors_of(design).folded(laminate).height)
     return _Passage(placed, folded_diameter(lobe, laminate.thickness), folded, "folded")
-
-
-def _lobe_width(design: Design) -> float | None:
-    """Return the width in mm of a lobe of a three-lobed actuator; None for others."""
-    form = design.form
-    if not form.is_parallel or form.stacks != LOBES or not isinstance(form.pockets, Discs):
-        return None
-    return max(form.pockets.diameters) + 2 * design.bond.width
 
 
 def _girth(placed: PlacedPart) -> float:
@@ -420,18 +396,19 @@ def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
     lumen = assembled.assembly.deploy.lumen_diameter
     if lumen is None:
         return
-    sizes = [
-        (reached, placed.name)
-        for placed in assembled.parts
-        if placed.made is not None
-        and (reached := sizes_of(placed.made.design, placed.made.laminate).get("reached_diameter"))
-    ]
-    if not sizes:
+    made = [placed for placed in assembled.parts if placed.made is not None]
+    sizes = ((_reached(placed), placed.name) for placed in made)
+    widest, name = max((size for size in sizes if size[0]), default=(None, ""))
+    if widest is None:
         yield _judged("lumen-brace", False, lumen, None, "none", ())
         return
-    widest, name = max(sizes)
     part, good = (assembled[name],), holds(widest, lumen)
     yield _judged("lumen-brace", good, lumen, widest, "reaches", part)
+
+
+def _reached(placed: PlacedPart) -> float | None:
+    assert placed.made is not None
+    return sizes_of(placed.made.design, placed.made.laminate).get("reached_diameter")
 
 
 # Collisions of solids in place, deflated, their pockets filled.
@@ -508,13 +485,18 @@ def run_checks(assembled: Assembled) -> tuple[Finding, ...]:
 def lowered_checks(rules: AssemblyRules, name: str | None = None) -> tuple[str, ...]:
     """Each limit (of one check) that an assembly weakens, with its value and the usual one."""
     usual = AssemblyRules()
-    keys = (
-        ("line-clearance", "line_clearance", rules.line_clearance < usual.line_clearance),
-        ("tube-match", "tube_tolerance", rules.tube_tolerance > usual.tube_tolerance),
-        ("seat", "seat_share", rules.seat_share < usual.seat_share),
-    )
+    weak = {
+        "line_clearance": rules.line_clearance < usual.line_clearance,
+        "tube_tolerance": rules.tube_tolerance > usual.tube_tolerance,
+        "seat_share": rules.seat_share < usual.seat_share,
+    }
+    checks = {
+        "line_clearance": "line-clearance",
+        "tube_tolerance": "tube-match",
+        "seat_share": "seat",
+    }
     return tuple(
         weakened(key, getattr(rules, key), getattr(usual, key), "default")
-        for check, key, is_weaker in keys
-        if is_weaker and name in (None, check)
+        for key, check in checks.items()
+        if weak[key] and name in (None, check)
     )

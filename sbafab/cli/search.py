@@ -43,7 +43,7 @@ from sbafab.search.quantities import (
 )
 from sbafab.search.space import FindRequest, figure_text, read_free
 from sbafab.search.sweep import SweepDocument, SweepRequest
-from sbafab.search.vary import KeyDifference, format_keys, format_value, varied_keys
+from sbafab.search.vary import format_keys, format_value, varied_keys
 
 Outcome = TypeVar("Outcome")
 FOUND = "found.toml"
@@ -410,15 +410,11 @@ def compare(
         show.document({**comparison.as_dict(), "folder": str(folder)})
         return
     names = ("", *comparison.names)
-    _print_keys("Keys", names, comparison.keys)
-    margins = [(row.rule, *map(comparing.margin_text, row.margins)) for row in comparison.rules]
-    show.table("Rules", names, margins)
+    show.table("Keys", names, comparing.key_rows(comparison.keys))
+    show.table("Rules", names, comparing.rule_rows(comparison.rules))
     _print_figures(comparison, names)
-    keys, rules = (
-        show.several(len(comparison.keys), "key"),
-        show.several(len(comparison.rules), "rule"),
-    )
-    figures = show.several(sum(pair.differs for pair in comparison.figures), "figure")
+    counts = len(comparison.keys), len(comparison.rules), sum(p.differs for p in comparison.figures)
+    keys, rules, figures = map(show.several, counts, ("key", "rule", "figure"))
     show.verdict(
         f"{first} and {second} differ in {keys}, {rules} and {figures}. Written to {folder}: "
         f"{comparing.PAGE}",
@@ -430,19 +426,11 @@ def print_changes(reached: YieldDesign) -> None:
     """Print the keys that were changed for a yield, and the figures before and after."""
     if reached.comparison is not None:
         names = ("", *comparing.DESIGNS)
-        _print_keys("Changed for the yield", names, reached.changes)
+        show.table("Changed for the yield", names, comparing.key_rows(reached.changes))
         _print_figures(reached.comparison, names)
-
-
-def _print_keys(title: str, names: Sequence[str], rows: Sequence[KeyDifference]) -> None:
-    show.table(title, names, [(row.key, *map(format_value, row.values)) for row in rows])
 
 
 def _print_figures(comparison: comparing.DesignComparison, names: Sequence[str]) -> None:
     """Print the main figures of both designs, below the names of the columns."""
-    main = [
-        (f"{pair.name}, {pair.unit}", *map(comparing.reached_text, pair.figures))
-        for pair in comparison.figures
-        if pair.is_main
-    ]
+    main = comparing.figure_rows(pair for pair in comparison.figures if pair.is_main)
     show.table("Figures, in parentheses the 90 % interval", names, main)

@@ -161,17 +161,14 @@ def predict_assembly(
         else:
             left_out.append(f"{placed.name}: no model knows the form of a drawn pocket outline")
     figures = [item for item in items if isinstance(item, AssemblyFigure)]
-    if assembled.assembly.name not in PAPERS:
+    name = assembled.assembly.name
+    if name not in PAPERS:
         figures = [replace(figure, paper="") for figure in figures]
+    touches = tuple(item for item in items if isinstance(item, Touch))
+    bent = tuple(item for item in items if isinstance(item, BentTouch))
+    near = tuple(p.name for p in actuators if is_near_burst(p.made.laminate, pressure_kpa))
     return AssemblyPrediction(
-        assembled.assembly.name,
-        pressure_kpa,
-        load_g,
-        tuple(figures),
-        tuple(item for item in items if isinstance(item, Touch)),
-        tuple(left_out),
-        tuple(item for item in items if isinstance(item, BentTouch)),
-        tuple(p.name for p in actuators if is_near_burst(p.made.laminate, pressure_kpa)),
+        name, pressure_kpa, load_g, tuple(figures), touches, tuple(left_out), bent, near
     )
 
 
@@ -181,50 +178,37 @@ def _arm_figures(
     """Yield height, reach, bend and load of an actuator with round pockets."""
     design, laminate = placed.made.design, placed.made.laminate
     is_papers = is_the_papers_3dof(design.form, laminate)
-    kpa, bent, blocked = (
-        Conditions(kpa=pressure, **more) for more in ({}, {"chambers": 1}, {"share": 0.75})
-    )
-    every = (pressure,) * arm.chambers
+    every, at = (pressure,) * arm.chambers, Conditions(kpa=pressure)
     free, flat = arm.pose(every), arm.flat_height
     # As in a design's own prediction: the stack's maps are approximate.
     stroke = free_rise(Counter(balloons_of(design, laminate, factors_of(design))), pressure).stroke
     push = arm.pose(every, plate=flat + 0.75 * stroke).force
-    on_stack = ModelId.ELASTIC_STACK
-    rows: list[tuple[str, float, str, Quantity, Conditions, str, ModelId]] = [
-        (
-            "height, flat",
-            flat,
-            "mm",
-            Quantity.FOLDED_HEIGHT,
-            ANYWHERE,
-            "about 1 (Sec. 6)",
-            on_stack,
-        ),
-        (
-            *("height, inflated", flat + stroke, "mm", Quantity.FREE_HEIGHT, kpa),
-            *("about 20 (Sec. 5)", ModelId.ELASTIC_BALLOON),
-        ),
-        ("push at 75 % of its stroke", push, "N", Quantity.BLOCKED_FORCE, blocked, "", on_stack),
+    blocked, bent = at._replace(share=0.75), at._replace(chambers=1)
+    rows: list[tuple[str, float, Quantity, Conditions, str]] = [
+        ("height, flat", flat, Quantity.FOLDED_HEIGHT, ANYWHERE, "about 1 (Sec. 6)"),
+        ("height, inflated", flat + stroke, Quantity.FREE_HEIGHT, at, "about 20 (Sec. 5)"),
+        ("push at 75 % of its stroke", push, Quantity.BLOCKED_FORCE, blocked, ""),
     ]
     if arm.chambers > 1:
         single = arm.pose((pressure, *(0.0,) * (arm.chambers - 1)))
         aside = float(np.hypot(*single.tip[:2]))
-        words = "maximum lateral tip displacement"
-        rows += [
-            ("bend by one chamber", single.bend, "deg", Quantity.BEND, bent, "", on_stack),
-            (words, aside, "mm", Quantity.ASIDE, bent, "", on_stack),
-        ]
+        rows.append(("bend by one chamber", single.bend, Quantity.BEND, bent, ""))
+        rows.append(("maximum lateral tip displacement", aside, Quantity.ASIDE, bent, ""))
     if load_g > 0:
         hung = arm.pose(every, tip_load=(load_g * 1e-3 * GRAVITY, 0.0, 0.0), near=free)
         sag = float(np.linalg.norm(hung.tip - free.tip))
         paper = "lifts 1.2 g (Sec. 5)" if load_g == MARBLE_G else ""
-        words = f"sag of the tip, {load_g:g} g across it"
         # Sag is load over stiffness.
-        rows.append((words, sag, "mm", Quantity.HELD_STIFFNESS, kpa, paper, on_stack))
-    for words, value, unit, quantity, at, paper, model in rows:
+        rows.append(
+            (f"sag of the tip, {load_g:g} g across it", sag, Quantity.HELD_STIFFNESS, at, paper)
+        )
+    for words, value, quantity, where, paper in rows:
+        unit = "mm" if quantity is Quantity.HELD_STIFFNESS else quantity.unit
+        is_balloon = quantity is Quantity.FREE_HEIGHT
+        model = ModelId.ELASTIC_BALLOON if is_balloon else ModelId.ELASTIC_STACK
         # The measured value beside a figure is that of a design's own prediction.
         by = ModelId.FILMS if quantity is Quantity.FOLDED_HEIGHT else model
-        beside = counterpart(design.form, quantity, at, by, arm.calibration, is_papers)
+        beside = counterpart(design.form, quantity, where, by, arm.calibration, is_papers)
         measured = beside.sentence() if beside else ""
         yield AssemblyFigure(placed.name, words, value, unit, model.words, paper, measured)
 
@@ -290,7 +274,7 @@ def _grip_figures(
     hold: Grip, stacks: int, pressure: float, load_g: float
 ) -> Iterator[AssemblyFigure]:
     """Yield diameters of a radial actuator, and the hold of its stacks in the assembly's lumen."""
-    widest = "about 28 (Sec. 2.1)"
+    widest, height, push, friction = "about 28 (Sec. 2.1)", *IN_THE_LUMEN
     rows = [
         ("diameter, deflated", hold.deflated, "mm", "tube and films", "15.33 (Sec. 2.1)"),
         ("diameter, inflated free", hold.free, "mm", ModelId.LENS.words, widest),
@@ -298,7 +282,6 @@ def _grip_figures(
     ]
     if hold.room is not None and hold.push is not None:
         force = pressure * hold.push
-        height, push, friction = IN_THE_LUMEN
         rows.append((f"{height} of {hold.lumen:g} mm", hold.room, "mm", STATIC, ""))
         rows.append((push, force, "N", LENS, "holds (Sec. 5)"))
         if load_g > 0:
@@ -380,11 +363,12 @@ class _Scene:
         apart = {placed.name, placed.part.on, *self._moving(placed.name)}
         names = [part.name for part in self.assembled.parts]
         apart.update(name for name in names[: names.index(placed.name)] if name in self.stacks)
-        for name_there, theirs in self.solids.items():
-            if name_there not in apart:
+        for other, theirs in self.solids.items():
+            volume = 0.0
+            if other not in apart:
                 volume = _shared_volume(self.solids[placed.name], theirs)
-                if volume > TOUCH:
-                    yield Touch(placed.name, name_there, volume)
+            if volume > TOUCH:
+                yield Touch(placed.name, other, volume)
 
     def bends(
         self, placed: PlacedSba, pause: Callable[[], None]
@@ -398,16 +382,16 @@ class _Scene:
         if arm.chambers < 2:
             return
         moving = {placed.name, *self._moving(placed.name)}
-        beside = {name: theirs for name, theirs in self.solids.items() if name not in moving}
         nearest: dict[str, tuple[float, str]] = {}
         met = set()
         for chambers in _ways(arm.chambers):
             pause()
             names = " and ".join(placed.made.laminate.chambers[i].name for i in chambers)
-            pose, foot, rest = self._bent(placed, chambers, self.pressure)
-            for part, theirs in beside.items():
-                facing = rest if part == placed.part.on else foot + rest
-                volume = _shared_volume(facing, theirs)
+            pose, facing = self._bent(placed, chambers, self.pressure)
+            for part, theirs in self.solids.items():
+                if part in moving:
+                    continue
+                volume = _shared_volume(facing(part), theirs)
                 if volume > TOUCH:
                     met.add(part)
                     first = self._first_contact(placed, chambers, part, pose)
@@ -415,7 +399,7 @@ class _Scene:
                     yield BentTouch(placed.name, part, names, volume, start, first.bend, measured)
                 elif part != placed.part.on:
                     least = nearest.get(part, (FARTHEST, ""))
-                    gap = _gap(facing, theirs, least[0])
+                    gap = _gap(facing(part), theirs, least[0])
                     nearest[part] = least if gap >= least[0] else (gap, names)
         for part, (gap, names) in nearest.items():
             if part not in met and gap < FARTHEST:
@@ -424,9 +408,9 @@ class _Scene:
 
     def _bent(
         self, placed: PlacedSba, chambers: Sequence[int], pressure: float
-    ) -> tuple[Pose, Solids, Solids]:
-        """Return the pose of an arm bent by some chambers, its lowest levels, which may rest on the
-        part under it, and its other levels with all that is fixed on it.
+    ) -> tuple[Pose, Callable[[str], Solids]]:
+        """Return the pose of an arm bent by some chambers, and what of it, with all that is fixed
+        on it, may meet a part: not its lowest levels the part under it, on which they may rest.
         """
         arm = self.stacks[placed.name]
         pose = arm.pose(tuple(pressure if i in chambers else 0.0 for i in range(arm.chambers)))
@@ -441,7 +425,7 @@ class _Scene:
             (foot if level < FOOT else rest).append(solid)
         for part in filter(_is_seen, self._moving(placed.name).values()):
             rest += self._solids(part, poses)
-        return pose, foot, rest
+        return pose, lambda part: rest if part == placed.part.on else foot + rest
 
     def _first_contact(
         self, placed: PlacedSba, chambers: Sequence[int], part: str, pose: Pose
@@ -450,9 +434,8 @@ class _Scene:
         low, high = min(SLIGHTEST, self.pressure / 2), self.pressure
         for _ in range(HALVINGS):
             middle = math.sqrt(low * high)
-            tried, foot, rest = self._bent(placed, chambers, middle)
-            facing = rest if part == placed.part.on else foot + rest
-            if _shared_volume(facing, self.solids[part]) > TOUCH:
+            tried, facing = self._bent(placed, chambers, middle)
+            if _shared_volume(facing(part), self.solids[part]) > TOUCH:
                 high, pose = middle, tried
             else:
                 low = middle
@@ -477,22 +460,18 @@ def _unmoved(placed: PlacedPart, stacks: Mapping[str, Stack], poses: Mapping[str
     """Return a part on flat hosts: balloons and webs of a stack in its pose; of others the part
     with its pockets filled, or the free inflated cylinder of one around a tube.
     """
-    part_design = placed.made
-    if part_design is not None and placed.name in stacks:
-        parts = inflated(part_design.laminate, stacks[placed.name], poses[placed.name], COARSE)
-        surfaces = [Surface(placed.upright(x.surface.points), x.surface.faces) for x in parts]
+    made = placed.made
+    if made is not None and placed.name in stacks:
+        parts = inflated(made.laminate, stacks[placed.name], poses[placed.name], COARSE)
+        surfaces = (Surface(placed.upright(x.surface.points), x.surface.faces) for x in parts)
         return [piece for surface in surfaces for piece in surface.manifold().decompose()]
-    widest = (
-        None
-        if part_design is None
-        else sizes(part_design.design, part_design.laminate).get("inflated_diameter")
-    )
-    if part_design is None or widest is None:
+    round_tube = {} if made is None else sizes(made.design, made.laminate)
+    if made is None or "inflated_diameter" not in round_tube:
         return [placed_surface(placed, filled=True).manifold()]
     import manifold3d
 
-    _, low, _, high = part_design.laminate.layers[0].profile.turned(placed.turn).bounds
-    cylinder = manifold3d.Manifold.cylinder(high - low, widest / 2)
+    _, low, _, high = made.laminate.layers[0].profile.turned(placed.turn).bounds
+    cylinder = manifold3d.Manifold.cylinder(high - low, round_tube["inflated_diameter"] / 2)
     rows = np.column_stack([np.array(placed.pose.rows), np.array(placed.pose.shift)])
     return [cylinder.translate((0.0, 0.0, low)).transform(rows)]
 

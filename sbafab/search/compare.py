@@ -324,8 +324,25 @@ def _is_main(quantity: Quantity, at: Conditions) -> bool:
 # Words of the table and the page.
 
 
-def margin_text(margin: RuleMargin | None) -> str:
-    """Return verdict and margin of a rule; the measured value if the rule has no limit."""
+Rows = list[tuple[str, ...]]
+
+
+def key_rows(keys: Iterable[KeyDifference]) -> Rows:
+    """Return keys with both values."""
+    return [(row.key, *map(format_value, row.values)) for row in keys]
+
+
+def rule_rows(rules: Iterable[RuleDifference]) -> Rows:
+    """Return rules with both verdicts and margins, or measured values if there is no limit."""
+    return [(row.rule, *map(_margin_text, row.margins)) for row in rules]
+
+
+def figure_rows(pairs: Iterable[FigurePair]) -> Rows:
+    """Return figures with both values and 90 % intervals."""
+    return [(f"{pair.name}, {pair.unit}", *map(_figure_text, pair.figures)) for pair in pairs]
+
+
+def _margin_text(margin: RuleMargin | None) -> str:
     if margin is None:
         return NOTHING
     value, word = (margin.measured, "") if margin.margin is None else (margin.margin, "margin ")
@@ -333,8 +350,7 @@ def margin_text(margin: RuleMargin | None) -> str:
     return f"{margin.verdict}{text}".rstrip()
 
 
-def reached_text(figure: Figure | None) -> str:
-    """Return a figure with its 90 % interval."""
+def _figure_text(figure: Figure | None) -> str:
     if figure is None:
         return NOTHING
     return f"{figure.value:.4g}" + (f" ({figure.range})" if figure.range else "")
@@ -359,10 +375,8 @@ def compare_html(comparison: DesignComparison) -> str:
     """Return the whole page of a comparison."""
     names, designs = comparison.names, comparison.designs
     head = ("", *names)
-    keys = [(row.key, *map(format_value, row.values)) for row in comparison.keys]
-    rules = [(row.rule, *map(margin_text, row.margins)) for row in comparison.rules]
+    keys, rules = key_rows(comparison.keys), rule_rows(comparison.rules)
     pairs = sorted(comparison.figures, key=lambda pair: not pair.is_main)
-    figures = [(f"{pair.name}, {pair.unit}", *map(reached_text, pair.figures)) for pair in pairs]
     grey = [number for number, pair in enumerate(pairs) if not pair.differs]
     intervals = "In parentheses the 90 % interval of what would be measured; grey figures agree."
     verdicts = [
@@ -375,7 +389,7 @@ def compare_html(comparison: DesignComparison) -> str:
         _inflated(comparison),
         PageSection("Keys", head=head, rows=keys, note="" if keys else "No key differs."),
         PageSection("Rules", head=head, rows=rules, note=same),
-        PageSection("Figures", head=head, rows=figures, grey=grey, note=intervals),
+        PageSection("Figures", head=head, rows=figure_rows(pairs), grey=grey, note=intervals),
     ]
     first, second = (each.design_sha256[:12] for each in designs)
     footer = (

@@ -39,7 +39,7 @@ from sbafab.models.figures import NEAR_BURST, Factors, Flag
 from sbafab.models.mechanisms import ASKED, mechanism_value
 from sbafab.models.paper import FULL_KPA, HEIGHTS, WATER_FLOW, Counterpart, counterpart
 from sbafab.models.pneumatics import refuse_pressure, seconds
-from sbafab.models.quantity import ANYWHERE, Conditions, ModelId, Quantity
+from sbafab.models.quantity import Conditions, ModelId, Quantity
 from sbafab.models.sizes import is_the_papers_3dof, sizes
 from sbafab.models.stack import MOST_PRESSURE, Stack, stack
 from sbafab.search.vary import key_values
@@ -604,38 +604,33 @@ class Subject:
 
     def counterpart(self, quantity: RequestedQuantity) -> Counterpart | None:
         """Return the paper's measured value if the model is off by over a quarter, else None."""
-        figure = self._figure(quantity)
-        if figure is None:
+        form, name = self.design.form, quantity.name
+        if group_of(quantity, form) is None:
             return None
-        of_papers = is_the_papers_3dof(self.design.form, self.laminate)
-        return counterpart(self.design.form, *figure, self.factors.calibration, of_papers)
-
-    def _figure(self, quantity: RequestedQuantity) -> tuple[Quantity, Conditions, ModelId] | None:
-        """Return the figure in ``predict`` and its model; None if the paper has no such
-        measurement.
-        """
-        at = Conditions(kpa=quantity.gauge_kpa)
-        match quantity.name:
-            case _ if group_of(quantity, self.design.form) is None:
+        at = Conditions(kpa=quantity.gauge_kpa, flow=quantity.flow)
+        if name == "height":
+            folded = self._actuator.folded
+            if folded.molten > 0 and folded.factor != 1:
                 return None
-            case "height":
-                folded = self._actuator.folded
-                is_pressed = folded.molten > 0 and folded.factor != 1
-                return None if is_pressed else (Quantity.FOLDED_HEIGHT, ANYWHERE, ModelId.FILMS)
-            case "stroke":
-                return Quantity.FREE_STROKE, at, ModelId.ELASTIC_BALLOON
-            case "bend":
-                at = at._replace(chambers=quantity.chambers)
-                return Quantity.BEND, at, ModelId.ELASTIC_STACK
-            case "time":
-                at = at._replace(flow=quantity.flow or WATER_FLOW)
-                return Quantity.WATER_TIME, at, ModelId.STACK_IN_TIME
-            case "lateral_stiffness":
-                return Quantity.SHUT_STIFFNESS, at, ModelId.STACK_SHUT
-        # The nearest of the three heights at which forces were measured.
-        share = self._stroke_of(quantity) / self._actuator.reference_stroke
-        near = min(HEIGHTS, key=lambda height: abs(height - share))
-        return Quantity.BLOCKED_FORCE, at._replace(share=near), ModelId.ELASTIC_STACK
+        elif name == "bend":
+            at = at._replace(chambers=quantity.chambers)
+        elif name == "force":
+            # The nearest of the three heights at which forces were measured.
+            share = self._stroke_of(quantity) / self._actuator.reference_stroke
+            at = at._replace(share=min(HEIGHTS, key=lambda height: abs(height - share)))
+        (of, model), of_papers = FIGURES[name], is_the_papers_3dof(form, self.laminate)
+        return counterpart(form, of, at, model, self.factors.calibration, of_papers)
+
+
+FIGURES = {
+    "height": (Quantity.FOLDED_HEIGHT, ModelId.FILMS),
+    "stroke": (Quantity.FREE_STROKE, ModelId.ELASTIC_BALLOON),
+    "bend": (Quantity.BEND, ModelId.ELASTIC_STACK),
+    "force": (Quantity.BLOCKED_FORCE, ModelId.ELASTIC_STACK),
+    "time": (Quantity.WATER_TIME, ModelId.STACK_IN_TIME),
+    "lateral_stiffness": (Quantity.SHUT_STIFFNESS, ModelId.STACK_SHUT),
+}
+"""Figures of ``predict`` and their models, of quantities that the paper measured."""
 
 
 def group_of(quantity: RequestedQuantity, form: Form) -> str | None:

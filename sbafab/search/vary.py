@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import random
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -92,7 +93,7 @@ def read_varied(text: str, option: str = "--vary") -> Varied:
     if not equals or not key or not values.strip():
         raise DesignError(f"{option} {shown(text)} is not KEY=VALUES; {_example(option)}")
     if ":" in values:
-        return _range(key, values.split(":"), text, option)
+        return _range(key, values.split(":"), f"{option} {shown(text)}", _example(option))
     # A list in brackets is one value; otherwise commas separate values.
     table = override({}, [f"values=[{values}]"])["values"]
     if not isinstance(table, list):
@@ -105,37 +106,29 @@ def _example(option: str) -> str:
     return f"write for example {option} chamber.diameter=4:8:0.5{more}"
 
 
-def _range(key: str, parts: Sequence[str], text: str, option: str) -> Varied:
+def _range(key: str, parts: Sequence[str], given: str, example: str) -> Varied:
     try:
-        ends = [_exact(part) for part in parts]
+        # The number in mm if it has a unit.
+        start, stop, *step = (Decimal(repr(millimetres(part))) for part in parts)
     except ValueError as error:
-        raise DesignError(f"{option} {shown(text)}: START, STOP and STEP {error}") from None
-    if len(ends) not in (2, 3):
-        raise DesignError(f"{option} {shown(text)} is not START:STOP:STEP; {_example(option)}")
-    start, stop = ends[:2]
+        raise DesignError(f"{given}: START, STOP and STEP {error}") from None
+    if len(step) > 1:
+        raise DesignError(f"{given} is not START:STOP:STEP; {example}")
     if stop < start:
-        raise DesignError(
-            f"{option} {shown(text)} stops below its start; write the smaller number first"
-        )
-    if len(ends) == 2:
+        raise DesignError(f"{given} stops below its start; write the smaller number first")
+    if not step:
         return Varied(key, (), float(start), float(stop))
-    step = ends[2]
-    if step <= 0:
-        raise DesignError(f"{option} {shown(text)}: STEP = {step} must be above 0")
-    count = int((stop - start) / step) + 1
+    by = step[0]
+    if by <= 0:
+        raise DesignError(f"{given}: STEP = {by} must be above 0")
+    count = int((stop - start) / by) + 1
     if count > MOST_VALUES:
         raise DesignError(
-            f"{option} {shown(text)} gives {count:,} values, and at most {MOST_VALUES:,} are "
-            "allowed; make STEP larger"
+            f"{given} gives {count:,} values, and at most {MOST_VALUES:,} are allowed; make STEP "
+            "larger"
         )
-    steps = [start + number * step for number in range(count)]
-    is_whole = start == int(start) and step == int(step)
-    return Varied(key, tuple(int(value) if is_whole else float(value) for value in steps))
-
-
-def _exact(text: str) -> Decimal:
-    """The number, in mm if it has a unit. Raises ValueError."""
-    return Decimal(repr(millimetres(text)))
+    kind = int if start == int(start) and by == int(by) else float
+    return Varied(key, tuple(kind(start + number * by) for number in range(count)))
 
 
 def _varied(key: str, values: Sequence[Any], text: str, option: str) -> Varied:
@@ -155,17 +148,15 @@ def refuse_unknown(design: Design, varied: Sequence[Varied], option: str = "--va
     """Raises DesignError for a key unknown to the design, and for one varied twice."""
     keys = [varied_key.key for varied_key in varied]
     for varied_key in varied:
-        key, values = varied_key.key, varied_key.values or (varied_key.low, varied_key.high)
+        key, problems = varied_key.key, []
         if keys.count(key) > 1:
             raise DesignError(f"{option} {key} is given twice; put all its values into one")
-        problems = []
-        for value in values:
+        for value in varied_key.values or (varied_key.low, varied_key.high):
             try:
                 design.with_({key: value})
+                break
             except DesignError as error:
                 problems.append(error)
-            else:
-                break
         else:
             raise problems[0]
 
@@ -178,9 +169,7 @@ def grid(varied: Sequence[Varied]) -> Iterator[Values]:
             raise DesignError(
                 f"{option} has no step; add one, {option}:STEP, or draw from it with --samples N"
             )
-    count = 1
-    for varied_key in varied:
-        count *= len(varied_key.values)
+    count = math.prod(len(varied_key.values) for varied_key in varied)
     if count > MOST_DESIGNS:
         raise DesignError(
             f"the grid has {count:,} designs, and at most {MOST_DESIGNS:,} are allowed; take "
@@ -205,12 +194,9 @@ def latin_hypercube(varied: Sequence[Varied], samples: int, seed: int) -> Iterat
         dice.shuffle(order)
         columns.append([_at(varied_key, (place + dice.random()) / samples) for place in order])
     names = [varied_key.key for varied_key in varied]
-    drawn = set()
-    for values in zip(*columns, strict=True):
-        # Few values give few combinations: each is used for one design.
-        if repr(values) not in drawn:
-            drawn.add(repr(values))
-            yield dict(zip(names, values, strict=True))
+    # Few values give few combinations: each is used for one design.
+    drawn = {repr(values): values for values in zip(*columns, strict=True)}
+    return (dict(zip(names, values, strict=True)) for values in drawn.values())
 
 
 def _at(varied: Varied, share: float) -> Any:
