@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import tomli_w
 
 from sbafab.actuators import build
@@ -30,7 +31,6 @@ from sbafab.models.figures import FLAGS, Flag, FlagList
 from sbafab.models.paper import Counterpart, CounterpartEntry
 from sbafab.rules.finding import Place
 from sbafab.runtime import Progress, ignore_progress
-from sbafab.search import space as searching
 from sbafab.search.quantities import (
     NAMES,
     Goal,
@@ -43,7 +43,15 @@ from sbafab.search.quantities import (
     shown_interval,
     shown_value,
 )
-from sbafab.search.space import FindRequest, GridPoint, SearchSpace, Trial, figure_text, misses
+from sbafab.search.space import (
+    FindRequest,
+    GridPoint,
+    SearchSpace,
+    Trial,
+    figure_text,
+    misses,
+    searched,
+)
 from sbafab.search.sweep_report import front
 from sbafab.search.vary import format_keys, key_values
 
@@ -149,7 +157,7 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
     if request.tries < LEAST_TRIES:
         raise DesignError(f"tries = {request.tries} must be at least {LEAST_TRIES}")
     try:
-        space = searching.searched(request, free_keys(request), progress)
+        space = searched(request, free_keys(request), progress)
     except KeyboardInterrupt as stop:
         raise Stopped("the search was stopped, and no file was written", *stop.args) from stop
     point, best = space.best()
@@ -343,15 +351,15 @@ def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[Bind
 
     For the nearest miss: the steps to designs that cannot be made, or that no model covers.
     """
-    for axis, neighbour in searching.single_steps(point):
-        if not space.holds(axis, neighbour):
+    for axis, neighbour, is_inside in space.neighbours(point):
+        if not is_inside:
             continue
         trial = space.peek(neighbour)
         if not trial.refused:
             is_nearer = best.holds and trial.cost < best.cost
         elif best.holds:
             # A refused one is judged by the step back.
-            back = space.peek(tuple(2 * at - to for at, to in zip(point, neighbour, strict=True)))
+            back = space.peek(tuple((2 * np.array(point) - neighbour).tolist()))
             is_nearer = not back.refused and back.cost > best.cost
         else:
             is_nearer = True
@@ -363,9 +371,9 @@ def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[Bind
 
 def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[RangeEnd]:
     """Yield the keys whose range alone prevents a better design, or a nearer miss."""
-    for axis, neighbour in searching.single_steps(point):
+    for axis, neighbour, is_inside in space.neighbours(point):
         free = space.free[axis]
-        if space.holds(axis, neighbour) or free.choices or space.is_excluded(axis, neighbour):
+        if is_inside or free.choices or space.is_excluded(axis, neighbour):
             continue
         if space.with_rules(space.peek(neighbour)).rank < best.rank:
             steps = space.lows[axis], space.highs[axis]

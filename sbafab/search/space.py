@@ -12,10 +12,14 @@ import itertools
 import math
 import random
 import traceback
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from sbafab.actuators import build
 from sbafab.design.files import shown
@@ -287,8 +291,8 @@ class SearchSpace:
         self.request = request
         self.free = free
         self.limit = request.tries
-        self.lows = [0] * len(free)
-        self.highs = [int(round((axis.high - axis.low) / axis.step, 6)) for axis in free]
+        self.lows = np.zeros(len(free), int)
+        self.highs = np.array([round((axis.high - axis.low) / axis.step, 6) for axis in free], int)
         self.trials: dict[GridPoint, Trial] = {}
         self._tell = progress
         self._keys = key_values(request.design)
@@ -306,13 +310,12 @@ class SearchSpace:
     @property
     def counts(self) -> list[int]:
         """Number of values of each key."""
-        return [high - low + 1 for low, high in zip(self.lows, self.highs, strict=True)]
+        return list((self.highs - self.lows + 1).tolist())
 
     @property
     def points(self) -> Iterator[GridPoint]:
         """Every design of the space."""
-        ends = zip(self.lows, self.highs, strict=True)
-        return itertools.product(*(range(low, high + 1) for low, high in ends))
+        return itertools.product(*map(range, self.lows.tolist(), (self.highs + 1).tolist()))
 
     def number(self, axis: int, point: GridPoint) -> float:
         """Return the value of a key at a point; for a list its largest number."""
@@ -335,14 +338,18 @@ class SearchSpace:
             return [round(value * number / max(listed), 2) for value in listed]
         return int(number) if free.low == int(free.low) and free.step == int(free.step) else number
 
-    def inside(self, steps: Sequence[int]) -> GridPoint:
+    def inside(self, steps: ArrayLike) -> GridPoint:
         """Return the point, or the nearest to it within the keys' ranges."""
-        ends = zip(steps, self.lows, self.highs, strict=True)
-        return tuple(min(max(at, low), high) for at, low, high in ends)
+        return tuple(np.clip(steps, self.lows, self.highs).tolist())
 
-    def holds(self, axis: int, point: GridPoint) -> bool:
-        """Return True if the range of a key holds its value at the point."""
-        return self.lows[axis] <= point[axis] <= self.highs[axis]
+    def neighbours(self, point: GridPoint) -> Iterator[tuple[int, GridPoint, bool]]:
+        """Yield the points one step of one key away, each with the key's number, and whether its
+        range holds it.
+        """
+        for axis, by in itertools.product(range(len(point)), (-1, 1)):
+            at = point[axis] + by
+            is_inside = bool(self.lows[axis] <= at <= self.highs[axis])
+            yield axis, (*point[:axis], at, *point[axis + 1 :]), is_inside
 
     def is_excluded(self, axis: int, point: GridPoint) -> bool:
         """Return True if a requirement on the key itself excludes its value at the point."""
@@ -449,7 +456,7 @@ def _explore(space: SearchSpace) -> None:
         elif space.best()[1].holds:
             break
         else:
-            point = tuple(map(dice.randint, space.lows, space.highs))
+            point = tuple(map(dice.randint, space.lows.tolist(), space.highs.tolist()))
         share = 4
         while share <= 2 * max(space.counts) and not space.is_over:
             point = _walk(space, point, [max(1, count // share) for count in space.counts])
@@ -464,7 +471,8 @@ def _grid(space: SearchSpace) -> Iterator[list[int]]:
     room = max(8.0, GRID_SHARE * space.request.tries)
     numbers = sum(not free.choices for free in space.free)
     levels = max(2, int(room ** (1 / max(1, numbers))))
-    for free, at, low, count in zip(space.free, space.start, space.lows, space.counts, strict=True):
+    axes = zip(space.free, space.start, space.lows.tolist(), space.counts, strict=True)
+    for free, at, low, count in axes:
         few = min(levels, count)
         steps = [low + round((count - 1) * number / max(1, few - 1)) for number in range(few)]
         yield [at] if free.choices else list(dict.fromkeys(steps))
@@ -472,13 +480,10 @@ def _grid(space: SearchSpace) -> Iterator[list[int]]:
 
 def _starts(space: SearchSpace) -> list[GridPoint]:
     """Return the starting point and the best points of the grid that lie far apart."""
-
-    def is_far(a: GridPoint, b: GridPoint) -> bool:
-        return any(abs(x - y) * 3 > count for x, y, count in zip(a, b, space.counts, strict=True))
-
     starts = [space.start]
     for point in sorted(space.trials, key=lambda point: space.trials[point].rank):
-        if len(starts) < STARTS and all(is_far(point, start) for start in starts):
+        apart = 3 * np.abs(np.subtract(starts, point)) > space.counts
+        if len(starts) < STARTS and apart.any(axis=1).all():
             starts.append(point)
     return starts
 
@@ -497,7 +502,7 @@ def _has_better_walk(space: SearchSpace, point: GridPoint) -> bool:
     counts = space.counts
     axes = [axis for axis, count in enumerate(counts) if 1 < count <= FEW and len(counts) > 1]
     for axis, by in itertools.product(sorted(axes, key=lambda axis: counts[axis]), FIXED_STEPS):
-        start = space.inside(_moved(point, axis, by))
+        start = space.inside(np.add(point, by * np.eye(len(point), dtype=int)[axis]))
         if start == point or space.is_over:
             continue
         for share in (32, 128, max(counts)):
@@ -515,51 +520,37 @@ def _walk(space: SearchSpace, point: GridPoint, stride: Sequence[int]) -> GridPo
     Where two requirements meet, only a step of both keys makes progress. A move that improved is
     repeated. A key whose stride is 0 is held fixed.
     """
-    still = (0,) * len(stride)
-    moving = [axis for axis, step in enumerate(stride) if step]
-    moves = [_moved(still, axis, sign * stride[axis]) for axis in moving for sign in (-1, 1)]
-    moves += [
-        _moved(_moved(still, a, sign * stride[a]), b, -sign * stride[b])
-        for a, b in itertools.combinations(moving, 2)
-        for sign in (-1, 1)
-    ]
+    steps = [by for by in np.diag(stride) if by.any()]
+    steps += [a - b for a, b in itertools.combinations(steps, 2)]
+    moves = deque(sign * by for by in steps for sign in (-1, 1))
     stale = 0
     while stale < len(moves) and not space.is_over:
-        to = space.inside([at + by for at, by in zip(point, moves[0], strict=True)])
+        to = space.inside(point + moves[0])
         if to != point and space.trial(to).rank < space.trial(point).rank:
             point, stale = to, 0
         else:
             stale += 1
-            moves = [*moves[1:], moves[0]]
+            moves.rotate(-1)
     return point
-
-
-def _moved(point: GridPoint, axis: int, by: int) -> GridPoint:
-    return (*point[:axis], point[axis] + by, *point[axis + 1 :])
-
-
-def single_steps(point: GridPoint) -> list[tuple[int, GridPoint]]:
-    """Return the points one step of one key away, each with the key's number."""
-    return [(axis, _moved(point, axis, by)) for axis in range(len(point)) for by in (-1, 1)]
 
 
 def _widen_ranges(space: SearchSpace) -> None:
     """Search beyond the ends of ranges that may widen, as long as that finds better designs."""
     for _ in range(WIDENINGS):
         point, before = space.best()
-        ends = space.lows[:], space.highs[:]
+        ends = space.lows.copy(), space.highs.copy()
         counts = space.counts
-        for axis, beyond in single_steps(point):
-            free, is_inside = space.free[axis], space.holds(axis, beyond)
+        for axis, beyond, is_inside in space.neighbours(point):
+            free = space.free[axis]
             is_impossible = space.number(axis, beyond) <= 0 or space.is_excluded(axis, beyond)
             if not free.widens or is_inside or is_impossible:
                 continue
             if beyond[axis] > point[axis]:
                 space.highs[axis] += counts[axis]
             else:
-                below = int(round((free.low + space.lows[axis] * free.step) / free.step, 6)) - 1
+                below = int(round(free.low / free.step + space.lows[axis], 6)) - 1
                 space.lows[axis] -= min(counts[axis], below)
-        if (space.lows, space.highs) == ends:
+        if space.counts == counts:
             return
         _refine(space)
         if not space.best()[1].rank < before.rank:
