@@ -34,8 +34,6 @@ from sbafab.search.find import (
 )
 from sbafab.search.find import find as search
 from sbafab.search.quantities import (
-    Goal,
-    Requirement,
     quantity_lines,
     read_all,
     read_sure,
@@ -249,12 +247,12 @@ def _print_quantities(result: FoundDesign) -> None:
     is_sure = request.sure is not None
     lines: dict[str, list[str]] = {}
     for row in request.requirements:
-        value = figure_text(request, best, row) + ("" if is_sure else _interval_text(result, row))
+        value = figure_text(request, best, row) + ("" if is_sure else result.interval_text(row))
         missed = "" if best.meets(row) else ": MISSED"
         line = f"{row.quantity.label} {value}; {row.bound}{missed}"
         lines.setdefault(row.quantity.label, []).append(line)
     label = goal.label if result.holds else goal.quantity.label
-    value = shown_value(goal.quantity, best.value(goal)) + _interval_text(result, goal)
+    value = shown_value(goal.quantity, best.value(goal)) + result.interval_text(goal)
     lines.setdefault(goal.quantity.label, []).append(f"{label}: {value}")
     for name, told_of in lines.items():
         for line in told_of:
@@ -267,12 +265,6 @@ def _print_quantities(result: FoundDesign) -> None:
         hint = "" if is_sure else "; --sure 0.9 requires each requirement with that probability"
         note = f"in parentheses the 90 % interval of what would be measured{hint}"
         show.wrapped(note, indent="  ")
-
-
-def _interval_text(result: FoundDesign, subject: Requirement | Goal) -> str:
-    """Return the 90 % interval in parentheses; empty without one."""
-    ends = result.interval_text(subject)
-    return f" ({ends})" if ends else ""
 
 
 USEFUL_KPA = 50.0

@@ -19,7 +19,16 @@ import numpy as np
 import tomli_w
 
 from sbafab.actuators import build
-from sbafab.design.files import KIT, Change, design_path, kit_names, override, read_toml, shown
+from sbafab.design.files import (
+    KIT,
+    Change,
+    design_path,
+    key_paths,
+    kit_names,
+    override,
+    read_toml,
+    shown,
+)
 from sbafab.design.kits import kit_path
 from sbafab.design.records import Design, Free
 from sbafab.documents import Document, PlainNumber, attribute
@@ -33,13 +42,13 @@ from sbafab.rules.finding import Place
 from sbafab.runtime import Progress, ignore_progress
 from sbafab.search.quantities import (
     NAMES,
+    ROUND_A_TUBE,
     Goal,
     RequestedQuantity,
     Requirement,
     Subject,
     group_of,
     read_quantity,
-    refuse_unknown_key,
     shown_interval,
     shown_value,
 )
@@ -105,10 +114,12 @@ class FoundDesign:
         """Requirements and rules that the best design breaks, one sentence each."""
         return misses(self.request, self.best)
 
-    def interval_text(self, subject: Requirement | Goal) -> str:
-        """Return the 90 % interval of a requirement or the goal without its unit; empty without."""
+    def interval_text(self, subject: Requirement | Goal, words: str = " ({})") -> str:
+        """Return the 90 % interval of a requirement or the goal, in words; empty without one."""
         interval = self.intervals.get(subject.quantity.label)
-        return shown_interval(interval) if interval and self.best.value(subject) >= 0 else ""
+        if interval is None or self.best.value(subject) < 0:
+            return ""
+        return words.format(shown_interval(interval))
 
 
 @dataclass(frozen=True)
@@ -222,8 +233,7 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
     free = [key for key in every if not key.asked or key.asked in names]
     keys = [key.key for key in free]
     for quantity in request.quantities:
-        refuse_unknown_key(quantity, design)
-        _refuse_bend(quantity, design, keys)
+        _refuse_unknown(quantity, design, keys)
     if request.sure is not None:
         _refuse_unsure(request, request.sure)
     for requirement in request.requirements:
@@ -236,6 +246,27 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
     if not any(key.startswith(OF_FILMS) for key in keys):
         _refuse_unknown_films(request)
     return narrowed
+
+
+def _refuse_unknown(quantity: RequestedQuantity, design: Design, free: Sequence[str]) -> None:
+    """Raises DesignError for an unknown key, with the likely one, and for a quantity that the
+    design's family does not have; also for a bend for which no chamber would stay empty.
+    """
+    name, form = quantity.name, design.form
+    if "." in name and name not in key_paths(type(design)):
+        design.with_({name: 1})
+    if name == "lumen" and form.lumen is None:
+        raise DesignError(f"{design.name} has no lumen; ask for one of a lobed design")
+    if name in ROUND_A_TUBE and form.wrap is None:
+        raise DesignError(f"{design.name} has no {name}; only radial designs do")
+    if name == "bend" and quantity.chambers >= form.stacks and COUNT not in free:
+        if not form.is_parallel:
+            raise DesignError(f"{design.name} does not bend; only chambers side by side do")
+        raise DesignError(
+            f"{quantity.label}: {design.name} has {form.stacks} chambers and one must stay empty; "
+            f"ask for at most {form.stacks - 1}, or for more chambers with --free "
+            f"{COUNT}=LOW:HIGH:STEP"
+        )
 
 
 def _refuse_unknown_films(request: FindRequest) -> None:
@@ -298,20 +329,6 @@ def _refuse_fixed(requirement: Requirement, design: Design, free: Sequence[str])
         raise DesignError(
             f"{key} = {value:g}, not {requirement.bound}, and the search does not change it; give "
             f"it a range with --free {key}=LOW:HIGH:STEP"
-        )
-
-
-def _refuse_bend(quantity: RequestedQuantity, design: Design, free: Sequence[str]) -> None:
-    """Raises DesignError for a bend for which no chamber would stay empty, while their number is
-    fixed.
-    """
-    stacks = design.form.stacks
-    if quantity.name == "bend" and quantity.chambers >= stacks and COUNT not in free:
-        if not design.form.is_parallel:
-            raise DesignError(f"{design.name} does not bend; only chambers side by side do")
-        raise DesignError(
-            f"{quantity.label}: {design.name} has {stacks} chambers and one must stay empty; "
-            f"ask for at most {stacks - 1}, or for more chambers with --free {COUNT}=LOW:HIGH:STEP"
         )
 
 
@@ -544,8 +561,7 @@ def found_toml(
     ]
     told.append((goal, shown_value(goal.quantity, best.value(goal)), "the goal"))
     for subject, value, what in told:
-        ends = outcome.interval_text(subject)
-        interval = f"; 90 % interval {ends}" if ends else ""
+        interval = outcome.interval_text(subject, "; 90 % interval {}")
         head.append(f"{subject.quantity.label} = {value} ({what}{interval})")
     head += [f"{name}: {measured.sentence()}" for name, measured in outcome.measured.items()]
     head += [f"{name}: {FLAGS[flag]}" for name, flags in outcome.flags.items() for flag in flags]

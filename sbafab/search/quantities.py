@@ -18,7 +18,7 @@ from itertools import permutations
 from string import ascii_letters
 from typing import Any, NamedTuple
 
-from sbafab.design.files import key_paths, listed, shown
+from sbafab.design.files import listed, shown
 from sbafab.design.records import Design, Form, Slots
 from sbafab.design.units import (
     KILOPASCALS,
@@ -646,13 +646,3 @@ def group_of(quantity: RequestedQuantity, form: Form) -> str | None:
 def free_height(kind: Balloon, kpa: float) -> float:
     """Free height (mm) of a balloon. Raises BeyondError if its film does not stand it."""
     return elastic.free_rise(Counter([kind]), kpa).stroke
-
-
-def refuse_unknown_key(quantity: RequestedQuantity, design: Design) -> None:
-    """Raises DesignError for an unknown key, with the likely one."""
-    if "." in quantity.name and quantity.name not in key_paths(type(design)):
-        design.with_({quantity.name: 1})
-    if quantity.name == "lumen" and design.form.lumen is None:
-        raise DesignError(f"{design.name} has no lumen; ask for one of a lobed design")
-    if quantity.name in ROUND_A_TUBE and design.form.wrap is None:
-        raise DesignError(f"{design.name} has no {quantity.name}; only radial designs do")

@@ -212,56 +212,58 @@ def numbers_of(value: Any) -> list[float]:
 
 
 def read_free(
-    design: Design, texts: Sequence[str], fixed: Sequence[str] = (), assigned: Sequence[str] = ()
+    design: Design,
+    free: str | Iterable[Free | str],
+    fixed: Sequence[str] = (),
+    assigned: Sequence[str] = (),
 ) -> tuple[Free, ...]:
-    """Return the family's own keys without those ``fixed``, replaced by the keys of the ``texts``
-    if given.
+    """Return the family's own keys without those ``fixed``, replaced by the keys of ``free``: texts
+    or records, or one text alone.
 
     Keys ``assigned`` by hand do not change, except lists, which are scaled as a whole; an envelope
     to fit determines the chamber. Raises DesignError.
     """
     keys = key_values(design)
     assigned = [key for key in assigned if not numbers_of(keys.get(key))]
-    named = [_free_of(text) for text in texts]
+    is_several = isinstance(free, Iterable) and not isinstance(free, str)
+    given = list(free) if is_several else [free]
+    named = [_free_of(key) for key in given]
+    texts = [key for key in given if isinstance(key, str)]
     refuse_unknown(design, [read_varied(text, "--free") for text in texts], "--free")
     for key, word in ((each.key, word) for each in named for word in each.choices):
         design.with_({key: word})
     fits = any(key.startswith("fits.") for key in assigned)
     unfree = {*assigned, *(["chamber.diameter"] if fits else [])}
-    free = {key.key: key for key in design.free if key.key not in unfree}
+    every = {key.key: key for key in design.free if key.key not in unfree}
     for key in dict.fromkeys(fixed):
-        if key not in assigned and free.pop(key, None) is None:
+        if key not in assigned and every.pop(key, None) is None:
             raise DesignError(
-                f"--fix {shown(key)}: a search changes {', '.join(free) or 'nothing'} by default"
+                f"--fix {shown(key)}: a search changes {', '.join(every) or 'nothing'} by default"
             )
     # Named keys are free whatever the requirements name.
-    free |= {key.key: key for key in named}
-    if "stack.balloons" in free and numbers_of(keys.get("chamber.diameter")):
+    every |= {key.key: key for key in named}
+    if "stack.balloons" in every and numbers_of(keys.get("chamber.diameter")):
         raise DesignError(
             "--free stack.balloons: chamber.diameter lists a diameter for each balloon, and a "
             "search scales that list; leave it out, or give one diameter"
         )
-    return tuple(free.values())
+    return tuple(every.values())
 
 
-def free_of(design: Design, free: Iterable[Free | str]) -> tuple[Free, ...]:
-    """Return the keys that a caller names, in place of the family's own: each a ``Free`` or a text,
-    or one text alone. Raises DesignError.
-    """
-    each = [free] if isinstance(free, str) else list(free) if isinstance(free, Iterable) else [free]
-    for key in each:
-        if not isinstance(key, Free | str):
-            raise DesignError(
-                f"free holds {shown(key)}; give texts KEY=LOW:HIGH:STEP, for example "
-                '["chamber.diameter=3:12:0.1"]'
-            )
-    texts = [key for key in each if isinstance(key, str)]
-    records = [key for key in each if isinstance(key, Free)]
-    return (*records, *read_free(design, texts, [key.key for key in design.free]))
+def free_of(design: Design, free: str | Iterable[Free | str]) -> tuple[Free, ...]:
+    """Return the keys that a caller names, in place of the family's own. Raises DesignError."""
+    return read_free(design, free, [key.key for key in design.free])
 
 
-def _free_of(text: str) -> Free:
+def _free_of(text: object) -> Free:
     """``KEY=LOW:HIGH:STEP``, or ``KEY=word,word`` for a key with a choice of words."""
+    if isinstance(text, Free):
+        return text
+    if not isinstance(text, str):
+        raise DesignError(
+            f"free holds {shown(text)}; give texts KEY=LOW:HIGH:STEP, for example "
+            '["chamber.diameter=3:12:0.1"]'
+        )
     stepped = read_varied(text, "--free")
     if stepped.values and all(isinstance(value, str) for value in stepped.values):
         return Free.of_words(stepped.key, stepped.values)

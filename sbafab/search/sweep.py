@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
@@ -156,8 +155,8 @@ def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress
         gone = stale_designs(folder / CSV, table)
         files = (*write_tables(table, folder), PAGE, JOURNAL)
         replace_text(folder / PAGE, sweep_html(request.design, request.varied, table))
-    outcomes = Counter(row["outcome"] for row in table.rows())
-    return SweptDesigns(folder, len(values), len(missing), dict(outcomes), files, table, gone)
+    outcomes = dict(table.outcomes)
+    return SweptDesigns(folder, len(values), len(missing), outcomes, files, table, gone)
 
 
 def _measure(

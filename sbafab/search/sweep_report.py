@@ -26,7 +26,7 @@ from sbafab.models.calibration import factors_of
 from sbafab.models.paper import CALIBRATED_MODELS, counterpart
 from sbafab.models.quantity import ANYWHERE, Conditions, FigureKey, Quantity
 from sbafab.reports.charts import ChartBars, ChartCurve, ChartSpecks, Panel, chart_svg
-from sbafab.search.trials import SweepRow
+from sbafab.search.trials import SweepOutcome, SweepRow
 from sbafab.search.vary import Values, Varied, format_value
 from sbafab.spreadsheet import write_rows
 from sbafab.version import GENERATOR
@@ -78,28 +78,35 @@ class Table:
         self.pressures_kpa = pressures_kpa
         self.is_whole = is_whole
         self.is_calibrated = is_calibrated
-        self.columns: dict[str, bool] = {}
-        """Columns of all rows, and whether they hold numbers only: keys, the varied ones first,
-        then rules, then figures."""
+        self.columns: list[str] = []
+        """Columns of all rows: keys, the varied ones first, then rules, then figures."""
         self.figures: dict[str, FigureKey] = {}
         """The figures of all rows by their columns."""
+        self.outcomes: Counter[SweepOutcome] = Counter()
+        self.causes: dict[str, list[str]] = {}
+        """Reasons of each cause of failure, each with the number of its design."""
+        self.hashes = {""}
         self._binding: set[str] = set()
         """Rules that anywhere fail, warn or pass without margin."""
         self._scan()
 
     def _scan(self) -> None:
         order: tuple[dict[str, None], ...] = ({}, {}, {}, {})
-        texts: set[str] = set()
         for number, row in enumerate(self.rows(), 1):
             for part, cells in zip(order, self._parts(number, row), strict=True):
                 part.update(dict.fromkeys(cells))
-                texts.update(n for n, c in cells.items() if not (c is None or _is_number(c)))
+            self.outcomes[row["outcome"]] += 1
+            self.hashes.add(row.get("sha256", ""))
+            failed = {} if row["outcome"] == "passes" else {row["outcome"]: row["reason"]}
+            for cause, message in row.get("failed", failed).items():
+                told = f"no. {number}: {cause}: {message}"
+                self.causes.setdefault(cause, []).append(told)
             self.figures |= {_heading(key): FigureKey.read(key) for key in row.get("figures", ())}
             for name, (verdict, margin, _, limit, _) in row.get("rules", {}).items():
                 is_tight = margin is not None and limit and abs(margin) < LITTLE * abs(limit)
                 if verdict != "pass" or is_tight:
                     self._binding.add(name)
-        self.columns = {name: name not in texts for part in order for name in part}
+        self.columns = list(dict.fromkeys(name for part in order for name in part))
 
     def _parts(self, number: int, row: SweepRow) -> tuple[dict[str, Any], ...]:
         """Return the cells of a row by column: its head, keys, rules and figures."""
@@ -141,10 +148,10 @@ class Table:
 
     def cells(self, names: Iterable[str]) -> Iterator[list[Any]]:
         """The cells of every row in these columns; None for empty cells."""
-        chosen = [(name, self.columns[name]) for name in names]
+        chosen = list(names)
         for number, row in enumerate(self.rows(), 1):
             every = {name: cell for part in self._parts(number, row) for name, cell in part.items()}
-            yield [_cell(every.get(name), is_number) for name, is_number in chosen]
+            yield [_cell(every.get(name)) for name in chosen]
 
 
 @lru_cache(maxsize=4096)
@@ -157,8 +164,8 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _cell(value: Any, is_number: bool) -> Any:
-    if value is None or is_number or isinstance(value, str):
+def _cell(value: Any) -> Any:
+    if value is None or isinstance(value, str) or _is_number(value):
         return value
     return json.dumps(value, ensure_ascii=False)
 
@@ -207,16 +214,14 @@ def stale_designs(path: Path, table: Table) -> int:
     """Return the number of designs in the CSV file at the path that are not in the table."""
     if not path.exists():
         return 0
-    now = {row.get("sha256", "") for row in table.rows()}
     with path.open(newline="", encoding="utf-8") as opened:
-        before = {row.get("sha256", "") for row in csv.DictReader(opened)}
-    return len(before - now - {""})
+        return len({row.get("sha256", "") for row in csv.DictReader(opened)} - table.hashes)
 
 
 # Pictures of the page: outcomes by the varied keys, and trade-offs.
 
 
-OUTCOMES = {
+OUTCOMES: Mapping[SweepOutcome, tuple[str, str]] = {
     "passes": ("#009e73", "pass every rule"),
     "fails": ("#d55e00", "fail a rule"),
     "refused": ("#999999", "cannot be made"),
@@ -299,7 +304,9 @@ def _bars(columns: Columns, key: str) -> Panel:
     return Panel("", key, "designs", (), bars=bars, names=names)
 
 
-def _specks(columns: Columns, x: str, y: str, outcomes: Iterable[str]) -> list[ChartSpecks]:
+def _specks(
+    columns: Columns, x: str, y: str, outcomes: Iterable[SweepOutcome]
+) -> list[ChartSpecks]:
     marks = [*OUTCOMES]
     rows = {outcome: _both(columns, x, y, outcome) for outcome in outcomes}
     return [
@@ -373,18 +380,21 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
     """Return the whole page of a sweep."""
     keys = [swept.key for swept in varied]
     objectives = _objectives(table)
-    columns, causes = _read(table, [*keys, *(objective.column for objective in objectives)])
-    counts = Counter(columns["outcome"])
+    names = ["outcome", *keys, *(objective.column for objective in objectives)]
+    columns = dict(zip(names, zip(*table.cells(names), strict=True), strict=True))
+    counts = table.outcomes
     pairs = _pairs(objectives, columns)
     note = ""
     if not pairs:
         none = "The passing designs do not differ in two figures, so there is no trade-off."
         note = none if counts["passes"] else "No design passes."
     sections = [PageSection("Passing designs", svg=passes_svg(columns, keys), note=note)]
+    causes = sorted(table.causes.items(), key=lambda item: -len(item[1]))
     if causes:
         more = len(causes) - MOST_REASONS
         note = f"{more} more causes are listed in the tables." if more > 0 else ""
-        head, rows = ["cause", "designs", "example"], causes[:MOST_REASONS]
+        head = ["cause", "designs", "example"]
+        rows = [[cause, str(len(told)), told[0]] for cause, told in causes[:MOST_REASONS]]
         sections.append(PageSection("Causes of failure", head=head, rows=rows, note=note))
     if pairs:
         sections += _trade_offs(design, table, keys, objectives, columns, pairs)
@@ -456,27 +466,6 @@ def _objectives(table: Table) -> list[Objective]:
     ]
     good = Objective(YIELD[0], "share of good builds", True)
     return [*objectives, good] if YIELD[0] in table.columns else objectives
-
-
-def _read(table: Table, names: Sequence[str]) -> tuple[Columns, list[list[str]]]:
-    """Return these columns and the outcomes, and the causes of failure, the most common first: each
-    with the number of designs, and the first of them with its reason.
-    """
-    columns: dict[str, list[Any]] = {name: [] for name in ("outcome", *names)}
-    for cells in table.cells(columns):
-        for column, cell in zip(columns.values(), cells, strict=True):
-            column.append(cell)
-    counts: Counter[str] = Counter()
-    examples: dict[str, str] = {}
-    for number, row in enumerate(table.rows(), 1):
-        failed = row.get("failed", {})
-        if row["outcome"] not in ("passes", "fails"):
-            failed = {row["outcome"]: row["reason"]}
-        for cause, message in failed.items():
-            counts[cause] += 1
-            examples.setdefault(cause, f"no. {number}: {cause}: {message}")
-    causes = [[cause, str(count), examples[cause]] for cause, count in counts.most_common()]
-    return columns, causes
 
 
 def _pairs(objectives: Sequence[Objective], columns: Columns) -> list[tuple[Objective, Objective]]:
