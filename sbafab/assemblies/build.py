@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from sbafab.design.files import (
     ASSEMBLY,
     add_waivers,
     design_path,
+    hint,
     kit_names,
     listed,
     override,
@@ -151,9 +151,8 @@ def _check_joint(name: str, part: AnyPart, parts: Mapping[str, AnyPart]) -> None
     where = f"parts.{name}"
     host = parts.get(str(part.on))
     if host is None:
-        near = difflib.get_close_matches(str(part.on), parts, 1)
-        hint = f"did you mean {near[0]}?" if near else f"the parts are {', '.join(parts)}"
-        raise DesignError(f"{where}.on = {shown(part.on)} is not a part of the assembly; {hint}")
+        known = hint(str(part.on), parts)
+        raise DesignError(f"{where}.on = {shown(part.on)} is not a part of the assembly; {known}")
     allowed = places_for(part, host)
     if not allowed:
         raise DesignError(

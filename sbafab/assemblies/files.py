@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
-import hashlib
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,14 +17,15 @@ from sbafab.design.files import (
     changed_keys,
     checked,
     design_path,
+    hint,
     listed,
     override,
     read_toml,
     shown,
     toml_tables,
 )
-from sbafab.design.identity import actuator_sha256, design_sha256
-from sbafab.design.records import Design, validated
+from sbafab.design.identity import actuator_sha256, design_sha256, tables_sha256
+from sbafab.design.records import Design, validated, without_none
 from sbafab.errors import DesignError
 
 
@@ -92,9 +90,8 @@ def _part(name: str, table: object) -> AnyPart:
     if kind is None:
         raise DesignError(f"{where}.kind is missing; add kind = one of {listed(KINDS)}")
     if not isinstance(kind, str) or kind not in KINDS:
-        near = difflib.get_close_matches(shown(kind).strip("'"), KINDS, 1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise DesignError(f"{where}.kind = {shown(kind)} must be one of {listed(KINDS)}{hint}")
+        kinds = hint(shown(kind).strip("'"), KINDS)
+        raise DesignError(f"{where}.kind = {shown(kind)} is not a kind of part; {kinds}")
     return checked(KINDS[kind], table, {}, f"{where}.")
 
 
@@ -103,7 +100,7 @@ DESIGN_FILE = "design.toml"
 
 def plain_tables(assembly: Assembly) -> dict[str, Any]:
     """Return the assembly's own keys as tables, with every default written out."""
-    return _without_none(assembly.model_dump(mode="json"))
+    return without_none(assembly.model_dump(mode="json"))
 
 
 def resolved(assembled: Assembled) -> dict[str, Any]:
@@ -116,15 +113,7 @@ def resolved(assembled: Assembled) -> dict[str, Any]:
             # The folder's design holds the keys that were set, the assembly's own among them.
             part["design"] = f"{source.design.name}/{DESIGN_FILE}"
             del part["set"]
-    return _without_none(table)
-
-
-def _without_none(table: dict[str, Any]) -> dict[str, Any]:
-    return {
-        key: _without_none(value) if isinstance(value, dict) else value
-        for key, value in table.items()
-        if value is not None
-    }
+    return without_none(table)
 
 
 def assembly_toml(assembled: Assembled) -> str:
@@ -138,8 +127,7 @@ def assembly_sha256(assembled: Assembled) -> str:
     """Return the hash of all inputs of the output, the designs of the parts included."""
     table = resolved(assembled)
     digests = {source.design.name: design_sha256(source.design) for source in assembled.designs}
-    text = json.dumps([table, digests], sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return tables_sha256([table, digests])
 
 
 def assembled_sha256(assembled: Assembled) -> str:
@@ -152,8 +140,7 @@ def assembled_sha256(assembled: Assembled) -> str:
         source = assembled[name].made
         actuator = {} if source is None else {"design": actuator_sha256(source.design)}
         parts[name] = {**part, **actuator, "note": None}
-    text = json.dumps(parts, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return tables_sha256(parts)
 
 
 def part_entry(placed: PlacedPart) -> dict[str, Any]:

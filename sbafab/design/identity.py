@@ -17,7 +17,7 @@ from sbafab.laminate.films import Film
 
 def design_sha256(design: Design) -> str:
     """Return the hash of everything that determines the output, named files by their content."""
-    return _sha256(_with_files(with_unused(design), design) | {"kit": kit_of(design).sha256})
+    return tables_sha256(_with_files(with_unused(design), design) | {"kit": kit_of(design).sha256})
 
 
 def actuator_sha256(design: Design) -> str:
@@ -40,7 +40,7 @@ def actuator_sha256(design: Design) -> str:
         *(("middle-first",) if design.registration.is_middle_first else ()),
     ]
     table["press"] = [getattr(design.press, key) for key in BONDED]
-    return _sha256(table)
+    return tables_sha256(table)
 
 
 NO_ACTUATOR = (
@@ -78,7 +78,8 @@ def _with_files(table: dict[str, Any], design: Design) -> dict[str, Any]:
     return override(table, [contents])
 
 
-def _sha256(table: dict[str, Any]) -> str:
+def tables_sha256(table: Any) -> str:
+    """Return the hash of tables, whatever the order of their keys."""
     text = json.dumps(table, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
 

@@ -7,7 +7,6 @@ pressure; bends, forces, stiffness and times come from the elastic stack.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections import Counter
@@ -18,7 +17,7 @@ from itertools import permutations
 from string import ascii_letters
 from typing import Any, NamedTuple
 
-from sbafab.design.files import listed, shown
+from sbafab.design.files import hint, shown
 from sbafab.design.records import Design, Form, Slots
 from sbafab.design.units import (
     KILOPASCALS,
@@ -189,9 +188,7 @@ def read_quantity(
         named = f"{', '.join(AT_PRESSURE[:-1])} and {AT_PRESSURE[-1]}"
         raise DesignError(f"{shown(text)}: only {named} take a pressure; {HOW}")
     if name not in NAMES and "." not in name:
-        near = difflib.get_close_matches(name, NAMES, 1)
-        mends = f"did you mean {near[0]}?" if near else f"there are {listed([*NAMES])} and any key"
-        raise DesignError(f"{shown(text)} is not a quantity; {mends}")
+        raise DesignError(f"{shown(text)} is not a quantity; {hint(name, [*NAMES, 'any key'])}")
     return RequestedQuantity(name, NAMES[name].unit if name in NAMES else "")
 
 
