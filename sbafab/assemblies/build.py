@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.actuators import build, records
-from sbafab.assemblies.records import AnyPart, Assembly, Base, Cup, Line, Magnet, Sba, Seat, Tube
+from sbafab.assemblies.records import AnyPart, Assembly, Line, Sba, Seat, Tube, girth_and_height
 from sbafab.design.files import (
     ASSEMBLY,
     add_waivers,
@@ -218,14 +218,7 @@ class PlacedPart:
         """Size along its own axis, mm; an SBA's is computed from the nominal films."""
         if self.made is not None:
             return self.made.laminate.thickness
-        match self.part:
-            case Tube() | Line():
-                return self.part.length
-            case Magnet() | Base():
-                return self.part.thickness
-            case Cup():
-                return self.part.height
-        raise TypeError(f"{self.name} is placed without its design")
+        return girth_and_height(self.part)[1]
 
     def at(self, p: Vector) -> Vector:
         """Return the place in the assembly of a point (x, y, z) in mm of the part's own frame."""

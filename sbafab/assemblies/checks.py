@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from sbafab.assemblies.build import Assembled, PlacedPart, about_axis, inlet_of
-from sbafab.assemblies.records import AssemblyRules, Base, Cup, Line, Magnet, Seat, Tube
+from sbafab.assemblies.records import AssemblyRules, Cup, Line, Seat, Tube, girth_and_height
 from sbafab.assemblies.shapes import face, placed_surface
 from sbafab.design.records import Discs
 from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.laminate import outline_diameter
-from sbafab.meshing.surface import Surface, Vector
+from sbafab.meshing.surface import Vector
 from sbafab.models.calibration import factors_of
 from sbafab.models.closed_forms import LOBES, folded_diameter
 from sbafab.models.sizes import deflated_diameter
@@ -23,6 +23,9 @@ from sbafab.models.sizes import sizes as sizes_of
 from sbafab.rules.finding import Finding, Place, Verdict, judged, marked
 from sbafab.rules.limits import holds, weakened
 from sbafab.rules.sentences import Clause, say
+
+if TYPE_CHECKING:
+    import manifold3d
 
 
 def _judged(
@@ -330,7 +333,7 @@ def aperture(assembled: Assembled) -> Iterator[Finding]:
 
 def _passage(placed: PlacedPart) -> _Passage:
     if placed.made is None:
-        size, is_soft = _girth(placed), isinstance(placed.part, Cup)
+        size, is_soft = girth_and_height(placed.part)[0], isinstance(placed.part, Cup)
         pressed, how = (0.0, "squeezed") if is_soft else (size, "as-it-is")
         return _Passage(placed, size, pressed, how)
     design, laminate = placed.made.design, placed.made.laminate
@@ -343,18 +346,6 @@ def _passage(placed: PlacedPart) -> _Passage:
     lobe = max(form.pockets.diameters) + 2 * design.bond.width
     folded = folded_diameter(lobe, factors_of(design).folded(laminate).height)
     return _Passage(placed, folded_diameter(lobe, laminate.thickness), folded, "folded")
-
-
-def _girth(placed: PlacedPart) -> float:
-    """Return the diameter of the smallest round hole that a bought part passes, mm."""
-    part = placed.part
-    if isinstance(part, Tube | Line):
-        return part.outer_diameter
-    if isinstance(part, Magnet | Cup):
-        return part.diameter
-    assert isinstance(part, Base)
-    short, middle, _ = sorted((part.width, part.length, part.thickness))
-    return float((short**2 + middle**2) ** 0.5)
 
 
 def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
@@ -382,7 +373,7 @@ def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
 
 def _deflated(placed: PlacedPart) -> float:
     if placed.made is None:
-        return _girth(placed)
+        return girth_and_height(placed.part)[0]
     wrap, laminate = placed.made.design.form.wrap, placed.made.laminate
     if wrap is not None:
         return deflated_diameter(wrap, laminate.thickness)
@@ -423,14 +414,15 @@ def collision(assembled: Assembled) -> Iterator[Finding]:
 
     An SBA bent round a tube lies on it by construction; this pair is not compared.
     """
-    surfaces = {p.name: placed_surface(p, filled=True) for p in assembled.parts}
-    solids = {name: surface.manifold() for name, surface in surfaces.items()}
+    solids = {p.name: placed_surface(p, filled=True).manifold() for p in assembled.parts}
+    lying = {(p.name, p.part.on) for p in assembled.parts if p.part.at == "outside"}
     worst = 0.0
     for number, a in enumerate(assembled.parts):
         for b in assembled.parts[:number]:
-            if _lies_on(a, b) or not _meet(surfaces[a.name], surfaces[b.name]):
+            solid, other = solids[a.name], solids[b.name]
+            if {(a.name, b.name), (b.name, a.name)} & lying or box_gap(solid, other) >= 0:
                 continue
-            shared = solids[a.name] ^ solids[b.name]
+            shared = solid ^ other
             volume = float(shared.volume())
             worst = max(worst, volume)
             if volume > TOUCH:
@@ -441,19 +433,10 @@ def collision(assembled: Assembled) -> Iterator[Finding]:
         yield _judged("collision", True, TOUCH, worst, "clear", (), "mm3")
 
 
-def _lies_on(a: PlacedPart, b: PlacedPart) -> bool:
-    return any(
-        upper.part.at == "outside" and upper.part.on == lower.name
-        for upper, lower in ((a, b), (b, a))
-    )
-
-
-def _meet(a: Surface, b: Surface) -> bool:
-    """Return True if the boxes round two surfaces meet."""
-    (low_a, high_a), (low_b, high_b) = (
-        (surface.points.min(axis=0), surface.points.max(axis=0)) for surface in (a, b)
-    )
-    return bool((low_a < high_b).all() and (low_b < high_a).all())
+def box_gap(a: manifold3d.Manifold, b: manifold3d.Manifold) -> float:
+    """Return the distance between the boxes of two solids, mm; 0 or less if they meet."""
+    box_a, box_b = (np.reshape(solid.bounding_box(), (2, 3)) for solid in (a, b))
+    return float(np.maximum(box_a[0] - box_b[1], box_b[0] - box_a[1]).max())
 
 
 # All checks, by stable names.

@@ -163,6 +163,25 @@ class Base(Fixed):
 
 
 AnyPart = Sba | Tube | Magnet | Cup | Line | Base
+
+
+def girth_and_height(part: AnyPart) -> tuple[float, float]:
+    """Return the diameter of the smallest round hole that a bought part passes, and its size along
+    its own axis, mm.
+    """
+    match part:
+        case Tube() | Line():
+            return part.outer_diameter, part.length
+        case Magnet():
+            return part.diameter, part.thickness
+        case Cup():
+            return part.diameter, part.height
+        case Base():
+            short, middle, _ = sorted((part.width, part.length, part.thickness))
+            return float((short**2 + middle**2) ** 0.5), part.thickness
+    raise TypeError("a part made from a design has its size")
+
+
 KINDS: dict[str, type[AnyPart]] = {
     "sba": Sba,
     "tube": Tube,

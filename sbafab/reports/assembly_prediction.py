@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.assemblies.build import Assembled, PartDesign, PlacedPart, PlacedSba
-from sbafab.assemblies.checks import TOUCH
+from sbafab.assemblies.checks import TOUCH, box_gap
 from sbafab.assemblies.shapes import placed_surface
 from sbafab.design.records import Discs, Slots
 from sbafab.laminate.burst import is_near_burst, refuse_beyond_burst
@@ -478,18 +478,12 @@ def _unmoved(placed: PlacedPart, stacks: Mapping[str, Stack], poses: Mapping[str
 
 def _shared_volume(first: Solids, second: Solids) -> float:
     """Return the volume of their intersection, mm3."""
-    return sum(float((a ^ b).volume()) for a in first for b in second if _box_gap(a, b) <= 0)
-
-
-def _box_gap(a: manifold3d.Manifold, b: manifold3d.Manifold) -> float:
-    """Return the distance between the boxes of two solids, mm; 0 or less if they meet."""
-    box_a, box_b = (np.array(solid.bounding_box()).reshape(2, 3) for solid in (a, b))
-    return float(np.maximum(box_a[0] - box_b[1], box_b[0] - box_a[1]).max())
+    return sum(float((a ^ b).volume()) for a in first for b in second if box_gap(a, b) <= 0)
 
 
 def _gap(arm: Solids, theirs: Solids, least: float) -> float:
     """Return the distance in mm between the nearest two, at most ``least``."""
-    pairs = ((_box_gap(a, b), a, b) for a in arm for b in theirs)
+    pairs = ((box_gap(a, b), a, b) for a in arm for b in theirs)
     for boxes, a, b in sorted(pairs, key=lambda pair: pair[0]):
         if boxes >= least:
             break

@@ -324,20 +324,20 @@ def _is_main(quantity: Quantity, at: Conditions) -> bool:
 # Words of the table and the page.
 
 
-Rows = list[tuple[str, ...]]
+ComparedRows = list[tuple[str, ...]]
 
 
-def key_rows(keys: Iterable[KeyDifference]) -> Rows:
+def key_rows(keys: Iterable[KeyDifference]) -> ComparedRows:
     """Return keys with both values."""
     return [(row.key, *map(format_value, row.values)) for row in keys]
 
 
-def rule_rows(rules: Iterable[RuleDifference]) -> Rows:
+def rule_rows(rules: Iterable[RuleDifference]) -> ComparedRows:
     """Return rules with both verdicts and margins, or measured values if there is no limit."""
     return [(row.rule, *map(_margin_text, row.margins)) for row in rules]
 
 
-def figure_rows(pairs: Iterable[FigurePair]) -> Rows:
+def figure_rows(pairs: Iterable[FigurePair]) -> ComparedRows:
     """Return figures with both values and 90 % intervals."""
     return [(f"{pair.name}, {pair.unit}", *map(_figure_text, pair.figures)) for pair in pairs]
 
