@@ -229,7 +229,7 @@ def _print_figures(prediction: Prediction) -> None:
     for title, figures in groups.items():
         if figures:
             show.line(f"\n{title}", "bold")
-        for line in _figure_lines(figures, models, show.console().width):
+        for line in _figure_lines(figures, models, show.width()):
             # The heading of a group starts at the margin.
             show.line(line, "" if line.startswith(" ") else "bold")
     show.line("\nModels and validity", "bold")

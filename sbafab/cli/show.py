@@ -5,6 +5,8 @@ from __future__ import annotations
 import functools
 import io
 import json
+import os
+import shutil
 import sys
 import textwrap
 import time
@@ -21,7 +23,7 @@ from sbafab.rules.finding import Finding, counted, decisive
 from sbafab.runtime import Progress, ignore_progress
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from rich.table import Table
 
     from sbafab.folders.build import Build
     from sbafab.folders.order import Order
@@ -31,8 +33,34 @@ NO_BREAK = "\u00a0"
 """No-break space: `wrapped` keeps the words on both sides on one line."""
 
 
-def console() -> Console:
-    """Return a console on standard output; 80 columns without a terminal and COLUMNS."""
+STYLES: Mapping[str, Mapping[str, Any]] = {
+    "": {},
+    "bold": {"bold": True},
+    "bold red": {"bold": True, "fg": "red"},
+    "green": {"fg": "green"},
+    "yellow": {"fg": "yellow"},
+}
+"""Styles of text on a terminal."""
+
+
+def line(words: str, style: str = "") -> None:
+    """Print a line without breaking it."""
+    _print_styled(click.style(words, **STYLES[style]))
+
+
+def _print_styled(words: str) -> None:
+    """Print a line, plain if there is no terminal or none that shows styles."""
+    is_plain = "NO_COLOR" in os.environ or os.environ.get("TERM") == "dumb"
+    click.echo(words, color=False if is_plain else None)
+
+
+def width() -> int:
+    """Return the columns of the terminal; 80 without a terminal and COLUMNS."""
+    return shutil.get_terminal_size().columns
+
+
+def _print_grid(grid: Table) -> None:
+    """Print a table of rich, whose import takes longer than the printing of lines."""
     from rich.console import Console
 
     class PipedConsole(Console):
@@ -41,14 +69,7 @@ def console() -> Console:
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError
 
-    return PipedConsole(highlight=False, soft_wrap=False)
-
-
-def line(words: str, style: str = "") -> None:
-    """Print a line without breaking it."""
-    from rich.text import Text
-
-    console().print(Text(words, style=style), soft_wrap=True)
+    PipedConsole(highlight=False, soft_wrap=False).print(grid)
 
 
 def wrapped(words: str, style: str = "", indent: str = "", first: str | None = None) -> None:
@@ -59,7 +80,7 @@ def wrapped(words: str, style: str = "", indent: str = "", first: str | None = N
     """
     lines = textwrap.wrap(
         words,
-        console().width,
+        width(),
         initial_indent=indent if first is None else first,
         subsequent_indent=indent or "  ",
         break_long_words=False,
@@ -89,7 +110,7 @@ def table(title: str, names: Sequence[str], rows: Sequence[Sequence[object]]) ->
         grid.add_column(Text(name), overflow="fold")
     for row in rows:
         grid.add_row(*(Text(_cell(value)) for value in row))
-    console().print(grid)
+    _print_grid(grid)
 
 
 def _cell(value: object) -> str:
@@ -106,7 +127,7 @@ def facts(rows: Iterable[tuple[str, str]]) -> None:
     grid.add_column(ratio=1, overflow="fold")
     for label, words in rows:
         grid.add_row(label, Text(words))
-    console().print(grid)
+    _print_grid(grid)
 
 
 def names(meanings: Mapping[str, str]) -> None:
@@ -175,9 +196,7 @@ def findings(groups: Groups, verbose: bool = False) -> None:
 
 def _print_rules(group: Sequence[Finding], verbose: bool) -> None:
     """Print a line for each rule's decisive finding; ``verbose``: for all, with their messages."""
-    from rich.text import Text
-
-    out, of_folders = console(), catalogue.names("folders")
+    of_folders = catalogue.names("folders")
     shown = group if verbose else list(decisive(group).values())
     wide = max((len(finding.rule) for finding in shown), default=0)
     line(f"{'rule':{wide}}  verdict  {'measured':>13}  {'limit':>14}", "bold")
@@ -186,11 +205,10 @@ def _print_rules(group: Sequence[Finding], verbose: bool) -> None:
         is_empty = finding.measured is finding.limit is None
         if finding.verdict == "pass" and is_empty and finding.rule not in of_folders:
             measured = "not compared"
-        row = Text(f"{finding.rule:{wide}}  ")
-        row.append(f"{finding.verdict:7}", style=COLOURS[finding.verdict])
-        row.append(f"  {measured:>13}  {limit_text(finding):>14}")
-        row.rstrip()
-        out.print(row, soft_wrap=True)
+        values = f"  {measured:>13}  {limit_text(finding):>14}".rstrip()
+        verdict_cell = f"{finding.verdict:7}" if values else finding.verdict
+        styled = click.style(verdict_cell, **STYLES[COLOURS[finding.verdict]])
+        _print_styled(f"{finding.rule:{wide}}  {styled}{values}")
         if verbose:
             wrapped(finding.message, indent="    ")
 
