@@ -438,7 +438,7 @@ _OWN: tuple[Artefact, ...] = (
         "bill.csv",
         "cut",
         "of a batch: the bill of materials",
-        made_by("sbafab.reports.traveller.materials:bill_csv", lambda of: (of.work,)),
+        made_by("sbafab.reports.traveller.work:bill_csv", lambda of: (of.work,)),
         needs=frozenset(("press", "preview")),
         is_page=True,
     ),

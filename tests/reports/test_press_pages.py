@@ -16,9 +16,16 @@ from sbafab.laminate.lay_up import press_steps
 from sbafab.reports.drawing import text_width
 from sbafab.reports.prints import seams_pdf
 from sbafab.reports.traveller.lay_up import beds
-from sbafab.reports.traveller.page import straight_run
+from sbafab.reports.traveller.lay_up import pitch as pitch_of
+from sbafab.reports.traveller.page import (
+    FoldPage,
+    PressPage,
+    SeamPage,
+    joint_pages,
+    step_pages,
+    straight_run,
+)
 from sbafab.reports.traveller.pictures import plan
-from sbafab.reports.traveller.steps import FoldPage, PressPage, SeamPage, joint_pages, step_pages
 from tests.reports.pages import DOUBLE, EARS, bench, built, page, words_of, work_of
 
 TPE, PTFE, BOND, OVERHANG = 0.038, 0.025, 0.75, 0.5
@@ -113,7 +120,7 @@ def test_without_pins_each_edge_is_laid_along_another() -> None:
 def test_every_piece_on_a_sheet_has_its_place() -> None:
     *_, last = step_pages(work_of("radial-15mm"))
     pitch = 15 * math.pi / 3
-    assert last.pitch == pytest.approx(pitch)
+    assert pitch_of(last.places) == pytest.approx(pitch)
     # 1 mm of sheet past the SBAs, which are 11.5 wide and 20 long.
     for (out, piece), place in zip(
         itertools.product((OVERHANG, 0.0), (1, 2, 3)), last.places, strict=True

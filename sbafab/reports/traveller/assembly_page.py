@@ -12,18 +12,23 @@ from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.assemblies.checks import SupplyRun, supply_runs
-from sbafab.assemblies.records import AnyPart, Base, Cup, Line, Magnet, Sba, Tube
+from sbafab.assemblies.records import AnyPart, Base, Cup
 from sbafab.assemblies.shapes import colours, own_surface
 from sbafab.cutting.sheets import SheetFile
 from sbafab.models.sizes import sizes
 from sbafab.pressing.schedule import joined_words
 from sbafab.reports.traveller.bench import cutting
 from sbafab.reports.traveller.formatting import frame, millimetres, render, size
-from sbafab.reports.traveller.materials import THREAD, Item, film_items, items_of_part
-from sbafab.reports.traveller.page import code_svg, context, preparations, record_text
+from sbafab.reports.traveller.page import code_svg, context, preparations, record_text, step_rows
 from sbafab.reports.traveller.pictures import definitions, part_regions, pattern_regions, sheet_rows
-from sbafab.reports.traveller.steps import step_rows
-from sbafab.reports.traveller.work import Work, assembly_times
+from sbafab.reports.traveller.work import (
+    THREAD,
+    Item,
+    Work,
+    assembly_times,
+    film_items,
+    items_of_part,
+)
 from sbafab.rules.finding import Finding
 
 _NAMES = re.compile(r'(\b(?:id|aria-labelledby)="|\bhref="#|url\(#)')
@@ -163,21 +168,20 @@ def _bought(assembled: Assembled) -> Iterator[Item]:
         yield Item("Adhesive", f"{glue}, for {joined_words(names)}")
 
 
+SIZES = {
+    "tube": "{material}, outer diameter {outer_diameter}, inner {inner_diameter}, {length} long",
+    "magnet": "{part}, {diameter} across, {thickness} thick",
+    "cup": "cast from {material}, rim {diameter}",
+    "line": "{tubing}, outer diameter {outer_diameter}, {length}",
+}
+"""Of parts by kind; of others material, width and length."""
+
+
 def _size(part: AnyPart) -> str:
-    mm = millimetres
-    if isinstance(part, Tube):
-        inner, long = mm(part.inner_diameter), mm(part.length)
-        return (
-            f"{part.material}, outer diameter {mm(part.outer_diameter)}, inner {inner}, {long} long"
-        )
-    if isinstance(part, Magnet):
-        return f"{part.part}, {mm(part.diameter)} across, {mm(part.thickness)} thick"
-    if isinstance(part, Cup):
-        return f"cast from {part.material}, rim {mm(part.diameter)}"
-    if isinstance(part, Line):
-        return f"{part.tubing}, outer diameter {mm(part.outer_diameter)}, {mm(part.length)}"
-    assert isinstance(part, Base)
-    return f"{part.material}, {size(part.width, part.length)}"
+    if isinstance(part, Base):
+        return f"{part.material}, {size(part.width, part.length)}"
+    values = {name: millimetres(v) if isinstance(v, float) else v for name, v in part}
+    return SIZES[part.kind].format_map(values)
 
 
 def adhesive(placed: PlacedPart) -> str | None:
@@ -210,11 +214,6 @@ class PartJoint:
         return adhesive(self.placed)
 
     @property
-    def has_mark(self) -> bool:
-        """True if the part has a direction."""
-        return isinstance(self.part, Sba | Tube | Base)
-
-    @property
     def is_below(self) -> bool:
         """True if the part is fixed on a lower face, upside down."""
         return self.part.at in ("bottom", "start")
@@ -235,13 +234,6 @@ class PartJoint:
         """Offset of the part's middle to the right and up, mm, looking at the same face."""
         x, y = self.part.offset
         return x, (-y if self.is_below else y)
-
-    @property
-    def past(self) -> float:
-        """Length of a line past the far face of its lumen, mm."""
-        assert isinstance(self.part, Line)
-        assert self.carrier is not None
-        return self.part.along + self.part.length - self.carrier.height
 
 
 def _mark_angle(placed: PlacedPart) -> float:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 from sbafab.assemblies.build import Assembled
@@ -21,8 +22,7 @@ from sbafab.pressing.dowels import push_out
 from sbafab.pressing.plate_heating import MELTING, PATIENCE, START
 from sbafab.pressing.schedule import plate_holes
 from sbafab.reports.traveller.formatting import NEWTONS_PER_POUND, frame, render
-from sbafab.reports.traveller.materials import films_of, has_underlay
-from sbafab.reports.traveller.work import Work
+from sbafab.reports.traveller.work import Work, films_of, has_underlay
 from sbafab.rules.pin_fit import NAME as PIN_FIT
 from sbafab.rules.pin_fit import most_on_a_pin
 
@@ -63,29 +63,17 @@ def _hold(work: Work, film: Film) -> HoldDown:
     return beam.hold_ptfe if film.is_mask else beam.hold_tpe
 
 
-class TightPin(NamedTuple):
-    """The stretch of a film over its pin that rule pin-fit warns of, and what it allows."""
-
-    stretch: float
-    allowed: float
-    work: Work
-
-    @property
-    def films(self) -> int:
-        """The largest number of films on one pin."""
-        return most_on_a_pin(self.work.laminate)
-
-
 def cutting(works: Sequence[Work]) -> dict[str, Any]:
     """Return the facts of the section on cutting, for designs on common sheets.
 
     The laser's minutes, metres of cut and travel, and contours are those of all sheets.
-    ``tight_pin`` is of the design whose films stretch most; None if rule pin-fit is silent.
-    ``loose`` and ``spare`` count the pieces of masks in several pieces.
+    ``tight_pin``: the finding of pin-fit on the design whose films stretch most, the design, and
+    the most films on one pin; None if that rule is silent. ``loose`` and ``spare`` count the pieces
+    of masks in several pieces.
     """
     sheets = works[0].sheets
     tight = [
-        TightPin(finding.measured, finding.limit or 0.0, work)
+        (finding.measured, finding.limit or 0.0, work.design, most_on_a_pin(work.laminate))
         for work in works
         for finding in work.findings
         if finding.rule == PIN_FIT and finding.measured
@@ -104,7 +92,7 @@ def cutting(works: Sequence[Work]) -> dict[str, Any]:
         "program": works[0].design.sheets.program,
         "kerf_notes": _kerf_notes(works),
         "held": list(held_films(works)),
-        "tight_pin": max(tight, key=lambda pin: pin.stretch, default=None),
+        "tight_pin": max(tight, key=itemgetter(0), default=None),
         "loose": sum(needed for needed, _ in loose),
         "spare": sum(spare for _, spare in loose),
     }
@@ -143,22 +131,13 @@ def nominal(works: Sequence[Work]) -> list[str]:
 # Pressure-indicating film.
 
 
-class FilmClass(NamedTuple):
-    """A class of pressure-indicating film: its name, its product, and its range in kPa."""
-
-    name: str
-    product: str
-    low: float
-    high: float
-
-
 FILM_CLASSES = (
-    FilmClass("extreme low pressure", "4LW", 50, 200),
-    FilmClass("ultra super low pressure", "LLLW", 200, 600),
-    FilmClass("super low pressure", "LLW", 500, 2500),
+    ("extreme low pressure", "4LW", 50, 200),
+    ("ultra super low pressure", "LLLW", 200, 600),
+    ("super low pressure", "LLW", 500, 2500),
 )
-"""Two-sheet films of Fujifilm Prescale, by the ranges in its maker's list as far as we know: the
-list was not opened, so the page asks to compare them with the box."""
+"""Two-sheet films of Fujifilm Prescale, by the ranges in kPa in its maker's list as far as we know:
+the list was not opened, so the page asks to compare them with the box."""
 
 
 def pressure_range(works: Sequence[Work]) -> tuple[float, float]:
@@ -166,11 +145,6 @@ def pressure_range(works: Sequence[Work]) -> tuple[float, float]:
     steps = [step for work in works for step in work.schedule.steps]
     low = min(min(step.film_kpa, step.bond_kpa, step.plate_kpa) for step in steps)
     return low, max(max(step.edge_kpa, step.film_kpa) for step in steps)
-
-
-def film_classes(low: float, high: float) -> list[FilmClass]:
-    """Return the fewest classes that cover a range in kPa, as far as possible."""
-    return [film for film in FILM_CLASSES if film.low < high and film.high > low]
 
 
 # The page.
@@ -286,7 +260,8 @@ def _heat_and_force(works: Sequence[Work]) -> dict[str, Any]:
         "most_raised": MOST_RAISED,
         "closings": sum(work.cycles.count * len(work.schedule.steps) for work in works),
         "pressures": (low, high),
-        "film_classes": film_classes(low, high),
+        # The fewest classes that cover the range, as far as possible.
+        "film_classes": [film for film in FILM_CLASSES if film[2] < high and film[3] > low],
         "pound_kpa": pound,
         "division_lbf": 2 * WANTED * first.pressure_kpa / pound,
         "division_n": 2 * WANTED * first.force_n,

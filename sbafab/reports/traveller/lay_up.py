@@ -173,21 +173,15 @@ class Things:
         layer = _widest(self.laminate, self.things[place])
         neighbour = _widest(self.laminate, beside[::-1] if place else beside)
         layer_index = layer.index if len(self.things[place]) > 1 else 0
-        edge = Alignment(
-            layer_index, len(layer.profile.pieces) > 1, film_name(neighbour), place == 0
-        )
+        edge = layer_index, len(layer.profile.pieces) > 1, film_name(neighbour), place == 0
         lip = _lip(layer.profile, neighbour.profile)
         if lip is None:
-            return edge if neighbour.role == "sheet" else None
+            return Alignment(*edge) if neighbour.role == "sheet" else None
         films = [i for i in beside if not self.laminate.layer(i).is_mask] or beside
         upper = self.laminate.layer(films[-1]) if place else neighbour
         is_on = upper is not neighbour and _lip(layer.profile, upper.profile) == (0.0, True)
-        return edge._replace(
-            outside=0.0 if abs(lip[0]) < EQUAL else lip[0],
-            all_round=lip[1],
-            on=film_name(upper) if is_on else "",
-            numbers=(neighbour.index, upper.index),
-        )
+        outside, on = 0.0 if abs(lip[0]) < EQUAL else lip[0], film_name(upper) if is_on else ""
+        return Alignment(*edge, outside, lip[1], on, (neighbour.index, upper.index))
 
 
 def face_down(layer: Layer, is_turned_over: bool = False) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -94,12 +94,16 @@ class Picture:
             f'stroke="{colours.line}" stroke-width="{coord(LINE / scale)}"/>'
         )
 
+    def place(self, matrix: Matrix, *elements: str) -> None:
+        """Add elements in a frame that ``matrix`` maps to the page."""
+        self.add(f'<g transform="matrix({" ".join(map(coord, matrix))})">', *elements, "</g>")
+
     def plate(self, plate: Region, matrix: Matrix, is_used: bool = True) -> None:
         """Add the base plate; dashed if it is not used, as it still shows the orientation."""
-        scale, moved = matrix[0], " ".join(map(coord, matrix))
+        scale = matrix[0]
         dashes = "" if is_used else f"{coord(1.6 / scale)} {coord(1.2 / scale)}"
         look = draw.style(draw.GREY, 0.25 / scale, fill=PLATE if is_used else "none", dashes=dashes)
-        self.add(draw.path(path_data(plate), f'{look} transform="matrix({moved})"'))
+        self.place(matrix, draw.path(path_data(plate), look))
 
     def label(self, at: Point, words: str, size: float = draw.SMALL) -> None:
         """Add text over a drawing, with a white rim for legibility."""
@@ -144,12 +148,10 @@ def thumbnail(pattern: str, is_flat: bool, film: Film, bounds: Bounds) -> str:
     return picture.svg()
 
 
-def _meet(a: Bounds, b: Bounds) -> bool:
-    return a[0] < b[2] and a[2] > b[0] and a[1] < b[3] and a[3] > b[1]
-
-
-def _within(box: Bounds, page: Bounds) -> bool:
-    return box[0] >= page[0] and box[1] >= page[1] and box[2] <= page[2] and box[3] <= page[3]
+def _shared(a: Bounds, b: Bounds) -> float:
+    """Return the area that two boxes share."""
+    wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+    return max(wide, 0.0) * max(high, 0.0)
 
 
 # The step seen from above: plate, layers, pins in or out, inlet tabs.
@@ -268,12 +270,6 @@ def _free_place(
         return round(covered + OUTSIDE * outside, 6)
 
     return min(places, key=cost)
-
-
-def _shared(a: Bounds, b: Bounds) -> float:
-    """Return the area that two boxes share."""
-    wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
-    return max(wide, 0.0) * max(high, 0.0)
 
 
 def _reach(laminate: Laminate, inlet: Inlet) -> float:
@@ -514,32 +510,28 @@ class SheetView(NamedTuple):
         return (*turned, *self.at(placement.shift))
 
     def in_one_row(self, box: Bounds) -> bool:
-        row = self.length / self.rows
-        is_whole = math.floor(box[0] / row) == math.floor(box[2] / row)
-        return is_whole and _within(box, (0.0, 0.0, self.length, self.height))
-
-
-class SheetRow(NamedTuple):
-    """A sheet of the cut list, with the count of each pattern, and its picture."""
-
-    sheet: SheetFile
-    film: Film
-    counts: list[tuple[str, int]]
-    picture: str
-    view: SheetView
+        (left, top, right, foot), row = box, self.length / self.rows
+        is_inside = left >= 0 and top >= 0 and right <= self.length and foot <= self.height
+        return is_inside and math.floor(left / row) == math.floor(right / row)
 
 
 def sheet_rows(
     design: Design, sheets: Sequence[SheetFile], marks: Mapping[str, str]
-) -> list[SheetRow]:
-    """Return the film sheets of a design; patterns carry the mark or the name of their design."""
+) -> list[dict[str, Any]]:
+    """Return the film sheets of a design, with the count of each pattern, after the mark or the
+    name of its design, and their pictures.
+    """
     films = {film.material: film for film in design.films.stock.values()}
-    rows = []
-    for number, sheet in enumerate(sheets, 1):
-        counts = [(_marked(name, pattern, marks), n) for name, pattern, n in sheet.counts]
-        picture = sheet_map(sheet, films[sheet.material], marks, f"sheet-{number}")
-        rows.append(SheetRow(sheet, films[sheet.material], counts, picture, _sheet_view(sheet)))
-    return rows
+    return [
+        {
+            "sheet": sheet,
+            "film": films[sheet.material],
+            "counts": [(_marked(name, pattern, marks), n) for name, pattern, n in sheet.counts],
+            "picture": sheet_map(sheet, films[sheet.material], marks, f"sheet-{number}"),
+            "view": _sheet_view(sheet),
+        }
+        for number, sheet in enumerate(sheets, 1)
+    ]
 
 
 def _marked(design: str, pattern: str, marks: Mapping[str, str]) -> str:
@@ -612,10 +604,12 @@ def _draw_sheet(
         if key not in places:
             places[key] = (x, y), labels(words, region.mapped(view.at, view.scale, mirror=True))
         (first_x, first_y), ranked = places[key]
-        for place in (free.moved(x - first_x, y - first_y) for free in ranked):
-            if view.in_one_row(place.box) and not any(_meet(place.box, box) for box in taken):
-                taken.append(place.box)
-                picture.label(place.at, words, place.size)
+        dx, dy = x - first_x, y - first_y
+        for (u, v), size, (left, top, right, foot) in ranked:
+            box = left + dx, top + dy, right + dx, foot + dy
+            if view.in_one_row(box) and not any(_shared(box, other) for other in taken):
+                taken.append(box)
+                picture.label((u + dx, v + dy), words, size)
                 break
 
 
@@ -629,17 +623,8 @@ SAMPLES = 7  # points along a label at which its part is looked up
 CHORD = 0.05  # distance of a chord from an arc of a part, mm on the page
 
 
-class PlacedLabel(NamedTuple):
-    """``at`` is the middle of the text's base line; ``size`` and ``box`` are mm on the page."""
-
-    at: Point
-    size: float
-    box: Bounds
-
-    def moved(self, dx: float, dy: float) -> PlacedLabel:
-        (x, y), (low_x, low_y, high_x, high_y) = self.at, self.box
-        box = low_x + dx, low_y + dy, high_x + dx, high_y + dy
-        return PlacedLabel((x + dx, y + dy), self.size, box)
+PlacedLabel = tuple[Point, float, Bounds]
+"""The middle of the text's base line, its size and its box, mm on the page."""
 
 
 def labels(words: str, part: Region) -> list[PlacedLabel]:
@@ -666,4 +651,4 @@ def labels(words: str, part: Region) -> list[PlacedLabel]:
     cost = np.sqrt((u**2 + v**2) / 2) + (1 - share) + OFF * (1 - on.mean(axis=0))
     rows = np.stack([x, y + 0.35 * size, size, x - wide, y - high, x + wide, y + high], axis=1)
     ranked = rows[np.argsort(cost.round(9), kind="stable")].tolist()
-    return [PlacedLabel((at_x, at_y), size, tuple(box)) for at_x, at_y, size, *box in ranked]
+    return [((at_x, at_y), size, tuple(box)) for at_x, at_y, size, *box in ranked]
