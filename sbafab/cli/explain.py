@@ -127,7 +127,7 @@ def explain(name: str | None, as_json: bool) -> None:
 def _explained(name: str) -> dict[str, Any]:
     """Return the keys of ExplainDocument for a name. Raises BadParameter with the nearest one."""
     if name in EXPLAINED:
-        return {"rule": name, **asdict(EXPLAINED[name])}
+        return {"rule": name, **EXPLAINED[name]._asdict()}
     if (term := name.replace("_", "-")) in TERMS:
         return {"term": term, "meaning": TERMS[term]}
     written = name.partition("@")[0].replace("-", "_")

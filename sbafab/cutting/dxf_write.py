@@ -114,7 +114,12 @@ def document_text(
     free = first + len(entities)
     if has_seam:
         tables, free = _with_seam_layer(tables, free), free + 1
-    filled = (_custom_properties(properties), to_extents, _extents(boxes), to_seed)
+    custom = "".join(
+        f"  9\n$CUSTOMPROPERTYTAG\n  1\n{_one_line(name)}\n"
+        f"  9\n$CUSTOMPROPERTY\n  1\n{_one_line(value)}\n"
+        for name, value in properties.items()
+    )
+    filled = custom, to_extents, _extents(boxes), to_seed
     return "".join((head, *filled, f"{free:X}", tables, drawn, end))
 
 
@@ -213,14 +218,6 @@ def number(value: float) -> str:
     if text.endswith("."):
         text += "0"
     return "0.0" if text == "-0.0" else text
-
-
-def _custom_properties(properties: Mapping[str, str]) -> str:
-    return "".join(
-        f"  9\n$CUSTOMPROPERTYTAG\n  1\n{_one_line(name)}\n"
-        f"  9\n$CUSTOMPROPERTY\n  1\n{_one_line(value)}\n"
-        for name, value in properties.items()
-    )
 
 
 def _one_line(text: str) -> str:

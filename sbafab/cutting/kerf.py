@@ -5,7 +5,7 @@ from __future__ import annotations
 from sbafab.cutting.cut_settings import CutSettings, kerf_text
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.contour import Contour, run_chords, tidy
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line
+from sbafab.geometry.edges import EPSILON, Arc, Line
 from sbafab.geometry.offset import Kerf, Lost, beam_path, widths
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import place_of
@@ -103,14 +103,10 @@ def in_chords(path: Region, role: Role | None, error: float, beam: float = 0.0) 
 
 def _contour(contour: Contour, grows: bool, error: float, beam: float) -> Contour:
     """The contour as lines that leave its material no less (``grows``), or no more, anywhere."""
-    points = [
-        p
-        for run in contour.runs
-        for p in run_chords(run, grows or _rounds_corner(run[0], beam), error)
-    ]
+    points = []
+    for run in contour.runs:
+        edge = run[0]
+        is_corner = isinstance(edge, Arc) and edge.ccw and abs(edge.radius - beam) < EPSILON
+        points += run_chords(run, grows or (is_corner and beam > 0), error)
     loop = [Line(p, q) for p, q in zip(points, (*points[1:], points[0]), strict=True) if p != q]
     return tidy(loop) or Contour(tuple(loop))
-
-
-def _rounds_corner(edge: Edge, beam: float) -> bool:
-    return isinstance(edge, Arc) and edge.ccw and beam > 0 and abs(edge.radius - beam) < EPSILON

@@ -114,17 +114,13 @@ def _pairs(rows: Sequence[_Rows], area: Bounds, turns: Sequence[Turn]) -> Iterat
             first = min(_laid_in(rows, inside, turns), key=most_copies)
             if not first.places:
                 continue
-            beyond = first.top if is_above else _right(shape, first)
+            turned = {turn: placed(shape, turn, (0.0, 0.0)) for turn in TURNS}
+            right = max(turned[turn].bounds[2] + shift[0] for turn, shift in first.places)
+            beyond = first.top if is_above else right
             corner = (low_x, beyond + spacing) if is_above else (beyond + spacing, low_y)
             rest = min(_laid_in(rows, (*corner, high_x, high_y), turns), key=most_copies)
             pair = lattice_of(shape, [*first.places, *rest.places])
             yield pair._replace(is_pair=True)
-
-
-def _right(shape: Region, lattice: Lattice) -> float:
-    """Return the highest x that the copies reach."""
-    right = {turn: placed(shape, turn, (0.0, 0.0)).bounds[2] for turn, _ in lattice.places}
-    return max(right[turn] + shift[0] for turn, shift in lattice.places)
 
 
 def lattice_of(shape: Region, places: Sequence[tuple[Turn, Point]]) -> Lattice:
@@ -244,7 +240,11 @@ class _Rows:
         """
         if box[0] < 2 * self.half_width - ROUNDING or box[1] < 2 * self.half_height - ROUNDING:
             return [[]]
-        ranked = [entry for family in self._families() for entry in self._ranked(family, box)]
+        ranked: list[tuple[float, _Pattern]] = []
+        for family in self._families():
+            counts = self._promise(family, box)
+            best = np.argsort(-counts, kind="stable")[:PROMISING].tolist()
+            ranked += [(float(counts[i]), _member(family, i)) for i in best]
         ranked.sort(key=lambda entry: -entry[0])
         return [self._laid(pattern, box) for _, pattern in ranked[:PROMISING]]
 
@@ -269,12 +269,6 @@ class _Rows:
         pair = _Row((_Copy(0, origin, origin), _Copy(1, there, rise)), pitches)
         yield _Pattern((pair,), (share * pitches,))
         yield _Pattern((pair,), (share * pitches, -share * pitches))
-
-    def _ranked(self, family: _Pattern, box: tuple[float, float]) -> list[tuple[float, _Pattern]]:
-        """Return a family's patterns with the number of copies that they promise."""
-        counts = self._promise(family, box)
-        best = np.argsort(-counts, kind="stable")[:PROMISING]
-        return [(float(counts[i]), _member(family, int(i))) for i in best]
 
     def _promise(self, family: _Pattern, box: tuple[float, float]) -> Numbers:
         rows, steps = family.rows, family.steps

@@ -94,7 +94,7 @@ def seam_properties(seam: Seam, settings: CutSettings) -> dict[str, str]:
         "TOOL": seam.tool,
         WIDTH: f"{seam.width:g}",
         "KIND": seam.kind,
-        **({} if offset is None else {"TOOL_OFFSET": offset_text(offset)}),
+        **({} if offset is None else {"TOOL_OFFSET": f"{offset[0]:.9g}, {offset[1]:.9g}"}),
         "UNITS": "mm",
         "GENERATOR": settings.generator,
     }
@@ -122,11 +122,6 @@ def moved(chains: Chains, by: Point) -> tuple[tuple[Edge, ...], ...]:
     if by == CENTRED:
         return tuple(map(tuple, chains))
     return tuple(tuple(shifted(edge, by) for edge in chain) for chain in chains)
-
-
-def offset_text(offset: Point) -> str:
-    """Return an offset as a seam's file states it: "12, -3.5"."""
-    return f"{offset[0]:.9g}, {offset[1]:.9g}"
 
 
 def shift_words(tool: str, offset: Point) -> str:

@@ -117,21 +117,13 @@ def design_runs(design: Design, laminate: Laminate) -> Runs:
     """Return the runs of a design's order."""
     order, most = design.order, design.order.at_once
     if most is None:
-        most = _copies_by_hours(design, laminate)
+        # As many as one person makes in a cycle. Minutes that are not stated count as 0.
+        timed = not films_without_minutes(laminate, design.press.timed_films)
+        parts = press_steps(laminate) if timed else ()
+        pressing = sum([minutes_closed(design.press, part.name) for part in parts], 0.0)
+        by_hand = (60 * CYCLE_HOURS - pressing) / HANDLING_MINUTES
+        most = max(1, math.floor(by_hand + ROUNDING))
     return runs_of(laminate, order.quantity, design.press.platen, most)
-
-
-def _copies_by_hours(design: Design, laminate: Laminate) -> int:
-    """Return the number of copies that one person makes in a cycle of CYCLE_HOURS, at least one.
-
-    Minutes that are not stated for the film count as 0: the press may then take longer.
-    """
-    press = design.press
-    pressing = 0.0
-    if not films_without_minutes(laminate, press.timed_films):
-        pressing = sum(minutes_closed(press, part.name) for part in press_steps(laminate))
-    handling = 60 * CYCLE_HOURS - pressing
-    return max(1, math.floor(handling / HANDLING_MINUTES + ROUNDING))
 
 
 def _grid(room: tuple[float, float], size: tuple[float, float]) -> tuple[int, int]:

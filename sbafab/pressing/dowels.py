@@ -229,9 +229,11 @@ def _choices(
     needs = {top: top + chamfer(diameter) for top in tops}
     seat = max(LEAST_SEAT, SEAT * diameter)
     depths = {
-        _rounded_down(length - length_tolerance(length) - depth_tolerance(length) - need)
+        # A multiple of ``STEP`` at or below: pins never stand lower for it.
+        round(math.floor(depth / STEP + ROUNDING) * STEP, 6)
         for need in needs.values()
         for length in sold
+        for depth in [length - length_tolerance(length) - depth_tolerance(length) - need]
     }
     choices = []
     for depth in sorted(depth for depth in depths if depth >= seat - ROUNDING):
@@ -241,30 +243,21 @@ def _choices(
             out = max(length - depth - top for top, length in known.items())
             choices.append(_Choice(depth, known, round(out, 6)))
     if not choices:
-        highest = max(needs.values())
+        least = seat + depth_tolerance(seat) + max(needs.values())
+        needed = next(least + off for limit, off in LENGTH_TOLERANCES if least + off <= limit)
         raise DesignError(
             f"the pin {pin} (diameter {diameter:g}) must be at least "
-            f"{_needed_length(seat, highest):.3f} mm long for a stack {max(tops):.3f} mm high, the "
+            f"{needed:.3f} mm long for a stack {max(tops):.3f} mm high, the "
             "tolerances of pin and hole counted, and "
             f"the longest there is has {sold[-1]:g}; give a longer one in registration.pin_lengths"
         )
     return choices
 
 
-def _rounded_down(depth: float) -> float:
-    """Return a multiple of ``STEP`` at or below a depth: pins never stand lower for it."""
-    return round(math.floor(depth / STEP + ROUNDING) * STEP, 6)
-
-
 def _shortest(sold: Sequence[float], depth: float, need: float) -> float | None:
     """Return the shortest pin that surely stands ``need`` mm over the plate, or None."""
     off = depth_tolerance(depth)
     return next((n for n in sold if n - length_tolerance(n) - off >= depth + need - ROUNDING), None)
-
-
-def _needed_length(seat: float, need: float) -> float:
-    least = seat + depth_tolerance(seat) + need
-    return next(least + off for limit, off in LENGTH_TOLERANCES if least + off <= limit)
 
 
 def _thickness(choices: Mapping[float, Sequence[_Choice]], thickness: float | None) -> float:

@@ -614,7 +614,9 @@ def _cautions(
         )
     for step, part in zip(steps, parts, strict=True):
         if step.bond == "flash" and (layers := _unpinned(laminate, part)):
-            which = layers_in_words(layers) if len(layers) < 4 else _by_role(laminate, layers)
+            roles = Counter(laminate.layer(index).role for index in layers)
+            by_role = joined_words([f"the {count} {role}s" for role, count in roles.items()])
+            which = layers_in_words(layers) if len(layers) < 4 else by_role
             words = f"step {step.step}: no pin holds {which}; align by hand"
             yield Caution(words, at_step=True)
 
@@ -680,8 +682,3 @@ def _unpinned(laminate: Laminate, part: LayUpStep) -> list[int]:
     bodies += [stack for stack in part.stacks if set(stack).isdisjoint(part.adds)]
     loose = [b for b in bodies if pinned.isdisjoint(laminate.layer(i).pattern for i in b)]
     return sorted(index for body in loose for index in body)
-
-
-def _by_role(laminate: Laminate, layers: Sequence[int]) -> str:
-    counts = Counter(laminate.layer(index).role for index in layers)
-    return joined_words([f"the {count} {role}s" for role, count in counts.items()])

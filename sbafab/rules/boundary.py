@@ -253,7 +253,11 @@ def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
         remaining: list[tuple[Layer, Region]] = []
         for below, region in visible:
             if below is films[index - 1]:
-                shared, rest = Region(), _left_by_next(laminate.interfaces[index - 1])
+                gap, shared, rest = laminate.interfaces[index - 1], Region(), below.profile
+                if below.pattern == film.pattern:
+                    rest = shared
+                elif not without_slivers(gap.contact).is_empty:
+                    rest = _minus(rest, film.profile)
             else:
                 shared, rest = _laid(region, film.profile)
             if rest.contours:
@@ -264,15 +268,6 @@ def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
                 pairs += _kept_apart(facing, index, below, between, film)
         visible = [*remaining, (film, film.profile)]
     return tuple(pairs)
-
-
-def _left_by_next(gap: Interface) -> Region:
-    """Return the part of a film that the film next to it leaves uncovered."""
-    if gap.below.pattern == gap.above.pattern:
-        return Region()
-    if without_slivers(gap.contact).is_empty:
-        return gap.below.profile
-    return _minus(gap.below.profile, gap.above.profile)
 
 
 def _kept_apart(
@@ -324,11 +319,11 @@ def without_slivers(region: Region) -> Region:
     """The region without pieces that are on average no wider than TOLERANCE."""
     if region.is_empty:
         return region
-    pieces = [piece for piece in region.pieces if _is_wide(piece)]
+    pieces = [
+        piece
+        for piece in region.pieces
+        if 2 * piece.area > TOLERANCE * sum([contour.length for contour in piece.contours], 0.0)
+    ]
     if len(pieces) == len(region.outers):
         return region
     return Region(tuple(contour for piece in pieces for contour in piece.contours))
-
-
-def _is_wide(piece: Region) -> bool:
-    return 2 * piece.area > TOLERANCE * sum([contour.length for contour in piece.contours], 0.0)

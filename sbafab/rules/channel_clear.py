@@ -88,21 +88,14 @@ FINE = 2e-5
 """mm: how near the place of the best clearance is found; the clearance itself is far nearer."""
 
 
-class _Clear(NamedTuple):
-    channel: Channel
-    diameter: float
-    at: Point
-    layer: Layer
-
-
 def check(measures: Measures) -> list[Finding]:
     """Return the diameter that passes through each channel, worst against the stated one."""
     laminate = measures.laminate
-    clearances = [_clear(channel) for channel in channels(laminate)]
+    clearances = [(channel, *_clear(channel)) for channel in channels(laminate)]
     if not clearances:
         sentence = "no-bore" if laminate.nets else "none"
         return [judged(NAME, True, None, None, "mm", Place(), sentence)]
-    channel, diameter, p, layer = min(clearances, key=lambda row: row.diameter - row[0].diameter)
+    channel, diameter, p, layer = min(clearances, key=lambda row: row[1] - row[0].diameter)
     place, limit = Place(None, (layer.index,), *p), channel.diameter
     facts = {"channel": channel.name, "layer": layer_name(layer)}
     good = holds(diameter, limit)
@@ -112,17 +105,18 @@ def check(measures: Measures) -> list[Finding]:
 RULE = Rule(NAME, check, explained(NAME))
 
 
-def _clear(channel: Channel) -> _Clear:
+def _clear(channel: Channel) -> tuple[float, Point, Layer]:
+    """Return the diameter that passes a channel, where it does, and the tightest layer."""
     closed = next((a for a in channel.layers if a.profile.contains(channel.centre)), None)
     if closed is not None:
-        return _Clear(channel, 0.0, channel.centre, closed)
+        return 0.0, channel.centre, closed
     room = {layer.index: layer.profile.distance_to_edge(channel.centre) for layer in channel.layers}
     tightest = min(channel.layers, key=lambda layer: room[layer.index])
     radius = room[tightest.index]
     # A circle round the axis cannot be beaten from any other place.
     circles = [hole.circle for hole in tightest.profile.holes if hole.circle is not None]
     if any(math.dist(c, channel.centre) < 1e-6 and abs(r - radius) < 1e-6 for c, r in circles):
-        return _Clear(channel, 2 * radius, channel.centre, tightest)
+        return 2 * radius, channel.centre, tightest
     near = [layer for layer in channel.layers if room[layer.index] < 2 * channel.diameter]
     # The nearest edge to any place within reach is no further from the axis than this.
     edges = {
@@ -139,7 +133,7 @@ def _clear(channel: Channel) -> _Clear:
 
     best = _highest(clearance, channel.centre, channel.diameter / 2)
     tightest = min(near, key=lambda layer: _signed_room(layer, edges[layer.index], best))
-    return _Clear(channel, max(0.0, 2 * clearance(best)), best, tightest)
+    return max(0.0, 2 * clearance(best)), best, tightest
 
 
 def _signed_room(layer: Layer, edges: Sequence[Edge], p: Point) -> float:

@@ -11,13 +11,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
-from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import LOOSE, Interface, Laminate
-from sbafab.rules.boundary import Facing, beside, edges_along, outward_reach, without_slivers
+from sbafab.rules.boundary import (
+    Facing,
+    beside,
+    edges_along,
+    middle,
+    outward_reach,
+    without_slivers,
+)
 from sbafab.rules.finding import Finding, Place, judged
 from sbafab.rules.limits import TOLERANCE, holds
 from sbafab.rules.margins import pin_at
@@ -28,19 +34,15 @@ from sbafab.rules.sentences import explained, layer_name
 NAME = "facing-films"
 
 
-class _Weld(NamedTuple):
-    """A place at which two films weld unintentionally, and the ``number`` of such places."""
-
-    region: Region
-    gap: Interface
-    number: int
+_Weld = tuple[Region, Interface, int]
+"""A place at which two films weld unintentionally, and the number of such places."""
 
 
 def check(measures: Measures) -> list[Finding]:
     """Return the largest unintended weld; without any, the least overhang of masks there."""
     laminate, limit = measures.laminate, measures.design.rules.mask_overhang
     pairs = _distinct(measures.facing)
-    welds = [_Weld(part, pair.gap, n) for pair, n in pairs for part in pair.bare.pieces]
+    welds = [(part, pair.gap, n) for pair, n in pairs for part in pair.bare.pieces]
     welds += _at_rims(laminate)
     if welds:
         return [_welded(welds, laminate)]
@@ -77,31 +79,20 @@ def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
     """Bonds between neighbouring balloons that reach a film edge other than a bore's."""
     for distinct in distinct_interfaces(laminate):
         gap = distinct.interface
-        if gap.kind == "chamber" or not gap.pressed or _is_of_one_balloon(gap):
+        of = {gap.below.balloon, gap.above.balloon}
+        # Films without a mask between them that belong together bond all over.
+        is_one = gap.kind == "bond" and (len(of) == 1 or None in of)
+        if gap.kind == "chamber" or not gap.pressed or is_one:
             continue
-        rim = Region(tuple(c for c in gap.contact.contours if not _is_bore(c, laminate)))
+        bores = [bore.centre for bore in laminate.bores]
+        rims = (c for c in gap.contact.contours if not (c.is_hole and any(map(c.winding, bores))))
+        rim = Region(tuple(rims))
         for piece in without_slivers(gap.bond).pieces:
-            if _is_apart(piece, rim) or _is_ear(piece, laminate):
-                continue
-            if edges_along(piece, rim):
-                yield _Weld(piece, gap, distinct.number)
-
-
-def _is_of_one_balloon(gap: Interface) -> bool:
-    """Return True if films without a mask between them belong together: they bond all over."""
-    of = {gap.below.balloon, gap.above.balloon}
-    return gap.kind == "bond" and (len(of) == 1 or None in of)
-
-
-def _is_apart(piece: Region, rim: Region) -> bool:
-    """Return True if a circle round the piece lies too far from the rim to share an edge."""
-    low_x, low_y, high_x, high_y = piece.bounds
-    middle = (low_x + high_x) / 2, (low_y + high_y) / 2
-    return rim.distance_to_edge(middle) > math.dist(middle, (high_x, high_y)) + TOLERANCE
-
-
-def _is_bore(contour: Contour, laminate: Laminate) -> bool:
-    return contour.is_hole and any(contour.winding(bore.centre) for bore in laminate.bores)
+            p = middle(piece)
+            # A circle round the piece that lies too far from the rim shares no edge.
+            is_near = rim.distance_to_edge(p) <= math.dist(p, piece.bounds[2:]) + TOLERANCE
+            if is_near and not _is_ear(piece, laminate) and edges_along(piece, rim):
+                yield piece, gap, distinct.number
 
 
 def _is_ear(piece: Region, laminate: Laminate) -> bool:
@@ -116,16 +107,14 @@ def _is_ear(piece: Region, laminate: Laminate) -> bool:
 
 
 def _welded(welds: Sequence[_Weld], laminate: Laminate) -> Finding:
-    worst = max(welds, key=lambda weld: round(weld.region.area, 9))
-    gap, area = worst.gap, worst.region.area
+    region, gap, _ = max(welds, key=lambda weld: round(weld[0].area, 9))
     masks = laminate.interfaces[gap.index - 1].masks
     layers = (gap.below.index, *(mask.index for mask in masks), gap.above.index)
-    place = Place(gap.index, layers, *_inside(worst.region))
+    place = Place(gap.index, layers, *_inside(region))
     facts: dict[str, Any] = {"lower": layer_name(gap.below), "upper": layer_name(gap.above)}
-    facts |= {"above": gap.above.index, "more": sum(weld.number for weld in welds) - 1}
-    return judged(
-        NAME, False, 0.0, area, "mm2", place, "welds" if facts["more"] else "weld", **facts
-    )
+    facts |= {"above": gap.above.index, "more": sum(number for _, _, number in welds) - 1}
+    sentence = "welds" if facts["more"] else "weld"
+    return judged(NAME, False, 0.0, region.area, "mm2", place, sentence, **facts)
 
 
 def _inside(region: Region) -> Point:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
 
 from sbafab.design.records import Design
 from sbafab.errors import GeometryError
@@ -27,12 +26,6 @@ ROUNDING = 1e-6
 """mm: more than the rounding of widths."""
 
 
-class _Feature(NamedTuple):
-    layer: Layer
-    kind: str
-    width: Width
-
-
 def check(measures: Measures) -> list[Finding]:
     """The finest web, slot or gap of any layer; and whether the cut path keeps every contour."""
     laminate, design = measures.laminate, measures.design
@@ -53,7 +46,7 @@ def check(measures: Measures) -> list[Finding]:
 RULE = Rule(NAME, check, explained(NAME))
 
 
-def _finest(laminate: Laminate) -> _Feature | None:
+def _finest(laminate: Laminate) -> tuple[Layer, str, Width] | None:
     """The narrowest web or slot of all layers; wider ones than the holes known are skipped."""
     layers = [
         (layers_of_pattern[0], laminate.as_cut(layers_of_pattern[0]))
@@ -64,14 +57,14 @@ def _finest(laminate: Laminate) -> _Feature | None:
     return _finer(layers, narrowest + ROUNDING) or _finer(layers, math.inf)
 
 
-def _finer(layers: Iterable[tuple[Layer, Region]], than: float) -> _Feature | None:
+def _finer(layers: Iterable[tuple[Layer, Region]], than: float) -> tuple[Layer, str, Width] | None:
     """Return the narrowest feature below ``than`` mm, or None."""
-    finest: _Feature | None = None
+    finest: tuple[Layer, str, Width] | None = None
     for layer, cut in layers:
         for kind, least in (("web", least_width), ("slot or hole", least_gap)):
             width = least(cut, SHARP, than)
             if width is not None and (finest is None or width.value < than):
-                finest, than = _Feature(layer, kind, width), width.value
+                finest, than = (layer, kind, width), width.value
     return finest
 
 

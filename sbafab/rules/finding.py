@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from sbafab.markup import data_frame, table_html
 from sbafab.rules.sentences import FAIL, REMEDY, Clause, is_said, say, tell
@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 Verdict = Literal["pass", "fail", "waived", "warn"]
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """Place of a worst value: interface (from 1, or None), layer indices, x and y in mm."""
 
     interface: int | None = None

@@ -6,8 +6,6 @@ pin holds all layers by it); it is reported as waived, by the pin's name.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from sbafab.geometry.edges import Point
 from sbafab.laminate.laminate import Pin
 from sbafab.rules.finding import Finding, Place, judged
@@ -20,10 +18,8 @@ from sbafab.rules.sentences import explained
 NAME = "mask-overhang"
 
 
-class _Overhang(NamedTuple):
-    value: float
-    at: Point
-    distinct: DistinctInterface
+_Overhang = tuple[float, Point, DistinctInterface]
+"""Value, place and interface of an overhang, mm."""
 
 
 def check(measures: Measures) -> list[Finding]:
@@ -37,9 +33,9 @@ def check(measures: Measures) -> list[Finding]:
         if gap.masks and gap.pressed and gap.masked.is_empty:
             outside.append(distinct)
         for edge, reach in measures.reaches(gap):
-            overhang = _Overhang(reach.value, edge.nearest(reach.at), distinct)
+            overhang = reach.value, edge.nearest(reach.at), distinct
             pin = pin_at(edge, pins)
-            if pin is not None and not holds(overhang.value, limit):
+            if pin is not None and not holds(reach.value, limit):
                 pinned.setdefault(pin.name, []).append(overhang)
             else:
                 free.append(overhang)
@@ -56,13 +52,13 @@ def _main(free: list[_Overhang], outside: list[DistinctInterface], limit: float)
         return judged(NAME, False, limit, 0.0, "mm", place, "outside", where=distinct.name)
     if not free:
         return judged(NAME, True, limit, None, "mm", Place(), "none")
-    value, p, distinct = min(free, key=lambda overhang: overhang.value)
+    value, p, distinct = min(free, key=lambda overhang: overhang[0])
     place, where = place_in(distinct.interface, p), distinct.name
     return judged(NAME, holds(value, limit), limit, value, "mm", place, "least", where=where)
 
 
 def _waived(pin: Pin, overhangs: list[_Overhang], limit: float) -> Finding:
-    value, _, (interface, _) = min(overhangs, key=lambda overhang: overhang.value)
-    numbers = {o.distinct.interface.index: o.distinct.number for o in overhangs}
+    value, _, (interface, _) = min(overhangs, key=lambda overhang: overhang[0])
+    numbers = {gap.index: number for _, _, (gap, number) in overhangs}
     place, count = place_in(interface, pin.centre), sum(numbers.values())
     return judged(NAME, "waived", limit, value, "mm", place, "pinned", pin=pin.name, count=count)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import Literal, NamedTuple
 
@@ -53,8 +53,7 @@ NETLIST = "netlist"
 FaultKind = Literal["open", "short", "leak", "dead-end", "stray"]
 
 
-@dataclass(frozen=True)
-class NetFault:
+class NetFault(NamedTuple):
     """A difference between nets and voids, with its place.
 
     ``nets`` are the nets that it concerns; ``interface``, None for a hole of an outer film, and
@@ -88,8 +87,7 @@ class NarrowPlace(NamedTuple):
     pressure: float | None
 
 
-@dataclass(frozen=True)
-class Connectivity:
+class Connectivity(NamedTuple):
     """The voids of a laminate against its nets.
 
     ``owners`` holds the names of each cavity's nets, empty for a slit or hole; ``groups`` the names

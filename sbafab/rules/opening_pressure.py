@@ -139,16 +139,15 @@ class _Side(NamedTuple):
         edges = (edge for part in self.bonded for edge in part.index.touching(across.bounds))
         shares = sorted(across.parameter(m) for edge in edges for m in meeting_points(across, edge))
         stretches = [
-            (self._bonded_at(across.at((low + high) / 2)), high - low)
+            (
+                1 + sum(part.contains(across.at((low + high) / 2)) for part in self.bonded),
+                high - low,
+            )
             for low, high in pairwise([0.0, *shares, 1.0])
             if (high - low) * across.length > TOUCH
         ]
         for count, group in groupby(stretches, key=lambda stretch: stretch[0]):
             yield count, sum(share for _, share in group)
-
-    def _bonded_at(self, p: Point) -> int:
-        outside = (n for n, part in enumerate(self.bonded, start=1) if not part.contains(p))
-        return next(outside, len(self.films))
 
 
 def _pressure(sides: Sequence[_Side], width: Width) -> float | None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from sbafab.geometry.edges import Point
-from sbafab.laminate.laminate import Laminate, Layer, Pin
+from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.laminate.lay_up import distinct_layers, press_steps
 from sbafab.rules.boundary import middle
 from sbafab.rules.channel_clear import ON_ONE_PIN, tooling_pins
@@ -89,10 +89,8 @@ def _blocked(laminate: Laminate) -> Iterator[Finding]:
                 continue
             facts = {"pin": pin.name, "step": step.number, "other": laid and laid.index}
             for layer in distinct_layers(laminate, step.layers):
-                if pin not in laminate.pins_holding(layer) and _is_in_the_way(layer, pin):
+                if pin in laminate.pins_holding(layer):
+                    continue
+                room = layer.profile.distance_to_edge(pin.centre)
+                if layer.profile.contains(pin.centre) or room < pin.diameter / 2 - TOLERANCE:
                     yield _miss(pin.centre, layer, "blocked-laid" if laid else "blocked", **facts)
-
-
-def _is_in_the_way(layer: Layer, pin: Pin) -> bool:
-    room = layer.profile.distance_to_edge(pin.centre)
-    return layer.profile.contains(pin.centre) or room < pin.diameter / 2 - TOLERANCE

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from sbafab.geometry.edges import Bounds
 from sbafab.laminate.lay_up import films_without_minutes
 from sbafab.rules.finding import Finding, Place, judged
 from sbafab.rules.limits import TOLERANCE
@@ -39,7 +38,8 @@ def _size(measures: Measures) -> Finding:
     measured, limit = min(sides, key=lambda side: side[1] - side[0])
     good = measured <= limit + TOLERANCE
     firsts = [layers[0] for layers in laminate.patterns.values()]
-    largest = max(firsts, key=lambda layer: _extent(layer.profile.bounds))
+    boxes = ((layer, layer.profile.bounds) for layer in firsts)
+    largest, _ = max(boxes, key=lambda row: max(row[1][2] - row[1][0], row[1][3] - row[1][1]))
     place = Place() if good else Place(None, (largest.index,), high_x, high_y)
     facts = {"platen_width": press.platen_width, "platen_length": press.platen_length}
     facts |= {"width": width, "length": length}
@@ -61,7 +61,3 @@ def _warnings(measures: Measures) -> Iterator[Finding]:
         if film.melts and modulus > STIFFEST:
             facts = {"table": film.table}
             yield judged(NAME, "warn", STIFFEST, modulus, "MPa", nowhere, "stiff", **facts)
-
-
-def _extent(box: Bounds) -> float:
-    return max(box[2] - box[0], box[3] - box[1])

@@ -9,7 +9,7 @@ from typing import Any
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Laminate, Layer, Pin
+from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.channel_clear import ON_ONE_PIN, Channel, channels, tooling_pins
 from sbafab.rules.finding import Finding, Place, judged
 from sbafab.rules.limits import TOLERANCE
@@ -67,7 +67,16 @@ def _opening_centre(layer: Layer, channel: Channel) -> Point | None:
 def _off_pins(laminate: Laminate) -> Iterator[tuple[float, Finding]]:
     """Tooling holes off their pin; one that a layer lacks is off by the pin's diameter."""
     for pin in tooling_pins(laminate):
-        off = {name: _off_pin(layers[0], pin) for name, layers in laminate.patterns.items()}
+        # The nearest round hole, at most the pin's diameter away.
+        off = {
+            name: min(
+                [
+                    pin.diameter,
+                    *(math.dist(h.circle[0], pin.centre) for h in first.profile.holes if h.circle),
+                ]
+            )
+            for name, (first, *_) in laminate.patterns.items()
+        }
         for roles in ON_ONE_PIN:
             siblings = [layer for layer in laminate.layers if layer.role in roles]
             holed = sum(off[layer.pattern] < pin.diameter for layer in siblings)
@@ -76,12 +85,6 @@ def _off_pins(laminate: Laminate) -> Iterator[tuple[float, Finding]]:
                     facts = {"layer": layer_name(layer), "pin": pin.name}
                     value, index = off[layer.pattern], layer.index
                     yield _departure(value, (index,), pin.centre, "off-pin", **facts)
-
-
-def _off_pin(layer: Layer, pin: Pin) -> float:
-    """Distance of the nearest round hole from the pin, at most its diameter, mm."""
-    circles = [hole.circle for hole in layer.profile.holes if hole.circle is not None]
-    return min([pin.diameter, *(math.dist(centre, pin.centre) for centre, _ in circles)])
 
 
 def _off_outline(laminate: Laminate) -> Iterator[tuple[float, Finding]]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.design.records import Design
@@ -68,8 +68,7 @@ class Share(NamedTuple):
         return max(0.0, middle - half), min(1.0, middle + half)
 
 
-@dataclass(frozen=True)
-class Yield:
+class Yield(NamedTuple):
     """Shares of good builds: of all interfaces together, and of each (by index)."""
 
     whole: Share
@@ -128,13 +127,8 @@ def _losing(shares: Mapping[int, Share], order: Sequence[int]) -> Clause:
 # Random builds in which a margin of an interface comes short.
 
 
-class CutContour(NamedTuple):
-    """A cut contour: by how far its film reaches beyond the nominal edge."""
-
-    layer: int
-    contour: int
-
-
+CutContour = tuple[int, int]
+"""A layer and its cut contour, by how far the film reaches beyond its nominal edge."""
 Error = CutContour | Freedom
 
 
@@ -159,7 +153,7 @@ def short_margins(margins: Margins, design: Design) -> ShortMargins | None:
     if not len(short):
         return None
     layers = seated(margins.interfaces[0])
-    cuts = [CutContour(layers[owner.seat], owner.contour) for owner in places.owners]
+    cuts = [(layers[owner.seat], owner.contour) for owner in places.owners]
     # More film widens a bond, more mask an overhang; no cut moves an overlap of seams.
     a, b = (
         (1.0 if owner.is_film == is_bond else -1.0) if owner.is_cut else 0.0
@@ -225,7 +219,9 @@ def simulate(
     measures = measures or Measures(laminate, design)
     indices = sorted({gap.index for equal in measures.equal for gap in equal})
     shortfalls, drawn_rows = _drawn(measures)
-    total = first_builds = design.rules.yield_builds or _quick_number(len(indices))
+    total = first_builds = design.rules.yield_builds or max(
+        1000, min(10_000, 300_000 // max(1, len(indices)))
+    )
     short_of = np.zeros(len(indices), dtype=np.intp)
     whole = drawn_builds = 0
     generator = np.random.default_rng(seed)
@@ -282,11 +278,6 @@ def _drawn(measures: Measures) -> tuple[list[tuple[ShortMargins, Indices]], int]
     return drawn, count
 
 
-def _quick_number(interfaces: int) -> int:
-    """10,000 builds up to 30 interfaces, first fewer of a taller stack."""
-    return max(1000, min(10_000, 300_000 // max(1, interfaces)))
-
-
 def _precise_number(share: Share) -> int:
     """Builds that make the interval of a share narrow: as many, or whole batches up to 40,000."""
     low, high = share.interval
@@ -309,8 +300,6 @@ def _renamed(
     for ours, theirs in pairs:
         twins.update(zip(map(id, ours), theirs, strict=True))
     return [
-        twins[id(error)]
-        if isinstance(error, Freedom)
-        else CutContour(layers[error.layer], error.contour)
+        twins[id(error)] if isinstance(error, Freedom) else (layers[error[0]], error[1])
         for error in errors
     ]

@@ -176,7 +176,12 @@ def _wrong_reaches(
                 chamber = next(c for c in laminate.chambers if c.name in names)
                 offences[void] = _leak(chamber, laminate, graph, came)[1]
             else:
-                offences[void] = _cut_off(void, names, laminate, graph)
+                interface = laminate.interfaces[void.level - 1]
+                sentence, p = (
+                    _seamed("cut-off" if names else "stray", interface),
+                    graph.pieces[void],
+                )
+                offences[void] = _offence(sentence, interface, middle(p), whose=sorted(names))
     return [offences[void] for void in sorted(offences, key=lambda void: void[1:])]
 
 
@@ -276,12 +281,6 @@ def _leak(
     elif last.kind != "opening":
         sentence = _seamed("leak", laminate.interfaces[interface - 1])
     return pocket, _offence(sentence, laminate.interfaces[interface - 1], p, **facts)
-
-
-def _cut_off(void: Void, names: frozenset[str], laminate: Laminate, graph: VoidGraph) -> Finding:
-    interface = laminate.interfaces[void.level - 1]
-    sentence = _seamed("cut-off" if names else "stray", interface)
-    return _offence(sentence, interface, middle(graph.pieces[void]), whose=sorted(names))
 
 
 def _seamed(sentence: str, interface: Interface) -> str:

@@ -103,7 +103,9 @@ class _Voids(NamedTuple):
         names: set[object] = set()
         for p in {edge.start for edge in overlap.edges}:
             here = {name for name, void in self.cavities if void.distance_to_edge(p) <= near}
-            names |= here or ({OUTSIDE} if _is_on(p, self.rim) else set())
+            names |= here or (
+                {OUTSIDE} if any(distance_to(edge, p) <= NEAR for edge in self.rim) else set()
+            )
         return len(names) > 1
 
 
@@ -126,9 +128,8 @@ class _Seams(NamedTuple):
             )
             for piece in (seam.region & partner.region & bare).pieces:
                 if self._is_needed(piece, (seam, partner)):
-                    body = partner.region & _swath(
-                        _edges_near(piece, partner, reach), partner.width
-                    )
+                    near = _edges_near(piece, partner, reach)
+                    body = partner.region & union(swept([e], partner.width, True) for e in near)
                     yield Overlap(a, b, *_depth(seam, body, piece, reach), middle(piece))
 
     def edge_bonds(self) -> Iterator[EdgeBond]:
@@ -212,11 +213,3 @@ def _short_parts(edge: Edge) -> Iterator[Edge]:
     count = math.ceil(abs(edge.sweep) / PART) if isinstance(edge, Arc) else 1
     for k in range(count):
         yield edge.part(edge.at(k / count), edge.at((k + 1) / count))
-
-
-def _swath(edges: Sequence[Edge], width: float) -> Region:
-    return union([swept([edge], width, True) for edge in edges])
-
-
-def _is_on(p: Point, edges: Sequence[Edge]) -> bool:
-    return any(distance_to(edge, p) <= NEAR for edge in edges)

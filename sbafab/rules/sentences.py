@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import string
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from sbafab.catalogue import catalogue
@@ -20,8 +19,7 @@ FAIL, REMEDY = "-fail", "-remedy"
 """Endings of the sentences for a failure, and for what a warning asks to do."""
 
 
-@dataclass(frozen=True)
-class Explanation:
+class Explanation(NamedTuple):
     """The condition that ``holds`` if a rule passes, ``why`` it matters, how to ``mend`` it.
 
     ``keys`` of a design file set the limit or the measured value. ``at_most``: the limit of a check

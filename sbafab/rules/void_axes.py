@@ -222,18 +222,15 @@ def _cuts(axis: VoidAxis) -> _Cuts:
 def _holds_any(axis: VoidAxis, cuts: _Cuts, places: Sequence[Point]) -> NDArray[np.bool_]:
     """Return True for the cuts that have one of the places behind them, or on their edge."""
     holds = np.zeros(len(cuts.first), dtype=np.bool_)
-    for place in (_inward(axis, complex(*place)) for place in places):
+    for p in (complex(*place) for place in places):
+        # A place may lie on the boundary: a little inward.
+        away = complex(axis.centres[np.abs(axis.points - p).argmin()]) - p
+        place = p + away * min(1.0, NUDGE / abs(away)) if away else p
         here, there = axis.points - place, axis.following - place
         turned = axis.summed(np.angle(here.conj() * there), cuts.first, cuts.last)
         closing = np.angle(here[cuts.last].conj() * here[cuts.first])
         holds |= np.abs(turned + closing) / math.tau > 0.25
     return holds
-
-
-def _inward(axis: VoidAxis, p: complex) -> complex:
-    """Return a point that may lie on the boundary a little inward."""
-    away = complex(axis.centres[np.abs(axis.points - p).argmin()]) - p
-    return p + away * min(1.0, NUDGE / abs(away)) if away else p
 
 
 def _within(arc: tuple[int, int, int], place: tuple[int, int], axis: VoidAxis) -> bool:

@@ -7,8 +7,7 @@ seam lies off by its tool's error of place; two edges of one seam move together,
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
@@ -23,8 +22,7 @@ NEAR: Final = 1e-5
 """mm within which a place begins at an edge."""
 
 
-@dataclass(frozen=True)
-class VoidEdges:
+class VoidEdges(NamedTuple):
     """The edges that bound the voids of an interface, with their errors of place, mm.
 
     ``kerf`` is the unknown kerf, ``seams`` the bonding seams with their tools' errors.
@@ -53,7 +51,7 @@ class VoidEdges:
     @property
     def with_seams_in_place(self) -> VoidEdges:
         """The edges with every seam on its path."""
-        return replace(self, seams=tuple((region, 0.0) for region, _ in self.seams))
+        return self._replace(seams=tuple((region, 0.0) for region, _ in self.seams))
 
     @property
     def _cut(self) -> float:
