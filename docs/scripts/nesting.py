@@ -25,9 +25,8 @@ import shapely
 
 from sbafab.actuators import load_design
 from sbafab.cutting.bottom_left import bottom_left
-from sbafab.cutting.nest_check import check_nest
 from sbafab.cutting.nesting import materials_of, nest, of_material
-from sbafab.cutting.placements import NestPart, Stock
+from sbafab.cutting.placements import NestPart, Stock, check_nest
 from sbafab.design.files import template_names
 from sbafab.errors import DesignError
 from sbafab.folders.build import make_build, stocks

@@ -17,7 +17,7 @@ from typing import NamedTuple, Protocol
 
 from sbafab.cutting.cut_settings import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE, LeadIns
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.nest_check import edge_distance
+from sbafab.cutting.placements import edge_distance
 from sbafab.cutting.verify import TOLERANCE
 from sbafab.errors import DesignError
 from sbafab.geometry.contour import Contour

@@ -5,16 +5,15 @@ from __future__ import annotations
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import wrap
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from sbafab.cutting.beam_paths import beam_runs, contour_runs, drawn
 from sbafab.cutting.cut_settings import PLAIN, CutSettings, file_properties, kerf_suffix
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
-from sbafab.cutting.index_marks import index_marks
 from sbafab.cutting.laser_programs import (
     PROGRAMS,
     LaserSheet,
@@ -29,10 +28,14 @@ from sbafab.cutting.sequence import cutting_minutes, cutting_sequence, travel
 from sbafab.cutting.verify import verify_file
 from sbafab.design.sections import Laser, Sheets
 from sbafab.geometry.edges import Point, box_round
+from sbafab.geometry.lazy_numpy import np
 from sbafab.geometry.region import Region
 from sbafab.geometry.spatial_index import boxes_meet, widened
 from sbafab.laminate.films import Material
 from sbafab.runtime import Counted
+
+if TYPE_CHECKING:
+    import shapely
 
 FOLDER = "sheets"
 
@@ -268,3 +271,84 @@ def _wrapped(text: str, count: int) -> list[str]:
         if len(lines) <= count and max(map(len, lines)) <= most:
             return lines
     return [text]
+
+
+# Index marks: the number of a part's pattern, engraved into the skeleton beside it.
+#
+# A mark keeps 0.5 mm from every part (half the spacing, if that is less than 1 mm), so that the
+# film on its two sides adds up to the default spacing of parts. It stands nearer to its part than
+# to any other, and never in a hole. If the skeleton has no such room, the part gets no mark.
+
+
+HEIGHT = 1.2
+"""mm of the digits."""
+FARTHEST = 2.5
+"""mm from a part to its mark."""
+CLEARANCE = 0.5
+"""mm from a mark to every part, at most."""
+AROUND = 32
+"""Places that are tried on each line round a part."""
+GRID = 2
+"""Decimals of a mark's place in mm: it hangs on no rounding of a library."""
+CHORD = 0.005
+"""mm by which the outlines that are searched round may lie inside their arcs."""
+
+
+class IndexMark(NamedTuple):
+    """The number of a pattern, its lower left corner, and its strokes."""
+
+    text: str
+    at: Point
+    strokes: tuple[Stroke, ...]
+
+
+def index_marks(nest: Nest, sheet: int) -> tuple[IndexMark, ...]:
+    """Return the marks of a sheet's parts, at most one for each."""
+    import shapely
+
+    placed, stock = nest.on_sheet(sheet), nest.stock
+    if not placed:
+        return ()
+    outlines = [Region(nest.region(placement).outers).shapely(CHORD) for placement in placed]
+    tree = shapely.STRtree(outlines)
+    clear, edge = clearance(stock.spacing) + CHORD, stock.border
+    inside = shapely.box(edge, edge, stock.width - edge, nest.length(sheet) - edge)
+    taken = [shapely.Point(x, y).buffer(d / 2) for x, y, d in stock.pins]
+    marks = []
+    for number, placement in enumerate(placed):
+        pattern = nest.parts[placement.part].pattern
+        # The number of a pattern, "5" of "P05".
+        text = pattern.lstrip("P").lstrip("0") or pattern
+        size = width(text, HEIGHT), HEIGHT
+        corners = np.array([*_corners(outlines[number], size, clear)])
+        boxes = shapely.box(*corners.T, *(corners + size).T)
+        is_free = shapely.contains_properly(inside, boxes)
+        is_free[tree.query(boxes, predicate="dwithin", distance=clear)[0]] = False
+        away = np.round(shapely.distance(boxes, outlines[number]), GRID)
+        near = np.flatnonzero(is_free & (away <= FARTHEST))
+        for place in near[np.argsort(away[near], kind="stable")]:
+            box = boxes[place]
+            around = tree.query(box, predicate="dwithin", distance=away[place] + 0.1)
+            if {*around} == {number} and not any(box.dwithin(mark, clear) for mark in taken):
+                x, y = map(float, corners[place])
+                taken.append(box)
+                marks.append(IndexMark(text, (x, y), strokes(text, (x, y), HEIGHT)))
+                break
+    return tuple(marks)
+
+
+def clearance(spacing: float) -> float:
+    """Return the least distance of a mark from every part, mm."""
+    return min(CLEARANCE, spacing / 2)
+
+
+def _corners(outline: shapely.MultiPolygon, size: Point, clear: float) -> Iterator[Point]:
+    """Yield lower left corners of boxes round a part, on lines that keep off it."""
+    import shapely
+
+    for off in (size[1] / 2, size[0] / 2, (size[0] ** 2 + size[1] ** 2) ** 0.5 / 2):
+        ring = shapely.buffer(outline, clear + off + 0.02)
+        exterior = ring.exterior if ring.geom_type == "Polygon" else ring.convex_hull.exterior
+        for n in range(AROUND):
+            p = exterior.interpolate(n / AROUND, normalized=True)
+            yield round(p.x - size[0] / 2, GRID), round(p.y - size[1] / 2, GRID)

@@ -15,9 +15,8 @@ from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.cut_settings import TRUE_ARCS, Curves, CutSettings
-from sbafab.cutting.nest_check import check_nest
 from sbafab.cutting.nesting import PLACES, from_dict, nest
-from sbafab.cutting.placements import Nest, NestPart
+from sbafab.cutting.placements import Nest, NestPart, check_nest
 from sbafab.design.records import Design
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.errors import DefectError, DesignError, GeometryError, OutputError

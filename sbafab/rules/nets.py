@@ -23,7 +23,7 @@ from sbafab.laminate.netlist import Netlist, compare
 from sbafab.rules.boundary import middle, without_slivers
 from sbafab.rules.finding import Finding, Place, Verdict, judged
 from sbafab.rules.measures import Measures, place_in
-from sbafab.rules.opening_pressure import hardest_place
+from sbafab.rules.narrow_voids import VoidEdges, hardest_place
 from sbafab.rules.rule import Rule
 from sbafab.rules.sentences import Clause, explained, say, tell
 from sbafab.rules.void_axes import (
@@ -34,7 +34,6 @@ from sbafab.rules.void_axes import (
     blind_ends,
     shortest_way,
 )
-from sbafab.rules.void_edges import VoidEdges
 from sbafab.rules.voids import (
     OUTSIDE,
     Cavity,

@@ -18,9 +18,9 @@ from sbafab.laminate.laminate import Chamber, Interface, Laminate
 from sbafab.rules.boundary import middle
 from sbafab.rules.finding import Finding, Place, judged
 from sbafab.rules.measures import Measures, distinct_interfaces, place_in
+from sbafab.rules.narrow_voids import VoidEdges
 from sbafab.rules.rule import Rule
 from sbafab.rules.sentences import explained, layer_name, say
-from sbafab.rules.void_edges import VoidEdges
 from sbafab.rules.voids import (
     OUTSIDE,
     Void,

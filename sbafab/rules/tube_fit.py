@@ -27,9 +27,9 @@ from sbafab.rules.boundary import outward_reach
 from sbafab.rules.finding import Finding, Place, Verdict, judged
 from sbafab.rules.limits import TOLERANCE, holds
 from sbafab.rules.measures import Measures, distinct_interfaces, place_in
+from sbafab.rules.narrow_voids import VoidEdges
 from sbafab.rules.rule import Rule
 from sbafab.rules.sentences import explained, say
-from sbafab.rules.void_edges import VoidEdges
 from sbafab.rules.voids import PAST_MOUTH, mouth_openings
 
 NAME = "tube-fit"

@@ -12,9 +12,8 @@ from shapely import unary_union
 from shapely.geometry import Point as ShapelyPoint
 from shapely.geometry import Polygon, box
 
-from sbafab.cutting.nest_check import check_nest
 from sbafab.cutting.nesting import nest
-from sbafab.cutting.placements import Nest, NestPart, Stock
+from sbafab.cutting.placements import Nest, NestPart, Stock, check_nest
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 
 

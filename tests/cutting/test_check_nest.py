@@ -7,8 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
-from sbafab.cutting.nest_check import check_nest, check_placed, least_distance
-from sbafab.cutting.placements import Nest, NestPart, Placement, Stock
+from sbafab.cutting.placements import (
+    Nest,
+    NestPart,
+    Placement,
+    Stock,
+    check_nest,
+    check_placed,
+    least_distance,
+)
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 

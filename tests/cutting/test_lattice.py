@@ -17,9 +17,8 @@ from shapely.geometry import Polygon, box
 
 from sbafab.actuators import build, load_design
 from sbafab.cutting.lattice import Lattice, lattices_of
-from sbafab.cutting.nest_check import check_nest
 from sbafab.cutting.nesting import nest, of_material
-from sbafab.cutting.placements import TURNS, Nest, NestPart, Stock, placed
+from sbafab.cutting.placements import TURNS, Nest, NestPart, Stock, check_nest, placed
 from sbafab.folders.build import make_build, stocks
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 

@@ -10,7 +10,7 @@ from typing import Any
 from sbafab.cutting.cut_settings import CUT_SHEET, ENGRAVE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
-from sbafab.cutting.nest_check import least_distance
+from sbafab.cutting.placements import least_distance
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point
