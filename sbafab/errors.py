@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-
 BY_SIGNAL = 128
 """Added to a signal's number, as shells do: the exit code of a command that it stopped."""
 ERROR_SCHEMA = "sbafab/error@1"
@@ -47,20 +43,6 @@ class TooLargeError(DesignError):
 
 class OutputError(SbafabError, OSError):
     """Files that cannot be written, or read back as written."""
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Turn an OSError of the block into an OutputError: ``path`` cannot be written."""
-    try:
-        yield
-    except SbafabError:
-        raise
-    except OSError as error:
-        reason = error.strerror or error
-        raise OutputError(
-            f"{path} cannot be written: {reason}; choose another folder with -o"
-        ) from None
 
 
 class OccupiedError(OutputError):

@@ -236,3 +236,17 @@ def replace_text(path: Path, text: str) -> None:
         begun.replace(path)
     finally:
         begun.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn an OSError of the block into an OutputError: ``path`` cannot be written."""
+    try:
+        yield
+    except SbafabError:
+        raise
+    except OSError as error:
+        reason = error.strerror or error
+        raise OutputError(
+            f"{path} cannot be written: {reason}; choose another folder with -o"
+        ) from None

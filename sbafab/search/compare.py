@@ -21,9 +21,9 @@ from sbafab.design.files import Change, override, shown
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, validated
 from sbafab.documents import Document, PlainNumber, attribute
-from sbafab.errors import DesignError, writing
+from sbafab.errors import DesignError
 from sbafab.folders.build import Build, make_build
-from sbafab.folders.swap import replace_text
+from sbafab.folders.swap import replace_text, writing
 from sbafab.laminate.burst import refuse_beyond_burst
 from sbafab.models.actuator import model_form
 from sbafab.models.balloons import has_balloons

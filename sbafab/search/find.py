@@ -32,7 +32,8 @@ from sbafab.design.files import (
 from sbafab.design.kits import kit_path
 from sbafab.design.records import Design, Free
 from sbafab.documents import Document, PlainNumber, attribute
-from sbafab.errors import DesignError, OutputError, SbafabError, Stopped, writing
+from sbafab.errors import DesignError, OutputError, SbafabError, Stopped
+from sbafab.folders.swap import writing
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.balloons import balloons_of, has_balloons
 from sbafab.models.calibration import uncertainty_of

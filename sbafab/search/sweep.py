@@ -17,8 +17,8 @@ from sbafab.design.files import KIT, OUTLINE, kit_names
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, plain_tables
 from sbafab.documents import Document, attribute
-from sbafab.errors import OutputError, Stopped, writing
-from sbafab.folders.swap import MANIFEST, replace_text
+from sbafab.errors import OutputError, Stopped
+from sbafab.folders.swap import MANIFEST, replace_text, writing
 from sbafab.markup import data_frame
 from sbafab.models.calibration import factors_of
 from sbafab.models.pneumatics import refuse_pressure, usual_pressures
