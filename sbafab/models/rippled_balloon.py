@@ -27,14 +27,13 @@ WIDE = 4.0
 """Pocket radius in ring widths above which films fall in step with the rim: strokes of narrower
 pockets agree within 0.5 % between both models.
 """
-START = 0.0005
-"""Film strain, p R / (E t), at which ripples are first followed: they appear above 0.001."""
+START, STEP, RUNGS = 0.0005, 2.0, 9
+"""Film strain, p R / (E t), at which ripples are first followed: they appear above 0.001; ratio of
+the pressures of two rungs, along which they are continued; number of rungs, of which at the next
+one, 0.256, waves would make no difference.
+"""
 USUAL = 0.013
 """Film strain at which the number of waves is chosen, if none is given."""
-END = 0.256
-"""Film strain above which waves make no difference."""
-STEP = 2.0
-"""Ratio of the pressures of two rungs, along which ripples are continued."""
 SEED = 0.02
 """Initial tilt in rad of a level rim."""
 LEVEL = 0.001
@@ -72,6 +71,20 @@ class Rippled(NamedTuple):
     outside: Array
 
 
+class FilmStates(NamedTuple):
+    """States of a balloon: heights in mm, energies of the films in uJ, volumes in ul."""
+
+    height: Array
+    energy: Array
+    volume: Array
+
+
+def resolves_waves(balloon: Balloon) -> bool:
+    """Return True if its waves are resolved: a wide pocket, equal films of the usual law."""
+    usual = balloon.wrinkles and not balloon.inextensible and balloon.order == 2
+    return usual and balloon.mate is None and balloon.pocket >= WIDE * balloon.ring
+
+
 def free_shapes(balloon: Balloon, pressure: ArrayLike) -> Shapes:
     """Return free balloons at pressures (kPa): with waves in step where the pocket is wide and its
     rim ripples, else by ``inflate``.
@@ -81,23 +94,15 @@ def free_shapes(balloon: Balloon, pressure: ArrayLike) -> Shapes:
 
 def with_waves(balloon: Balloon, shapes: Shapes) -> Shapes:
     """Return ``free_shapes`` at the pressures of free balloons by ``inflate``."""
-    rows = np.flatnonzero(shapes.pressure < _first_pressure(balloon) * END / START)
+    rows = np.flatnonzero(shapes.pressure < _rung_pressure(balloon, RUNGS))
     if not resolves_waves(balloon) or not len(rows):
         return shapes
-    resolved_balloons = rippled(balloon, shapes.pressure[rows])
-    grown = _grown(balloon, resolved_balloons.edge, resolved_balloons.outside)
+    found = rippled(balloon, shapes.pressure[rows])
+    grown = _have_waves(balloon, found.edge, found.outside)
     parts = [part.copy() for part in shapes]
-    for part, resolved_part in zip(parts, resolved_balloons.shapes, strict=True):
-        part[rows[grown]] = resolved_part[grown]
+    for part, resolved in zip(parts, found.shapes, strict=True):
+        part[rows[grown]] = resolved[grown]
     return Shapes(*parts)
-
-
-def _grown(balloon: Balloon, edge: Array, outside: Array) -> NDArray[np.bool_]:
-    """Return True for balloons with waves: at the rim's outside, or in step at the pocket's edge
-    with a rim that may stay level.
-    """
-    waves: NDArray[np.bool_] = np.maximum(np.abs(edge), np.abs(outside)) > LEVEL * balloon.ring
-    return waves
 
 
 def compressed_shapes(
@@ -113,91 +118,65 @@ def compressed_shapes(
     balloons with waves, and volumes that rise with pressure. Waves between plates are not computed.
     Shapes r and z come from ``inflate``.
     """
-    p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
-    p, h = np.atleast_1d(p), np.atleast_1d(h)
-    shapes = inflate(balloon, p, h, tied=tied)
-    waves = wave_states(balloon)
+    p, h = (np.atleast_1d(np.asarray(each, float)) for each in (pressure, height))
+    p, h = np.broadcast_arrays(p, h)
+    shapes, waves = inflate(balloon, p, h, tied=tied), wave_states(balloon)
     if not len(waves.height):
         return shapes
     ladder = np.linspace(0, LADDER_TOP, LADDER_STEPS + 1)[1:] ** 2 * waves.height.max()
     pressures, row = np.unique(p, return_inverse=True)
-    grid = [part.ravel() for part in np.meshgrid(pressures, ladder, indexing="ij")]
-    rungs = inflate(balloon, grid[0], grid[1], tied=True)
+    steps = [part.ravel() for part in np.meshgrid(pressures, ladder, indexing="ij")]
+    rungs = inflate(balloon, steps[0], steps[1], tied=True)
     force, volume, energy = (part.copy() for part in (shapes.force, shapes.volume, shapes.energy))
     for number, pressure_of in enumerate(pressures):
-        here = np.flatnonzero(row == number)
-        part = slice(number * len(ladder), (number + 1) * len(ladder))
-        smooth = FilmStates(h[here], shapes.energy[here], shapes.volume[here])
+        here, part = np.flatnonzero(row == number), np.flatnonzero(steps[0] == pressure_of)
+        own = FilmStates(h[here], shapes.energy[here], shapes.volume[here])
         more = FilmStates(ladder, rungs.energy[part], rungs.volume[part])
-        states = FilmStates(
-            *(np.concatenate(each) for each in zip(smooth, more, waves, strict=True))
-        )
-        low, high, share = _between(states, float(pressure_of), len(here))
-        mixed = np.flatnonzero(low != high)
-        low, high, share = low[mixed], high[mixed], share[mixed]
+        states = FilmStates(*map(np.concatenate, zip(own, more, waves, strict=True)))
         potential = states.energy - pressure_of * states.volume
+        corners = _envelope(states.height, potential)
+        at = np.setdiff1d(np.arange(len(here)), corners)
+        after = np.searchsorted(states.height[corners], states.height[at])
+        after = np.clip(after, 1, len(corners) - 1)
+        low, high, at = corners[after - 1], corners[after], here[at]
         rise = states.height[high] - states.height[low]
-        at = here[mixed]
-        force[at] = -(potential[high] - potential[low]) / rise
-        volume[at] = states.volume[low] + share * (states.volume[high] - states.volume[low])
-        energy[at] = states.energy[low] + share * (states.energy[high] - states.energy[low])
+        share = np.clip((h[at] - states.height[low]) / rise, 0.0, 1.0)
+        force[at] = (potential[low] - potential[high]) / rise
+        for total, values in ((volume, states.volume), (energy, states.energy)):
+            total[at] = values[low] + share * (values[high] - values[low])
     return shapes._replace(force=force, volume=volume, energy=energy)
+
+
+def _envelope(height: Array, potential: Array) -> NDArray[np.int_]:
+    """Return the numbers of the states on the convex envelope of the potential, by height."""
+    hull: list[int] = []
+    for k in np.lexsort((potential, height)).tolist():
+        x, y = height[k], potential[k]
+        if hull and x - height[hull[-1]] < SAME_HEIGHT:
+            continue
+        while len(hull) > 1:
+            a, b = hull[-2:]
+            rise = (potential[b] - potential[a]) * (x - height[a])
+            if rise < (y - potential[a]) * (height[b] - height[a]):
+                break
+            hull.pop()
+        hull.append(k)
+    return np.array(hull)
 
 
 def least_free_states(balloon: Balloon, smooth: Shapes) -> FilmStates:
     """Return the free balloons of least energy among all known states, at the pressures of
     ``smooth``: the states at which ``compressed_shapes`` carries no force.
     """
-    waves = wave_states(balloon)
-    states = FilmStates(smooth.height.copy(), smooth.energy.copy(), smooth.volume.copy())
+    waves, own = wave_states(balloon), (smooth.height, smooth.energy, smooth.volume)
     if not len(waves.height):
-        return states
-    for number, p in enumerate(smooth.pressure):
-        potential = waves.energy - p * waves.volume
-        best = int(potential.argmin())
-        if potential[best] < states.energy[number] - p * states.volume[number]:
-            for part, values in zip(states, waves, strict=True):
-                part[number] = values[best]
-    return states
-
-
-class FilmStates(NamedTuple):
-    """States of a balloon: heights in mm, energies of the films in uJ, volumes in ul."""
-
-    height: Array
-    energy: Array
-    volume: Array
-
-
-def _between(
-    states: FilmStates, pressure: float, count: int
-) -> tuple[NDArray[np.int_], NDArray[np.int_], Array]:
-    """Return the neighbours on the convex envelope of E - p V on either side of each of the first
-    ``count`` states, and its fraction between them; both are the state itself if it is on the
-    envelope.
-    """
-    potential = states.energy - pressure * states.volume
-    order = np.lexsort((potential, states.height))
-    hull: list[int] = []
-    for k in order.tolist():
-        x, y = states.height[k], potential[k]
-        if hull and x - states.height[hull[-1]] < SAME_HEIGHT:
-            continue
-        while len(hull) > 1:
-            a, b = hull[-2:]
-            rise = (potential[b] - potential[a]) * (x - states.height[a])
-            if rise < (y - potential[a]) * (states.height[b] - states.height[a]):
-                break
-            hull.pop()
-        hull.append(k)
-    corners = np.array(hull)
-    places = states.height[corners]
-    after = np.clip(np.searchsorted(places, states.height[:count]), 1, len(corners) - 1)
-    low, high = corners[after - 1], corners[after]
-    share = (states.height[:count] - places[after - 1]) / (places[after] - places[after - 1])
-    alone = np.isin(np.arange(count), corners)
-    low, high = (np.where(alone, np.arange(count), each) for each in (low, high))
-    return low, high, np.clip(np.where(alone, 0.0, share), 0.0, 1.0)
+        return FilmStates(*own)
+    potential = waves.energy - smooth.pressure[:, None] * waves.volume
+    gains = potential.min(1) < smooth.energy - smooth.pressure * smooth.volume
+    best = potential.argmin(1)
+    return FilmStates(
+        *(np.where(gains, with_[best], one) for with_, one in zip(waves, own, strict=True))
+    )
 
 
 @lru_cache(maxsize=64)
@@ -209,64 +188,53 @@ def wave_states(balloon: Balloon) -> FilmStates:
     They are interpolated between rungs of one branch, and some are computed where another branch
     begins.
     """
-    none = FilmStates(np.zeros(0), np.zeros(0), np.zeros(0))
+    none = FilmStates(*np.zeros((3, 0)))
     if not resolves_waves(balloon):
         return none
-    waves, first = usual_waves(balloon), _first_pressure(balloon)
-    count = round(math.log(END / START) / math.log(STEP))
-    x = np.stack([_rung(balloon, waves, k).x for k in range(count)], 1)
-    edge = x[PLACES * balloon.edge + UP]
-    grown = _grown(balloon, edge, edge + balloon.ring * _tilt(balloon, x))
+    of, number = _waving(balloon, usual_waves(balloon)), np.arange(RUNGS)
+    x = np.stack([_rung(of, k)[0] for k in range(RUNGS)], 1)
+    grown = _have_waves(balloon, *_amplitudes(balloon, x))
     if not grown.any():
         return none
-    of, at = _waving(balloon, waves), np.arange(float(count))
-    total = Waves(of, first * STEP**at, _normals(of, x)).total(x, np.arange(count))
-    rungs = FilmStates(2 * x[PLACES * balloon.neck_edge + Z], 2 * total.stored, 2 * total.volume)
-    ends = np.flatnonzero(grown[:-1] | grown[1:])
-    is_one = np.array([_are_one_branch(of, x[:, k], x[:, k + 1]) for k in ends])
-    parts = [FilmStates(*(each[grown] for each in rungs))]
-    between = np.arange(1, RUNG_PARTS) / RUNG_PARTS
-    for k in ends[is_one].tolist():
-        parts.append(_interpolated(rungs, first * STEP**at, k, between))
-    jumps = ends[~is_one]
-    if len(jumps):
+    pressures = _rung_pressure(balloon, number)
+    total = Waves(of, pressures, x).total(x, number)
+    height = 2 * x[PLACES * balloon.neck_edge + Z]
+    rungs = FilmStates(height, 2 * total.stored, 2 * total.volume)
+    parts, jumps = [FilmStates(*(each[grown] for each in rungs))], []
+    for k in np.flatnonzero(grown[:-1] | grown[1:]).tolist():
+        if _are_one_branch(of, x[:, k], x[:, k + 1]):
+            parts.append(_interpolated(rungs, pressures, k))
+        else:
+            jumps.append(k + np.arange(1, JUMP_PARTS) / JUMP_PARTS)
+    if jumps:
         # Another branch begins between these rungs.
-        places = (jumps[:, None] + np.arange(1, JUMP_PARTS) / JUMP_PARTS).ravel()
-        shapes = rippled(balloon, first * STEP**places).shapes
+        shapes = rippled(balloon, _rung_pressure(balloon, np.concatenate(jumps))).shapes
         parts.append(FilmStates(shapes.height, shapes.energy, shapes.volume))
-    return FilmStates(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+    return FilmStates(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def _interpolated(rungs: FilmStates, pressures: Array, k: int, shares: Array) -> FilmStates:
+def _interpolated(rungs: FilmStates, pressures: Array, k: int) -> FilmStates:
     """Return states between rungs k and k + 1 of one branch: the height and the volume as
     polynomials of the pressure's logarithm, the energy as a cubic with slopes p dV/dp.
     """
-    near = slice(max(k - 1, 0), k + 3)
-    x, at = np.log(pressures[near] / pressures[k]) / math.log(STEP), shares
-    height = _polynomial(x, rungs.height[near], at)
-    volume = _polynomial(x, rungs.volume[near], at)
-    ends = np.array([0.0, 1.0])
-    nudge = 1e-4
-    slopes = (_polynomial(x, rungs.volume[near], ends + nudge) - rungs.volume[k : k + 2]) / nudge
+    at, ends, nudge = np.arange(1, RUNG_PARTS) / RUNG_PARTS, np.array([0.0, 1.0]), 1e-4
+    near = np.arange(max(k - 1, 0), min(k + 3, RUNGS))
+    shares = _lagrange(near - k, np.concatenate([at, ends + nudge]))
+    volume = shares @ rungs.volume[near]
+    slopes = (volume[-2:] - rungs.volume[k : k + 2]) / nudge
     a, b = pressures[k : k + 2] * slopes
     rise = rungs.energy[k + 1] - rungs.energy[k]
     energy = rungs.energy[k] + at * (a + at * (3 * rise - 2 * a - b + at * (a + b - 2 * rise)))
-    return FilmStates(height, energy, volume)
+    return FilmStates((shares @ rungs.height[near])[:-2], energy, volume[:-2])
 
 
-def _polynomial(x: Array, values: Array, at: Array) -> Array:
-    """Return the polynomial through values at ``x`` at other places (Lagrange)."""
-    total = np.zeros_like(at)
-    for i, value in enumerate(values):
-        rest = np.delete(x, i)
-        total += value * np.prod((at[:, None] - rest) / (x[i] - rest), axis=1)
-    return total
-
-
-def resolves_waves(balloon: Balloon) -> bool:
-    """Return True if its waves are resolved: a wide pocket, equal films of the usual law."""
-    usual = balloon.wrinkles and not balloon.inextensible and balloon.order == 2
-    return usual and balloon.mate is None and balloon.pocket >= WIDE * balloon.ring
+def _lagrange(nodes: NDArray[np.int_], at: Array) -> Array:
+    """Return the weights of values at nodes in their polynomial at places: (places, nodes)."""
+    weights = np.ones((len(at), len(nodes)))
+    for i, node in enumerate(nodes):
+        rest = np.delete(nodes, i)
+        weights[:, i] = np.prod((at[:, None] - rest) / (node - rest), axis=1)
+    return weights
 
 
 @one_blas_thread
@@ -280,54 +248,48 @@ def rippled(balloon: Balloon, pressure: ArrayLike, waves: int | None = None) -> 
     p = np.atleast_1d(np.asarray(pressure, dtype=float))
     if not (np.isfinite(p) & (p > 0)).all():
         raise DesignError("pressure of a balloon must be above 0 kPa")
-    n = waves or usual_waves(balloon)
-    of = _waving(balloon, n)
-    at = np.maximum(np.log(p / _first_pressure(balloon)) / math.log(STEP), 0.0)
-    starts = [_starts(of, float(place)) for place in at]
-    x = np.stack([start for several in starts for start in several], 1)
-    row = np.repeat(np.arange(len(p)), [len(several) for several in starts])
-    problem = Waves(of, p[row], _normals(of, x))
+    of = _waving(balloon, waves or usual_waves(balloon))
+    at = np.maximum(np.log(p / _rung_pressure(balloon, 0)) / math.log(STEP), 0.0)
+    starts = [_starts(of, place) for place in at.tolist()]
+    x, row = np.concatenate(starts, 1), np.repeat(np.arange(len(p)), [s.shape[1] for s in starts])
+    problem = Waves(of, p[row], x)
     try:
         x = _equilibrium(problem, x)
     except DesignError:
         # One by one, and on smaller steps.
-        rungs = _first_pressure(balloon) * STEP ** at.astype(np.int_)
+        rungs = _rung_pressure(balloon, at.astype(np.int_))
         each = (_continued(of, x[:, [i]], rungs[which], p[which]) for i, which in enumerate(row))
         x = np.concatenate(list(each), 1)
     energy = problem.total(x, np.arange(len(row))).energy
     x = x[:, [min(np.flatnonzero(row == i), key=energy.__getitem__) for i in range(len(p))]]
-    state = Waves(of, p, _normals(of, x)).total(x, np.arange(len(p)))
+    state = Waves(of, p, x).total(x, np.arange(len(p)))
     r, z = (np.ascontiguousarray(x[k::PLACES].T) for k in (R, Z))
     z[:, : balloon.neck_edge] = z[:, balloon.neck_edge, None]
     shapes = Shapes(p, 2 * z[:, 0], 2 * state.volume, np.zeros(len(p)), 2 * state.stored, r, z)
-    edge = x[PLACES * balloon.edge + UP]
-    return Rippled(shapes, n, edge, edge + balloon.ring * _tilt(balloon, x))
+    return Rippled(shapes, of.waves, *_amplitudes(balloon, x))
 
 
 @lru_cache(maxsize=256)
 def usual_waves(balloon: Balloon) -> int:
     """Return the number of waves of least energy of well-grown ripples, by ``ripples_at``."""
-    shape = inflate(balloon, _first_pressure(balloon) * USUAL / START)
+    shape = inflate(balloon, _rung_pressure(balloon, math.log(USUAL / START, STEP)))
     (ripple,) = ripples_at((balloon,), [coordinates(shape.r, shape.z)])
     return int(ripple.waves[0])
 
 
-def _starts(of: Waving, at: float) -> list[Array]:
-    """Return starts between two rungs: one interpolated on a common branch, else both."""
+def _starts(of: Waving, at: float) -> Array:
+    """Return the start between two rungs, interpolated on a common branch, or both rungs:
+    (coordinates, starts).
+    """
     k = int(at)
-    near = [_rung(of.balloon, of.waves, each).x for each in (k, k + 1)]
-    if not _are_one_branch(of, *near):
-        return near
-    for each, front in ((k - 1, True), (k + 2, False)):
-        if each >= 0 and START * STEP**each < END:
-            more = _rung(of.balloon, of.waves, each).x
-            if _are_one_branch(of, more, near[0 if front else -1]):
-                near = [more, *near] if front else [*near, more]
-                k -= front
-    # The polynomial through them (Lagrange).
-    u, places = at - k, range(len(near))
-    shares = [math.prod((u - j) / (i - j) for j in places if j != i) for i in places]
-    return [sum((share * x for share, x in zip(shares, near, strict=True)), np.zeros_like(near[0]))]
+    near = {each: _rung(of, each)[0] for each in (k, k + 1)}
+    if not _are_one_branch(of, *near.values()):
+        return np.stack(list(near.values()), 1)
+    for each, beside in ((k - 1, k), (k + 2, k + 1)):
+        if 0 <= each < RUNGS and _are_one_branch(of, x := _rung(of, each)[0], near[beside]):
+            near[each] = x
+    shares = _lagrange(np.array(list(near)), np.array([at]))
+    return np.stack(list(near.values()), 1) @ shares.T
 
 
 def _are_one_branch(of: Waving, first: Array, second: Array) -> bool:
@@ -338,9 +300,10 @@ def _are_one_branch(of: Waving, first: Array, second: Array) -> bool:
     return bool(a @ b > ALIKE * math.sqrt((a @ a) * (b @ b)))
 
 
-def _first_pressure(balloon: Balloon) -> float:
-    """Return the pressure in kPa of the first rung."""
-    return START * balloon.membrane_stiffness / balloon.pocket
+def _rung_pressure(balloon: Balloon, k: ArrayLike) -> Array:
+    """Return the pressure in kPa of rungs."""
+    first = START * balloon.membrane_stiffness / balloon.pocket
+    return np.asarray(first * STEP ** np.asarray(k, float))
 
 
 @lru_cache(maxsize=32)
@@ -348,44 +311,40 @@ def _waving(balloon: Balloon, waves: int) -> Waving:
     return Waving(balloon, waves)
 
 
-class Rung(NamedTuple):
-    """Coordinates at a pressure; ``in_step`` if films have fallen in step with the rim by then."""
+def _rung(of: Waving, k: int) -> tuple[Array, bool]:
+    """Return a balloon's coordinates at the pressure of rung ``k``, and whether its films have
+    fallen in step with the rim by then.
 
-    x: Array
-    in_step: bool
-
-
-def _rung(balloon: Balloon, waves: int, k: int) -> Rung:
-    """Return a balloon at the pressure of rung ``k``. Shapes depend only on pressure over modulus,
-    so films of any modulus share the rungs of the paper's film.
+    Shapes depend only on pressure over modulus: films of any modulus share those of the paper's.
     """
-    return _rung_of_paper(replace(balloon, modulus=Balloon.modulus), waves, k)
+    return _rung_of_paper(replace(of.balloon, modulus=Balloon.modulus), of.waves, k)
 
 
 @lru_cache(maxsize=512)
-def _rung_of_paper(balloon: Balloon, waves: int, k: int) -> Rung:
-    """Return a balloon at the pressure of rung ``k``, continued from the rung below."""
-    of, p = _waving(balloon, waves), np.array([_first_pressure(balloon) * STEP**k])
+def _rung_of_paper(balloon: Balloon, waves: int, k: int) -> tuple[Array, bool]:
+    """Return ``_rung``, continued from the rung below."""
+    of, p = _waving(balloon, waves), _rung_pressure(balloon, [k])
+    edge = PLACES * balloon.edge
     if k == 0:
         shape = inflate(balloon, p)
         x, in_step = np.zeros((of.is_free.size, 1)), False
         x[R::PLACES], x[Z::PLACES] = shape.r.T, shape.z.T
     else:
-        below = _rung_of_paper(balloon, waves, k - 1)
-        x, in_step = below.x[:, None].copy(), below.in_step
-    if not _ripples(balloon, x[:, 0]):
-        x[PLACES * balloon.edge + EDGE] = -SEED * balloon.thickness / 2
-        x[PLACES * balloon.edge + UP] = SEED * balloon.ring / 3
+        below, in_step = _rung_of_paper(balloon, waves, k - 1)
+        x = below[:, None].copy()
+    if not 2 / balloon.thickness * abs(x[edge + EDGE, 0]) > LEVEL:
+        x[edge + EDGE] = -SEED * balloon.thickness / 2
+        x[edge + UP] = SEED * balloon.ring / 3
     if not in_step and START * STEP**k <= LATEST:
         # Also from there with films pushed in step with the rim.
         x = np.repeat(x, 2, axis=1)
-        x[UP::PLACES, 1] += math.copysign(KICK, x[PLACES * balloon.edge + UP, 1]) * _film_wave(of)
+        x[UP::PLACES, 1] += math.copysign(KICK, x[edge + UP, 1]) * _film_wave(of)
     x = _continued(of, x, p[0] / STEP, p[0])
     rows = np.arange(x.shape[1])
-    energy = Waves(of, np.repeat(p, len(rows)), _normals(of, x)).total(x, rows).energy
+    energy = Waves(of, np.repeat(p, len(rows)), x).total(x, rows).energy
     # Of equal ones the plain start's: its waves are of the branch below.
     gains = bool(energy[-1] < energy[0] * (1 + CLEARLY))
-    return Rung(x[:, -1 if gains else 0], in_step or gains)
+    return x[:, -1 if gains else 0], in_step or gains
 
 
 def _film_wave(of: Waving) -> Array:
@@ -397,29 +356,23 @@ def _film_wave(of: Waving) -> Array:
     return wave
 
 
-def _tilt(balloon: Balloon, x: Array) -> Array:
-    """Return the tilt of the rim, in rad."""
-    return np.asarray(-2 / balloon.thickness * x[PLACES * balloon.edge + EDGE])
+def _amplitudes(balloon: Balloon, x: Array) -> tuple[Array, Array]:
+    """Return the amplitudes in mm of the pocket's edge and of the rim's outside."""
+    edge, tilt = (x[PLACES * balloon.edge + place] for place in (UP, EDGE))
+    return edge, edge - balloon.ring * 2 / balloon.thickness * tilt
 
 
-def _ripples(balloon: Balloon, x: Array) -> bool:
-    return bool(np.abs(_tilt(balloon, x)) > LEVEL)
-
-
-def _normals(of: Waving, x: Array) -> Array:
-    """Return the normals of the mean film, in r and z, and its stretch: (rows, elements, 3)."""
-    balloon = of.balloon
-    r, z = x[R::PLACES].T, x[Z::PLACES].T.copy()
-    z[:, : balloon.neck_edge] = z[:, balloon.neck_edge, None]
-    dr, dz = np.diff(r), np.diff(z)
-    length = np.hypot(dr, dz)
-    return np.stack([-dz / length, dr / length, length / balloon.film.lengths], -1)
+def _have_waves(balloon: Balloon, edge: Array, outside: Array) -> NDArray[np.bool_]:
+    """Return True for balloons with waves: at the rim's outside, or in step at the pocket's edge
+    with a rim that may stay level.
+    """
+    return np.asarray(np.maximum(np.abs(edge), np.abs(outside)) > LEVEL * balloon.ring)
 
 
 def _continued(of: Waving, x: Array, low: float, high: float, halvings: int = HALVINGS) -> Array:
     """Return the equilibrium at a pressure, continued from another, in smaller steps if needed."""
     try:
-        return _equilibrium(Waves(of, np.full(x.shape[1], high), _normals(of, x)), x)
+        return _equilibrium(Waves(of, np.full(x.shape[1], high), x), x)
     except DesignError:
         if not halvings:
             raise

@@ -33,10 +33,7 @@ def at(one: Balloon, pressure: float, waves: int) -> tuple[Waves, np.ndarray]:
     of, shape = Waving(one, waves), inflate(one, pressure)
     x = np.zeros((of.is_free.size, 1))
     x[R::PLACES], x[Z::PLACES] = shape.r.T, shape.z.T
-    dr, dz = np.diff(shape.r), np.diff(shape.z)
-    length = np.hypot(dr, dz)
-    normals = np.stack([-dz / length, dr / length, length / one.film.lengths], -1)
-    return Waves(of, np.array([pressure]), normals), x
+    return Waves(of, np.array([pressure]), x), x
 
 
 def waved(problem: Waves, x: np.ndarray, size: float, seed: int = 3) -> np.ndarray:
