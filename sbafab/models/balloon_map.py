@@ -13,6 +13,7 @@ Lengths mm, pressures kPa, volumes ul, forces mN, energies uJ.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
@@ -23,7 +24,12 @@ from numpy.typing import ArrayLike, NDArray
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes, distinct, inflate
 from sbafab.models.film_elements import Array
-from sbafab.models.rippled_balloon import compressed_shapes, least_free_states, with_waves
+from sbafab.models.rippled_balloon import (
+    FilmStates,
+    compressed_shapes,
+    least_free_states,
+    with_waves,
+)
 from sbafab.runtime import one_blas_thread
 
 DEGREE = 5
@@ -73,41 +79,43 @@ MOST_STRETCH = 0.15
 """Share by which films may stretch; a single modulus is unlikely to hold beyond it."""
 
 
-def _spline_pieces() -> Array:
-    """Polynomials of the uniform B-spline: row j belongs to coefficient j, in powers of u."""
-    rows = np.ones((1, 1))
-    for degree in range(1, DEGREE + 1):
-        wider = np.zeros((degree + 1, degree + 1))
-        for j, row in enumerate(rows):
-            # Cox-de Boor: basis j counts from degree - 1 - j pieces before u.
-            start = degree - 1 - j
-            rising = np.convolve(row, [start, 1.0]) / degree
-            falling = np.convolve(row, [degree - start, -1.0]) / degree
-            wider[j + 1] += rising[: degree + 1]
-            wider[j] += falling[: degree + 1]
-        rows = wider
-    return rows
-
-
-PIECES = _spline_pieces()
+_POWERS = range(DEGREE + 1)
 POWERS = np.arange(DEGREE + 1.0)
+BASIS = np.zeros((3, DEGREE + 1, DEGREE + 1))
+"""Weights of a piece's coefficients by powers of the place in it, from 0 to 1: of the value of a
+uniform B-spline (in truncated powers), its first and second derivative.
+"""
+BASIS[0] = [
+    [
+        sum(
+            (-1) ** i
+            * math.comb(DEGREE + 1, i)
+            * math.comb(DEGREE, k)
+            * (DEGREE - j - i) ** (DEGREE - k)
+            for i in range(DEGREE + 1 - j)
+        )
+        / math.factorial(DEGREE)
+        for k in _POWERS
+    ]
+    for j in _POWERS
+]
+for _order in (1, 2):
+    BASIS[_order, :, :-1] = BASIS[_order - 1, :, 1:] * POWERS[1:]
+PIECES = BASIS[0]
 BERNSTEIN = np.linalg.inv(
     [
-        [math.comb(DEGREE, k) * u**k * (1 - u) ** (DEGREE - k) for k in range(DEGREE + 1)]
+        [math.comb(DEGREE, k) * u**k * (1 - u) ** (DEGREE - k) for k in _POWERS]
         for u in np.linspace(0, 1, DEGREE + 1)
     ]
 )
 """Matrix from values at evenly spaced places from 0 to 1 to Bernstein coefficients."""
-SLOPES = np.stack([PIECES[:, k] * k for k in range(1, DEGREE + 1)], -1)
 WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
 """The coefficients of each piece by height."""
 PIECES_IN_ALL = HEIGHT_SPANS + 2
 """Pieces of a spline by height, with an extrapolation at either end."""
-CURVES = np.stack([SLOPES[:, k] * k for k in range(1, DEGREE)], -1)
-BY_PRESSURE = np.zeros((3, DEGREE + 1, DEGREE + 1))
-BY_PRESSURE[0], BY_PRESSURE[1, :, :-1], BY_PRESSURE[2, :, :-2] = PIECES, SLOPES, CURVES
-"""Weights of a piece's coefficients by powers: of values, first and second derivatives."""
-COUNTS = np.arange(DEGREE + 1)[:, None]
+BELOW = np.array([[1.0, -1.0, 1.0], [0.0, 1.0, -2.0], [0.0, 0.0, 1.0]])
+ABOVE = np.stack([POWERS**0, POWERS, POWERS * (POWERS - 1) / 2])
+"""First three powers of a piece about a point one piece before its own first three, and after."""
 
 
 def _near_pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
@@ -124,30 +132,6 @@ def _near_pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray
 
 
 *PAIRS, PAIR_OF = _near_pairs(HEIGHT_SPANS + DEGREE)
-
-
-def basis(x: Array, order: int = 0) -> tuple[NDArray[np.int_], Array]:
-    """Return the first coefficient of the piece at ``x`` (in pieces), and the weights of it and the
-    next ones there: for the value, or for the first or second derivative.
-    """
-    first = x.astype(np.int_)
-    table = (PIECES, SLOPES, CURVES)[order]
-    u = x - first
-    powers = u[..., None] ** np.arange(table.shape[1])
-    return first, powers @ table.T
-
-
-def _taylor_shift(by: float, count: int) -> Array:
-    """Return the first three powers of a polynomial about a point ``by`` further: (3, count)."""
-    rows = np.zeros((3, count))
-    for k in range(count):
-        for j in range(min(k, 2) + 1):
-            rows[j, k] = math.comb(k, j) * by ** (k - j)
-    return rows
-
-
-ENDS = _taylor_shift(-1.0, 3), _taylor_shift(1.0, DEGREE + 1)
-"""Extrapolations below the first piece and above the last one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +180,7 @@ class BalloonMap:
         refuse_outside(p, self.most_pressure)
         x, rate = (part.ravel() for part in self.scaled(p))
         first = x.astype(np.int_)
-        each = BY_PRESSURE[:orders] @ (x - first) ** POWERS[:, None]
+        each = BASIS[:orders] @ (x - first) ** POWERS[:, None]
         if orders > 2:
             each[2] *= rate * rate
             flat = p.ravel()
@@ -206,7 +190,7 @@ class BalloonMap:
             each[1] *= rate
         weights = np.zeros((len(self.coefficients), orders, p.size))
         states = np.arange(p.size)
-        weights[first + COUNTS, :, states] = each.transpose(1, 2, 0)
+        weights[first + WINDOWS[0, :, None], :, states] = each.transpose(1, 2, 0)
         if sucked:
             fall = np.exp((below - p) / COLLAPSE_SUCTION).ravel()
             weights[:, 0] -= COLLAPSE_SUCTION * (fall - 1) * weights[:, 1]
@@ -225,21 +209,21 @@ class BalloonMap:
 
     def force(self, pressure: ArrayLike, height: ArrayLike) -> Array:
         """Return the force in mN on the plate at either end; below 0 for a pull."""
-        return -self._along(0, pressure, height).first * self.spans
+        return -self._along(0, pressure, height)[1] * self.spans
 
     def volume(self, pressure: ArrayLike, height: ArrayLike) -> Array:
         """Return the volume of the balloon, ul."""
-        return self._along(1, pressure, height).value
+        return self._along(1, pressure, height)[0]
 
     def potential(self, pressure: ArrayLike, height: ArrayLike) -> Array:
         """Return the energy of the films less pressure times volume, uJ."""
-        return self._along(0, pressure, height).value
+        return self._along(0, pressure, height)[0]
 
-    def _along(self, which: int, pressure: ArrayLike, height: ArrayLike) -> Along:
+    def _along(self, which: int, pressure: ArrayLike, height: ArrayLike) -> tuple[Array, ...]:
+        """Return one of ``splines`` and its rate by height, in pieces."""
         p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
         table = self.splines(p)[:, :, which].reshape(DEGREE + 1, -1)
-        begins = np.arange(p.size).reshape(p.shape)
-        return Along(*horner(table, begins, h * self.spans, p.size))
+        return horner(table, np.arange(p.size).reshape(p.shape), h * self.spans, p.size)
 
     def free_height(self, pressure: ArrayLike) -> Array:
         """Return the height in mm of the unloaded balloon."""
@@ -291,14 +275,6 @@ def _stiffened(made: BalloonMap, ratio: float) -> BalloonMap:
     )
 
 
-class Along(NamedTuple):
-    """Value, first and second derivative of splines, by pieces."""
-
-    value: Array
-    first: Array
-    second: Array
-
-
 def pieces(coefficients: Array) -> Array:
     """Polynomials of splines by height: (..., coefficients) become (..., PIECES_IN_ALL, powers).
 
@@ -307,8 +283,8 @@ def pieces(coefficients: Array) -> Array:
     inner = coefficients[..., WINDOWS] @ PIECES
     polynomials = np.zeros((*inner.shape[:-2], PIECES_IN_ALL, DEGREE + 1))
     polynomials[..., 1:-1, :] = inner
-    polynomials[..., 0, :3] = inner[..., 0, :3] @ ENDS[0].T
-    polynomials[..., -1, :3] = inner[..., -1, :] @ ENDS[1].T
+    polynomials[..., 0, :3] = inner[..., 0, :3] @ BELOW.T
+    polynomials[..., -1, :3] = inner[..., -1, :] @ ABOVE.T
     return polynomials
 
 
@@ -346,11 +322,13 @@ def horner(
 @one_blas_thread
 def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     """The map of a balloon from 0 to a pressure in kPa, to somewhat above its free height."""
-    scale = scale_pressure_of(balloon)
+    scale = SCALE_STRAIN * balloon.membrane_stiffness / balloon.pocket
     p = scale * np.sinh(_spread(PRESSURE_POINTS) * math.asinh(most_pressure / scale))
     rises = np.linspace(most_pressure / RISES, most_pressure, RISES)
     smooth = inflate(balloon, np.concatenate([rises, p[1:]]))
-    top = HEADROOM * highest(balloon, smooth.rows(slice(RISES)))
+    rising = with_waves(balloon, smooth.rows(slice(RISES)))
+    # Up to the last pressure, or to the largest allowed stretch of its films.
+    top = HEADROOM * float(np.interp(MOST_STRETCH, stretch(balloon, rising), rising.height))
     # The flatter a slack film lies, the lower the pressure that makes it taut.
     even = _spread(HEIGHT_POINTS)
     least = min(LEAST_HEIGHT, LEAST_SHARE * top)
@@ -359,24 +337,8 @@ def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     shapes = compressed_shapes(balloon, pressures, heights, tied=True)
     blank = np.zeros((PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE))
     frame = BalloonMap(balloon, most_pressure, top, blank, scale)
-    stands = least_free_states(balloon, smooth.rows(slice(RISES, None)))
-    is_inside = stands.height < top
-    free = _Free(p[1:][is_inside], stands.height[is_inside], stands.volume[is_inside])
-    return replace(frame, coefficients=_fitted(frame, pressures, heights, shapes, free))
-
-
-def scale_pressure_of(balloon: Balloon) -> float:
-    """Return the pressure p0 in kPa below which pieces are equal in pressure."""
-    return SCALE_STRAIN * balloon.membrane_stiffness / balloon.pocket
-
-
-def highest(balloon: Balloon, rising: Shapes) -> float:
-    """Height in mm to which it may rise freely: at the last pressure, or at the largest allowed
-    stretch of its films; ``rising`` are shapes from ``inflate``.
-    """
-    free = with_waves(balloon, rising)
-    longer = stretch(balloon, free)
-    return float(np.interp(MOST_STRETCH, longer, free.height))
+    free = least_free_states(balloon, smooth.rows(slice(RISES, None)))
+    return replace(frame, coefficients=_fitted(frame, shapes, heights, p, free))
 
 
 def _spread(count: int) -> Array:
@@ -385,165 +347,137 @@ def _spread(count: int) -> Array:
     return (even + (1 - np.cos(math.pi * even)) / 2) / 2
 
 
-class _Free(NamedTuple):
-    """Free balloons at pressures (kPa): heights in mm, volumes in ul."""
+def _fitted(
+    frame: BalloonMap, shapes: Shapes, h: Array, pressures: Array, free: FilmStates
+) -> Array:
+    """Return the coefficients of the potential: least squares of W, the force and the volume of
+    balloons between plates at heights ``h``, and of ``free`` ones at ``pressures`` but the first.
 
-    pressure: Array
-    height: Array
-    volume: Array
-
-
-def _fitted(frame: BalloonMap, p: Array, h: Array, shapes: Shapes, free: _Free) -> Array:
-    """Coefficients of the potential: least squares of W, the force and the volume."""
-    top, blank = frame.most_height, frame.coefficients
-    x, rate = frame.scaled(p)
-    y = np.minimum(h * HEIGHT_SPANS / top, HEIGHT_SPANS * (1 - 1e-12))
-    by_p = [_rows(x, order, blank.shape[0]) for order in (0, 1)]
-    by_h = [_rows(y, order, blank.shape[1]) for order in (0, 1)]
-
-    flat, lowest = _rows(0 * y, 0, blank.shape[1]), h == h.min()
-
-    def equations(i: int, j: int, scale: Array, by_height: Array | None = None) -> Array:
-        rows = by_h[j] if by_height is None else by_height
-        return np.asarray((by_p[i][:, :, None] * rows[:, None, :]).reshape(len(p), -1) * scale)
-
-    # ``inflate`` fixes the wrinkles' stress while it seeks equilibrium, so its forces and volumes
-    # are not exactly slopes of one potential. Heights and bends depend on the forces.
+    ``inflate`` fixes the wrinkles' stress while it seeks equilibrium, so its forces and volumes are
+    not exactly slopes of one potential. Heights and bends depend on the forces.
+    """
+    top, p = frame.most_height, shapes.pressure
     area = shapes.r[:, -1].max() ** 2 * math.pi
-    stand, lift = _free_rows(frame, free, area)
     push = 1 / (area * (p + LOW_PRESSURE) + 3 * np.abs(shapes.force))
     room = VOLUME_WEIGHT / (area * np.minimum(h + LOW_HEIGHT, top))
-    potential = shapes.energy - p * shapes.volume
-    scale = push / top
-    matrix = np.concatenate(
-        [
-            equations(0, 0, scale[:, None]),
-            equations(0, 1, (-push * HEIGHT_SPANS / top)[:, None]),
-            equations(1, 0, (-rate * room)[:, None]),
-            # A balloon pressed flat has no volume.
-            equations(1, 0, (-FLAT_WEIGHT * rate * room)[:, None], flat)[lowest],
-            stand,
-            lift[0],
-        ]
+    inside = free.height < top
+    stands, at, held = free.height[inside], pressures[1:][inside], free.volume[inside]
+    lift = FREE_WEIGHT / (area * (at + LOW_PRESSURE))
+    roomy = FREE_WEIGHT * VOLUME_WEIGHT / (area * np.minimum(stands + LOW_HEIGHT, top))
+    lowest = h == h.min()
+    flat = FLAT_WEIGHT * room[lowest]
+    matrix, right_side = (
+        np.concatenate(each)
+        for each in zip(
+            (
+                _rows(frame, p, h, 0, 0) * push[:, None] / top,
+                (shapes.energy - p * shapes.volume) * push / top,
+            ),
+            (_rows(frame, p, h, 0, 1) * push[:, None], shapes.force * push),
+            (_rows(frame, p, h, 1, 0) * room[:, None], shapes.volume * room),
+            # A balloon pressed flat has no volume, a free one carries no force.
+            (_rows(frame, p[lowest], 0 * p[lowest], 1, 0) * flat[:, None], 0 * flat),
+            (_rows(frame, at, stands, 0, 1) * lift[:, None], 0 * lift),
+            (_rows(frame, at, stands, 1, 0) * roomy[:, None], held * roomy),
+            strict=True,
+        )
     )
-    right_side = np.concatenate(
-        [
-            potential * scale,
-            shapes.force * push,
-            shapes.volume * room,
-            np.zeros(lowest.sum() + len(stand)),
-            lift[1],
-        ]
-    )
-    held = shapes.volume.reshape(HEIGHT_POINTS, -1).max(0)
-    best = _admissible(matrix, right_side, _limits(frame, area, p[:PRESSURE_POINTS], held))
+    most = shapes.volume.reshape(HEIGHT_POINTS, -1).max(0)
+    best = _admissible(matrix, right_side, _limits(frame, area, pressures, most))
     if best is None:
         raise DesignError(
             f"no smooth map of a balloon fits up to {frame.most_pressure:g} kPa; ask for less "
             "pressure"
         )
-    return np.asarray(best.reshape(blank.shape))
+    return np.asarray(best.reshape(frame.coefficients.shape))
 
 
-def _free_rows(frame: BalloonMap, free: _Free, area: float) -> tuple[Array, tuple[Array, Array]]:
-    """Return equations of free balloons: no force, and their volumes with the right side."""
-    counts = frame.coefficients.shape
-    x, rate = frame.scaled(free.pressure)
-    y = np.minimum(free.height * frame.spans, HEIGHT_SPANS * (1 - 1e-12))
-    values, slopes = (_rows(x, order, counts[0]) for order in (0, 1))
-    by_h = [_rows(y, order, counts[1]) for order in (0, 1)]
-    push = FREE_WEIGHT / (area * (free.pressure + LOW_PRESSURE))
-    room = (
-        FREE_WEIGHT
-        * VOLUME_WEIGHT
-        / (area * np.minimum(free.height + LOW_HEIGHT, frame.most_height))
-    )
-    count = len(x)
-    force = (values[:, :, None] * by_h[1][:, None]).reshape(count, -1) * push[:, None]
-    volume = (slopes[:, :, None] * by_h[0][:, None]).reshape(count, -1) * (-rate * room)[:, None]
-    return force * frame.spans, (volume, free.volume * room)
+def _rows(frame: BalloonMap, p: Array, h: Array, by_p: int, by_h: int) -> Array:
+    """Return W, or the volume or the force as its negative derivative by pressure or by height, at
+    places (n,) as a matrix by coefficients: (n, coefficients).
+    """
+    x, rate = frame.scaled(p)
+    y = np.minimum(h * frame.spans, HEIGHT_SPANS * (1 - 1e-12))
+    sides = []
+    for place, order, count in zip((x, y), (by_p, by_h), frame.coefficients.shape, strict=True):
+        first = place.astype(np.int_)
+        weights = (place - first)[:, None] ** POWERS @ BASIS[order].T
+        side = np.zeros((len(place), count))
+        np.put_along_axis(side, first[:, None] + WINDOWS[0], weights, 1)
+        sides.append(side)
+    if by_p:
+        sides[0] *= -rate[:, None]
+    if by_h:
+        sides[1] *= -frame.spans
+    return np.asarray((sides[0][:, :, None] * sides[1][:, None]).reshape(len(p), -1))
 
 
-@dataclass(frozen=True, eq=False)
+LimitKinds = tuple[tuple[Array, Array, Array], ...]
+"""Of each kind of limit the matrices by pressure and by height (Bernstein coefficients,
+coefficients), and a constant for each row by pressure, added to the result.
+"""
+
+
 class MapLimits:
     """Functions of a spline's coefficients ``units * x`` that must be above 0, with MARGIN as
-    target: the matrices by pressure and by height (Bernstein coefficients, coefficients) of each of
-    the ``kinds``, and a constant for each row by pressure, added to the result.
+    target.
 
-    Limits are ``rows @ x >= least``, divided by the lengths ``size`` of their gradients. A row is
-    the product of one row by pressure and one by height, of six coefficients each; all products
-    with ``rows``, (values, coefficients), are computed from these.
+    Limits are ``rows @ x >= least``. A row is the product of one by pressure and one by height, of
+    six coefficients each, over the length ``size`` of its gradient g, sqrt(g @ metric @ g). All
+    products with ``rows``, (values, coefficients), are computed from these.
     """
 
-    kinds: tuple[tuple[Array, Array, Array], ...]
-    units: Array
-    size: Array
-
-    @classmethod
-    def scaled(
-        cls, kinds: tuple[tuple[Array, Array, Array], ...], units: Array, metric: Array
-    ) -> MapLimits:
-        """Return the limits on x, whose gradients g have lengths sqrt(g @ metric @ g)."""
-        count = PRESSURE_SPANS + DEGREE
-        whole = units[:, None] * metric * units
-        pairs = whole.reshape((count, count) * 2).swapaxes(1, 2).reshape(count**2, count**2)
-        size = [np.sqrt(_squares(a) @ pairs @ _squares(b).T).ravel() for a, b, _ in kinds]
-        return cls(kinds, units, np.concatenate(size))
-
-    @cached_property
-    def least(self) -> Array:
-        """The least values of the rows."""
-        rooms = [np.repeat(room, len(along)) for _, along, room in self.kinds]
-        return np.asarray((MARGIN - np.concatenate(rooms)) / self.size)
-
-    @cached_property
-    def _unit_products(self) -> Array:
-        return np.asarray(self.units[:, None] * self.units)
-
-    @cached_property
-    def _outer_products(self) -> list[tuple[Array, Array]]:
-        """Products of pairs of near coefficients, of each kind's rows: (rows, pairs), twice."""
+    def __init__(self, kinds: LimitKinds, units: Array, metric: Array) -> None:
+        self.units, self.unit_products = units, units[:, None] * units
+        self.sides = [(across, along) for across, along, _ in kinds]
+        # Products of near coefficients, of each kind's rows: (rows, pairs), twice.
         first, second = PAIRS
-        return [(a[:, first] * a[:, second], b[:, first] * b[:, second]) for a, b, _ in self.kinds]
+        self.pairs = [
+            (a[:, first] * a[:, second], b[:, first] * b[:, second]) for a, b in self.sides
+        ]
+        count = len(first) + 1
+        near = np.bincount(PAIR_OF.ravel(), (self.unit_products * metric).ravel(), count**2)
+        near = near.reshape(count, count)[:-1, :-1]
+        self.size = self._row_by_row([np.sqrt(a @ near @ b.T) for a, b in self.pairs])
+        rooms = [np.broadcast_to(room[:, None], (len(a), len(b))) for a, b, room in kinds]
+        self.least = (MARGIN - self._row_by_row(rooms)) / self.size
 
     def times(self, x: Array) -> Array:
         """Return ``rows @ x``."""
         grid = (self.units * x).reshape(PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE)
-        values = [(across @ grid @ along.T).ravel() for across, along, _ in self.kinds]
-        return np.asarray(np.concatenate(values) / self.size)
+        return self._row_by_row([a @ grid @ b.T for a, b in self.sides]) / self.size
 
     def transposed(self, factors: Array) -> Array:
         """Return ``factors @ rows``."""
-        parts = zip(self.kinds, self._grids(factors / self.size), strict=True)
-        total = sum(across.T @ grid @ along for (across, along, _), grid in parts)
+        parts = zip(self.sides, self._grids(factors / self.size), strict=True)
+        total = sum(a.T @ grid @ b for (a, b), grid in parts)
         return np.asarray(np.ravel(total) * self.units)
 
     def normal_matrix(self, weights: Array) -> Array:
         """Return ``rows.T @ diag(weights) @ rows``."""
         pairs = np.zeros((len(PAIRS[0]) + 1,) * 2)
         grids = self._grids(weights / self.size**2)
-        for (across, along), grid in zip(self._outer_products, grids, strict=True):
-            pairs[:-1, :-1] += across.T @ (grid @ along)
+        for (a, b), grid in zip(self.pairs, grids, strict=True):
+            pairs[:-1, :-1] += a.T @ (grid @ b)
         matrix = pairs.take(PAIR_OF)
-        matrix *= self._unit_products
+        matrix *= self.unit_products
         return np.asarray(matrix)
 
-    def _grids(self, values: Array) -> list[Array]:
-        """Return each kind's values: (by pressure, by height)."""
-        shapes = [(len(across), len(along)) for across, along, _ in self.kinds]
-        ends = np.cumsum([rows * columns for rows, columns in shapes])
-        parts = np.split(values, ends[:-1])
-        return [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
+    @staticmethod
+    def _row_by_row(grids: Sequence[Array]) -> Array:
+        return np.concatenate([grid.ravel() for grid in grids])
+
+    def _grids(self, values: Array) -> Iterator[Array]:
+        """Yield each kind's values: (by pressure, by height)."""
+        start = 0
+        for a, b in self.sides:
+            end = start + len(a) * len(b)
+            yield values[start:end].reshape(len(a), len(b))
+            start = end
 
 
-def _squares(rows: Array) -> Array:
-    return (rows[:, :, None] * rows[:, None]).reshape(len(rows), -1)
-
-
-def _limits(
-    frame: BalloonMap, area: float, pressures: Array, held: Array
-) -> tuple[tuple[Array, Array, Array], ...]:
-    """Return the kinds of ``MapLimits`` on W. Volumes rise with pressure, are above 0 without
+def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> LimitKinds:
+    """Return the limits on W. Volumes rise with pressure, are above 0 without
     pressure, and at the end of each piece at most the largest volume ``held`` at the next of
     ``pressures`` at any height, as shares of area times height. Forces fall with height, as shares
     of pressure times area.
@@ -598,11 +532,8 @@ def _parts(ends: Array, order: int, count: int) -> Array:
     """
     low, wide = ends[:-1], np.diff(ends)
     first = (low + wide / 2).astype(np.int_)
-    table = np.zeros((DEGREE + 1, DEGREE + 1))
-    pieces_of_order = (PIECES, SLOPES, CURVES)[order]
-    table[:, : pieces_of_order.shape[1]] = pieces_of_order
     places = (low - first)[:, None] + wide[:, None] * np.linspace(0, 1, DEGREE + 1)
-    weights = BERNSTEIN @ (places[..., None] ** POWERS) @ table.T
+    weights = BERNSTEIN @ (places[..., None] ** POWERS) @ BASIS[order].T
     matrices = np.zeros((len(low), DEGREE + 1, count))
     columns = first[:, None, None] + np.arange(DEGREE + 1)
     np.put_along_axis(matrices, np.broadcast_to(columns, weights.shape), weights, -1)
@@ -619,9 +550,7 @@ def _times_line(parts: Array, line: Array) -> Array:
     return np.asarray(BERNSTEIN @ (line_values[..., None] * values))
 
 
-def _admissible(
-    matrix: Array, right_side: Array, kinds: tuple[tuple[Array, Array, Array], ...]
-) -> Array | None:
+def _admissible(matrix: Array, right_side: Array, kinds: LimitKinds) -> Array | None:
     """Return the least-squares coefficients within the limits; None if none exist."""
     # With columns scaled to equal length the normal equations are well-conditioned (2e6; 1e17
     # without scaling), and need no orthogonal factorisation.
@@ -629,16 +558,9 @@ def _admissible(
     columns = matrix * units
     normal = columns.T @ columns
     free = np.linalg.solve(normal, columns.T @ right_side)
-    limits = MapLimits.scaled(kinds, units, np.linalg.inv(normal))
+    limits = MapLimits(kinds, units, np.linalg.inv(normal))
     best = nearest_admissible(free, normal, limits)
     return None if best is None else np.asarray(units * best)
-
-
-def _rows(x: Array, order: int, count: int) -> Array:
-    first, weights = basis(x, order)
-    rows = np.zeros((len(x), count))
-    np.put_along_axis(rows, first[:, None] + np.arange(DEGREE + 1), weights, 1)
-    return rows
 
 
 def stretch(kind: Balloon, shape: Shapes) -> Array:
