@@ -16,7 +16,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes, distinct, inflate
 from sbafab.models.film_elements import Array
+from sbafab.models.least_energy import eliminated, solved
 from sbafab.models.rippled_balloon import (
     FilmStates,
     compressed_shapes,
@@ -601,11 +601,12 @@ def nearest_admissible(point: Array, metric: Array, limits: MapLimits) -> Array 
         ratio = push / slack
         matrix = limits.normal_matrix(ratio)
         matrix += metric
-        parts = _eliminated(matrix)
+        width = HEIGHT_SPANS + DEGREE
+        parts = eliminated(matrix, BLOCK * width, DEGREE * width)
         even = ratio * gap
 
         def step(pull: Array) -> tuple[Array, Array, Array]:
-            ahead = _solved(parts, -limits.transposed(pull + even) - off)  # noqa: B023
+            ahead = solved(parts, -limits.transposed(pull + even) - off)  # noqa: B023
             slacker = limits.times(ahead) + gap  # noqa: B023
             return ahead, slacker, -pull - ratio * slacker  # noqa: B023
 
@@ -617,44 +618,6 @@ def nearest_admissible(point: Array, metric: Array, limits: MapLimits) -> Array 
         share = min(1.0, STEP_SHARE * min(_share(slack, slacker), _share(push, harder)))
         x, slack, push = x + share * ahead, slack + share * slacker, push + share * harder
     return None
-
-
-class _Eliminated(NamedTuple):
-    """A block of unknowns, and those ``after`` it that it is coupled to: of a matrix L L^T, the
-    ``inverse`` of its part of L, and its rows ``across`` of L^T.
-    """
-
-    here: slice
-    after: slice
-    inverse: Array
-    across: Array
-
-
-def _eliminated(rows: Array) -> list[_Eliminated]:
-    """Return the blocks of a positive definite matrix (coefficients, coefficients), which is
-    overwritten, eliminated in turn: those of a few pressures, coupled to the next DEGREE ones.
-    LAPACK's solver for whole matrices takes three times as long.
-    """
-    parts = []
-    width = HEIGHT_SPANS + DEGREE
-    for start in range(0, len(rows), BLOCK * width):
-        end = start + BLOCK * width
-        here, after = slice(start, end), slice(end, end + DEGREE * width)
-        inverse = np.linalg.inv(np.linalg.cholesky(rows[here, here]))
-        across = inverse @ rows[here, after]
-        rows[after, after] -= across.T @ across
-        parts.append(_Eliminated(here, after, inverse, across))
-    return parts
-
-
-def _solved(parts: list[_Eliminated], right_side: Array) -> Array:
-    x = right_side.copy()
-    for here, after, inverse, across in parts:
-        x[here] = inverse @ x[here]
-        x[after] -= across.T @ x[here]
-    for here, after, inverse, across in reversed(parts):
-        x[here] = inverse.T @ (x[here] - across @ x[after])
-    return x
 
 
 def _share(values: Array, by: Array) -> float:

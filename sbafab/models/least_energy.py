@@ -107,9 +107,12 @@ def equilibrium(problem: Potential, x: Array) -> Array:
 # Banded symmetric systems, many small ones at once.
 
 
+BLOCK = 48
+"""Unknowns that are eliminated together: LAPACK is slow for more than 64."""
+
+
 def solve(band: Array, right_side: Array) -> Array:
-    """Return the solution of A x = ``right_side``: (n, rows), or (n, several, rows) with several
-    right sides for each A.
+    """Return the solution of A x = ``right_side``: (n, rows).
 
     ``band`` (n, width, rows) holds ``A[i, i + k]`` at ``[i, k]``. By A = L D L^T without pivoting,
     all rows in step; a negative pivot is replaced by its absolute value, so that for the gradient
@@ -120,16 +123,15 @@ def solve(band: Array, right_side: Array) -> Array:
     # Room for both halves and beyond the end; A[i, i + k] at [i, reach + k].
     full = np.zeros((size + reach, 2 * reach + 1, rows))
     full[:size, reach:] = band
-    several = right_side.reshape(size, -1, rows)
-    solution = np.zeros((size + reach, *several.shape[1:]))
-    solution[:size] = several
+    solution = np.zeros((size + reach, 1, rows))
+    solution[:size, 0] = right_side
     step, across, row = full.strides
     # Of each pivot, the square of the rows and columns behind it that it reaches.
     squares = np.lib.stride_tricks.as_strided(
         full[1:, reach:], (size, reach, reach, rows), (step, step - across, across, row)
     )
     lower, pivots = np.empty((size, reach, 1, rows)), np.empty((size, 1, rows))
-    square, side = np.empty((reach, reach, rows)), np.empty((reach, *several.shape[1:]))
+    square, side = np.empty((reach, reach, rows)), np.empty((reach, 1, rows))
     for i in range(size):
         right = full[i, reach + 1 :]
         pivot = np.abs(full[i, reach], out=pivots[i, 0])
@@ -143,51 +145,67 @@ def solve(band: Array, right_side: Array) -> Array:
     for i in reversed(range(size)):
         np.multiply(lower[i], solution[i + 1 : i + width], out=side)
         solution[i] -= side.sum(0)
-    return solution[:size].reshape(right_side.shape)
+    return np.asarray(solution[:size, 0])
 
 
-def solve_positive(band: Array, right_side: Array) -> Array | None:
-    """Return the solution of A x = ``right_side`` (n, rows) as ``solve`` does; None unless all A
-    are positive definite.
-
-    Blocks are as wide as the band: faster for a wide band and few rows.
+def solve_whole(band: Array, right_side: Array) -> Array | None:
+    """Return the solution of A x = ``right_side`` as ``solve`` does; None unless all A are positive
+    definite. Faster for few rows.
     """
-    size, width, rows = band.shape
-    count = -(-size // width)
-    # Beyond the end A is 1, so that all blocks are whole.
-    entries = np.zeros((rows, count * width * width + 1))
-    whole = entries[:, :-1].reshape(rows, count * width, width)
-    whole[:, size:, 0] = 1.0
-    whole[:, :size] = band.transpose(2, 0, 1)
-    # A[i, i + k] at [i, i + k]: each block's upper half, then what couples it to the next.
-    across, item = entries.strides
-    skewed = np.lib.stride_tricks.as_strided(
-        entries,
-        (rows, count, width, 2 * width),
-        (across, width * width * item, (width - 1) * item, item),
-    )
-    is_lower = np.tri(width, k=-1, dtype=bool)
-    upper = np.where(is_lower, 0.0, skewed[..., :width])
-    diagonal = upper + np.triu(upper, 1).swapaxes(2, 3)
-    # Each block's coupling to the next, and its part of the solution.
-    both = np.zeros((rows, count, width, width + 1))
-    np.copyto(both[..., :-1], skewed[..., width:], where=is_lower)
-    both.reshape(rows, -1, width + 1)[:, :size, -1] = right_side.T
-    turned = np.ascontiguousarray(both[..., :-1].swapaxes(2, 3))
-    for k in range(count):
-        if k:
-            lower = turned[:, k - 1] @ both[:, k - 1]
-            diagonal[:, k] -= lower[..., :-1]
-            both[:, k, :, -1] -= lower[..., -1]
-        try:
-            np.linalg.cholesky(diagonal[:, k])
-        except np.linalg.LinAlgError:
-            return None
-        both[:, k] = np.linalg.solve(diagonal[:, k], both[:, k])
-    solution = both[..., -1].copy()
-    for k in reversed(range(count - 1)):
-        solution[:, k] -= (both[:, k, :, :-1] @ solution[:, k + 1, :, None])[..., 0]
-    return np.asarray(solution.reshape(rows, -1)[:, :size].T)
+    whole = dense(band)
+    try:
+        np.linalg.cholesky(whole)
+        return np.asarray(np.linalg.solve(whole, right_side.T[..., None])[..., 0].T)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def solve_blocks(band: Array, right_side: Array) -> Array | None:
+    """Return the solution as ``solve_whole`` does, row by row; faster for a wide band."""
+    reach = band.shape[1] - 1
+    try:
+        parts = [eliminated(matrix, BLOCK, reach) for matrix in dense(band)]
+    except np.linalg.LinAlgError:
+        return None
+    return np.stack([solved(*each) for each in zip(parts, right_side.T, strict=True)], 1)
+
+
+class Eliminated(NamedTuple):
+    """A block of unknowns, and those ``after`` it that it is coupled to: of a matrix L L^T, the
+    ``inverse`` of its part of L, and its rows ``across`` of L^T.
+    """
+
+    here: slice
+    after: slice
+    inverse: Array
+    across: Array
+
+
+def eliminated(rows: Array, block: int, reach: int) -> list[Eliminated]:
+    """Return the blocks of a positive definite matrix (n, n), which is overwritten, eliminated in
+    turn; unknowns are coupled to no more than ``reach`` ones after their block.
+
+    Raises LinAlgError if it is not positive definite.
+    """
+    parts = []
+    for end in range(block, len(rows) + block, block):
+        here, after = slice(end - block, end), slice(end, end + reach)
+        inverse = np.linalg.inv(np.linalg.cholesky(rows[here, here]))
+        across = inverse @ rows[here, after]
+        rows[after, after] -= across.T @ across
+        parts.append(Eliminated(here, after, inverse, across))
+    return parts
+
+
+def solved(parts: list[Eliminated], right_side: Array) -> Array:
+    """Return the solution of A x = ``right_side`` (n,) by the blocks of A."""
+    x = right_side.copy()
+    for here, after, inverse, across in parts:
+        x[here] = inverse @ x[here]
+        x[after] -= across.T @ x[here]
+    for here, after, inverse, across in reversed(parts):
+        x[here] = inverse.T @ (x[here] - across @ x[after])
+    return x
 
 
 class Packing(NamedTuple):
@@ -249,15 +267,3 @@ def dense(band: Array) -> Array:
         i = np.arange(size - k)
         whole[:, i, i + k] = whole[:, i + k, i] = band[: size - k, k].T
     return whole
-
-
-def solve_whole(band: Array, right_side: Array) -> Array | None:
-    """Return the solution of A x = ``right_side`` (n, rows) as ``solve`` does; None unless all A
-    are positive definite. Faster for few rows.
-    """
-    whole = dense(band)
-    try:
-        np.linalg.cholesky(whole)
-        return np.asarray(np.linalg.solve(whole, right_side.T[..., None])[..., 0].T)
-    except np.linalg.LinAlgError:
-        return None

@@ -49,22 +49,21 @@ def map_text(name: str, stack: Stack, form: str, points: int = POINTS) -> str:
     return _csv(stack, points)
 
 
-def _grid(balloon: BalloonMap, points: int) -> tuple[Array, Array]:
-    """Return pressures, closer together where they are low, and heights."""
+def _tables(balloon: BalloonMap, points: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Return pressures, closer together where they are low, heights, forces, volumes and
+    potentials, (5, pressures, heights), and where the map holds.
+    """
     even = np.linspace(0.0, 1.0, points)
-    pressures = balloon.most_pressure * even**2
-    return pressures, balloon.most_height * even
+    p, h = np.meshgrid(balloon.most_pressure * even**2, balloon.most_height * even, indexing="ij")
+    values = balloon.force(p, h), balloon.volume(p, h), balloon.potential(p, h)
+    return np.stack([p, h, *values]), holds_at(balloon, p.ravel(), h.ravel()).reshape(p.shape)
 
 
 def _csv(stack: Stack, points: int) -> str:
     rows: list[Sequence[str]] = [COLUMNS]
     for number, balloon in enumerate(stack.maps, start=1):
-        pressures, heights = _grid(balloon, points)
-        p, h = (grid.ravel() for grid in np.meshgrid(pressures, heights, indexing="ij"))
-        holds = holds_at(balloon, p, h)
-        p, h = p[holds], h[holds]
-        columns = (p, h, balloon.force(p, h), balloon.volume(p, h), balloon.potential(p, h))
-        for row in zip(*(column.tolist() for column in columns), strict=True):
+        columns, holds = _tables(balloon, points)
+        for row in columns[:, holds].T.tolist():
             rows.append([str(number), *(f"{value:.7g}" for value in row)])
     return csv_text(rows)
 
@@ -119,22 +118,22 @@ def _record(name: str, stack: Stack, points: int) -> dict[str, Any]:
 
 
 def _balloon(balloon: BalloonMap, points: int) -> MappedBalloon:
-    pressures, heights = _grid(balloon, points)
-    p, h = np.meshgrid(pressures, heights, indexing="ij")
-    holds = holds_at(balloon, p.ravel(), h.ravel()).reshape(p.shape)
+    (p, h, *values), holds = _tables(balloon, points)
+    force, volume, potential = (
+        [
+            [x if here else None for x, here in zip(*row, strict=True)]
+            for row in zip(each.tolist(), holds.tolist(), strict=True)
+        ]
+        for each in values
+    )
     return MappedBalloon.read(
         balloon,
-        pressure=pressures.tolist(),
-        height=heights.tolist(),
-        force=_rows(balloon.force(p, h), holds),
-        volume=_rows(balloon.volume(p, h), holds),
-        potential=_rows(balloon.potential(p, h), holds),
+        pressure=p[:, 0].tolist(),
+        height=h[0].tolist(),
+        force=force,
+        volume=volume,
+        potential=potential,
     )
-
-
-def _rows(values: Array, holds: NDArray[np.bool_]) -> list[list[float | None]]:
-    rows = zip(values.tolist(), holds.tolist(), strict=True)
-    return [[value if here else None for value, here in zip(*row, strict=True)] for row in rows]
 
 
 def _short(value: float) -> float:
@@ -260,30 +259,24 @@ def area(p, h, balloon=0):
 '''
 
 
-def _cells(balloon: BalloonMap) -> dict[str, list[float] | list[str]]:
-    """Return cells of pressure and height, and one row per pressure with + where the map holds."""
-    covered = map_range(balloon)
-    return {
-        "cell_pressures": [_short(p) for p in covered.pressures.tolist()],
-        "cell_heights": [_short(h) for h in covered.heights.tolist()],
-        "holds": ["".join("+" if cell else "-" for cell in row) for row in covered.within.tolist()],
-    }
-
-
 def _python(name: str, stack: Stack) -> str:
-    balloons = [
-        {
-            **BalloonSizes.of(balloon),
-            "most_pressure": balloon.most_pressure,
-            "most_height": balloon.most_height,
-            "scale_pressure": balloon.scale_pressure,
-            "coefficients": [
-                [float(f"{c:.10g}") for c in row] for row in balloon.coefficients.tolist()
-            ],
-            **_cells(balloon),
-        }
-        for balloon in stack.maps
-    ]
+    balloons = []
+    for balloon in stack.maps:
+        covered = map_range(balloon)
+        within = [["-+"[cell] for cell in row] for row in covered.within.tolist()]
+        sizes = ("most_pressure", "most_height", "scale_pressure")
+        balloons.append(
+            {
+                **BalloonSizes.of(balloon),
+                **{size: getattr(balloon, size) for size in sizes},
+                "coefficients": [
+                    [float(f"{c:.10g}") for c in row] for row in balloon.coefficients.tolist()
+                ],
+                "cell_pressures": [_short(p) for p in covered.pressures.tolist()],
+                "cell_heights": [_short(h) for h in covered.heights.tolist()],
+                "holds": ["".join(row) for row in within],
+            }
+        )
     return PYTHON.format(
         name=name,
         levels=stack.levels.tolist(),

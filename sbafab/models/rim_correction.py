@@ -484,22 +484,17 @@ def _pairs(a: Array, b: Array) -> Array:
 
 
 def _newton_steps(band: Array, right_side: Array) -> Array:
-    """Return Newton's steps, with a larger diagonal if the tangent stiffness is indefinite."""
-    step = least_energy.solve_positive(band, right_side)
-    if step is not None:
-        return step
-    rows = band.shape[-1]
-    if rows > 1:
-        # Increase the diagonal only where needed.
-        halves = slice(None, rows // 2), slice(rows // 2, None)
-        return np.concatenate(
-            [_newton_steps(band[..., half], right_side[..., half]) for half in halves], -1
-        )
-    diagonal = np.abs(band[:, 0])
-    for more in DAMPINGS:
-        band = band.copy()
-        band[:, 0] += more * diagonal
-        step = least_energy.solve_positive(band, right_side)
-        if step is not None:
-            return step
-    return least_energy.solve(band, right_side)
+    """Return Newton's steps, with a larger diagonal where the tangent stiffness is indefinite."""
+    together = least_energy.solve_blocks(band, right_side)
+    if together is not None:
+        return together
+    steps = []
+    for one, side in zip(np.moveaxis(band, -1, 0)[..., None], right_side.T[..., None], strict=True):
+        stiffer, diagonal = one.copy(), np.abs(one[:, 0])
+        for more in (0.0, *DAMPINGS):
+            stiffer[:, 0] += more * diagonal
+            step = least_energy.solve_blocks(stiffer, side)
+            if step is not None:
+                break
+        steps.append(least_energy.solve(stiffer, side) if step is None else step)
+    return np.concatenate(steps, 1)
