@@ -274,6 +274,6 @@ def _tail(number: int, inlet: Inlet, body: Region, design: Design) -> Tail:
 
 
 def with_tails(pockets: Region, inlet_tails: Sequence[Tail]) -> Region:
-    """Return the bottom balloon's masks with their tails and the holes of these."""
+    """Return the bottom balloon's masks with their tails, which have holes for the pins."""
     parts = [part for tail in inlet_tails for part in (tail.strip, tail.head)]
     return union([pockets, *parts]) - _openings(pin for tail in inlet_tails for pin in tail.pins)

@@ -124,7 +124,7 @@ def _contour_runs(
 
 
 class _Lap:
-    """Places along a contour by their way from its first vertex, mm."""
+    """Positions along a contour, by their distance from its first vertex along it, mm."""
 
     def __init__(self, contour: Contour) -> None:
         self.contour = contour

@@ -145,7 +145,7 @@ def _cuts(contours: Iterable[Contour], profile: DxfProfile) -> Iterator[_Entity]
         else:
             edges = [part for edge in contour.edges for part in _quarters(edge)]
             if profile == "chords" and any(isinstance(edge, Arc) for edge in edges):
-                raise ValueError("an arc is left: draw the contours in chords first")
+                raise ValueError("an arc remains; convert the contours to chords first")
             if profile == "arcs":
                 yield from (_edge_entity(layer, edge) for edge in edges)
             else:

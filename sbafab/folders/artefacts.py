@@ -332,7 +332,7 @@ def _checks(folder: DesignFolder) -> str:
 
 
 def _design(folder: DesignFolder) -> str:
-    """Return the design as a file; a drawing and a kit of the user's come to lie beside it."""
+    """Return the design as a file; the user's drawings and kit are copied beside it."""
     design = folder.design
     names: dict[Path, str] = {}
     for key, file in design.drawings.items():

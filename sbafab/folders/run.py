@@ -490,7 +490,7 @@ def _may_stay(path: str, anew: Collection[str]) -> bool:
 
 
 def _differs(path: str, old_folder: Path, folder: Path) -> bool:
-    """True if a file that a new run wrote was not in the old folder, or had other contents."""
+    """Return True if a file of the new run is not in the old folder, or differs from it."""
     old = old_folder / path
     return not old.is_file() or old.read_bytes() != (folder / path).read_bytes()
 

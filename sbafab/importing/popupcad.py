@@ -296,7 +296,7 @@ class CadDesign:
         """Return the index of the operation that a link names. Raises DesignError."""
         identity, output = reference if isinstance(reference, list | tuple) else (reference, 0)
         if identity not in self.ids:
-            raise DesignError("takes an operation that is not there; save it again")
+            raise DesignError("refers to a missing operation; save it again")
         index = self.ids.index(identity)
         if output != 0 and self.operations[index].kind in OPERATIONS:
             raise DesignError(

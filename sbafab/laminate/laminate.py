@@ -440,7 +440,7 @@ def interface_regions(below: Region, above: Region, masks: Sequence[Region]) -> 
 
 
 def _seamed(regions: Regions, seams: Sequence[Seam]) -> Regions:
-    """The regions of an interface that seams alone bond; none bonds through a mask."""
+    """The regions of an interface that seams alone bond; a seam bonds nothing through a mask."""
     mask, contact, bare, _ = regions
     bond = bare & union([seam.region for seam in seams]) if seams else NOTHING
     return mask, contact, bond, contact - bond

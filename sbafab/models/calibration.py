@@ -264,8 +264,8 @@ class ModelCalibration(Section):
         return unknown.value(self.mean[row] - half), unknown.value(self.mean[row] + half)
 
     def shifted(self) -> list[tuple[float, Factors]]:
-        """Return the factors with one design unknown after the other moved by about a standard
-        deviation, and by how much its coordinate has moved.
+        """Return, for each design unknown, the move of its coordinate by about one standard
+        deviation, and the factors so moved.
         """
         moved = []
         for row in range(DESIGN_UNKNOWNS):

@@ -234,7 +234,7 @@ class Grip(NamedTuple):
 
     @property
     def why_none(self) -> str:
-        """The reason why no hold in the lumen is given."""
+        """The reason why the hold in the lumen is left out."""
         if self.lumen is None:
             return "no lumen is given: set deploy.lumen_diameter"
         if self.deflated >= self.lumen:

@@ -515,7 +515,7 @@ class _Reading:
 
 
 class _Cut(NamedTuple):
-    """A place where two parts of a net are apart by ``length`` mm; the least ``cost`` is likeliest.
+    """A gap of ``length`` mm between two parts of a net; the one of least ``cost`` is likeliest.
 
     A film between two ends costs nothing, bond its length, a crossing of channels twice its width.
     """

@@ -96,7 +96,7 @@ def _leave_to_innermost(
 ) -> None:
     """Assign chambers between seams to the pocket inside; the void outside all seams is a flap.
 
-    A closed seam parts the films round it in two: a pocket, and a flap that holds no pressure.
+    A closed seam divides the films round it into a pocket and a flap that holds no pressure.
     """
     voids = sorted(
         (void for void in owners if void.level == level),

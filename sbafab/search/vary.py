@@ -82,7 +82,7 @@ def _of_values(key: str, values: Iterable[Any]) -> Varied:
     is_one = isinstance(values, Mapping) or not isinstance(values, Iterable)
     table = as_in_a_file([values] if is_one else list(values))
     if not table:
-        raise DesignError(f"vary holds no value of {key}; give one or several")
+        raise DesignError(f"vary has no value for {key}; give at least one")
     return _varied(key, table, key, "vary")
 
 

@@ -284,7 +284,7 @@ def edited(text: str, edits: Iterable[Edit]) -> str:
             document = tomlkit.parse(before)
             _put(document, parts, _value(key, value), dotted=True)
             if not _holds(document, parts):
-                raise DesignError(f"{key} cannot be put in here; change it in the text")
+                raise DesignError(f"{key} cannot be inserted here; change it in the text")
     return tomlkit.dumps(document)
 
 

@@ -55,7 +55,7 @@ REFUSED: list[tuple[Any, str]] = [
     ("a=1:2:3:4", "START:STOP:STEP"),
     ("a=0:1000:0.001", "at most 10,000"),
     ("a=3,4,3", "3 twice"),
-    ({"a": []}, "vary holds no value of a"),
+    ({"a": []}, "vary has no value for a"),
     ({"a": [3, np.int64(3)]}, "names 3 twice"),
     ({"a": np.arange(10_001)}, "a has 10,001 values, and at most 10,000"),
     ({"a": "8:4"}, "smaller number first"),

@@ -79,7 +79,7 @@ class Sweep:
 def sweep(stack: Layup, forms: Sequence[FormedFilm]) -> Sweep:
     """The films as prisms, bottom to top.
 
-    If films lie on each other, they share the nodes in the closure of a bond; if gaps are kept,
+    Films that lie on each other share the nodes of a bond, its edge included; if gaps are kept,
     prisms join them. Nodes halfway up over mid-edge nodes are for tetrahedra.
     """
     swept, is_tet = Sweep(stack), stack.settings.element == "tet"
