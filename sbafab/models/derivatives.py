@@ -1,94 +1,163 @@
-"""Derivatives of a stack in equilibrium by pressures, forces and moments on the tip, and an outer
-plate.
+"""Stacks linearised: derivatives of poses by pressures, forces and moments on the tip, and an outer
+plate; and Newton's method for freedoms and pressures together.
 
 In equilibrium the gradient g(q, x) of the energy is 0, so the freedoms q follow a change of x by
 dq/dx = -H^-1 dg/dx, with H the second derivatives of the energy with the closed contacts (implicit
 function theorem). If a contact is just closing or opening, derivatives apply to the pose's side.
+The first axis of arrays is that of states.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sbafab.errors import DesignError
+from sbafab.models.column import BatchPoses, Column, Pose
+from sbafab.models.film_elements import Array
+from sbafab.models.stack_balance import is_positive_definite, step_limit
 from sbafab.models.stack_loads import (
-    CROSS,
-    SMALL,
     WALL_POINTS,
+    Energy,
+    Load,
+    PlateContact,
+    Springs,
     crossing,
-    level_motions,
-    loaded_energy,
+    energy,
     plate_chain,
-    with_diagonal_blocks,
 )
-
-if TYPE_CHECKING:
-    from sbafab.models.film_elements import Array
-    from sbafab.models.stack import Stack
-    from sbafab.models.stack_balance import Pose
-    from sbafab.models.stack_loads import Load, LoadedEnergy, PlateContact, Springs
 
 RIGID = 1e-9
 """Share of the largest compliance below which a motion of the tip counts as impossible."""
-
 RESIDUAL = 1e-7
 """Tolerance of the residual, mN or mN mm: poses are in equilibrium to about 1e-6 mm."""
 CORRECTIONS = 6
 """Maximum Newton steps to reach it; one suffices unless contacts open or close."""
-UNIT, QUARTER_TURN = np.eye(2), np.array([[0.0, 1.0], [-1.0, 0.0]])
+P0 = 0.1
+"""Pressure in kPa below which pressures are counted evenly, above in their logarithm."""
+LAST_ERROR = 1e-6
+"""Error (mm, rad, asinh) at which freedoms and pressures together are solved."""
+TURNED_BACK = 0.5
+"""Share of a pressure step reversed by the next step, above which that one is halved."""
+CONTACT_ROUNDS = 8
+"""Rounds in which a step's contacts with an outer plate are found."""
 
 
-class Tangent(NamedTuple):
-    """n states linearised: the ``gradient`` of the energy (n, freedoms), its second derivatives (n,
-    groups, size, size) of groups of levels that do not act on each other, and the force on an outer
-    plate (n) in mN; ``energy`` is that of loaded states.
+class Linearised(NamedTuple):
+    """n states linearised at freedoms ``at`` (n, rows, 3): their ``springs`` and ``energy``.
+
+    ``counts`` (freedoms,) are how many levels each freedom stands for. ``volumes`` (n, chambers) in
+    ul, with their rates ``filling`` (n, freedoms, chambers) by a level's freedoms and ``swelling``
+    (n, chambers) by pressures with all plates held.
     """
 
+    column: Column
+    at: Array
     springs: Springs
-    gradient: Array
-    matrix: Array
-    push: Array
-    energy: LoadedEnergy | None
+    energy: Energy
+    counts: Array
+    volumes: Array
+    filling: Array
+    swelling: Array
 
-    @property
-    def touch(self) -> PlateContact | None:
-        """Contact with an outer plate."""
-        return None if self.energy is None else self.energy.touch
-
-    def solved(self, right: Array) -> Array:
-        """Return the solutions (n, freedoms, k) of the second derivatives by right sides."""
-        groups = self.matrix.shape[:3]
-        moves = np.linalg.solve(self.matrix, right.reshape(*groups, -1))
-        return np.asarray(moves.reshape(right.shape))
-
-    def top(self, stack: Stack, at: Array) -> tuple[Array, Array]:
+    def top(self) -> tuple[Array, Array]:
         """Return tips (n, 3) in mm, and the turn and move of the top by the freedoms (n, freedoms,
-        6).
+        6), as of ``Chain.motions``.
         """
-        if self.energy is not None:
-            return self.energy.plates.tip, self.energy.flat_motions
-        plates = plate_chain(at[:, stack.levels], stack.pitch)
-        motions = level_motions(plates)
-        kinds = (stack.levels == np.arange(len(stack.maps))[:, None]).astype(float)
-        by_kind = kinds @ motions.reshape(*motions.shape[:2], 18)
-        return plates.tip, by_kind.reshape(len(at), -1, 6)
+        if self.energy.plates is not None and self.energy.motions is not None:
+            return self.energy.plates.tip, self.energy.motions
+        levels, (count, rows, _) = self.column.levels, self.at.shape
+        is_by_level = rows == len(levels)
+        plates = plate_chain(self.at if is_by_level else self.at[:, levels], self.column.pitch)
+        motions = plates.motions().reshape(count, len(levels), 18)
+        if not is_by_level:
+            motions = (levels == np.arange(rows)[:, None]).astype(float) @ motions
+        return plates.tip, motions.reshape(count, -1, 6)
+
+    def tip_motion(self) -> Array:
+        """Return the motion of the tip, then the turn of the top, by freedoms: (n, freedoms, 6)."""
+        tip, motions = self.top()
+        turns = motions[..., :3]
+        return np.concatenate([motions[..., 3:] - turns @ crossing(tip), turns], axis=-1)
+
+    def filled(self, moves: Array) -> Array:
+        """Return the volumes' changes (n, chambers, k) by moves (n, freedoms, k)."""
+        return np.asarray((self.filling * self.counts[:, None]).swapaxes(1, 2) @ moves)
+
+    def pushed(self) -> tuple[Array, Array]:
+        """Return the force in mN on an outer plate by the freedoms (n, freedoms), and by a shift of
+        the plate (n).
+        """
+        touch = self.energy.touch
+        if touch is None:
+            return np.zeros(self.filling.shape[:2]), np.zeros(len(self.at))
+        stiff = touch.stiff_touches[:, :WALL_POINTS]
+        pushes = (stiff[:, None] @ self.energy.deeper()[:, :WALL_POINTS])[:, 0]
+        return pushes, stiff.sum(1)
+
+    def rates(
+        self,
+        pulls: Array,
+        volumes: Array | float = 0.0,
+        tip: Array | float = 0.0,
+        force: Array | float = 0.0,
+    ) -> Rates:
+        """Return the rates by k quantities that pull on the freedoms (n, freedoms, k) in mN or mN
+        mm; ``volumes`` (n, chambers, k), ``tip`` (n, 6, k) and ``force`` (n, k) in mN are rates at
+        rest. Of states by level. Raises DesignError for a pose that is about to buckle.
+        """
+        try:
+            moves = self.energy.solved(pulls)
+        except np.linalg.LinAlgError:
+            raise DesignError(
+                "the stack is about to buckle and has no derivatives; change a pressure or load"
+            ) from None
+        motion = self.tip_motion().swapaxes(1, 2) @ moves + tip
+        pushes = ((self.pushed()[0][:, None] @ moves)[:, 0] + force) / 1000
+        by_level = moves.reshape(*self.at.shape, -1)
+        return Rates(motion[:, :3], motion[:, 3:], self.filled(moves) + volumes, pushes, by_level)
 
 
-def tangent(
-    stack: Stack, springs: Springs, load: Load | None, at: Array, forces: Array | None = None
-) -> Tangent:
-    """Return n states linearised at freedoms (n, rows, 3), each kind of balloon without a load and
-    each level under one; ``forces`` of an outer plate as of ``loaded_energy``.
+def linearised(
+    column: Column,
+    load: Load | None,
+    pressures: Array,
+    at: Array,
+    by_level: bool = False,
+    forces: Array | None = None,
+) -> Linearised:
+    """Return n states linearised at pressures (n, chambers) in kPa and freedoms (n, rows, 3), each
+    kind of balloon without a load and each level under one, or ``by_level``; ``forces`` of an outer
+    plate as of ``energy``.
     """
-    if load is None:
-        _, gradient, matrix = springs.energy(at)
-        return Tangent(springs, gradient.reshape(len(at), -1), matrix, np.zeros(len(at)), None)
-    now = loaded_energy(springs, stack.pitch, load, at, forces)
-    matrix = hessian(now, now.rest(), at, stack.pitch)[:, None]
-    return Tangent(springs, now.gradient, matrix, now.push, now)
+    by_level = by_level or load is not None
+    springs = column.springs(pressures, sucked=True, by_level=by_level, orders=3)
+    now = energy(springs, column.pitch, load, at, forces)
+    volumes, filling = springs.order(at, 1)
+    swelling, _ = springs.order(at, 2, with_rates=False)
+    counts = np.ones(at.shape[1]) if by_level else column.counts(load)
+    flat = filling.swapaxes(2, 3).reshape(*now.gradient.shape, -1)
+    return Linearised(
+        column, at, springs, now, counts.repeat(3), counts @ volumes, flat, counts @ swelling
+    )
+
+
+def linearised_poses(poses: BatchPoses) -> Linearised:
+    """Return poses linearised by level, in equilibrium to rounding. Raises DesignError for a pose
+    that is about to buckle.
+    """
+    at = poses.freedoms
+    for _ in range(CORRECTIONS):
+        now = linearised(poses.column, poses.load, poses.pressures, at, by_level=True)
+        room = RESIDUAL * (1 + 1e-3 * now.energy.push)
+        if (np.abs(now.energy.gradient).max(1) < room).all():
+            break
+        at = at + now.rates(-now.energy.gradient[..., None]).freedoms[..., 0]
+    return now
 
 
 class Rates(NamedTuple):
@@ -102,6 +171,10 @@ class Rates(NamedTuple):
     volumes: Array
     force: Array
     freedoms: Array
+
+    def part(self, number: int, columns: Any = slice(None)) -> Rates:
+        """Return those of one of several poses, by some of the quantities."""
+        return Rates(*(part[number][..., columns] for part in self))
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,174 +212,175 @@ class Derivatives:
         return np.asarray((vectors * inverse) @ vectors.T * np.outer(scale, scale))
 
 
-class Linearised(NamedTuple):
-    """A stack linearised about an equilibrium.
-
-    ``freedoms`` (levels, 3) are those in equilibrium to rounding; ``matrices`` (groups, size, size)
-    second derivatives of the energy, group by group of levels that do not act on each other. By
-    freedoms: ``motion`` (6, levels, 3) of the tip, ``filling`` (chambers, levels, 3) of the volumes
-    in ul, ``films`` (levels, chambers, 3) of the balloons' potentials in uJ, ``push`` (levels, 3)
-    of the force on an outer plate in mN. With all plates held: ``swelling`` ul of each chamber by
-    its pressure, ``hardness`` mN on an outer plate by its own shift.
+def derivatives(poses: BatchPoses) -> list[Derivatives]:
+    """Return the derivatives of each pose under its load. Raises DesignError for a pose that is
+    about to buckle.
     """
-
-    freedoms: Array
-    matrices: Array
-    motion: Array
-    filling: Array
-    swelling: Array
-    films: Array
-    push: Array
-    hardness: float
-
-    def rates(
-        self, pulls: Array, volumes: Array | None = None, tip: Array | None = None, force: float = 0
-    ) -> Rates:
-        """Return the rates by n quantities that pull on the freedoms (levels, 3, n) in mN or mN mm.
-
-        ``volumes`` (chambers, n), ``tip`` (6, n) and ``force`` (mN) are rates at rest. Raises
-        DesignError for a pose that is about to buckle.
-        """
-        groups, size, _ = self.matrices.shape
-        count = pulls.shape[-1]
-        moves = _solved(self.matrices, pulls.reshape(groups, size, count))
-        flat = moves.reshape(-1, count)
-        motion = self.motion.reshape(6, -1) @ flat
-        filled = self.filling.reshape(len(self.filling), -1) @ flat
-        if volumes is not None:
-            filled += volumes
-        if tip is not None:
-            motion += tip
-        pushes = (self.push.ravel() @ flat + force) / 1000
-        return Rates(motion[:3], motion[3:], filled, pushes, np.asarray(flat.reshape(-1, 3, count)))
-
-
-def derivatives(
-    stack: Stack, pose: Pose, load: Load | None = None, sucked: bool = False
-) -> Derivatives:
-    """Return the derivatives of a pose of a stack under the load that it was found with. Raises
-    DesignError for a pose that is about to buckle.
-    """
-    at = linearised(stack, pose, load, sucked)
-    chambers = stack.chambers
-    has_plate = load is not None and load.wall is not None
-    pulls = np.empty((*at.freedoms.shape, chambers + 6 + has_plate))
-    pulls[..., :chambers] = at.filling.transpose(1, 2, 0)
-    pulls[..., chambers : chambers + 6] = 1000 * at.motion.transpose(1, 2, 0)
-    volumes = np.zeros((chambers, pulls.shape[-1]))
-    volumes[:, :chambers] = np.diag(at.swelling)
-    if has_plate:
-        pulls[..., -1] = at.push
-    each = at.rates(pulls, volumes)
-    parts = [
-        Rates(*(part[..., columns] for part in each))
-        for columns in (slice(chambers), slice(chambers, chambers + 6), slice(chambers + 6, None))
+    now, chambers = linearised_poses(poses), poses.column.chambers
+    pushed, hardness = now.pushed()
+    has_plate = now.energy.touch is not None
+    pulls = [now.filling, 1000 * now.tip_motion(), pushed[..., None]][: 2 + has_plate]
+    count = chambers + 6 + has_plate
+    volumes = now.swelling[..., None] * np.eye(chambers, count)
+    force = -hardness[:, None] * (np.arange(count) == chambers + 6)
+    rates = now.rates(np.concatenate(pulls, axis=-1), volumes, force=force)
+    parts = [slice(chambers), slice(chambers, chambers + 6), slice(chambers + 6, None)]
+    each = [[rates.part(number, part) for part in parts] for number in range(len(poses))]
+    return [
+        Derivatives(poses.pose(number), pressure, wrench, plate if has_plate else None)
+        for number, (pressure, wrench, plate) in enumerate(each)
     ]
-    by_plate = None
-    if has_plate:
-        by_plate = parts[2]._replace(force=parts[2].force - at.hardness / 1000)
-    return Derivatives(pose, parts[0], parts[1], by_plate)
 
 
-def linearised(
-    stack: Stack, pose: Pose, load: Load | None = None, sucked: bool = False
-) -> Linearised:
-    """Return a stack linearised about a pose under the load that it was found with."""
-    each = stack.springs(pose.pressures, sucked, by_level=True, orders=3)
-    push, hardness = np.zeros_like(pose.freedoms), 0.0
-    if load is None:
-        springs = stack.springs(pose.pressures, sucked)
-        kinds = pose.freedoms[stack.first_levels]
-        for _ in range(CORRECTIONS):
-            _, gradient, blocks = springs.energy(kinds)
-            if np.abs(gradient).max() < RESIDUAL:
-                break
-            kinds = kinds - _solved(blocks, gradient[..., None])[..., 0]
-        matrices = blocks[stack.levels]
-        freedoms = kinds[stack.levels]
-        plates = plate_chain(freedoms, stack.pitch)
-        motions = level_motions(plates)
-    else:
-        freedoms = pose.freedoms
-        for _ in range(CORRECTIONS):
-            now = loaded_energy(each, stack.pitch, load, freedoms)
-            matrix = hessian(now, now.rest(), freedoms, stack.pitch)
-            if np.abs(now.gradient).max() < RESIDUAL * (1 + 1e-3 * now.push):
-                break
-            freedoms = freedoms - _solved(matrix, now.gradient).reshape(-1, 3)
-        matrices = matrix[None]
-        plates, motions = now.plates, now.motions
-        if now.touch is not None:
-            stiff = (now.touch.stiff * now.touch.touches)[:WALL_POINTS]
-            push = (stiff @ now.deeper(now.touch)[:WALL_POINTS]).reshape(-1, 3)
-            hardness = float(stiff.sum())
-    films, filling = each.order(freedoms, [0, 1])[1]
-    swelling, _ = each.order(freedoms, 2, with_rates=False)
-    return Linearised(
-        freedoms,
-        matrices,
-        plates.tip_motion(motions).transpose(2, 0, 1),
-        filling.transpose(1, 0, 2),
-        swelling.sum(0),
-        films,
-        push,
-        hardness,
-    )
+# Freedoms and pressures together.
 
 
-def _solved(matrices: Array, right: Array) -> Array:
-    try:
-        return np.asarray(np.linalg.solve(matrices, right))
-    except np.linalg.LinAlgError:
-        raise DesignError(
-            "the stack is about to buckle and has no derivatives; change a pressure or load"
-        ) from None
+def place_of(pressures: ArrayLike) -> Array:
+    """Return the coordinate of pressures in kPa in which heights are nearly linear."""
+    return np.asarray(np.arcsinh(np.asarray(pressures) / P0))
 
 
-# Second derivatives of the energy under a load.
+def pressure_at(places: ArrayLike) -> Array:
+    """Return the pressures in kPa of coordinates."""
+    return np.asarray(P0 * np.sinh(places))
 
 
-def hessian(now: LoadedEnergy, rest: Array, freedoms: Array, pitch: float) -> Array:
-    """Return the second derivatives (..., freedoms, freedoms) of the energy of a stack under a
-    load; ``rest`` are those of all but the springs, as of ``LoadedEnergy.rest``.
+def pressure_rate(places: Array) -> Array:
+    """Return the rates of pressures in kPa by their coordinates."""
+    return np.asarray(P0 * np.cosh(places))
+
+
+class Unknowns(NamedTuple):
+    """Coordinates of pressures (n, chambers), freedoms (n, rows, 3) and contact forces (n, points)
+    in mN, NaN where a plate's stiffness makes them.
     """
-    blocks = now.blocks.copy()
-    blocks[..., 1:, 1:] -= _tilt_works(now, freedoms, pitch)
-    return with_diagonal_blocks(rest, blocks)
+
+    x: Array
+    at: Array
+    forces: Array
+
+    @property
+    def pressures(self) -> Array:
+        """Pressures in kPa: (n, chambers)."""
+        return pressure_at(self.x)
+
+    @classmethod
+    def of(cls, column: Column, load: Load | None, x: Array, freedoms: Array) -> Unknowns:
+        """Return the run that begins at freedoms (n, levels, 3)."""
+        wall = None if load is None else load.wall
+        points = 0 if wall is None else len(wall.local)
+        return cls(x, column.rows_of(freedoms, load), np.full((len(x), points), np.nan))
 
 
-def _tilt_works(now: LoadedEnergy, freedoms: Array, pitch: float) -> Array:
-    """Return the work of the forces by the two tilts of one level that ``LoadedEnergy.turned``
-    omits: (..., levels, 2, 2).
+Ahead = Callable[[Any, Linearised, Array, Array], Array]
+"""The steps of the pressures' coordinates (n, chambers) of some of the states, by the states
+linearised, the coordinates, and the moves of the freedoms to equilibrium and by each coordinate:
+(n, freedoms, 1 + chambers)."""
 
-    A point y from the level's middle moves by a x y with the turn a of a tilt. The second tilt,
-    with the turn b, changes that to second order by da/db x y + a x (b x y - c x s / 2);
-    ``turned`` includes the mean of a x (b x y) and b x (a x y). s goes from plate to plate, c is
-    the turn of the level's first half, so that the middle shifts by c x s / 2.
+
+@np.errstate(over="ignore", invalid="ignore")
+def together(
+    column: Column,
+    load: Load | None,
+    run: Unknowns,
+    ahead: Ahead,
+    ends: tuple[float, float],
+    steps: int,
+    enough: float = LAST_ERROR,
+) -> tuple[Unknowns, BatchPoses]:
+    """Return the states after Newton's method for freedoms and pressures, and as poses those whose
+    steps became smaller than ``enough``; the pressures' coordinates stays within ``ends``.
+
+    A plate's contact forces are additional unknowns.
     """
-    plates, acting = now.plates, now.acting
-    half = freedoms[..., 1:] / 2
-    safe = np.maximum((half * half).sum(-1), SMALL)
-    angle = np.sqrt(safe)
-    # A tilt's turn, in the frame of the level's middle, is (sine I + mean v v) times its rate, and
-    # the first half's has the skew part of the Jacobian besides (``rotations``).
-    sine = np.sin(angle) / angle
-    mean = (1 - sine) / safe
-    sine_rate = (np.cos(angle) - sine) / safe
-    mean_rate = -(sine_rate + 2 * mean) / safe
-    skew = half @ QUARTER_TURN * ((1 - np.cos(angle)) / safe)[..., None]
-    # Moments about the level's middle, along the turns, v, the plane's axes, and across the rise.
-    arms = acting.arms - plates.middles[..., None] * acting.forces[..., None, :]
-    moment = (arms.reshape(*arms.shape[:-2], 9) @ CROSS.T)[..., None, :]
-    works = now.works[..., 1:, 3]
-    along = (half * works).sum(-1)
-    axes = (works - (mean * along)[..., None] * half) / sine[..., None]
-    across = ((moment @ crossing(plates.rises)) @ -plates.turns.swapaxes(-1, -2))[..., 0, :]
-    mixed = (sine_rate + mean)[..., None] * half
-    pairs = mixed[..., :, None] * axes[..., None, :] - skew[..., :, None] * across[..., None, :]
-    lift = now.works[..., 0, 3] * (freedoms[..., 0] + pitch)
-    second = pairs + pairs.swapaxes(-1, -2)
-    second += (2 * mean_rate * along)[..., None, None] * (half[..., :, None] * half[..., None, :])
-    second += (2 * mean * along)[..., None, None] * UNIT
-    second += lift[..., None, None] * (plates.turns @ plates.turns.swapaxes(-1, -2))
-    return np.asarray(second / 4)
+    end = Unknowns(*(part.copy() for part in run))
+    live, before, last = np.arange(len(run.x)), np.zeros_like(run.x), np.zeros(len(run.x))
+    is_found, is_stable = np.zeros((2, len(run.x)), dtype=bool)
+    for _ in range(steps if len(live) else 0):
+        forces = None if np.isnan(run.forces).any() else run.forces
+        now = linearised(column, load, run.pressures, run.at, forces=forces)
+        try:
+            move, dx, deeper = _step(run, now, lambda *parts, live=live: ahead(live, *parts))
+        except np.linalg.LinAlgError:
+            break
+        # Oscillation at the limits of pressures and at contact changes.
+        turns = (dx * before).sum(-1) < -TURNED_BACK * (before * before).sum(-1)
+        share = np.where(turns, 0.5, 1.0) * step_limit(move)
+        pushes, touch = run.forces, now.energy.touch
+        if touch is not None:
+            pushes = touch.resists(touch.deep + share[:, None] * deeper)
+        x = np.clip(run.x + share[:, None] * dx, *ends)
+        run, before = Unknowns(x, run.at + share[:, None, None] * move, pushes), dx
+        largest = np.maximum(np.abs(move).max((1, 2)), np.abs(dx).max(1))
+        is_over = largest < enough
+        if touch is None:
+            is_over |= largest * largest < enough * last
+        for mine, its in zip(end, run, strict=True):
+            mine[live] = its
+        is_found[live] = is_over
+        is_stable[live[is_over]] = is_positive_definite(now.energy.matrix[is_over]).all(1)
+        goes = ~is_over & np.isfinite(largest)
+        if not goes.any():
+            break
+        last = np.where(share == 1, largest, 0.0)[goes]
+        run, live, before = Unknowns(*(part[goes] for part in run)), live[goes], before[goes]
+    pushes = np.zeros(len(end.x)) if load is None else end.forces[:, :WALL_POINTS].sum(1)
+    freedoms = end.at if load is not None else end.at[:, column.levels]
+    return end, BatchPoses(column, load, end.pressures, freedoms, pushes, is_stable, is_found)
+
+
+def _step(
+    run: Unknowns, now: Linearised, ahead: Callable[[Linearised, Array, Array], Array]
+) -> tuple[Array, Array, Array]:
+    """Return the steps of freedoms (n, rows, 3) and of the pressures' coordinates (n, chambers) to
+    the linearised equilibria, and by how many mm a plate's points are then deeper (n, points).
+
+    A plate's contacts are those at the step's end. They act on the freedoms through the six turns
+    and moves of the top alone, so that other contacts than the first need no further solution of
+    all levels (Woodbury).
+    """
+    filling = now.filling * pressure_rate(run.x)[:, None]
+    pulls, touch = [-now.energy.gradient[..., None], filling], now.energy.touch
+    if touch is None:
+        moves = now.energy.solved(np.concatenate(pulls, axis=-1))
+        dx = ahead(now, run.x, moves)
+        return _sum(moves, dx).reshape(run.at.shape), dx, run.forces
+    motions = now.top()[1]
+    pulls[0] = pulls[0] + motions @ (touch.forces[:, None] @ touch.lines).swapaxes(1, 2)
+    first = now.energy.solved(np.concatenate([*pulls, motions], axis=-1))
+    begin, by_pull = np.split(motions.swapaxes(1, 2) @ first, [-6], axis=-1)
+    before = is_in = touch.deep > touch.least
+    stiffness, live = _contact_top(touch, is_in)[0], np.ones(len(run.x), dtype=bool)
+    for number in range(CONTACT_ROUNDS):
+        more, pull = _contact_top(touch, is_in)
+        more, pulled = more - stiffness, begin.copy()
+        pulled[..., 0] -= (by_pull @ pull[..., None])[..., 0]
+        tops = np.linalg.solve(np.eye(6) + by_pull @ more, pulled).astype(float, copy=False)
+        back = more @ tops
+        back[..., 0] += pull
+        moves = first[..., :-6] - first[..., -6:] @ back
+        dx = ahead(now, run.x, moves)
+        deeper = (touch.lines @ _sum(tops, dx)[..., None])[..., 0]
+        after = touch.deep + deeper > touch.least
+        live &= (after != is_in).any(1)
+        if number and (CONTACT_ROUNDS - 1 - number) % 2 == 0:
+            # Later rounds would repeat an oscillation between two sets of contacts.
+            live &= (after != before).any(1)
+        if not live.any():
+            break
+        before, is_in = is_in, np.where(live[:, None], after, is_in)
+    return _sum(moves, dx).reshape(run.at.shape), dx, deeper
+
+
+def _sum(moves: Array, dx: Array) -> Array:
+    """Return the moves (n, k) to equilibrium at the pressures' coordinates ``dx`` ahead."""
+    return np.asarray(moves[..., 0] + (moves[..., 1:] @ dx[..., None])[..., 0])
+
+
+def _contact_top(touch: PlateContact, is_in: Any) -> tuple[Array, Array]:
+    """Return the stiffness (n, 6, 6) and the pull (n, 6) of points in contact (n, points) on the
+    turns and moves of the top.
+    """
+    stiff = touch.stiff * is_in
+    lines = touch.lines.swapaxes(1, 2)
+    return (lines * stiff[:, None]) @ touch.lines, (lines @ (stiff * touch.deep)[..., None])[..., 0]

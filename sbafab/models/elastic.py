@@ -20,6 +20,7 @@ from sbafab.models.actuator import Actuator
 from sbafab.models.balloon import Balloon, Shapes, inflate
 from sbafab.models.balloon_map import MOST_STRETCH, BalloonMap, stretch
 from sbafab.models.balloons import balloons_of
+from sbafab.models.column import BatchPoses
 from sbafab.models.figures import (
     MODELS,
     Factors,
@@ -36,7 +37,6 @@ from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
 from sbafab.models.quantity import Conditions, Quantity, chamber_count
 from sbafab.models.rippled_balloon import compressed_shapes, free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
-from sbafab.models.stack_balance import BatchPoses
 
 Value = TypeVar("Value")
 ELASTIC, TIME, SHUT = (MODELS[of] for of in ("elastic-balloon", "stack-in-time", "stack-shut"))
@@ -641,7 +641,7 @@ def _poses(stack: Stack, chambers: int, pressures: Array, rest: float = 0.0) -> 
     rows[:, :chambers] = pressures[:, None]
     states = stack.equilibria(rows[rows.max(1) <= stack.most_pressure], None)
     count = int(np.logical_and.accumulate(states.is_met).sum())
-    return stack.poses_of(states.part(slice(count)))
+    return states.part(slice(count))
 
 
 # Balloons on top of each other: all carry the same force, and their strokes add up.

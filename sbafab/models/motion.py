@@ -1,62 +1,46 @@
 """Stacks in time: chambers that fill through their lines, in equilibrium at every instant.
 
-Freedoms and pressures of many states are found together by Newton's method. States that it does not
-solve soon go from equilibrium to equilibrium one by one, like all states against an outer plate.
-Lengths mm, pressures kPa, volumes ul. Arrays have one row per state.
+Freedoms and pressures of many states are found together by Newton's method; a step that it does not
+solve is gone in parts. Lengths mm, pressures kPa, volumes ul. Arrays have one row per state.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sbafab.errors import DesignError
-from sbafab.models.derivatives import derivatives, tangent
+from sbafab.models.column import CHUNK, LOADED_CHUNK, BatchPoses, Column, Pose
+from sbafab.models.derivatives import (
+    Linearised,
+    Unknowns,
+    linearised_poses,
+    place_of,
+    pressure_at,
+    pressure_rate,
+    together,
+)
 from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import ATMOSPHERE_KPA, Line
-from sbafab.models.stack_balance import (
-    CHUNK,
-    LOADED_CHUNK,
-    Balance,
-    BatchPoses,
-    Equilibria,
-    Pose,
-    bounded_solutions,
-    is_positive_definite,
-    put,
-    step_limit,
-)
-from sbafab.models.stack_loads import Load
+from sbafab.models.stack_balance import bounded_solutions, definite
 from sbafab.runtime import one_blas_thread
 
-if TYPE_CHECKING:
-    from sbafab.models.stack import Stack
-
-
+ROUNDING = 1e-11
+"""Rounding of volumes in ul."""
 MOTION_STEPS = 16
 """Maximum Newton steps of freedoms and pressures together."""
-MOTION_ERRORS = np.array([1e-6, 1e-5])
-"""Errors at which these end: mm and rad, and the share of a pressure."""
-VOLUME_POWER = 0.3
-"""Power of the pressure that volumes grow by, about: of balloons that stretch."""
-ROUNDS = 2
-"""Newton's steps of flows and contents in the first step of films."""
-MOST_STEPS = 40
-HALVINGS = 20
-OVERSHOT = 0.5
-"""Share of a step's first slope that its last one may rise to, in the line search."""
-SCALE_PRESSURE = 0.01
-"""Pressure in kPa below which volumes are nearly linear in pressure, above in its logarithm."""
 LONGEST_STEP = 2.0
+"""Largest change of the pressures' coordinates in one of them."""
 SUCTION = 90.0
 """Limit of suction in kPa for a shut chamber, before its fluid boils or leaks."""
-TOLERANCE = 1e-5
-LEAST_CONTENT = 20.0
+MOST_STEPS, HALVINGS = 40, 20
+OVERSHOT = 0.5
+"""Share of a step's first slope that its last one may rise to, in the line search."""
+TOLERANCE, LEAST_CONTENT = 1e-5, 20.0
 """Tolerance as a share of a chamber's content; in ul, the least content it is taken of."""
 
 
@@ -75,7 +59,7 @@ class Supply(NamedTuple):
     least: float
 
     @property
-    def _more(self) -> float:
+    def more(self) -> float:
         """Volume of a gas in the line."""
         return self.line.dead_volume + self.line.tube_volume if self.line.fluid.is_gas else 0.0
 
@@ -84,11 +68,6 @@ class Supply(NamedTuple):
         is_gas = self.line.fluid.is_gas
         return 1 + pressures / ATMOSPHERE_KPA if is_gas else np.ones_like(pressures)
 
-    def with_volumes(self, volumes: Array, pressures: Array) -> Supply:
-        """Return the supply of chambers that have volumes in ul at pressures before the step."""
-        held = (volumes + self._more) * self.squeezed(pressures)
-        return self._replace(contents=self.contents + held)
-
     def excess(self, volumes: Array, pressures: Array) -> tuple[Array, Array]:
         """Return by how many ul the volumes are too large, and this by pressure at equal volumes:
         (n, chambers) each.
@@ -96,7 +75,7 @@ class Supply(NamedTuple):
         flow = rate = np.zeros_like(pressures)
         if self.sources is not None:
             flow, rate = self.line.flows(self.sources, pressures)
-        squeezed, whole = self.squeezed(pressures), volumes + self._more
+        squeezed, whole = self.squeezed(pressures), volumes + self.more
         own = -self.acts * rate
         if self.line.fluid.is_gas:
             own = own + whole / ATMOSPHERE_KPA
@@ -108,229 +87,138 @@ class Supply(NamedTuple):
         return self._replace(contents=self.contents[where], acts=self.acts[where], sources=sources)
 
 
-class SupplyStep(NamedTuple):
-    """States of a ``stack`` under a ``load`` that take in a supply."""
+def moved(begin: BatchPoses, supply: Supply) -> BatchPoses:
+    """Return the poses after a step. Raises DesignError for the first state that has none.
 
-    stack: Stack
-    load: Load | None
+    Freedoms and pressures together first; then, where that does not converge, from equilibrium to
+    equilibrium.
+    """
+    held = (begin.volumes + supply.more) * supply.squeezed(begin.pressures)
+    supply, found = supply._replace(contents=supply.contents + held), begin
+    size = CHUNK if begin.load is None else LOADED_CHUNK
+    for first in range(0, len(begin), size):
+        part = np.arange(len(begin))[first : first + size]
+        step = Intake(begin.part(part), supply.at(part))
+        found = found.replaced(part, step.together())
+    rest = np.flatnonzero(~found.is_met)
+    if rest.size:
+        found = found.replaced(rest, Intake(begin.part(rest), supply.at(rest)).descent())
+    return found
 
-    def after(self, begin: Balance, pressures: Array, supply: Supply) -> tuple[Balance, Array]:
-        """Return the balance and the pressures (n, chambers) in kPa after a step. Raises
-        DesignError for the first state that has no pose.
+
+class Intake(NamedTuple):
+    """States that take in a supply from where they ``begin``.
+
+    The excess of volumes is the gradient of one function of the pressures, whose minimum is sought:
+    volumes are slopes of a concave potential, and more pressure lets less in. Pressures stay at or
+    above the least, and a chamber that would need less draws in the rest.
+    """
+
+    begin: BatchPoses
+    supply: Supply
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and largest the pressures' coordinates."""
+        top = self.begin.column.most_pressure
+        return float(place_of(self.supply.least)), float(place_of(top))
+
+    def ahead(self, which: Any, now: Linearised, x: Array, moves: Array) -> Array:
+        """Return Newton's steps of the pressures' coordinates (n, chambers) of some of the states,
+        as of ``derivatives.together``.
+
+        With the freedoms' own steps put in, the volumes' rates by pressure are a matrix that is
+        symmetric and positive definite.
         """
-        stack, at, p = self.stack, begin.freedoms.copy(), pressures.copy()
-        is_solved = np.zeros(len(p), dtype=bool)
-        if self.load is None or self.load.wall is None:
-            size = CHUNK if self.load is None else LOADED_CHUNK
-            for first in range(0, len(p), size):
-                part = slice(first, first + size)
-                is_solved[part] = self._together(at[part], p[part], supply.at(part))
-        is_solved &= stack.excess(at, self.load) <= 0
-        found = Balance.of(at)
-        for number in np.flatnonzero(~is_solved):
-            one = slice(number, number + 1)
-            start = stack.by_level(begin.freedoms[one])
-            # Pumps may have left chambers under suction.
-            old = stack.equilibria(pressures[one], self.load, start, sucked=True)
-            alone = supply.at(one).with_volumes(old.volumes, old.pressures)
-            states = stack.states_of(self._alone(stack.pose_of(old), alone), self.load)
-            put(found, one, states.balance)
-            p[one] = states.pressures
-        return found, p
+        rate, filled = pressure_rate(x), now.filled(moves)
+        wrong, own = self.supply.at(which).excess(now.volumes + filled[..., 0], pressure_at(x))
+        # A shut valve leaves a pressure of exactly 0.
+        wrong[np.abs(wrong) < ROUNDING] = 0.0
+        matrix = filled[..., 1:] / rate[:, None]
+        matrix = matrix + (now.swelling + own)[..., None] * np.eye(x.shape[1])
+        # Chambers at an end stay; the others may pass one within a step.
+        least = np.where(x <= self.ends[0], 0.0, -np.inf)
+        most = np.where(x >= self.ends[1], 0.0, np.inf)
+        dx = bounded_solutions(definite(matrix), -wrong, least, most) / rate
+        longest = np.maximum(np.abs(dx).max(1, keepdims=True), LONGEST_STEP)
+        return np.asarray(dx * (LONGEST_STEP / longest))
 
-    @np.errstate(over="ignore", invalid="ignore")
-    def _together(self, at: Array, p: Array, supply: Supply) -> NDArray[np.bool_]:
-        """Write the freedoms (n, rows, 3) and pressures (n, chambers) after a step; return which
-        states (n) are solved.
+    def together(self) -> BatchPoses:
+        """Return the states by Newton's method for freedoms and pressures together."""
+        begin = self.begin
+        run = Unknowns.of(begin.column, begin.load, place_of(begin.pressures), begin.freedoms)
+        _, found = together(begin.column, begin.load, run, self.ahead, self.ends, MOTION_STEPS)
+        top = begin.column.most_pressure
+        return replace(
+            found, is_found=found.is_found & found.is_stable & (found.pressures < top).all(1)
+        )
 
-        Pressures stay at or above the least, and a chamber that would need less draws in the rest.
+    def descent(self) -> BatchPoses:
+        """Return the states, from equilibrium to equilibrium. Raises DesignError for the first that
+        has none.
         """
-        is_solved, live, ends = np.zeros(len(p), dtype=bool), np.arange(len(p)), (at, p)
-        y, before, most = _place_of(p), np.zeros((len(p), 2)), self.stack.most_pressure
-        least = float(_place_of(np.array(supply.least)))
-        for number in range(MOTION_STEPS):
-            try:
-                now = self._linearised(at, p)
-                if not number:
-                    supply = supply.with_volumes(now.volumes, p)
-                dy, dp = _pressure_step(now, p, y, supply, 1 if number else ROUNDS)
-            except np.linalg.LinAlgError:
-                break
-            columns = np.concatenate([dp, np.ones((len(p), 1))], axis=1)
-            move = (now.moves @ columns[..., None]).reshape(at.shape)
-            share = np.minimum(1.0, LONGEST_STEP / np.maximum(np.abs(dy).max(1), 1e-12))
-            share = np.minimum(share, step_limit(move).min(-1))
-            at = at + share[:, None, None] * move
-            y = np.maximum(y + share[:, None] * dy, least)
-            after = np.minimum(_pressure_at(y), most)
-            change = np.abs(after - p) / (np.abs(p) + SCALE_PRESSURE)
-            largest, p = np.stack([np.abs(move).max((1, 2)), change.max(1)], axis=1), after
-            is_over = (largest < MOTION_ERRORS).all(1)
-            is_over |= (largest * largest < MOTION_ERRORS * before).all(1)
-            goes = ~is_over & np.isfinite(largest).all(1)
-            if not goes.all():
-                which = live[is_over]
-                ends[0][which], ends[1][which] = at[is_over], p[is_over]
-                is_firm = is_positive_definite(now.matrix[is_over])
-                is_solved[which] = is_firm.all(1) & (p[is_over] < most).all(1)
-                if not goes.any():
-                    break
-                live, at, y, p, supply = live[goes], at[goes], y[goes], p[goes], supply.at(goes)
-                largest, share = largest[goes], share[goes]
-            before = np.where((share == 1.0)[:, None], largest, 0.0)
-        return is_solved
-
-    def _linearised(self, at: Array, p: Array) -> Linear:
-        stack, count = self.stack, len(p)
-        springs = stack.springs(p, True, by_level=self.load is not None, orders=3)
-        now = tangent(stack, springs, self.load, at)
-        volumes, filling = springs.order(at, 1)
-        swelling, _ = springs.order(at, 2, with_rates=False)
-        pulls = np.concatenate([filling, -now.gradient.reshape(*at.shape[:2], 1, 3)], axis=2)
-        moves = now.solved(pulls.swapaxes(2, 3).reshape(count, now.gradient.shape[1], -1))
-        counts = stack.row_counts[self.load is None]
-        by_row = (counts[:, None, None] * filling).transpose(0, 2, 1, 3)
-        filled = by_row.reshape(count, p.shape[1], -1) @ moves
-        rates = filled[..., :-1] + (counts @ swelling)[..., None] * np.eye(p.shape[1])
-        return Linear(now.matrix, moves, counts @ volumes, filled[..., -1], rates)
-
-    def _alone(self, pose: Pose, supply: Supply) -> Pose:
-        """Return the pose of one state after a step, from equilibrium to equilibrium.
-
-        The excess is the gradient of one function of the pressures, whose minimum is sought:
-        volumes are slopes of a concave potential, and more pressure lets less in. Newton's method
-        with a line search in asinh(p / SCALE_PRESSURE), in which volumes are nearly linear.
-        """
-        top = self.stack.most_pressure
-        ends = math.asinh(supply.least / SCALE_PRESSURE), math.asinh(top / SCALE_PRESSURE)
-        close = TOLERANCE * np.maximum(np.abs(supply.contents[0]), LEAST_CONTENT)
-        start = np.maximum(np.arcsinh(np.asarray(pose.pressures) / SCALE_PRESSURE), ends[0])
-        now = self._tried(start, supply, pose)
+        begin, top = self.begin, self.begin.column.most_pressure
+        x = np.maximum(place_of(begin.pressures), self.ends[0])
+        now = self._equilibria(x, begin.freedoms).met()
+        live = np.arange(len(x))
         for _ in range(MOST_STEPS):
-            lacks = (now.x >= ends[1]) & (now.wrong < 0)
-            counts = ~((now.x <= ends[0]) & (now.wrong >= 0)) & ~lacks
-            if (np.abs(now.wrong) <= close)[counts].all():
+            wrong, lin = self._excess(now), linearised_poses(now)
+            lacks = (x >= self.ends[1]) & (wrong < 0)
+            counts = ~((x <= self.ends[0]) & (wrong >= 0)) & ~lacks
+            close = TOLERANCE * np.maximum(np.abs(self.supply.contents), LEAST_CONTENT)
+            goes = ((np.abs(wrong) > close) & counts).any(1)
+            if not goes.any():
                 if lacks.any():
                     raise DesignError(
                         f"the chambers would need more than {top:g} kPa; ask for less"
                     )
-                return now.pose
-            ahead = self._newton_step(now, counts, ends[0])
-            ahead *= min(1.0, LONGEST_STEP / max(float(np.abs(ahead).max()), 1e-12))
-            now = self._downhill(now, ahead, ends, supply)
+                return now
+            filling = lin.filling * pressure_rate(x)[:, None]
+            moves = lin.energy.solved(filling)
+            still = np.zeros((*moves.shape[:2], 1))
+            ahead = self.ahead(live, lin, x, np.concatenate([still, moves], axis=-1))
+            ahead[~goes] = 0.0
+            x, now = self._downhill(x, now, wrong, ahead)
         raise DesignError(
             "no equilibrium of the stack found at the end of this step; try a shorter one"
         )
 
     def _downhill(
-        self, now: PoseTrial, ahead: Array, ends: tuple[float, float], supply: Supply
-    ) -> PoseTrial:
-        """Return the trial at the end of a step's descent, by a line search."""
-        steep = float(now.wrong @ (now.rates * ahead))
-        share = 1.0
+        self, x: Array, now: BatchPoses, wrong: Array, ahead: Array
+    ) -> tuple[Array, BatchPoses]:
+        """Return the states at the end of steps, by a line search."""
+        steep = (wrong * pressure_rate(x) * ahead).sum(1)
+        share, begin = np.ones(len(x)), x
+        rest = np.flatnonzero(ahead.any(1))
         for _ in range(HALVINGS):
-            x = np.clip(now.x + share * ahead, *ends)
-            try:
-                tried = self._tried(x, supply, now.pose)
-            except DesignError:
-                share /= 2
-                continue
-            still = (x > ends[0]) & (x < ends[1])
-            slope = float((tried.wrong * tried.rates * ahead)[still].sum())
-            if slope <= -OVERSHOT * steep:
-                return tried
-            share *= min(max(steep / (steep - slope), 0.1), 0.7)
-        return tried
+            tried = np.clip(begin + share[:, None] * ahead, *self.ends)[rest]
+            found = Intake(now.part(rest), self.supply.at(rest))._equilibria(
+                tried, now.freedoms[rest]
+            )
+            good = found.is_met
+            slope = np.zeros(len(rest))
+            alone = Intake(found, self.supply.at(rest))
+            still = (tried > self.ends[0]) & (tried < self.ends[1])
+            parts = alone._excess(found) * pressure_rate(tried) * ahead[rest]
+            slope = np.where(still, parts, 0.0).sum(1)
+            over = steep[rest] / np.minimum(steep[rest] - slope, -1e-300)
+            good &= slope <= -OVERSHOT * steep[rest]
+            x = x.copy()
+            x[rest[good]] = tried[good]
+            now = now.replaced(rest[good], found.part(good))
+            less = np.where(found.is_met, np.clip(over, 0.1, 0.7), 0.5)
+            share[rest] *= np.where(good, 1.0, less)
+            rest = rest[~good]
+            if not rest.size:
+                break
+        return x, now
 
-    def _tried(self, x: Array, supply: Supply, near: Pose) -> PoseTrial:
-        pressures = np.minimum(SCALE_PRESSURE * np.sinh(x), self.stack.most_pressure)[None]
-        start = near.freedoms[None]
-        states = self.stack.equilibria(pressures, self.load, start, sucked=True)
-        wrong, own = supply.excess(states.volumes, pressures)
-        pose = self.stack.pose_of(states)
-        return PoseTrial(x, pose, wrong[0], own[0], SCALE_PRESSURE * np.cosh(x))
+    def _equilibria(self, x: Array, start: Array) -> BatchPoses:
+        p = np.minimum(pressure_at(x), self.begin.column.most_pressure)
+        return self.begin.column.equilibria(p, self.begin.load, start, sucked=True)
 
-    def _newton_step(self, now: PoseTrial, counts: NDArray[np.bool_], least: float) -> Array:
-        """Return Newton's step by x of the active chambers; 0 of the others."""
-        rates = derivatives(self.stack, now.pose, self.load, sucked=True).by_pressure.volumes
-        slopes, which = rates + np.diag(now.own), np.flatnonzero(counts)
-        while True:
-            ahead = np.zeros_like(now.x)
-            matrix = slopes[np.ix_(which, which)]
-            values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
-            values = np.maximum(np.abs(values), 1e-9 * np.abs(values).max(initial=0.0) + 1e-12)
-            step = -(vectors @ ((vectors.T @ now.wrong[which]) / values))
-            ahead[which] = step / now.rates[which]
-            may = (now.x[which] > least) | (ahead[which] >= 0)
-            if may.all():
-                return ahead
-            # Chambers at their least pressure stay; only the others move.
-            which = which[may]
-
-
-class Linear(NamedTuple):
-    """n states linearised: the tangent stiffness (n, groups, size, size), the ``moves`` (n,
-    freedoms, chambers + 1) by each pressure and to equilibrium, the volumes (n, chambers) in ul and
-    their changes to equilibrium, and the rates of these by pressures (n, chambers, chambers).
-    """
-
-    matrix: Array
-    moves: Array
-    volumes: Array
-    settling: Array
-    rates: Array
-
-
-class PoseTrial(NamedTuple):
-    """A trial pose: ``x``, asinh(p / SCALE_PRESSURE) of the chambers; the excess of their volumes
-    in ul (``wrong``), its rates by pressure at equal volumes (``own``); and kPa by x (``rates``).
-    """
-
-    x: Array
-    pose: Pose
-    wrong: Array
-    own: Array
-    rates: Array
-
-
-def _place_of(pressures: Array) -> Array:
-    """Return the coordinate of pressures in which volumes are nearly linear."""
-    return np.sinh(VOLUME_POWER * np.arcsinh(pressures / SCALE_PRESSURE))
-
-
-def _pressure_at(places: Array) -> Array:
-    """Return the pressures of coordinates."""
-    return SCALE_PRESSURE * np.sinh(np.arcsinh(places) / VOLUME_POWER)
-
-
-def _pressure_rate(pressures: Array, places: Array) -> Array:
-    """Return the rates of pressures by their coordinates."""
-    return np.hypot(pressures, SCALE_PRESSURE) / (VOLUME_POWER * np.hypot(1.0, places))
-
-
-def _pressure_step(
-    now: Linear, p: Array, y: Array, supply: Supply, rounds: int
-) -> tuple[Array, Array]:
-    """Return the step of the pressures' coordinates (n, chambers), and of the pressures to first
-    order.
-
-    With the freedoms' own steps put in, the volumes' rates by pressure are a matrix that is
-    symmetric and positive definite.
-    """
-    first_rate = rate = _pressure_rate(p, y)
-    total, at, place, ahead = np.zeros_like(p), p, y, now.volumes + now.settling
-    for number in range(rounds):
-        if number:
-            place = np.maximum(y + total / first_rate, float(_place_of(np.array(supply.least))))
-            at = _pressure_at(place)
-            rate = _pressure_rate(at, place)
-            total = (place - y) * first_rate
-            ahead = now.volumes + now.settling + (now.rates @ total[..., None])[..., 0]
-        wrong, own = supply.excess(ahead, at)
-        whole = now.rates + (own * (rate / first_rate))[..., None] * np.eye(p.shape[1])
-        least = np.where(at <= supply.least, 0.0, -np.inf)
-        total = total + bounded_solutions(whole, -wrong, least, np.full_like(least, np.inf))
-    return total / first_rate, total
+    def _excess(self, poses: BatchPoses) -> Array:
+        return self.supply.excess(poses.volumes, poses.pressures)[0]
 
 
 @dataclass
@@ -343,7 +231,7 @@ class Motion:
     as well.
     """
 
-    stack: Stack
+    stack: Column
     line: Line
     load: dict[str, Any]
     pose: Pose
@@ -377,10 +265,8 @@ class Motion:
             # A pump that stands still is shut: its chamber may come to suction where a load bends
             # it open.
             supply = Supply(self.line, acts * values, acts, None, -SUCTION)
-        stack, load = self.stack, self.stack.acting(self.load)
-        begin = stack.states_of(self.pose, load)
-        found, p = SupplyStep(stack, load).after(begin.balance, begin.pressures, supply)
-        self.pose = stack.pose_of(stack.settled(p, found, load, sucked=True))
+        begin = self.stack.states_of(self.pose, self.stack.acting(self.load))
+        self.pose = moved(begin, supply).pose()
         self.sources = tuple(values.tolist())
         if flows is not None:
             self.sources = tuple(
@@ -393,35 +279,30 @@ class Motion:
 
 @dataclass(eq=False)
 class BatchMotion:
-    """N moving stacks, as ``Motion``: ``step`` them, then read ``pressures``, ``tips``, ``times``.
+    """N moving stacks, as ``Motion``: ``step`` them, then read ``poses`` and ``times``.
 
-    ``balance`` and ``pressures`` (N, chambers) in kPa are their states, ``start`` the first one;
-    ``times`` (N,) in s; ``line`` feeds each chamber.
+    ``start`` is the first pose; ``times`` (N,) in s; ``line`` feeds each chamber.
     """
 
-    stack: Stack
     line: Line
-    load: Load | None
-    start: Equilibria
-    balance: Balance
-    pressures: Array
+    start: BatchPoses
+    poses: BatchPoses
     times: Array
 
     def restart(self, where: Any) -> None:
         """Put some of the states (a mask, their numbers or a slice) at the start, at 0 s."""
         self.times[where] = 0.0
-        put(self.balance, where, self.start.balance)
-        self.pressures[where] = self.start.pressures
+        self.poses = self.poses.replaced(where, self.start)
 
     @property
     def tips(self) -> Array:
         """Middles of the top plates in mm: (N, 3)."""
-        return self.stack.tips(self.balance.freedoms)
+        return self.poses.tips
 
     @property
-    def poses(self) -> BatchPoses:
-        """The poses now."""
-        return self.stack.poses_of(self.stack.settled(self.pressures, self.balance, self.load))
+    def pressures(self) -> Array:
+        """Pressures in the chambers, kPa: (N, chambers)."""
+        return self.poses.pressures
 
     @one_blas_thread
     def step(self, dt: float, pressures: ArrayLike) -> None:
@@ -429,12 +310,11 @@ class BatchMotion:
         DesignError as ``Motion.step`` does, for the first state that has no pose.
         """
         _refuse_time(dt)
-        sources = self.stack.table(pressures, len(self.times))
+        sources = self.poses.column.table(pressures, len(self.times))
         acts = np.clip(self.times + dt - self.line.delay, 0.0, dt)[:, None]
         supply = Supply(self.line, np.zeros_like(sources), acts, sources, 0.0)
-        step = SupplyStep(self.stack, self.load)
-        self.balance, self.pressures = step.after(self.balance, self.pressures, supply)
-        self.times += dt
+        self.poses = moved(self.poses, supply)
+        self.times = self.times + dt
 
 
 def _refuse_time(dt: float) -> None:

@@ -20,11 +20,11 @@ from sbafab.actuators import build
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.models.calibration import factors_of
-from sbafab.models.derivatives import Linearised, Rates, linearised
+from sbafab.models.derivatives import Linearised, Rates, linearised_poses
 from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
 from sbafab.models.stack import MOST_PRESSURE, Pose, Stack, stack
-from sbafab.models.stack_loads import WALL_POINTS, Load, loaded_energy
+from sbafab.models.stack_loads import NO_LOAD, WALL_POINTS, energy, plate_chain
 
 KEYS = (
     "chamber.diameter",
@@ -108,7 +108,7 @@ def sensitivities(
 
     whole = made()
     pose = whole.pose(pressures, **load)
-    at = linearised(whole, pose, whole.acting(load), load.get("sucked", False))
+    at = linearised_poses(whole.states_of(pose, whole.acting(load)))
     rows = []
     for key in keys:
         value = _value(design, key)
@@ -189,8 +189,9 @@ def _by_modulus(at: Linearised, pose: Pose, value: float) -> Rates:
     """Return the rates by the modulus of all films, exact but for contacts' stiffness."""
     p = np.array(pose.pressures)
     # U is W + p V; and V(p, E) = V(p / E).
-    slopes = at.films.sum(1) + np.tensordot(p, at.filling, 1)
-    return at.rates(-slopes[..., None] / value, (-p * at.swelling / value)[:, None])
+    films = at.springs.order(at.at, 0)[1].sum(2)
+    slopes = films.reshape(1, -1) + at.filling @ p
+    return at.rates(-slopes[..., None] / value, (-p * at.swelling / value)[..., None]).part(0)
 
 
 def _by_key(
@@ -206,25 +207,18 @@ def _by_key(
     whole, *ends = stacks
     if any((each.levels != whole.levels).any() for each in ends):
         raise DesignError(f"{key} changes which balloons are equal; ask for another key")
-    acting = whole.acting(load) or Load(np.zeros(3), None, None)
-    now = loaded_energy(
-        whole.springs(pose.pressures, load.get("sucked", False), by_level=True),
-        whole.pitch,
-        acting,
-        at.freedoms,
-    )
-    touch = now.touch
+    touch = at.energy.touch
     forces = None if touch is None else touch.forces
-    low, high = (_held(each, at.freedoms, pose, load, forces) for each in ends)
+    low, high = (_held(each, at.at, pose, load, forces) for each in ends)
     slope, volumes, tip, deep = ((b - a) / (2 * step) for a, b in zip(low, high, strict=True))
     pulls, force = -slope, 0.0
     if touch is not None:
         # A stiff plate keeps its contacts.
-        harder = touch.stiff * touch.touches * deep
-        pulls = pulls - (harder @ now.deeper(touch)).reshape(-1, 3)
-        force = float(harder[:WALL_POINTS].sum())
-    motion = np.concatenate([tip, np.zeros(3)])[:, None]
-    by_key = at.rates(pulls[..., None], volumes[:, None], motion, force)
+        harder = touch.stiff_touches * deep
+        pulls = pulls - (harder[:, None] @ at.energy.deeper())[:, 0]
+        force = float(harder[:, :WALL_POINTS].sum())
+    motion = np.concatenate([tip, np.zeros((1, 3))], axis=1)
+    by_key = at.rates(pulls[..., None], volumes[..., None], motion[..., None], force).part(0)
     return Sensitivity(
         key, value, pose, by_key, (ends[1].flat_height - ends[0].flat_height) / (2 * step)
     )
@@ -233,13 +227,12 @@ def _by_key(
 def _held(
     other: Stack, freedoms: Array, pose: Pose, load: dict[str, Any], forces: Array | None
 ) -> tuple[Array, Array, Array, Array]:
-    """Return of a stack with its plates held the slope (levels, 3) of its energy against given
-    contact forces, volumes (chambers,), tip (3,) in mm and depths in an outer plate (points,) in
-    mm.
+    """Return of a stack with its plates held the slope (1, freedoms) of its energy against given
+    contact forces, volumes (1, chambers), tip (1, 3) in mm and depths in an outer plate (1, points)
+    in mm.
     """
-    springs = other.springs(pose.pressures, load.get("sucked", False), by_level=True)
-    acting = other.acting(load) or Load(np.zeros(3), None, None)
-    now = loaded_energy(springs, other.pitch, acting, freedoms, forces)
-    deep = np.zeros(0) if now.touch is None else now.touch.deep
-    volumes = springs.order(freedoms, 1, with_rates=False)[0].sum(0)
-    return now.gradient.reshape(-1, 3), volumes, now.plates.tip, deep
+    springs = other.springs(np.array([pose.pressures]), sucked=True, by_level=True)
+    now = energy(springs, other.pitch, other.acting(load) or NO_LOAD, freedoms, forces)
+    deep = np.zeros((1, 0)) if now.touch is None else now.touch.deep
+    volumes = springs.order(freedoms, 1, with_rates=False)[0].sum(1)
+    return now.gradient, volumes, plate_chain(freedoms, other.pitch).tip, deep

@@ -74,7 +74,7 @@ def printed(code: str) -> list[str]:
         ),
         ("np.linalg.pinv", "inflate(Balloon(mate=Balloon(thickness=0.1)), 8.0)"),
         (
-            "sbafab.models.stack.free_equilibrium",
+            "sbafab.models.column.descent",
             "StackBatch(sbafab.stack('1dof-5mm')).poses([[8]])",
         ),
     ],
@@ -85,7 +85,7 @@ def test_models_are_solved_on_one_thread_and_the_caller_keeps_its_own(
     module, _, name = solver.rpartition(".")
     lines = printed(
         f"""
-from sbafab.models import rippled_balloon, stack
+from sbafab.models import column, rippled_balloon
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.stack import StackBatch
 solve, within = {solver}, set()

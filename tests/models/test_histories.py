@@ -13,12 +13,14 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.models.motion import LEAST_CONTENT, SUCTION, TOLERANCE, Motion
+from sbafab.models.motion import SUCTION, Motion
 from sbafab.models.pneumatics import AIR, WATER, Line
 from sbafab.models.stack import Stack
 
 COUNT = int(os.environ.get("SBAFAB_HISTORIES", "3"))
 STEPS = 15
+TOLERANCE, LEAST_CONTENT = 1e-5, 20.0
+"""Tolerance as a share of a chamber's content; in ul, the least content it is taken of."""
 LOADS: list[dict[str, Any]] = [{}, {"tip_load": (0.0, 0.005, -0.005)}]
 
 

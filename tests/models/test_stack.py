@@ -15,7 +15,7 @@ from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.elastic import blocked_force, pose_bent_by
 from sbafab.models.rippled_balloon import free_shapes
 from sbafab.models.stack import Plate, Stack
-from sbafab.models.stack_loads import WALL_RIM, loaded_energy
+from sbafab.models.stack_loads import WALL_RIM, energy
 
 LOADS: dict[str, dict[str, Any]] = {
     "7 mN on the tip": {"tip_load": (0.0, 0.005, -0.005)},
@@ -258,8 +258,8 @@ def test_a_stack_that_slips_far_under_a_plate_has_a_pose(pressures: Any) -> None
     assert pose.stable
     load = stack.load((0.0, 0.0, 0.0), False, plate)
     assert load is not None
-    springs = stack.springs(pressures, by_level=True)
-    now = loaded_energy(springs, stack.pitch, load, pose.freedoms)
+    springs = stack.springs(np.array([pressures]), by_level=True)
+    now = energy(springs, stack.pitch, load, pose.freedoms[None])
     assert np.abs(now.gradient).max() < 1e-3 * now.push
 
 

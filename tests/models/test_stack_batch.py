@@ -66,10 +66,7 @@ def test_loaded_poses_are_the_single_ones(three: Stack, load: str) -> None:
 
 
 @pytest.mark.parametrize("load", ["tip", "gravity"])
-def test_loaded_motions_are_the_single_ones(
-    three: Stack, load: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(motions, "TOLERANCE", 1e-7)
+def test_loaded_motions_are_the_single_ones(three: Stack, load: str) -> None:
     short = replace(three, levels=three.levels[:5])
     moving = StackBatch(short).motion(2, **LOADS[load])
     singles = [short.motion(**LOADS[load]) for _ in range(2)]
@@ -130,10 +127,7 @@ def test_what_is_no_batch_is_refused(three: Stack) -> None:
 
 
 @pytest.mark.parametrize("line", [Line(AIR, delay=0.03), Line(WATER)])
-def test_motions_are_the_single_ones(
-    three: Stack, line: Line, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(motions, "TOLERANCE", 1e-7)
+def test_motions_are_the_single_ones(three: Stack, line: Line) -> None:
     numbers = np.random.default_rng(3)
     moving = StackBatch(three).motion(3, line)
     singles = [three.motion(line=line) for _ in range(3)]

@@ -11,7 +11,6 @@ ROOT = Path(sbafab.__file__).parent
 STATES = {
     "geometry/edges.py": {"Arc", "Line"},
     "models/motion.py": {"Motion", "BatchMotion"},
-    "models/inverse_kinematics.py": {"Nearest"},
     "folders/artefacts.py": {"DesignFolder"},
     "rules/voids.py": {"VoidGraph"},
     "studio/answers.py": {"AnswerShapes"},

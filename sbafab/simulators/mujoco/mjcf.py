@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.derivatives import Linearised, linearised
+from sbafab.models.derivatives import Linearised, linearised_poses
 from sbafab.models.film_elements import Array
 from sbafab.models.joint_chain import JOINTS, axis_of, disc_inertia, joint_values, plate_mass
 from sbafab.models.stack import Pose, Stack
@@ -45,9 +45,9 @@ def chain_text(name: str, stack: Stack, pressures: Sequence[float]) -> str:
     Raises DesignError if the stack has no stable pose there.
     """
     pose = stack.pose(pressures)
-    at = linearised(stack, pose)
+    at = linearised_poses(stack.states_of(pose, None))
     listed = ", ".join(f"{pressure:g}" for pressure in pose.pressures)
-    if np.linalg.eigvalsh(at.matrices).min() <= 0:
+    if np.linalg.eigvalsh(at.energy.matrix).min() <= 0:
         raise DesignError(
             f"the pose at {listed} kPa is about to buckle, so that no springs "
             "hold it; give other --pressures"
@@ -74,7 +74,7 @@ def chain_text(name: str, stack: Stack, pressures: Sequence[float]) -> str:
         axis_of=axis_of,
         tendons=[*_springs(at), *_chambers(at)],
         ranges=ends,
-        places=joint_values(at.freedoms).round(12),
+        places=joint_values(at.at[0]).round(12),
         key=POSE,
         settling=SETTLING,
         dt=DT,
@@ -88,22 +88,15 @@ def valid_range(stack: Stack, pose: Pose, at: Linearised) -> float:
     p = np.asarray(pose.pressures)
     each = np.concatenate([np.eye(stack.chambers), np.ones((1, stack.chambers))])
     ways = np.concatenate([each, -each])
+    moves = at.energy.solved(at.filling)[0]
     for span in RANGES:
         ends = np.clip(p + span * ways, 0.0, stack.most_pressure)
-        if all(_is_close(stack, pose, at, end) for end in ends):
+        exact = stack.equilibria(ends, None, pose.freedoms[None].repeat(len(ends), 0))
+        linear = at.at + ((ends - p) @ moves.T).reshape(exact.freedoms.shape)
+        away = np.linalg.norm(plate_chain(linear, stack.pitch).tip - exact.tips, axis=-1)
+        if (exact.is_met & (away <= LINEAR_SHARE * ACCURACY * length_of(pose))).all():
             return span
     return 0.0
-
-
-def _is_close(stack: Stack, pose: Pose, at: Linearised, pressures: Array) -> bool:
-    pulls = np.einsum("clf,c->lf", at.filling, pressures - pose.pressures)
-    moves = np.linalg.solve(at.matrices, pulls[..., None])[..., 0]
-    tip = plate_chain(at.freedoms + moves, stack.pitch).places[-1]
-    try:
-        exact = stack.pose(tuple(pressures.tolist()), near=pose).tip
-    except DesignError:
-        return False
-    return float(np.linalg.norm(tip - exact)) <= LINEAR_SHARE * ACCURACY * length_of(pose)
 
 
 def length_of(pose: Pose) -> float:
@@ -122,9 +115,9 @@ def _springs(at: Linearised) -> Iterator[Tendon]:
     Stiffer springs keep both halves of a tilt equal: MuJoCo's equality constraints ignore dampers,
     and diverge with masses this small.
     """
-    lower = np.linalg.cholesky(at.matrices)
+    lower = np.linalg.cholesky(at.energy.matrix[0])
     roots = np.diagonal(lower, axis1=1, axis2=2)
-    levels = zip(lower / roots[:, None], roots**2, at.freedoms, strict=True)
+    levels = zip(lower / roots[:, None], roots**2, at.at[0], strict=True)
     for level, (columns, stiffnesses, freedoms) in enumerate(levels, start=1):
         lengths = (freedoms @ columns).round(12)
         for spring, ways, stiffness, length in zip(
@@ -139,7 +132,8 @@ def _springs(at: Linearised) -> Iterator[Tendon]:
 
 def _chambers(at: Linearised) -> Iterator[Tendon]:
     """A tendon per chamber: its length grows like the chamber's volume, in ul."""
-    for chamber, rates in enumerate(at.filling, start=1):
+    filling = at.filling[0].T.reshape(-1, *at.at.shape[1:])
+    for chamber, rates in enumerate(filling, start=1):
         parts = [part for level, ways in enumerate(rates, 1) for part in _joints(level, ways)]
         yield f"chamber{chamber}", None, parts
 
