@@ -54,11 +54,6 @@ class PartPose(NamedTuple):
         moved: NDArray[np.float64] = points @ np.array(self.rows).T + np.array(self.shift)
         return moved
 
-    @property
-    def axis(self) -> Vector:
-        """Direction of the part's own axis."""
-        return self.rows[0][2], self.rows[1][2], self.rows[2][2]
-
 
 def _vector(values: NDArray[np.float64]) -> Vector:
     x, y, z = values.tolist()
@@ -271,14 +266,17 @@ def assemble(assembly: Assembly) -> Assembled:
     design_of = {name: design for design in designs for name in design.parts}
     placed: dict[str, PlacedPart] = {}
     for name in order:
-        part = assembly.parts[name]
-        made = design_of.get(name)
+        part, made, radius = assembly.parts[name], design_of.get(name), None
         if part.on is None:
             _check_root(name, made)
             pose = LYING if assembly.pose == "lying" else PartPose()
-            placed[name] = _at_pose(name, part, pose, made)
         else:
-            placed[name] = _placed(name, part, made, placed[part.on])
+            pose, radius = _joined(name, part, made, placed[part.on])
+        placed[name] = (
+            PlacedPart(name, part, pose)
+            if made is None
+            else PlacedSba(name, part, pose, made, radius)
+        )
     return Assembled(assembly, designs, tuple(placed.values()))
 
 
@@ -355,26 +353,21 @@ def _check_root(name: str, source: PartDesign | None) -> None:
         )
 
 
-def _placed(name: str, part: AnyPart, source: PartDesign | None, host: PlacedPart) -> PlacedPart:
+def _joined(
+    name: str, part: AnyPart, source: PartDesign | None, host: PlacedPart
+) -> tuple[PartPose, float | None]:
+    """Return the pose of a part on its host, and the radius that an SBA is bent round."""
     _check_kinds(name, part, source, host)
-    if part.at == "outside":
-        assert isinstance(host.part, Tube)
-        radius, side = host.part.outer_diameter / 2, _frame(host).then(about_axis(part.angle))
-        if source is not None:
-            return PlacedSba(name, part, side.then(shifted(0.0, 0.0, part.along)), source, radius)
-        return PlacedPart(name, part, side.then(shifted(radius, 0.0, part.along)).then(OUTWARD))
     if isinstance(part, Line) and host.made is not None and part.at == "inlet":
-        return PlacedPart(name, part, _at_inlet(name, part, host, host.made.laminate))
-    return _at_pose(name, part, _frame(host).then(_on_axis(part, host)), source)
-
-
-def _at_pose(name: str, part: AnyPart, pose: PartPose, source: PartDesign | None) -> PlacedPart:
-    return PlacedPart(name, part, pose) if source is None else PlacedSba(name, part, pose, source)
-
-
-def _frame(placed: PlacedPart) -> PartPose:
-    """Return the frame that other parts are fixed in: turned with the part."""
-    return placed.pose.then(about_axis(placed.turn))
+        return _at_inlet(name, part, host, host.made.laminate), None
+    frame = host.pose.then(about_axis(host.turn))
+    if part.at != "outside":
+        return frame.then(_on_axis(part, host)), None
+    assert isinstance(host.part, Tube)
+    radius, side = host.part.outer_diameter / 2, frame.then(about_axis(part.angle))
+    if source is not None:
+        return side.then(shifted(0.0, 0.0, part.along)), radius
+    return side.then(shifted(radius, 0.0, part.along)).then(OUTWARD), None
 
 
 def _on_axis(part: AnyPart, host: PlacedPart) -> PartPose:

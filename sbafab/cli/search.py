@@ -36,7 +36,6 @@ from sbafab.search.find import find as search
 from sbafab.search.quantities import (
     quantity_lines,
     read_all,
-    read_sure,
     shown_value,
 )
 from sbafab.search.space import FindRequest, figure_text, read_free
@@ -59,13 +58,6 @@ which round pockets have of the paper's film alone:
 """
 
 
-def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float | None:
-    try:
-        return None if text is None else read_sure(text)
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r} {error}", ctx, param) from None
-
-
 @click.command(help=HELP.format(quantities=quantity_lines()))
 @opt.design_argument(metavar="[DESIGN]", required=False)
 @opt.option(
@@ -79,7 +71,7 @@ def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float
 @opt.option(
     "--sure P",
     "Probability with which each requirement on a predicted quantity must hold, e.g. 0.9.",
-    callback=_sure,
+    opt.PartialShare("P"),
 )
 @opt.flow_option("Flow of water in all, for the time")
 @opt.option(

@@ -307,16 +307,6 @@ def read_share(text: str) -> float:
     return read
 
 
-def read_sure(text: str) -> float:
-    """Return a probability from a text such as 0.9 or 90%. Raises ValueError with the end of a
-    sentence.
-    """
-    sure = read_share(text)
-    if not 0.5 < sure < 1:
-        raise ValueError("must be above 0.5 and below 1, such as 0.9 or 90%")
-    return sure
-
-
 def shown_value(quantity: RequestedQuantity, value: float) -> str:
     """A figure with its unit, for display."""
     if quantity.name == "force" and value < 0:
