@@ -120,7 +120,7 @@ find 1dof-5mm --max mass=nan | must be a number
 find 1dof-5mm --min bend=90 | 1dof-5mm does not bend
 find 1dof-5mm --max time=1 --flow "35 l" | must be a flow
 find 1dof-5mm --sure 0.4 | must be above 0.5 and below 1
-find 1dof-5mm --sure 90 | must be a fraction from 0 to 1
+find 1dof-5mm --sure 90 | must be a share above 0 and below 1
 find 1dof-5mm --min reference_stroke=5 --sure 0.9 | ask for stroke@10kPa
 find 1dof-5mm --set models.calibration=none --sure 0.9 | needs a calibration
 find 1dof-5mm --max mass=-1 | must be at least 0
