@@ -14,7 +14,7 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.models.figures import LEFT_OUT, Figure, Prediction
 from sbafab.models.mechanisms import NOT_CALIBRATED
-from sbafab.reports.solid_png import assembly_png, solid_png
+from sbafab.reports.solid_pictures import assembly_pngs, solid_png
 from sbafab.rules.finding import counted
 
 DESIGNS = Path(__file__).parents[1] / "gallery"
@@ -162,7 +162,7 @@ def _first_sentence(text: str) -> str:
 
 def _picture(found: Design | Assembly, source: str) -> bytes:
     if isinstance(found, Assembly):
-        return assembly_png(sbafab.assemble(source))
+        return assembly_pngs(sbafab.assemble(source))[0]
     return solid_png(sbafab.build(found), *PIXELS)
 
 

@@ -18,9 +18,8 @@ from PIL import Image
 
 import sbafab
 from sbafab.reports.charts import relation_svg
-from sbafab.reports.inflated_picture import PictureRequest, write_picture
 from sbafab.reports.layers_svg import layers_svg
-from sbafab.reports.solid_png import assembly_png, solid_png
+from sbafab.reports.solid_pictures import PictureRequest, assembly_pngs, solid_png, write_picture
 from sbafab.reports.stack_svg import stack_svg
 
 IMAGES = Path(__file__).parents[1] / "images"
@@ -35,7 +34,7 @@ def solid() -> None:
     """The solids of the templates and of an assembly."""
     for name in ("1dof-5mm", ARM, "radial-15mm"):
         (IMAGES / f"{name}-solid.png").write_bytes(solid_png(sbafab.build(name), 1200, 900))
-    (IMAGES / "brace-assembled.png").write_bytes(assembly_png(sbafab.assemble("brace")))
+    (IMAGES / "brace-assembled.png").write_bytes(assembly_pngs(sbafab.assemble("brace"))[0])
 
 
 def flat() -> None:

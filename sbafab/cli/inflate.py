@@ -20,7 +20,7 @@ from sbafab.models.calibration import factors_of
 from sbafab.models.map_files import FORMATS, map_text
 from sbafab.models.pneumatics import refuse_pressure
 from sbafab.models.stack import MOST_PRESSURE, stack
-from sbafab.reports.inflated_picture import (
+from sbafab.reports.solid_pictures import (
     MOVING,
     WHY,
     Movement,

@@ -26,7 +26,6 @@ from sbafab.lab.coupon import (
     calibrated,
     read_measurements,
 )
-from sbafab.lab.cut_sheet import read_cut_sheet
 from sbafab.lab.inspection import (
     Inspection,
     InspectionDocument,
@@ -35,8 +34,7 @@ from sbafab.lab.inspection import (
     inspect_picture,
     sizes_csv,
 )
-from sbafab.lab.picture import ScanPicture, read_picture
-from sbafab.lab.registration import Reference
+from sbafab.lab.scan import Reference, ScanPicture, read_cut_sheet, read_picture
 
 MOST_LINES = 20
 """Pieces amiss that are printed; the files have all."""

@@ -118,7 +118,7 @@ class DesignFolder:
     @cached_property
     def solid_png(self) -> bytes:
         """The picture of the solid, which the traveller shows as well."""
-        picture: bytes = plugins.load("sbafab.reports.solid_png:solid_png")(self.marked)
+        picture: bytes = plugins.load("sbafab.reports.solid_pictures:solid_png")(self.marked)
         return picture
 
 

@@ -147,7 +147,7 @@ def _write_assembly(
     """
     progress("assembled", 0, 1)
     (path / "preview").mkdir()
-    draw = plugins.load("sbafab.reports.solid_png:assembly_pngs")
+    draw = plugins.load("sbafab.reports.solid_pictures:assembly_pngs")
     picture, bare = draw(assembled, _note(order))
     (path / PICTURE).write_bytes(picture)
     meshes = []

@@ -24,8 +24,8 @@ from sbafab.errors import DesignError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, left_turn
 from sbafab.geometry.region import Region, disc, polygon
-from sbafab.lab.picture import ScanPicture
-from sbafab.lab.registration import MILLIMETRES, SMALLEST, Location, PointArray, Scan, Warp, xy
+from sbafab.lab.registration import SMALLEST, Location, PointArray, Warp, xy
+from sbafab.lab.scan import MILLIMETRES, Scan, ScanPicture
 
 FloatArray = NDArray[np.float64]
 

@@ -19,11 +19,10 @@ from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
 from sbafab.geometry.region import coord
 from sbafab.lab.coupon import COLUMNS, INSTRUMENT, Value, student_t
-from sbafab.lab.cut_sheet import DrawnSheet
 from sbafab.lab.edges import EdgeFit, Scale, fitted, scale_of
-from sbafab.lab.picture import ScanPicture
 from sbafab.lab.pieces import PieceFinding, piece_findings
-from sbafab.lab.registration import SMALLEST, Content, Location, Reference, Scan, locate
+from sbafab.lab.registration import SMALLEST, Content, Location, locate
+from sbafab.lab.scan import DrawnSheet, Reference, Scan, ScanPicture
 from sbafab.reports.drawing import TEXT, box, document, line, text
 from sbafab.spreadsheet import csv_text
 

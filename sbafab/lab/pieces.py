@@ -13,9 +13,9 @@ import shapely
 
 from sbafab.geometry.edges import Bounds
 from sbafab.geometry.region import Region
-from sbafab.lab.cut_sheet import SheetShape
 from sbafab.lab.edges import TOLERANCE, EdgeFit
-from sbafab.lab.registration import SMALLEST, Complexes, Location, Scan, polyline, xy
+from sbafab.lab.registration import SMALLEST, Complexes, Location, polyline, xy
+from sbafab.lab.scan import Scan, SheetShape
 
 PieceVerdict = Literal[
     "sound",

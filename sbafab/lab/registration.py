@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import combinations, product
 from typing import Any, Literal, NamedTuple
 
@@ -19,8 +18,7 @@ from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
 from sbafab.geometry.contour import Contour
-from sbafab.lab.cut_sheet import DrawnSheet
-from sbafab.lab.picture import PictureOutline, ScanPicture, outlines
+from sbafab.lab.scan import Scan
 
 PointArray = NDArray[np.float64]
 """x and y, (n, 2)."""
@@ -39,44 +37,6 @@ LEAST_SHARE = 0.5  # least share of outlines that a picture of the sheet must sh
 ENOUGH = 0.97  # share of matched outlines at which the search for a better pose ends
 SCALE_STEP = 0.01  # scale steps in which poses are ranked
 SMALLEST = 0.2  # least area of a hole to search, mm2
-
-
-MILLIMETRES = 25.4  # an inch, mm
-
-
-@dataclass(frozen=True)
-class Reference:
-    """``dpi`` along the picture's rows and columns; a ``bar`` of this length, mm; the ``pins``.
-
-    The first of bar, pins and dpi that is given is used; without any, the scale is 1.
-    """
-
-    dpi: tuple[float, float] | None = None
-    bar: float | None = None
-    pins: bool = False
-
-    @property
-    def pixels_per_mm(self) -> float | None:
-        return None if self.dpi is None else math.sqrt(self.dpi[0] * self.dpi[1]) / MILLIMETRES
-
-
-@dataclass(frozen=True)
-class Scan:
-    """A picture of a sheet and how it was taken.
-
-    ``is_camera``: with perspective. ``is_light``: film is lighter than its background.
-    """
-
-    picture: ScanPicture
-    sheet: DrawnSheet
-    reference: Reference
-    is_camera: bool = False
-    is_light: bool = True
-
-    @cached_property
-    def outlines(self) -> list[PictureOutline]:
-        """The outlines in the picture, largest first."""
-        return outlines(self.picture)
 
 
 @dataclass(frozen=True)

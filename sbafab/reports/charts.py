@@ -121,15 +121,10 @@ def _panel(panel: Panel, place: int, begin: float) -> tuple[list[str], float, fl
     """
     plot = _plot(panel, begin)
     elements = list(_axes(plot, place))
-    rows = 0
-    widest = AXES[0]
-    for kind, draw_items in (
-        ("bars", _bars(plot)),
-        ("specks", _specks(plot)),
-        ("curve", _curves(plot)),
-        ("points", _points(plot)),
-    ):
-        for number, (label, sign, shapes) in enumerate(draw_items, start=1):
+    rows, widest = 0, AXES[0]
+    kinds = {"bars": _bars, "specks": _specks, "curve": _curves, "points": _points}
+    for kind, items in kinds.items():
+        for number, (label, sign, shapes) in enumerate(items(plot), start=1):
             elements.append(f'<g id="{kind}{place}.{number}">{shapes}</g>')
             if label:
                 x, y = plot.left, HEAD + AXES[1] + FOOT + ROW * (rows + 0.5)

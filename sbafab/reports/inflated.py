@@ -102,8 +102,7 @@ class _Level:
 
     def points(self, x: Array, y: Array, z: Array) -> Array:
         """Places in space of points in this frame."""
-        places: Array = self.origin + np.stack([x, y, z], axis=-1) @ self.axes.T
-        return places
+        return np.asarray(self.origin + np.stack([x, y, z], axis=-1) @ self.axes.T)
 
     def heights(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Heights of the lower and the upper plate over points of the plane."""
@@ -217,7 +216,7 @@ def _joined(surfaces: Sequence[Surface]) -> Surface:
 
 def _normals(surface: Surface) -> Array:
     """Unit normals (n, 3) of the points: means of their faces, by area."""
-    a, b, c = (surface.points[surface.faces[:, i]] for i in range(3))
+    a, b, c = surface.points.take(surface.faces.T, axis=0)
     of_faces = np.cross(b - a, c - a)
     normals = np.zeros_like(surface.points)
     for corner in range(3):

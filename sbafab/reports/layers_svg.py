@@ -71,8 +71,8 @@ def _grid(cards: Sequence[Card], block: float) -> tuple[float, int, Point, Point
     largest = max(max(card.size) for card in cards)
     best: tuple[float, int, Point, Point] | None = None
     for scale in SCALES:
-        sizes = [card.cell(scale) for card in cards]
-        cell = max(size[0] for size in sizes), max(size[1] for size in sizes)
+        widths, heights = zip(*(card.cell(scale) for card in cards), strict=True)
+        cell = max(widths), max(heights)
         columns = min(len(cards), math.floor(wide / cell[0]))
         if columns:
             rows = math.ceil(len(cards) / columns)
@@ -231,6 +231,7 @@ def _drawn(card: Card, scale: float, corner: Point, cell: Point) -> Iterator[str
     spare_y = cell[1] - CAPTION - UNDER - card.size[1] * scale
     left, top = x + LEFT + spare_x / 2, y + CAPTION + spare_y / 2
     frame = CardFrame(left - low_x * scale, top + high_y * scale, scale)
+    column = frame.at((high_x, 0.0))[0] + LEAD
     yield f'<g id="{card.layers[0].pattern}">'
     yield from _heading(card, corner, cell)
     yield from _outline(card, frame)
@@ -239,7 +240,6 @@ def _drawn(card: Card, scale: float, corner: Point, cell: Point) -> Iterator[str
     for fold in card.folds:
         yield from _fold(fold, card.layers[0], frame)
     yield from _overall(card, frame)
-    column = frame.at((high_x, 0.0))[0] + LEAD
     yield from _callouts(card, frame, column, (y + CAPTION + 2.0, y + cell[1] - UNDER))
     yield "</g>"
 

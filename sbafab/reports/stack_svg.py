@@ -10,6 +10,7 @@ from typing import NamedTuple
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Interval, Region, coord, section
 from sbafab.laminate.films import ink
+from sbafab.laminate.joints import Fold
 from sbafab.laminate.laminate import Interface, Laminate, Layer, Pin
 from sbafab.laminate.lay_up import press_steps
 from sbafab.reports import drawing as draw
@@ -88,15 +89,6 @@ class Rod(NamedTuple):
         return (self.span[0] + self.span[1]) / 2
 
 
-class FoldEnd(NamedTuple):
-    """A fold cut by the plane, at ``s`` along it; its film is on the far or the near side."""
-
-    lower: int
-    upper: int
-    s: float
-    is_ahead: bool
-
-
 class StackSection:
     """The cut, in mm along the plane from the chamber's axis, positive toward its inlet, and its
     place on the page: ``across`` and ``up`` are page mm per mm of it.
@@ -161,8 +153,10 @@ class StackSection:
                 spans = self._clipped(plane.cut(gap.bond))
                 yield Joint(gap, spans, bottom + half, top - half)
 
-    def _fold_ends(self, plane: SectionPlane) -> Iterator[FoldEnd]:
-        """Yield the folds cut by the plane, if the films shown end at them."""
+    def _fold_ends(self, plane: SectionPlane) -> Iterator[tuple[Fold, float, bool]]:
+        """Yield the folds cut by the plane, if the films shown end at them: where, and whether the
+        film is on the far side.
+        """
         (a, b), (dx, dy) = plane
         for fold in self.laminate.folds:
             (x, y), (u, v) = fold.line
@@ -172,7 +166,7 @@ class StackSection:
             s = ((x - a) * (v - y) - (y - b) * (u - x)) / along
             for start, end in self.by_index[fold.lower].spans:
                 if abs(start - s) < 1e-6 or abs(end - s) < 1e-6:
-                    yield FoldEnd(fold.lower, fold.upper, s, abs(start - s) < 1e-6)
+                    yield fold, s, abs(start - s) < 1e-6
 
     def _clipped(self, spans: Spans) -> Spans:
         return tuple((max(start, self.low), end) for start, end in spans if end > self.low)
@@ -272,8 +266,8 @@ def stack_svg(laminate: Laminate) -> str:
         look = draw.film_fill(layer.film), ink(layer.film).line
         elements += cut.boxes(spans, top + inset, bottom - inset, *look)
     elements += _bonds(cut, with_masks=False)
-    for fold in cut.folds:
-        elements += _fold(fold, cut)
+    for fold, s, is_ahead in cut.folds:
+        elements += _fold(fold, s, is_ahead, cut)
     elements += [*_breaks(cut), *_dimensions(cut), *_labels(cut), *_legend(cut, page)]
     return draw.document(PAGE_WIDTH, page, f"{laminate.name}: section", elements)
 
@@ -298,11 +292,11 @@ def _bonds(cut: StackSection, with_masks: bool) -> Iterator[str]:
             yield from cut.boxes(spans, top, bottom, BOND)
 
 
-def _fold(fold: FoldEnd, cut: StackSection) -> Iterator[str]:
+def _fold(fold: Fold, s: float, is_ahead: bool, cut: StackSection) -> Iterator[str]:
     """Yield the film that continues from one half to the other, and the line of the fold."""
-    lower, upper, turn = cut.by_index[fold.lower], cut.by_index[fold.upper], int(not fold.is_ahead)
+    lower, upper, turn = cut.by_index[fold.lower], cut.by_index[fold.upper], int(not is_ahead)
     film, thick, outer = lower.layer.film, lower.bottom - lower.top, (lower.bottom - upper.top) / 2
-    x, low, high = map(coord, (cut.x(fold.s), lower.bottom, upper.top))
+    x, low, high = map(coord, (cut.x(s), lower.bottom, upper.top))
     round_ = f"A{coord(outer)} {coord(outer)} 0 0"
     data = f"M{x} {low}{round_} {1 - turn} {x} {high}V{coord(upper.top + thick)}"
     if outer - thick > 1e-6:
@@ -343,14 +337,11 @@ def _breaks(cut: StackSection) -> Iterator[str]:
 
 
 def _wave(start: Point, end: Point) -> str:
-    away = math.dist(start, end)
-    steps = max(8, round(away))
-    (x0, y0), (u, v) = start, ((end[0] - start[0]) / away, (end[1] - start[1]) / away)
-    points = []
-    for i in range(steps + 1):
-        along, sway = away * i / steps, 0.5 * math.sin(math.tau * i / 8)
-        points.append((x0 + along * u + sway * v, y0 + along * v - sway * u))
-    return draw.line(points, colour=draw.GREY, width=0.2)
+    a, away = complex(*start), complex(*end) - complex(*start)
+    steps = max(8, round(abs(away)))
+    sway = [0.5 * math.sin(math.tau * i / 8) / abs(away) for i in range(steps + 1)]
+    points = [a + away * (i / steps - 1j * side) for i, side in enumerate(sway)]
+    return draw.line([(p.real, p.imag) for p in points], colour=draw.GREY, width=0.2)
 
 
 def _dimensions(cut: StackSection) -> Iterator[str]:
@@ -486,11 +477,10 @@ def _pocket(cut: StackSection) -> Iterator[Feature]:
 def _neck_ring(cut: StackSection) -> Iterator[Feature]:
     """Yield bonds beside the bore that carry one balloon on the next, or a sheet's windows."""
     for joint in cut.bonds("separator"):
-        for span in joint.spans:
-            if span[0] < 0 < span[1]:
-                yield sum(span) / 2, _words("window, bond", span), joint
-        for span in [span for span in joint.spans if span[1] <= 0][-1:]:
-            yield sum(span) / 2, _words("neck ring, bond", span), joint
+        windows = [span for span in joint.spans if span[0] < 0 < span[1]]
+        rings = [span for span in joint.spans if span[1] <= 0][-1:]
+        for name, spans in (("window, bond", windows), ("neck ring, bond", rings)):
+            yield from ((sum(span) / 2, _words(name, span), joint) for span in spans)
 
 
 def _overhang(cut: StackSection) -> Iterator[Feature]:

@@ -33,8 +33,7 @@ from sbafab.models.pneumatics import usual_pressures
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import MOST_PRESSURE, stack
-from sbafab.reports.inflated_picture import WHY, PictureRequest, pictures_at_one_scale
-from sbafab.reports.solid_png import solid_png
+from sbafab.reports.solid_pictures import WHY, PictureRequest, pictures_at_one_scale, solid_png
 from sbafab.runtime import Progress, ignore_progress
 from sbafab.search import advice
 from sbafab.search.advice import YieldDesign

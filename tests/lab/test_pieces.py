@@ -10,11 +10,9 @@ import pytest
 import shapely
 from shapely import affinity
 
-from sbafab.lab.cut_sheet import read_cut_sheet
 from sbafab.lab.inspection import Inspection, inspect_picture
-from sbafab.lab.picture import read_picture
 from sbafab.lab.pieces import PieceFinding
-from sbafab.lab.registration import Reference
+from sbafab.lab.scan import Reference, read_cut_sheet, read_picture
 from tests.lab.scans import Camera, pieces_of, render, save
 from tests.lab.test_scans import inspected
 from tests.quick import few

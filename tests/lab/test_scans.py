@@ -11,10 +11,8 @@ import pytest
 import shapely
 
 from sbafab.errors import DesignError
-from sbafab.lab.cut_sheet import read_cut_sheet
 from sbafab.lab.inspection import Inspection, inspect_picture
-from sbafab.lab.picture import read_picture
-from sbafab.lab.registration import Reference
+from sbafab.lab.scan import Reference, read_cut_sheet, read_picture
 from tests.lab.conftest import cut
 from tests.lab.scans import Camera, Change, render, save
 from tests.quick import few

@@ -235,9 +235,9 @@ def test_seams_and_folds_are_cut_where_they_lie(tmp_path: Path) -> None:
     assert svg.count(f'fill="{BOND}"') == len(joint.spans) + 1  # one in the legend
     assert "bond of a seam, drawn over the line between the films" in svg
     folded = laminate_of("folded")
-    (fold,) = StackSection(folded).folds
+    ((_, place, is_ahead),) = StackSection(folded).folds
     # From the chamber's centre at y = -1 to the line at y = -12; the film lies toward the mouth.
-    assert (fold.s, fold.is_ahead) == (pytest.approx(-11), True)
+    assert (place, is_ahead) == (pytest.approx(-11), True)
     assert stack_svg(folded).count("stroke-dasharray") == 2
 
 

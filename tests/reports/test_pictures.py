@@ -26,13 +26,16 @@ from sbafab.meshing.solid import Slab, fuse
 from sbafab.models.stack import Stack
 from sbafab.reports.canvas import COLOURS, View, rasterize
 from sbafab.reports.inflated import InflatedPart, inflated, pressed
-from sbafab.reports.inflated_picture import (
+from sbafab.reports.solid_pictures import (
     PictureRequest,
+    assembly_pngs,
+    cutaway,
+    keyhole,
     pictures_at_one_scale,
     pose_of,
+    solid_png,
     write_picture,
 )
-from sbafab.reports.solid_png import assembly_png, cutaway, keyhole, solid_png
 
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 CHANGES = ("stack.balloons=4",)
@@ -250,8 +253,8 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(
 
 def test_every_part_outside_is_seen_in_its_colour() -> None:
     made = sbafab.assemble("brace", "parts.arm.set.stack.balloons=2")
-    picture = assembly_png(made, width=400, height=300)
-    assert picture == assembly_png(made, width=400, height=300)
+    picture = assembly_pngs(made, width=400, height=300)[0]
+    assert picture == assembly_pngs(made, width=400, height=300)[0]
     upper = np.asarray(image_of(picture), dtype=float)[: round(300 * 0.8)].reshape(-1, 3)
     share = upper / np.maximum(upper.max(axis=1, keepdims=True), 1)
     for colour in (BOUGHT["tube"], BOUGHT["cup"], BOUGHT["line"], *FILMS[:2]):

@@ -17,7 +17,7 @@ from sbafab.cli import app
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import design_toml
 from sbafab.errors import DesignError
-from sbafab.reports.inflated_picture import PictureRequest, pictures_at_one_scale
+from sbafab.reports.solid_pictures import PictureRequest, pictures_at_one_scale
 from sbafab.search import compare as module
 from sbafab.search import sweep as sweep_module
 from sbafab.search.compare import compare, compare_html, load_compared
