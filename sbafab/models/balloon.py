@@ -201,6 +201,8 @@ class BalloonLoad(NamedTuple):
     ripple: Ripple
 
     def rows(self, these: NDArray[np.int_]) -> BalloonLoad:
+        if len(these) == len(self.pressure):
+            return self
         pressure, half, cap = self.pressure[these], self.half[these], self.cap[:, these]
         return BalloonLoad(pressure, half, cap, self.tied, self.ripple.rows(these))
 
@@ -263,8 +265,8 @@ def _shapes(films: FilmPair, loads: Sequence[BalloonLoad], motion: FilmMotion, y
 
 
 def initial_shape(balloon: Balloon, load: BalloonLoad) -> Array:
-    """Return the coordinates of bulged films to start from, as high as their pressure could lift
-    them: (coordinates, rows).
+    """Return the coordinates of films to start from: bulged, as high as their pressure could lift
+    them, or cones if plates pull them higher: (coordinates, rows).
     """
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
@@ -275,10 +277,10 @@ def initial_shape(balloon: Balloon, load: BalloonLoad) -> Array:
         )
         rise = np.minimum(rise, plate)
     rise = np.clip(rise, 0.05 * free, 0.8 * free)
-    rise = np.maximum(rise, load.half) if load.tied else rise
-    shape = np.clip(1 - ((flat - balloon.neck) / free) ** 2, 0.0, 1.0)
-    shape[: balloon.neck_edge + 1] = 1.0
-    z = np.minimum(rise * shape[:, None], load.half + 1 / PLATE_STIFFNESS)
+    out = np.clip((flat - balloon.neck) / free, 0.0, 1.0)[:, None]
+    pulled = load.tied & (load.half > rise)
+    z = np.where(pulled, load.half, rise) * np.where(pulled, 1 - out, 1 - out**2)
+    z = np.minimum(z, load.half + 1 / PLATE_STIFFNESS)
     return coordinates(np.tile(flat, (len(rise), 1)), z.T)
 
 

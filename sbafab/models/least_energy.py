@@ -76,32 +76,37 @@ def equilibrium(problem: Potential, x: Array) -> Array:
         state = problem.at(to, live)
         room = 1e-12 * (np.abs(energy) + scale)
         good = (share == 0.0) | (state.energy <= energy + 1e-4 * share * slope + room)
-        x, energy = np.where(good, to, x), np.where(good, state.energy, energy)
+        x, energy = _where(good, to, x), np.where(good, state.energy, energy)
         lower = np.where(share > 0, damping / 10, np.clip(10 * damping, 1e-3, 1e9))
         damping = np.where(good, np.where(lower < 1e-6, 0.0, lower), damping)
         step = problem.newton_step(state, damping)
-        falls = (step * state.gradient).sum(0)
+        falls, change = np.einsum("ij,ij->j", step, state.gradient), problem.change(x, step)
         # Stop when rounding decides whether the energy falls.
         still = np.abs(state.gradient).max(0) <= problem.close[live]
         still |= (np.abs(falls) <= ROUNDING * (np.abs(energy) + scale)) & (damping == 0.0)
         still &= good
         # No element is stretched, turned or shortened by more than its length: none collapses.
-        full = np.minimum(1.0, LONGEST_STEP / np.maximum(problem.change(x, step), 1e-300))
+        full = np.minimum(1.0, LONGEST_STEP / np.maximum(change, 1e-300))
         halved = np.where(good, 0, halved + 1)
         less = np.where(halved < HALVINGS, share / 2, 0.0)
         share = np.where(good, np.where(falls <= 0, full, 0.0), less)
-        step_taken, slope = np.where(good, step, step_taken), np.where(good, falls, slope)
+        step_taken, slope = _where(good, step, step_taken), np.where(good, falls, slope)
         if still.any():
             # The last step is too short for the energy to judge it, and squares the error.
-            last = np.where(problem.change(x, step) < LAST_STEP, x + step, x)
-            minimum[:, live[still]] = last[:, still]
+            last = np.where(change < LAST_STEP, step, 0.0)[:, still]
+            minimum[:, live[still]] = x[:, still] + last
             if still.all():
                 return minimum
-            is_open = ~still
+            is_open = np.flatnonzero(~still)
             live, x, step_taken = live[is_open], x[:, is_open], step_taken[:, is_open]
             share, damping, slope = share[is_open], damping[is_open], slope[is_open]
             energy, halved = energy[is_open], halved[is_open]
     raise NoEquilibrium
+
+
+def _where(good: NDArray[np.bool_], new: Array, old: Array) -> Array:
+    """Return the columns of ``new`` where good, else of ``old``."""
+    return new if good.all() else np.where(good, new, old)
 
 
 # Banded symmetric systems, many small ones at once.
@@ -221,7 +226,9 @@ class Packing(NamedTuple):
 
     def band(self, entries: Array) -> Array:
         """Return the band (size, width, rows) from entries (n, rows)."""
-        sums = np.add.reduceat(entries[self.source] * self.weight[:, None], self.starts)
+        weighted = entries[self.source]
+        weighted *= self.weight[:, None]
+        sums = np.add.reduceat(weighted, self.starts)
         whole = np.zeros((self.shape[0] * self.shape[1], entries.shape[1]))
         whole[self.into] = sums
         return whole.reshape(*self.shape, -1)
