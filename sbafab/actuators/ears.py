@@ -8,6 +8,7 @@ distances, so that it fits on its pins in one position only.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
@@ -34,6 +35,12 @@ FAR = 500.0
 ROUNDING = 1e-6
 
 
+def reach(region: Region, direction: Point) -> float:
+    """Return the extent of the region from (0, 0) along a unit direction, mm."""
+    turn = -math.degrees(math.atan2(direction[1], direction[0]))
+    return region.turned(turn).bounds[2]
+
+
 @dataclass(frozen=True)
 class Ray:
     """Ray of an ear: it starts inside the part and runs outward.
@@ -56,8 +63,8 @@ class Ray:
 
     def reach(self, body: Region, width: float) -> float:
         """Reach of a body along the ray, in a band of this width, mm."""
-        band = strip(self.start, self.at(FAR), width) & body
-        return max((e.farthest_along(self.start, self.direction) for e in band.edges), default=0.0)
+        (x, y), band = self.start, strip(self.start, self.at(FAR), width) & body
+        return 0.0 if band.is_empty else reach(band.moved(-x, -y), self.direction)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Literal, Self
 from pydantic import Field
 
 from sbafab.actuators import Family
-from sbafab.actuators.ears import film_setback
+from sbafab.actuators.ears import film_setback, reach
 from sbafab.actuators.fitted_size import Fits, fitted
 from sbafab.actuators.stacking import (
     Footprint,
@@ -17,7 +17,6 @@ from sbafab.actuators.stacking import (
     build_footprint,
     free_of_round,
     pocket_shapes,
-    reach,
     round_pockets,
 )
 from sbafab.design.records import Design, Form, Free, card, degrees_of_freedom

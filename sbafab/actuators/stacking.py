@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -355,12 +354,6 @@ def check_neck(design: Design, pockets: list[Region]) -> None:
             f"{design.bond.width:g} round it (outer radius {ring:.3f}) does not fit a pocket that "
             f"leaves {room:.3f} round the channel; {remedy}"
         )
-
-
-def reach(region: Region, direction: Point) -> float:
-    """Return the extent of the region from (0, 0) along a unit direction, mm."""
-    turn = -math.degrees(math.atan2(direction[1], direction[0]))
-    return region.turned(turn).bounds[2]
 
 
 def tab_and_strip(

@@ -146,7 +146,7 @@ def _check_joint(name: str, part: AnyPart, parts: Mapping[str, AnyPart]) -> None
     where = f"parts.{name}"
     host = parts.get(str(part.on))
     if host is None:
-        known = hint(str(part.on), parts)
+        known = hint(part.on, parts)
         raise DesignError(f"{where}.on = {shown(part.on)} is not a part of the assembly; {known}")
     allowed = places_for(part, host)
     if not allowed:

@@ -90,7 +90,7 @@ def _part(name: str, table: object) -> AnyPart:
     if kind is None:
         raise DesignError(f"{where}.kind is missing; add kind = one of {listed(KINDS)}")
     if not isinstance(kind, str) or kind not in KINDS:
-        kinds = hint(shown(kind).strip("'"), KINDS)
+        kinds = hint(kind, KINDS)
         raise DesignError(f"{where}.kind = {shown(kind)} is not a kind of part; {kinds}")
     return checked(KINDS[kind], table, {}, f"{where}.")
 

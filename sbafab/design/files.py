@@ -63,11 +63,16 @@ def listed(values: Iterable[object]) -> str:
     return ", ".join(f'"{value}"' for value in values)
 
 
-def hint(name: str, names: Iterable[str]) -> str:
-    """Return the known name that is most like another one as a question, or all of them."""
+def suggestion(name: object, names: Iterable[str]) -> str:
+    """Return the known name that is most like another one as a question; empty if none is."""
+    near = difflib.get_close_matches(shown(name).strip("'"), names, 1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def hint(name: object, names: Iterable[str], others: str = "") -> str:
+    """Return the most similar known name as a question, else ``others``, by default all names."""
     names = list(names)
-    near = difflib.get_close_matches(name, names, 1)
-    return f"did you mean {near[0]}?" if near else f"there are {listed(names)}"
+    return suggestion(name, names)[2:] or others or f"there are {listed(names)}"
 
 
 def shown(value: object) -> str:
@@ -160,8 +165,7 @@ def _allowed(problem: Any) -> str:
         return str(context["error"])
     if kind == "literal_error":
         known = re.findall("'([^']*)'", context["expected"])
-        near = difflib.get_close_matches(shown(problem["input"]).strip("'"), known, 1)
-        return f"must be {context['expected']}" + (f"; did you mean {near[0]}?" if near else "")
+        return f"must be {context['expected']}{suggestion(problem['input'], known)}"
     if kind == "string_pattern_mismatch":
         return PATTERNS.get(context["pattern"], "must match {pattern}".format(**context))
     if kind == "float_type" and isinstance(problem["input"], str):
@@ -297,8 +301,7 @@ def _hint(missing: Path) -> str:
         near = [exact] if exact in beside else difflib.get_close_matches(missing.name, beside, 1)
         if near:
             return f"did you mean {missing.with_name(near[0])}?"
-    near = difflib.get_close_matches(str(missing), names, 1)
-    return f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
+    return hint(missing, names, f"the templates are {', '.join(names)}")
 
 
 def read_toml(path: Path) -> dict[str, Any]:

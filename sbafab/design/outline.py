@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -60,22 +61,37 @@ def read_outline(path: Path) -> Region:
 
 def understood(path: Path) -> Outline:
     """Return a drawn outline with its size as text. Raises DesignError."""
-    try:
+    with _faults_of(f"outline {path}"):
         return _understood(path, content(path))
+
+
+@contextmanager
+def _faults_of(drawing: str) -> Iterator[None]:
+    """Raise the faults of a drawing with its name."""
+    try:
+        yield
     except FitError as error:
-        raise DesignError(f"outline {path} has a {error}; round it off") from None
+        raise DesignError(f"{drawing} has a {error}; round it off") from None
     except DesignError as error:
-        raise DesignError(f"outline {path} {error}") from None
+        raise DesignError(f"{drawing} {error}") from None
 
 
 @lru_cache(maxsize=4)
 def _understood(path: Path, content: bytes) -> Outline:
     """The outline of a file with this content; cached, as a run needs it more than once."""
     polylines, scale = _traced(path)
-    loops = closed_loops(list(counted(polylines, MOST_OUTLINE_EDGES)))
-    if len(loops) > 1:
-        raise DesignError(f"holds {len(loops)} closed paths; keep only the pocket's outline")
-    region = _inside(sealed(loops[0]))
+    region = nested(_contours(polylines, MOST_OUTLINE_EDGES))
+    if len(region.contours) > 1:
+        raise DesignError(
+            f"holds {len(region.contours)} closed paths; keep only the pocket's outline"
+        )
+    low_x, low_y, high_x, high_y = region.bounds
+    width, height = high_x - low_x, high_y - low_y
+    if max(width, height) > LARGEST or min(width, height) < SMALLEST:
+        raise DesignError(
+            f"measures {width:.4g} x {height:.4g} mm, where {SMALLEST:g} to {LARGEST:g} is "
+            "allowed; check its units"
+        )
     shift = ""
     if not _surrounds(region, (0.0, 0.0)):
         x, y = centroid(region)
@@ -86,10 +102,8 @@ def _understood(path: Path, content: bytes) -> Outline:
             )
         # The printed shift is the one applied.
         region, shift = region.moved(-round(x, 6), -round(y, 6)), ", centred on its centroid"
-    low_x, low_y, high_x, high_y = region.bounds
-    size = f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
     # Without the file's name: the design is the same wherever its drawing is stored.
-    return Outline(region, f"drawn outline: {size}, {scale}{shift}")
+    return Outline(region, f"drawn outline: {width:.3f} x {height:.3f} mm, {scale}{shift}")
 
 
 def content(path: Path) -> bytes:
@@ -149,21 +163,19 @@ def closed_loops(polylines: list[Polyline]) -> list[Polyline]:
     return loops
 
 
-def _inside(loop: Polyline) -> Region:
-    """The region inside a loop, if it is a simple one of sensible size."""
-    if loop:
-        low_x, low_y, high_x, high_y = Contour(loop).bounds
-        width, height = high_x - low_x, high_y - low_y
-        if max(width, height) > LARGEST or min(width, height) < SMALLEST:
-            raise DesignError(
-                f"measures {width:.4g} x {height:.4g} mm, where {SMALLEST:g} to {LARGEST:g} is "
-                "allowed; check its units"
-            )
+def _contours(polylines: Iterator[Polyline], most: int) -> list[Contour]:
+    """Return the contours that polylines of at most ``most`` edges close to. Raises DesignError."""
+    contours = []
+    for loop in map(sealed, closed_loops(list(counted(polylines, most)))):
         refuse_crossings(loop)
-    contour = tidy(loop) if loop else None
-    if contour is None:
-        raise DesignError("encloses no area; draw the outline of a pocket")
-    return Region((contour.reversed() if contour.is_hole else contour,))
+        contour = tidy(loop) if loop else None
+        if contour is None:
+            x, y = loop[0].start if loop else (0.0, 0.0)
+            raise DesignError(
+                f"has a contour without area at x {x:.4f}, y {y:.4f}; delete it, or check the units"
+            )
+        contours.append(contour)
+    return contours
 
 
 def _surrounds(region: Region, p: Point) -> bool:
@@ -214,38 +226,23 @@ def read_drawing(path: Path, layer: str | None = None) -> Region:
     ``laminate.json``. Units are read as for an outline. Raises DesignError with the file and the
     place.
     """
-    try:
+    with _faults_of(f"drawing {path}"):
         if path.suffix.lower() == ".json":
             return _profile(path, content(path), layer)
         return _drawn(path, content(path), layer)
-    except FitError as error:
-        raise DesignError(f"drawing {path} has a {error}; round it off") from None
-    except DesignError as error:
-        raise DesignError(f"drawing {path} {error}") from None
 
 
 @lru_cache(maxsize=64)
 def _drawn(path: Path, content: bytes, layer: str | None) -> Region:
     """The region of a file with this content; cached, as a run needs it more than once."""
     polylines, _ = _traced(path, layer, is_plot=True)
-    loops = [sealed(loop) for loop in closed_loops(list(counted(polylines, MOST_EDGES)))]
-    for loop in loops:
-        refuse_crossings(loop)
-    p = crossing(tuple(edge for loop in loops for edge in loop)) if len(loops) > 1 else None
+    contours = _contours(polylines, MOST_EDGES)
+    p = crossing(tuple(edge for contour in contours for edge in contour.edges))
     if p is not None:
         raise DesignError(
             f"has contours that cross or touch each other at x {p[0]:.4f}, y {p[1]:.4f}; draw them "
             "apart, or join them"
         )
-    contours = []
-    for loop in loops:
-        contour = tidy(loop)
-        if contour is None:
-            x, y = loop[0].start if loop else (0.0, 0.0)
-            raise DesignError(
-                f"has a contour without area at x {x:.4f}, y {y:.4f}; delete it, or check the units"
-            )
-        contours.append(contour)
     low_x, low_y, high_x, high_y = box_round([contour.bounds for contour in contours])
     if max(high_x - low_x, high_y - low_y) > LARGEST_DRAWING:
         raise DesignError(

@@ -208,38 +208,29 @@ def _ellipse(entity: Any, factor: float) -> Read:
     return elliptical_arc(centre, major, minor, first, first + turn), heights
 
 
-def _light_polyline(entity: Any, factor: float) -> Read:
-    points = zip(entity.vertices_in_wcs(), entity.get_points("b"), strict=True)
-    return _through(
-        [(*point, float(bulge)) for point, (bulge,) in points],
-        _side(entity),
-        factor,
-        entity.closed,
-    )
-
-
-def _heavy_polyline(entity: Any, factor: float) -> Read:
-    if not (entity.is_2d_polyline or entity.is_3d_polyline):
-        raise DesignError("holds a POLYLINE that is a mesh; draw the outline alone")
-    # Flag 16 marks the frame points of a curve-fitted polyline, which it does not pass through.
-    rows = [
-        (*point, vertex.dxf.get("bulge", 0.0))
-        for point, vertex in zip(entity.points_in_wcs(), entity.vertices, strict=True)
-        if not vertex.dxf.flags & 16
-    ]
-    side = _side(entity) if entity.is_2d_polyline else 1.0
-    return _through(rows, side, factor, entity.is_closed)
-
-
-def _through(
-    rows: list[tuple[float, float, float, float]], side: float, factor: float, closed: bool
-) -> Read:
-    """A polyline through rows of x, y, z and bulge."""
+def _polyline(entity: Any, factor: float) -> Read:
+    """A polyline, light or heavy."""
+    if entity.dxftype() == "LWPOLYLINE":
+        points, flat = entity.vertices_in_wcs(), True
+        bulges = [float(bulge) for (bulge,) in entity.get_points("b")]
+        rows = list(zip(points, bulges, strict=True))
+        is_closed = entity.closed
+    else:
+        flat, is_closed = entity.is_2d_polyline, entity.is_closed
+        if not (flat or entity.is_3d_polyline):
+            raise DesignError("holds a POLYLINE that is a mesh; draw the outline alone")
+        # Flag 16 marks the frame points of a curve-fitted polyline, which it does not pass through.
+        rows = [
+            (point, vertex.dxf.get("bulge", 0.0))
+            for point, vertex in zip(entity.points_in_wcs(), entity.vertices, strict=True)
+            if not vertex.dxf.flags & 16
+        ]
     refuse_more_than_limit(len(rows))
-    for *_, bulge in rows:
+    side = _side(entity) if flat else 1.0
+    for _, bulge in rows:
         place(bulge, 0.0)
-    vertices = [(*place(x * factor, y * factor), side * bulge) for x, y, _, bulge in rows]
-    return polyline(vertices, closed), [z for _, _, z, _ in rows]
+    vertices = [(*place(x * factor, y * factor), side * bulge) for (x, y, _), bulge in rows]
+    return polyline(vertices, is_closed), [z for (_, _, z), _ in rows]
 
 
 def _spline(entity: Any, factor: float) -> Read:
@@ -273,8 +264,8 @@ READERS: Mapping[str, Callable[[Any, float], Read]] = {
     "LINE": _line,
     "ARC": _round,
     "CIRCLE": _round,
-    "LWPOLYLINE": _light_polyline,
-    "POLYLINE": _heavy_polyline,
+    "LWPOLYLINE": _polyline,
+    "POLYLINE": _polyline,
     "ELLIPSE": _ellipse,
     "SPLINE": _spline,
 }

@@ -6,7 +6,6 @@ says so. Lengths are mm.
 
 from __future__ import annotations
 
-import difflib
 import math
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
@@ -29,6 +28,7 @@ from sbafab.design.files import (
     override,
     shown,
     suggest_from_user_folder,
+    suggestion,
 )
 from sbafab.design.films import (
     FaceBondings,
@@ -493,9 +493,8 @@ def validated(
             "with generate, check, predict and studio, and other commands take one of its designs"
         )
     if not isinstance(family, str) or family not in families:
-        near = difflib.get_close_matches(shown(family).strip("'"), families, 1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{hint}")
+        near = suggestion(family, families)
+        raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{near}")
     _refuse_unused(data, families[family], family)
     return checked(families[family], under_kit(data, folder), families).placed(folder).fitted()
 

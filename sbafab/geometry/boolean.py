@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from operator import lt
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from sbafab.errors import GeometryError, InconsistentError
 from sbafab.geometry.arrangement import Arrangement, overlaid, overlay
@@ -178,17 +178,14 @@ def chains_of(contours: Iterable[CountedContour]) -> list[ClosedChain]:
     return [chain for chain in chains if chain.turns]
 
 
-class ChainGroup:
+class ChainGroup(NamedTuple):
     """Chains that meet, or one that stays clear of all others.
 
     The chains of all other groups wind round it ``outside`` times.
     """
 
-    __slots__ = ("chains", "outside")
-
-    def __init__(self, chains: list[ClosedChain], outside: int) -> None:
-        self.chains = chains
-        self.outside = outside
+    chains: list[ClosedChain]
+    outside: int
 
     @property
     def is_alone(self) -> bool:
@@ -203,11 +200,8 @@ class ChainGroup:
     @property
     def clear(self) -> list[int]:
         """The chain number of each edge; -1 if the chain may meet itself."""
-        return [
-            number if chain.alone else -1
-            for number, chain in enumerate(self.chains)
-            for _ in chain.outline.edges
-        ]
+        numbers = [number if chain.alone else -1 for number, chain in enumerate(self.chains)]
+        return [n for n, c in zip(numbers, self.chains, strict=True) for _ in c.outline.edges]
 
 
 def grouped(chains: Sequence[ClosedChain]) -> list[ChainGroup]:

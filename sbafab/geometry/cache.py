@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache, wraps
 from typing import Any, ParamSpec, TypeVar
 
@@ -26,48 +26,38 @@ def stored(record: Record, name: str, compute: Callable[[Record], Value]) -> Val
     return value
 
 
-class Exact:
-    """A record that compares equal within a tolerance, but is a cache key by its exact numbers.
-
-    Not an abstract base class: the cache tests every key against it, which would be slow.
+class _Call:
+    """Arguments of a function, told apart by their exact numbers: regions compare equal within a
+    tolerance.
     """
 
-    def exact_hash(self) -> int:
-        """Return a hash of the exact numbers."""
-        raise NotImplementedError
+    __slots__ = ("arguments", "hash", "named")
 
-    def is_exactly(self, other: object) -> bool:
-        """Return True if the other record holds exactly the same numbers."""
-        raise NotImplementedError
-
-
-class _Key:
-    """A record that is told from others by its exact numbers."""
-
-    __slots__ = ("record",)
-
-    def __init__(self, record: Exact) -> None:
-        self.record = record
+    def __init__(self, arguments: tuple[Any, ...], named: Mapping[str, Any]) -> None:
+        self.arguments, self.named = arguments, named
+        self.hash = hash((_hash(arguments), *named.items()))
 
     def __hash__(self) -> int:
-        return self.record.exact_hash()
+        return self.hash
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self.record.is_exactly(other.record)
+        return (
+            isinstance(other, _Call)
+            and self.named == other.named
+            and _is_same(self.arguments, other.arguments)
+        )
 
 
-def _key(value: Any) -> Any:
-    if isinstance(value, Exact):
-        return _Key(value)
-    is_of_records = isinstance(value, tuple) and value and isinstance(value[0], Exact)
-    return tuple(map(_key, value)) if is_of_records else value
+def _hash(value: Any) -> int:
+    if isinstance(value, tuple):
+        return hash(tuple(map(_hash, value)))
+    return value.exact_hash if hasattr(value, "exact_hash") else hash(value)
 
 
-def _value(key: Any) -> Any:
-    if isinstance(key, _Key):
-        return key.record
-    is_of_records = isinstance(key, tuple) and key and isinstance(key[0], _Key)
-    return tuple(map(_value, key)) if is_of_records else key
+def _is_same(a: Any, b: Any) -> bool:
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return len(a) == len(b) and all(map(_is_same, a, b))
+    return bool(a.is_exactly(b) if hasattr(a, "is_exactly") else a == b)
 
 
 def cached(function: Callable[Arguments, Value], most: int = MOST) -> Callable[Arguments, Value]:
@@ -78,12 +68,11 @@ def cached(function: Callable[Arguments, Value], most: int = MOST) -> Callable[A
     """
 
     @lru_cache(maxsize=most)
-    def computed(arguments: tuple[Any, ...], named: tuple[tuple[str, Any], ...]) -> Value:
-        values: Any = [_value(key) for key in arguments]
-        return function(*values, **dict(named))
+    def computed(call: _Call) -> Value:
+        return function(*call.arguments, **call.named)
 
     @wraps(function)
     def cached_function(*arguments: Arguments.args, **named: Arguments.kwargs) -> Value:
-        return computed(tuple([_key(value) for value in arguments]), tuple(named.items()))
+        return computed(_Call(arguments, named))
 
     return cached_function

@@ -36,10 +36,6 @@ def unit(degrees: float) -> Point:
     return quarters.get(degrees % 360) or (math.cos(angle), math.sin(angle))
 
 
-def _along(p: Point, origin: Point, unit: Point) -> float:
-    return (p[0] - origin[0]) * unit[0] + (p[1] - origin[1]) * unit[1]
-
-
 @dataclass(slots=True, unsafe_hash=True)
 class Line:
     """A straight edge from ``start`` to ``end``."""
@@ -100,10 +96,6 @@ class Line:
     def farthest_from(self, p: Point) -> float:
         """Greatest distance from ``p`` to a point of the edge."""
         return max(math.dist(p, self.start), math.dist(p, self.end))
-
-    def farthest_along(self, origin: Point, unit: Point) -> float:
-        """Return the farthest reach of the edge from ``origin`` along a unit direction, mm."""
-        return max(_along(self.start, origin, unit), _along(self.end, origin, unit))
 
     def to_left(self, p: Point) -> float:
         """Return the distance of ``p`` to the left of the infinite line, mm."""
@@ -262,14 +254,6 @@ class Arc:
         if math.dist(p, self.centre) > EPSILON and 0.0 <= self.parameter(opposite) <= 1.0:
             return math.dist(p, self.centre) + self.radius
         return max(math.dist(p, self.start), math.dist(p, self.end))
-
-    def farthest_along(self, origin: Point, unit: Point) -> float:
-        """Return the farthest reach of the edge from ``origin`` along a unit direction, mm."""
-        cx, cy = self.centre
-        r = self.radius
-        top = (cx + unit[0] * r, cy + unit[1] * r)
-        ends = max(_along(self.start, origin, unit), _along(self.end, origin, unit))
-        return _along(top, origin, unit) if 0.0 <= self.parameter(top) <= 1.0 else ends
 
     def to_left(self, p: Point) -> float:
         """Return the distance of ``p`` to the left of the whole circle, mm."""

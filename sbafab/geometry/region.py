@@ -14,7 +14,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from sbafab.geometry.boolean import combined, more_than
-from sbafab.geometry.cache import Exact, cached
+from sbafab.geometry.cache import cached
 from sbafab.geometry.contour import (
     Contour,
     Similarity,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Region(Exact):
+class Region:
     """A planar region, possibly of several pieces, possibly empty."""
 
     contours: tuple[Contour, ...] = ()
@@ -123,12 +123,9 @@ class Region(Exact):
     def __hash__(self) -> int:
         return self._hash
 
-    def exact_hash(self) -> int:
-        """Return a hash of the contours' exact numbers, in their order."""
-        return self._exact_hash
-
     @cached_property
-    def _exact_hash(self) -> int:
+    def exact_hash(self) -> int:
+        """A hash of the contours' exact numbers, in their order."""
         return hash(tuple([contour.start_hash for contour in self.contours]))
 
     def is_exactly(self, other: object) -> bool:

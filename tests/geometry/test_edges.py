@@ -49,9 +49,6 @@ def test_an_edge_against_points_all_along_it(edge: Edge, p: Point, share: float)
     assert edge.farthest_from(p) == pytest.approx(max(math.dist(p, q) for q in along), abs=step)
     xs, ys = zip(*along, strict=True)
     assert edge.bounds == pytest.approx((min(xs), min(ys), max(xs), max(ys)), abs=step)
-    assert edge.farthest_along((1.0, 2.0), (0.6, 0.8)) == pytest.approx(
-        max(0.6 * (x - 1) + 0.8 * (y - 2) for x, y in along), abs=step
-    )
     q = edge.at(share)
     assert edge.parameter(q) == pytest.approx(share, abs=1e-6)
     for offset in (0.3, -0.3):
