@@ -17,7 +17,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from sbafab.design.films import DATE_PATTERN, FACE_PATTERN
-from sbafab.design.sections import NAME_PATTERN, PART_PATTERN, rule_names
+from sbafab.design.sections import BATCH_PATTERN, NAME_PATTERN, PART_PATTERN, rule_names
 from sbafab.errors import DesignError
 
 PATTERNS = {
@@ -26,6 +26,7 @@ PATTERNS = {
     PART_PATTERN: "must be 1 to 32 letters, digits, dashes or underscores, beginning with a letter",
     FACE_PATTERN: "must be 1 to 32 small letters, digits, dashes or underscores, beginning with a "
     "letter",
+    BATCH_PATTERN: "must be 1 to 12 letters, digits or dots, beginning with a letter or digit",
     DATE_PATTERN: "must be a date such as 2026-03-31",
 }
 """Descriptions of texts that must match a pattern."""

@@ -40,10 +40,11 @@ def svg_polylines(path: Path, layer: str | None = None) -> tuple[Iterator[Polyli
     size in mm, cm or the like is read as 1 unit = 1 mm.
     """
     root = _root(path)
-    if layer is not None:
-        _keep_layer(root, layer)
+    groups = [element for element in root.iter() if local(element) in GROUPS]
+    if layer is not None and not any(layer in _names(group) for group in groups):
+        raise nothing_on(layer, (name for group in groups for name in _names(group)[:1]))
     scale, words = _unit(root)
-    return _polylines(list(_drawn(root)), scale), words
+    return _polylines(list(_drawn(root, layer)), scale), words
 
 
 # Numbers, paths and transforms as SVG 2 writes them: the library reads damaged ones in its own way.
@@ -167,11 +168,10 @@ UNDRAWN = frozenset(
         *("clipPath", "cursor", "defs", "desc", "filter", "font", "font-face", "hatch"),
         *("linearGradient", "marker", "mask", "meshgradient", "metadata", "pattern"),
         *("radialGradient", "solidcolor", "style", "symbol", "title", "view"),
+        *("foreignObject", "image", "text"),
     }
 )
-"""Never drawn in place, whatever they contain."""
-NO_PATHS = frozenset({"foreignObject", "image", "text"})
-"""Drawn, but no outline: lettering and pictures beside it, as in a DXF."""
+"""Never drawn in place, whatever they contain; and lettering and pictures, which are no outline."""
 CHANGING = frozenset({"animate", "animateMotion", "animateTransform", "script", "set", "link"})
 """Elements that change others, wherever they are."""
 SHAPES = {
@@ -257,15 +257,27 @@ def _refuse_sheet(text: str) -> None:
         raise DesignError(f"has {what[:40]} in a style sheet; {PLAIN}")
 
 
-def _drawn(root: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, str]]:
-    """Yield the drawn shapes in order, each with its transforms, the outermost first."""
+def _names(element: ElementTree.Element) -> list[str]:
+    """The label and the id of a group."""
+    names = element.get(LABEL), element.get("id")
+    return [name for name in names if name] if local(element) in GROUPS else []
+
+
+def _drawn(
+    root: ElementTree.Element, layer: str | None
+) -> Iterator[tuple[ElementTree.Element, str]]:
+    """Yield the drawn shapes, or those of a layer, in order, each with its transforms, the
+    outermost first.
+    """
     space = root.tag.removesuffix("svg")
     # Outermost last, so that the next one is the last of the list.
-    waiting = [(root, "")]
+    waiting = [(root, "", layer is None)]
     while waiting:
-        element, outer = waiting.pop()
+        element, outer, inside = waiting.pop()
         name = local(element)
-        if element.tag != space + name or name in UNDRAWN | NO_PATHS:
+        inside = inside or layer in _names(element)
+        holds = inside or any(layer in _names(inner) for inner in element.iter())
+        if element.tag != space + name or name in UNDRAWN or not holds:
             continue
         if name not in ATTRIBUTES or (name == "svg" and element is not root):
             raise DesignError(f"holds <{name}>; {PLAIN}")
@@ -278,7 +290,7 @@ def _drawn(root: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, str
         if name in SHAPES:
             yield element, outer
         else:
-            waiting += [(inner, outer) for inner in reversed(element)]
+            waiting += [(inner, outer, inside) for inner in reversed(element)]
 
 
 def _is_displayed(element: ElementTree.Element) -> bool:
@@ -299,25 +311,6 @@ def _is_displayed(element: ElementTree.Element) -> bool:
         if not _PAINT.fullmatch(key) and value not in VALUES.get(key, ()):
             raise DesignError(f'has {key[:40]} "{value[:40]}" on <{name}>; {PLAIN}')
     return True
-
-
-def _keep_layer(root: ElementTree.Element, layer: str) -> None:
-    """Remove everything except one layer, and the groups that contain it, from a drawing."""
-    groups = [element for element in root.iter() if local(element) in GROUPS]
-    named = [group for group in groups if layer in (group.get(LABEL), group.get("id"))]
-    if not named:
-        names = (group.get(LABEL) or group.get("id") for group in groups)
-        raise nothing_on(layer, filter(None, names))
-    holder_of = {child: element for element in root.iter() for child in element}
-    named_holders = {*named}
-    holders = [*named]
-    for holder in holders:
-        if holder in holder_of:
-            holders.append(holder_of[holder])
-    named_holders.update(holders)
-    for holder in {*holders}.difference(named):
-        for child in [child for child in holder if child not in named_holders]:
-            holder.remove(child)
 
 
 # Shapes as strands, by the library.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeVar
@@ -199,18 +199,18 @@ class Design(Section):
     @property
     def pin_error(self) -> float:
         """Largest displacement of a layer on several pins, mm."""
-        registration = self.registration
-        if registration.pin_error is not None:
-            return registration.pin_error
-        return pin_error(self.thickest_pin, registration.plate_made_by)
+        return self._error_on(pin_error)
 
     @property
     def lone_pin_error(self) -> float:
         """Largest displacement of a layer on a single pin, whose place does not count, mm."""
+        return self._error_on(lone_pin_error)
+
+    def _error_on(self, pins: Callable[[float, PlateMachine], float]) -> float:
         registration = self.registration
         if registration.pin_error is not None:
             return registration.pin_error
-        return lone_pin_error(self.thickest_pin, registration.plate_made_by)
+        return pins(self.thickest_pin, registration.plate_made_by)
 
     @property
     def plate_machine(self) -> PlateMachine | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
@@ -31,6 +30,7 @@ MOST = 1000
 
 
 ROUNDING = 1e-9
+BATCH_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9.]{0,11}$"
 
 
 class OrderSection(Section):
@@ -55,7 +55,7 @@ class OrderSection(Section):
     at_once: int | None = Field(default=None, ge=1, le=MOST)
     """Most copies in one press cycle, as far as the heated area has room for them; by default as
     many as one person lays up and presses in 8 hours (ours)."""
-    batch: str | None = Field(default=None, max_length=12)
+    batch: str | None = Field(default=None, pattern=BATCH_PATTERN)
     """Name of the batch, before its serials: "24" makes "24-A-03" of "A-03". None by default; set
     one if a design is made again, as records identify an actuator by design and serial."""
     tray: bool | None = None
@@ -70,18 +70,8 @@ class OrderSection(Section):
 
     @field_validator("batch", mode="before")
     @classmethod
-    def _is_short_name(cls, batch: object) -> object:
-        text = str(batch) if type(batch) is int else batch
-        # Characters that cannot be printed are reported by the check on all texts.
-        if (
-            isinstance(text, str)
-            and text.isprintable()
-            and not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9.]{0,11}", text)
-        ):
-            raise ValueError(
-                "must be 1 to 12 letters, digits or dots, beginning with a letter or digit"
-            )
-        return text
+    def _may_be_a_number(cls, batch: object) -> object:
+        return str(batch) if type(batch) is int else writable(batch)
 
     @field_validator("good")
     @classmethod

@@ -8,11 +8,6 @@ from collections.abc import Iterator, Sequence
 from sbafab.geometry.edges import Bounds, Edge, Point, distance_to
 from sbafab.geometry.lazy_numpy import np
 
-FEW_BOXES = 100
-"""Number of boxes up to which a sweep is faster than arrays."""
-AT_ONCE = 1_000_000
-"""Pairs compared at once, which bounds the memory."""
-
 
 def widened(box: Bounds, margin: float) -> Bounds:
     """The box with ``margin`` added on every side."""
@@ -25,14 +20,7 @@ def boxes_meet(a: Bounds, b: Bounds) -> bool:
 
 
 def close_pairs(boxes: Sequence[Bounds], reach: float) -> list[tuple[int, int]]:
-    """Return the numbers of boxes that come within ``reach`` of each other, by a sweep along x.
-
-    Many boxes are compared in arrays; the order of the pairs is the same.
-    """
-    return (_few_pairs if len(boxes) <= FEW_BOXES else _many_pairs)(boxes, reach)
-
-
-def _few_pairs(boxes: Sequence[Bounds], reach: float) -> list[tuple[int, int]]:
+    """Return the numbers of boxes that come within ``reach`` of each other, by a sweep along x."""
     pairs: list[tuple[int, int]] = []
     active: list[tuple[float, float, float, int]] = []
     lefts = [box[0] for box in boxes]
@@ -45,31 +33,6 @@ def _few_pairs(boxes: Sequence[Bounds], reach: float) -> list[tuple[int, int]]:
                 pairs.append((j, i))
         active.append((high_x, low, high, i))
     return pairs
-
-
-def _many_pairs(boxes: Sequence[Bounds], reach: float) -> list[tuple[int, int]]:
-    sides = np.array(boxes)
-    order = np.argsort(sides[:, 0], kind="stable")
-    low_x, low, high_x, high = sides[order].T
-    # Ranks: each box may meet those after it as far as they start before it ends.
-    last = np.searchsorted(low_x - reach, high_x, side="right")
-    counts = np.maximum(last - np.arange(1, len(order) + 1), 0)
-    until = np.cumsum(counts)
-    pairs = []
-    first = 0
-    while first < len(order):
-        done = until[first - 1] if first else 0
-        after = max(first + 1, int(np.searchsorted(until, done + AT_ONCE, side="right")))
-        repeats = counts[first:after]
-        before = np.repeat(np.arange(first, after), repeats)
-        ahead = np.arange(len(before)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-        behind = before + 1 + ahead
-        meets = (low[before] <= high[behind] + reach) & (high[before] >= low[behind] - reach)
-        pairs.append(np.array([behind[meets], before[meets]]))
-        first = after
-    behind, before = np.concatenate(pairs, axis=1)
-    turn = np.lexsort((before, behind))
-    return list(zip(order[before[turn]].tolist(), order[behind[turn]].tolist(), strict=True))
 
 
 class EdgeIndex:
