@@ -20,10 +20,8 @@ from sbafab.design.files import (
     Change,
     add_waivers,
     design_path,
-    open_what_fits,
-    override,
     read_toml,
-    suggest_from_user_folder,
+    with_changes,
 )
 from sbafab.design.outline import understood
 from sbafab.design.records import Design, validated
@@ -81,12 +79,8 @@ def load_design(
     sentence if it cannot be built.
     """
     path = design_path(source)
-    changes = list(changes)
-    data = add_waivers(override(read_toml(path), changes), waivers)
-    data.setdefault("name", path.stem)
-    suggest_from_user_folder(data, changes)
-    open_what_fits(data, changes)
-    return validated(data, records(), path.parent)
+    data = add_waivers(with_changes(read_toml(path), changes), waivers)
+    return validated({"name": path.stem, **data}, records(), path.parent)
 
 
 def build(design: Design) -> Laminate:

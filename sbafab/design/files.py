@@ -420,26 +420,30 @@ def as_in_a_file(value: Any) -> Any:
     return [as_in_a_file(inner) for inner in value] if type(value) in (list, tuple) else value
 
 
-def suggest_from_user_folder(data: dict[str, Any], changes: Iterable[Change]) -> None:
-    """Make the paths of drawings and kits that a change names relative to the working directory."""
-    keys = set(changed_keys(changes))
+def with_changes(data: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, Any]:
+    """Return a design's tables with changes to its keys.
+
+    Paths of drawings and kits that they name are relative to the working directory. Changes to
+    ``fits`` clear ``chamber.diameter`` unless they set it. Raises DesignError for invalid changes.
+    """
+    changes = list(changes)
+    changed, keys = override(data, changes), set(changed_keys(changes))
+    chamber: Any = changed.get("chamber")
     if OUTLINE in keys:
-        chamber = data["chamber"]
-        chamber["outline"] = str(Path(str(chamber["outline"])).absolute())
+        chamber["outline"] = _from_user(chamber["outline"])
     for key in filter(_SHAPE_FILE.fullmatch, keys):
-        shape = data["shapes"][key.split(".")[1]]
-        shape["file"] = str(Path(str(shape["file"])).absolute())
-    if KIT in keys and isinstance(data[KIT], str) and data[KIT] not in kit_names():
-        data[KIT] = str(Path(data[KIT]).absolute())
-
-
-def open_what_fits(data: dict[str, Any], changes: Iterable[Change]) -> None:
-    """Clear ``chamber.diameter`` if changes set ``fits`` and not the diameter."""
-    keys = set(changed_keys(changes))
-    chamber = data.get("chamber")
+        shape = changed["shapes"][key.split(".")[1]]
+        shape["file"] = _from_user(shape["file"])
+    if KIT in keys and isinstance(changed[KIT], str) and changed[KIT] not in kit_names():
+        changed[KIT] = _from_user(changed[KIT])
     fits = DIAMETER not in keys and any(key.startswith(f"{FITS}.") for key in keys)
     if fits and isinstance(chamber, dict):
         chamber.pop("diameter", None)
+    return changed
+
+
+def _from_user(path: object) -> str:
+    return str(Path(str(path)).absolute())
 
 
 def add_waivers(

@@ -96,22 +96,23 @@ def kit_of(design: Design) -> Kit:
 def departures(design: Design) -> list[str]:
     """Return the dotted keys that a design sets differently from its kit."""
     kit = kit_of(design)
+    tubes, adhesives = kit.record.tubes, kit.record.adhesives
     record = checked(KitFile, {"schema": SCHEMA, "name": "x", "version": "x", **kit.tables}, {})
     values, usual = with_unused(design), without_none(record.model_dump(mode="json"))
     keys = [key for key, _ in dotted(kit.tables) if _at(values, key) != _at(usual, key)]
-    tube = kit.tubes.get(design.inlet.tube)
-    if kit.tubes and tube is None:
+    tube = tubes.get(design.inlet.tube)
+    if tubes and tube is None:
         keys.append("inlet.tube")
     elif tube is not None and tube.outer_diameter != design.inlet.tube_outer_diameter:
         keys.append("inlet.tube_outer_diameter")
-    if kit.adhesives and design.inlet.adhesive not in kit.adhesives:
+    if adhesives and design.inlet.adhesive not in adhesives:
         keys.append("inlet.adhesive")
     return keys
 
 
 def tube_name(design: Design) -> str:
     """Return the design's tubing, unless a tube of that name has another size in the kit."""
-    tube = kit_of(design).tubes.get(design.inlet.tube)
+    tube = kit_of(design).record.tubes.get(design.inlet.tube)
     if tube is not None and tube.outer_diameter != design.inlet.tube_outer_diameter:
         return OTHER_TUBE
     return design.inlet.tube
@@ -121,7 +122,7 @@ def adhesive_for(design: Design, films: Iterable[Film]) -> str | None:
     """Return the adhesive that bonds tubes to these films; None if it is the kit's and they are not
     listed. An adhesive outside the kit is the designer's choice.
     """
-    adhesive = kit_of(design).adhesives.get(design.inlet.adhesive)
+    adhesive = kit_of(design).record.adhesives.get(design.inlet.adhesive)
     if adhesive is None or all(film.product in adhesive.bonds for film in films):
         return design.inlet.adhesive
     return None
@@ -131,7 +132,7 @@ def cure_hours(design: Design) -> float | None:
     """Return the hours in which the tubes' adhesive cures: the order's, the kit's, else None."""
     if design.order.cure_hours is not None:
         return design.order.cure_hours
-    adhesive = kit_of(design).adhesives.get(design.inlet.adhesive)
+    adhesive = kit_of(design).record.adhesives.get(design.inlet.adhesive)
     return None if adhesive is None else adhesive.cure_hours
 
 
@@ -145,8 +146,8 @@ def citation(design: Design) -> dict[str, Any]:
     """Return the kit's entry in manifest and checks: name, version, hash, departures."""
     kit = kit_of(design)
     return {
-        "name": kit.name,
-        "version": kit.version,
+        "name": kit.record.name,
+        "version": kit.record.version,
         "sha256": kit.sha256,
         "departures": departures(design),
     }
@@ -155,4 +156,4 @@ def citation(design: Design) -> dict[str, Any]:
 def cited(design: Design) -> str:
     """Return the kit's name, version and hash as text."""
     kit = kit_of(design)
-    return f"kit {kit.name}, version {kit.version} (sha256 {kit.sha256[:12]})"
+    return f"kit {kit.record.name}, version {kit.record.version} (sha256 {kit.sha256[:12]})"

@@ -113,22 +113,16 @@ class KitFile(Section):
 
 @dataclass(frozen=True)
 class Kit:
-    """A lab's kit.
+    """A kit that was read.
 
-    ``tables`` hold the keys that it gives a design, ``sources`` the origin of its numbers by dotted
-    key; ``sha256`` is the hash of all tables.
+    ``tables`` hold its sections with plain values; ``sha256`` is the hash of all tables, and
+    ``text`` the file on disk, unchanged.
     """
 
-    name: str
-    version: str
-    about: str
-    sha256: str
+    record: KitFile
     tables: Mapping[str, Any]
-    sources: Mapping[str, str]
-    tubes: Mapping[str, Tube]
-    adhesives: Mapping[str, Adhesive]
+    sha256: str
     text: bytes
-    """The file on disk, unchanged."""
 
 
 def kit_path(kit: object, folder: Path) -> Path:
@@ -156,8 +150,8 @@ def kit_path(kit: object, folder: Path) -> Path:
 
 def read_kit(path: Path) -> Kit:
     """Return the kit of a file. Raises DesignError with one sentence for a fault in it."""
-    tables, sources = read_toml(path), dict[str, str]()
-    plain = _without_sources(tables, "", sources, path)
+    tables = read_toml(path)
+    plain = _without_sources(tables, "", path)
     for key in OF_A_DESIGN:
         section, _, name = key.partition(".")
         table = plain.get(section)
@@ -168,16 +162,9 @@ def read_kit(path: Path) -> Kit:
     except DesignError as error:
         raise DesignError(f"{path}: {error}") from None
     text = json.dumps(tables, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    sha256 = hashlib.sha256(text.encode()).hexdigest()
     return Kit(
-        name=record.name,
-        version=record.version,
-        about=record.about,
-        sha256=hashlib.sha256(text.encode()).hexdigest(),
-        tables={section: plain[section] for section in SECTIONS if section in plain},
-        sources=sources,
-        tubes=record.tubes,
-        adhesives=record.adhesives,
-        text=path.read_bytes(),
+        record, {key: plain[key] for key in SECTIONS if key in plain}, sha256, path.read_bytes()
     )
 
 
@@ -189,9 +176,7 @@ def load_kit(kit: object, folder: Path) -> Kit:
     return _shipped(path) if kit in kit_names() else read_kit(path)
 
 
-def _without_sources(
-    table: Mapping[str, Any], prefix: str, sources: dict[str, str], path: Path
-) -> dict[str, Any]:
+def _without_sources(table: Mapping[str, Any], prefix: str, path: Path) -> dict[str, Any]:
     """Return tables of plain values. Raises DesignError for a number or bond without a source."""
     plain: dict[str, Any] = {}
     for key, value in table.items():
@@ -203,9 +188,9 @@ def _without_sources(
                     f'{path}: {where} must be {{ value = ..., source = "where it is from" }} and '
                     "nothing else"
                 )
-            plain[key], sources[where] = value[VALUE], source
+            plain[key] = value[VALUE]
         elif isinstance(value, dict):
-            plain[key] = _without_sources(value, f"{where}.", sources, path)
+            plain[key] = _without_sources(value, f"{where}.", path)
         elif prefix and (key == BONDS or (key not in TEXTS and _is_number(value))):
             raise DesignError(
                 f"{path}: {where} = {shown(value)} has no source; write {where} = {{ value = "
@@ -267,18 +252,17 @@ def _merged(table: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str,
 
 def inlet_of_kit(kit: Kit, inlet: Mapping[str, Any], is_named: bool) -> dict[str, Any]:
     """Return the kit's first adhesive, and its first tube or the one that the inlet names."""
-    values: dict[str, Any] = {}
-    if kit.adhesives:
-        values["adhesive"] = next(iter(kit.adhesives))
-    if not kit.tubes:
+    tubes, adhesives = kit.record.tubes, kit.record.adhesives
+    values = {"adhesive": next(iter(adhesives))} if adhesives else {}
+    if not tubes:
         return values
-    name = inlet.get("tube", next(iter(kit.tubes)))
-    if isinstance(name, str) and name in kit.tubes:
-        return {**values, "tube": name, "tube_outer_diameter": kit.tubes[name].outer_diameter}
+    name = inlet.get("tube", next(iter(tubes)))
+    if isinstance(name, str) and name in tubes:
+        return {**values, "tube": name, "tube_outer_diameter": tubes[name].outer_diameter}
     if is_named and "tube_outer_diameter" not in inlet:
         raise DesignError(
-            f"inlet.tube = {shown(name)} is not in kit {kit.name} ({listed(kit.tubes)}); name one "
-            "of those, add it to the kit, or give inlet.tube_outer_diameter"
+            f"inlet.tube = {shown(name)} is not in kit {kit.record.name} ({listed(tubes)}); name "
+            "one of those, add it to the kit, or give inlet.tube_outer_diameter"
         )
     return values
 

@@ -24,11 +24,10 @@ from sbafab.design.files import (
     changed_keys,
     checked,
     listed,
-    open_what_fits,
     override,
     shown,
-    suggest_from_user_folder,
     suggestion,
+    with_changes,
 )
 from sbafab.design.films import (
     FaceBondings,
@@ -468,18 +467,12 @@ def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
     films = override({"films": {}}, changes).get("films")
     if isinstance(films, dict):
         data["films"] = without_other_products(data.get("films", {}), films)
-    data = override(data, changes)
-    suggest_from_user_folder(data, changes)
-    open_what_fits(data, changes)
-    family = type(design)
-    _refuse_unused(data, family, design.family)
-    data = under_kit(data, design.folder)
-    return checked(family, data, {design.family: family}).placed(design.folder).fitted()
+    return validated(with_changes(data, changes), {design.family: type(design)}, design.folder)
 
 
 def validated(
-    data: Mapping[str, Any], families: Mapping[str, type[Design]], folder: Path
-) -> Design:
+    data: Mapping[str, Any], families: Mapping[str, type[AnyDesign]], folder: Path
+) -> AnyDesign:
     """Return the design record of the family that ``data`` names.
 
     Raises DesignError with one sentence: field, value, allowed values, remedy.
@@ -493,18 +486,15 @@ def validated(
             "with generate, check, predict and studio, and other commands take one of its designs"
         )
     if not isinstance(family, str) or family not in families:
+        allowed = f"{'one of ' if len(families) > 1 else ''}{listed(families)}"
         near = suggestion(family, families)
-        raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{near}")
-    _refuse_unused(data, families[family], family)
-    return checked(families[family], under_kit(data, folder), families).placed(folder).fitted()
-
-
-def _refuse_unused(data: Mapping[str, Any], record: type[Design], family: str) -> None:
-    """Raises DesignError for a key that the family does not use, whatever its value."""
+        raise DesignError(f"family = {shown(family)} must be {allowed}{near}")
+    record = families[family]
     for key, _ in dotted(data):
         if not record.uses(key):
             instead = record.unused.get(key) or record.unused[key.partition(".")[0]]
             raise DesignError(f"{key} is a key that family {family} does not use; {instead}")
+    return checked(record, under_kit(data, folder), families).placed(folder).fitted()
 
 
 def resolved(design: Design) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def record(
     devices. Raises DesignError, OutputError.
     """
     designs = [built] if isinstance(built, Design) else [part.design for part in built.designs]
-    kit = ", ".join(dict.fromkeys(kit_of(design).name for design in designs))
+    kit = ", ".join(dict.fromkeys(kit_of(design).record.name for design in designs))
     rows = [
         row.model_copy(update={"kit": kit}) if isinstance(row, Record) and not row.kit else row
         for row in rows

@@ -64,7 +64,7 @@ def test_with_keeps_the_rest_and_checks_like_a_design_file() -> None:
     assert wide.folder == design.folder
     with pytest.raises(DesignError, match=r"stack\.baloons .* did you mean stack\.balloons"):
         design.with_(stack={"baloons": 3})
-    with pytest.raises(DesignError, match=r"family = 'lobed' must be '1dof'"):
+    with pytest.raises(DesignError, match="family = 'lobed' must be \"1dof\""):
         design.with_(family="lobed")
 
 

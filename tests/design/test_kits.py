@@ -10,7 +10,7 @@ import pytest
 
 import sbafab
 from sbafab.actuators import load_design
-from sbafab.design.files import templates_folder
+from sbafab.design.files import read_toml, templates_folder
 from sbafab.design.films import Films
 from sbafab.design.identity import OTHER_TUBE, citation, cure_hours, design_sha256, tube_name
 from sbafab.design.kits import read_kit, write_kit
@@ -65,14 +65,15 @@ def lab(tmp_path: Path) -> Path:
 
 
 def test_the_papers_kit_says_every_number_that_a_design_has_by_default() -> None:
-    kit = read_kit(templates_folder() / "kits" / "paper.toml")
+    path = templates_folder() / "kits" / "paper.toml"
+    kit, written = read_kit(path), read_toml(path)
     usual = {section: record.model_dump(mode="json") for section, record in SECTIONS.items()}
     for key, value in numbers(usual).items():
         assert at(kit.tables, key) == value, key
-        assert kit.sources[key].strip()
+        assert at(written, f"{key}.source").strip()
     tube = Design.model_fields["inlet"].default
-    assert kit.tubes[tube.tube].outer_diameter == tube.tube_outer_diameter
-    assert tube.adhesive in kit.adhesives
+    assert kit.record.tubes[tube.tube].outer_diameter == tube.tube_outer_diameter
+    assert tube.adhesive in kit.record.adhesives
 
 
 def test_a_kit_gives_what_the_design_leaves_out(lab: Path, tmp_path: Path) -> None:
@@ -202,7 +203,7 @@ def test_a_film_keeps_its_numbers_when_read_back(tmp_path: Path) -> None:
 
 def test_a_kit_is_never_written_over(tmp_path: Path) -> None:
     path = write_kit(tmp_path / "our-lab.toml")
-    assert read_kit(path).name == "our-lab"
+    assert read_kit(path).record.name == "our-lab"
     with pytest.raises(DesignError, match="exists"):
         write_kit(path)
 

@@ -249,7 +249,7 @@ def acceptance(work: Work) -> dict[str, Any]:
     """Return the values for ``acceptance.html.j2``."""
     design, laminate = work.design, work.laminate
     masks = [mask for gap in laminate.interfaces for mask in gap.masks]
-    tube = kit_of(design).tubes.get(tube_name(design))
+    tube = kit_of(design).record.tubes.get(tube_name(design))
     mechanism = design.form.mechanism
     inlets, ports = (
         [inlet.chamber for inlet in laminate.inlets],
