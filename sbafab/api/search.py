@@ -84,20 +84,14 @@ def compare(
     default 10, times at ``flow_ml_min``. With ``out``, ``out/compare/compare.html`` is written,
     with pictures of both. Raises DesignError, and OutputError.
     """
-    designs = [
-        source if isinstance(source, Design) else load_compared(source)
+    (a, name_a), (b, name_b) = (
+        (source, source.name)
+        if isinstance(source, Design)
+        else (load_compared(source), str(source))
         for source in (first, second)
-    ]
-    names = [
-        source.name if isinstance(source, Design) else str(source) for source in (first, second)
-    ]
-    comparison = run_compare(
-        designs[0],
-        designs[1],
-        (names[0], names[1]),
-        None if pressures_kpa is None else numbers("pressures_kpa", pressures_kpa),
-        flow_ml_min,
     )
+    pressures = None if pressures_kpa is None else numbers("pressures_kpa", pressures_kpa)
+    comparison = run_compare(a, b, (name_a, name_b), pressures, flow_ml_min)
     if out is not None:
         write_page(comparison, Path(out))
     return comparison

@@ -237,11 +237,9 @@ def _ways(design: Design, fixed: Collection[str]) -> Iterator[tuple[dict[str, st
     if registration.method == "channel-pin" and METHOD not in fixed:
         ears = [{METHOD: "ears", **plate} for plate in plates]
     with_pins = [[{**plate, **order} for order in orders] for plate in plates]
-    for group in (*with_pins, *([way] for way in ears)):
-        for most in (0, FEW_STEPS):
-            yield from ((way, most) for way in group)
-    for group in (*with_pins, ears):
-        yield from ((way, MOST_STEPS) for way in group)
+    groups = [*with_pins, *([way] for way in ears)]
+    yield from ((way, most) for group in groups for most in (0, FEW_STEPS) for way in group)
+    yield from ((way, MOST_STEPS) for group in groups for way in group)
 
 
 def _best(
@@ -250,14 +248,13 @@ def _best(
     """Return the best share that passes the other rules, with its changes; of equal ones the
     first.
     """
-    every = [
+    every = (
         (share, trials, steps)
         for trials in tried
         for (steps, seed), share in trials.shares.items()
         if share is not None and seed == SEED
-    ]
-    every.sort(key=lambda entry: -entry[0].value)
-    for share, trials, steps in every[:MOST_CHECKED]:
+    )
+    for share, trials, steps in sorted(every, key=lambda each: -each[0].value)[:MOST_CHECKED]:
         if not trials.broken(steps):
             words = {key: _value_of(trials.design, key) for key in (METHOD, SEQUENCE, PLATE)}
             return share, _changes(design, {**trials.lengths(steps), **words})
@@ -340,12 +337,9 @@ def _smallest(trials: _Trials, most: int) -> Steps | None:
         steps = bond + more, overhang + more
         if trials.share(steps, CHECK_SEED) is None:
             return None
-        is_enough = trials.is_enough(steps, CHECK_SEED)
-        broken = trials.broken(steps) if is_enough else {WORST_CASE}
-        if not broken:
-            return steps
+        broken = trials.broken(steps) if trials.is_enough(steps, CHECK_SEED) else {WORST_CASE}
         if broken != {WORST_CASE}:
-            return None
+            return None if broken else steps
     return None
 
 

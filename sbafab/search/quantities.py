@@ -119,10 +119,6 @@ UNITS = {
 }
 """Units of masses, forces, angles, times, stiffness and pressures; lengths have the units of design
 files."""
-UNDER_VACUUM = ("slip",)
-"""Quantities at pressures below atmospheric."""
-KEYS = {"lumen": "lumen.diameter"}
-"""Quantities that are keys: requirements may name them, and no model is needed."""
 ROUND_A_TUBE = ("deflated_diameter", "inflated_diameter", "reached_diameter")
 REACHED, WIDEST = "reached_diameter", "inflated_diameter"
 """Inflated diameters around a tube: the lower figure, for a wall that it must reach, and the upper
@@ -159,7 +155,9 @@ class RequestedQuantity:
     @property
     def key(self) -> str | None:
         """The design key that the quantity stands for, or None."""
-        return self.name if "." in self.name else KEYS.get(self.name)
+        if self.name == "lumen":
+            return "lumen.diameter"
+        return self.name if "." in self.name else None
 
     @property
     def is_moved(self) -> bool:
@@ -200,7 +198,7 @@ def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:
 
 
 def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -> RequestedQuantity:
-    is_vacuum = name in UNDER_VACUUM
+    is_vacuum = name == "slip"
     read: dict[str, Any] = {}
     try:
         for place in places:
