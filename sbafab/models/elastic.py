@@ -407,7 +407,8 @@ def _forces(
         except DesignError as error:
             yield LeftOut(f"{quantity.named(at)}, elastic stack", str(error), (quantity,)), None
             continue
-        pose = _level_pose(stack, pressure, stroke)
+        # Values at other factors need no pose: a force does not depend on whether it is stable.
+        pose = _level_pose(stack, pressure, stroke) if checks_films else None
         buckles = pose is not None and not pose.stable
         by = replace(model, trust=f"{BUCKLES}; {model.trust}") if buckles else model
         yield Figure(quantity, value, by, at), pose
