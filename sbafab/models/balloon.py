@@ -311,15 +311,16 @@ def total_energy(balloon: Balloon, load: BalloonLoad, x: Array) -> TotalEnergy:
     film, edge, p = balloon.film, balloon.edge, load.pressure
     r, z = x[0::2], x[1::2]
     elements = Elements.of(r, z)
-    bend = bending(film, balloon.bending_stiffness, slice(balloon.neck_edge, edge), elements)
+    bent = slice(balloon.neck_edge, edge)
+    bend, joined = bending(film, balloon.bending_stiffness, bent, elements)
     stretch, content = membrane(film, elements, load.cap), air_volume(film, edge, elements)
     eased = ripple_energy(film, edge, load.ripple, r)
     slopes, curves = (
         [a - p * b for a, b in zip(*both, strict=True)]
         for both in ((stretch.slopes, content.slopes), (stretch.curves, content.curves))
     )
-    for total, bent in ((slopes, bend.term.slopes), (curves, bend.term.curves)):
-        for number, part in enumerate(bent):
+    for total, parts in ((slopes, bend.slopes), (curves, bend.curves)):
+        for number, part in enumerate(parts):
             total[number] += part
     over = z - load.half
     touches = over > 0
@@ -330,9 +331,9 @@ def total_energy(balloon: Balloon, load: BalloonLoad, x: Array) -> TotalEnergy:
         stiff[held] = PLATE_STIFFNESS * np.maximum(p, 1.0) * balloon.node_areas[held]
     over, stiff = np.where(touches, over, 0.0), np.where(touches, stiff, 0.0)
     pressed = stiff * over
-    energy = bend.term.energy + stretch.energy + eased.energy
+    energy = bend.energy + stretch.energy + eased.energy
     energy = energy - p * content.energy + (pressed * over).sum(0) / 2
-    by_place, band = assembled_gradient(slopes), assembled_tangent(curves, bend.joined)
+    by_place, band = assembled_gradient(slopes), assembled_tangent(curves, joined)
     by_place[1::2] += pressed
     by_place[2 * edge :: 2] += eased.slopes
     band[1::2, 0] += stiff
@@ -409,7 +410,9 @@ class FilmEnergy:
 
     def __init__(self, films: FilmPair, loads: Sequence[BalloonLoad], motion: FilmMotion) -> None:
         self.films, self.loads, self.motion = films, loads, motion
-        self.scale, self.close = tolerances(films[0], loads[0])
+        pressure, pocket = loads[0].pressure, films[0].pocket
+        self.scale = pressure * pocket**3
+        self.close = RESIDUAL * np.maximum(pressure, LEAST_PRESSURE) * math.pi * pocket**2
 
     def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
         twist = self.motion.twist[:, None]
@@ -435,12 +438,6 @@ class FilmEnergy:
         return np.asarray(np.max(parts, axis=0))
 
 
-def tolerances(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
-    """Return an energy scale of each balloon, uJ, and the tolerance of its residual, mN."""
-    force = RESIDUAL * np.maximum(load.pressure, LEAST_PRESSURE) * math.pi * balloon.pocket**2
-    return load.pressure * balloon.pocket**3, force
-
-
 def relative_change(x: Array, ahead: Array) -> Array:
     """Return the largest share of its length by which a step changes an element: (rows,)."""
     length, by = (np.hypot(y[2::2] - y[:-2:2], y[3::2] - y[1:-2:2]) for y in (x, ahead))
@@ -460,15 +457,15 @@ def _equilibrium(problem: FilmEnergy, y: Array) -> Array:
 
 def compressed_length(balloon: Balloon, x: Array) -> Array:
     """Return the length in mm along the film over which the smooth hoop is compressed."""
-    strains, lengths = strain(balloon.film, x[0::2], x[1::2]), balloon.film.lengths
-    is_compressed = strains.hoop + balloon.poisson * strains.meridian < 0
+    (meridian, hoop), lengths = strain(balloon.film, x[0::2], x[1::2]), balloon.film.lengths
+    is_compressed = hoop + balloon.poisson * meridian < 0
     return np.asarray(np.maximum((lengths * balloon.may_wrinkle) @ is_compressed, lengths.min()))
 
 
 def wrinkle_stress(balloon: Balloon, x: Array, zone: Array) -> Array:
     """Return the hoop stress in kPa that wrinkles over a zone carry, by each element's tension."""
     film, (r, z) = balloon.film, (x[0::2], x[1::2])
-    tension = balloon.membrane_stiffness * strain(film, r, z).meridian
+    tension = balloon.membrane_stiffness * strain(film, r, z)[0]
     # A wrinkle in a curved film stretches the meridian: a large number of short ones costs least.
     support = np.maximum(tension, 0.0) * (math.pi / zone) ** 2
     support = support + balloon.membrane_stiffness * curvature(film, r, z) ** 2
@@ -480,10 +477,10 @@ def ripples_at(films: Sequence[Balloon], shapes: Sequence[Array]) -> list[Ripple
     """Return the rim's ripples at coordinates of one film, mirrored by the other, or of both."""
     strains = [strain(film.film, x[0::2], x[1::2]) for film, x in zip(films, shapes, strict=True)]
     pulls = [
-        film.membrane_stiffness * strains_of.meridian[film.edge - 1]
-        for film, strains_of in zip(films, strains, strict=True)
+        film.membrane_stiffness * meridian[film.edge - 1]
+        for film, (meridian, _) in zip(films, strains, strict=True)
     ]
-    return rim_ripples(films, strains[0].hoop[films[0].edge :], pulls)
+    return rim_ripples(films, strains[0][1][films[0].edge :], pulls)
 
 
 # The bonded rim of a balloon, which buckles out of its plane where its hoop is compressed.

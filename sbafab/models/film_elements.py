@@ -81,17 +81,10 @@ class EnergyTerm(NamedTuple):
     curves: list[Array]
 
 
-class Strain(NamedTuple):
-    """Meridional and hoop strain of the elements."""
-
-    meridian: Array
-    hoop: Array
-
-
-def strain(flat: FlatFilm, r: Array, z: Array) -> Strain:
-    """Return the strains of each element."""
-    stretches = _squared_stretches(flat, Elements.of(r, z))
-    return Strain(*(strain_measure(flat, square) for square in stretches))
+def strain(flat: FlatFilm, r: Array, z: Array) -> tuple[Array, Array]:
+    """Return the meridional and the hoop strain of each element."""
+    along, around = _squared_stretches(flat, Elements.of(r, z))
+    return strain_measure(flat, along), strain_measure(flat, around)
 
 
 def curvature(flat: FlatFilm, r: Array, z: Array) -> Array:
@@ -166,17 +159,12 @@ def membrane(flat: FlatFilm, at: Elements, cap: Array) -> EnergyTerm:
     )
 
 
-class BendingTerm(NamedTuple):
-    """Bending energy, and the second derivatives that couple the elements before and after a kink,
-    by dr dr, dr dz, dz dr and dz dz of the two; each (kinks, films).
-    """
-
-    term: EnergyTerm
-    joined: list[Array]
-
-
-def bending(flat: FlatFilm, rigidity: float, bent: slice, at: Elements) -> BendingTerm:
-    """Return the bending energy along the meridian and round the hoop between clamped edges.
+def bending(
+    flat: FlatFilm, rigidity: float, bent: slice, at: Elements
+) -> tuple[EnergyTerm, list[Array]]:
+    """Return the bending energy along the meridian and round the hoop between clamped edges; and
+    the second derivatives that couple the elements before and after a kink, by dr dr, dr dz, dz dr
+    and dz dz of the two, each (kinks, films).
 
     The elements outside the nodes ``bent`` are bonded face to face with their mirror image: they do
     not bend, but give way at their root as the arms of a double cantilever beam do.
@@ -209,7 +197,7 @@ def bending(flat: FlatFilm, rigidity: float, bent: slice, at: Elements) -> Bendi
     before = -stiff * a[:edge], -stiff * b[:edge]
     after = a[1 : edge + 1], b[1 : edge + 1]
     joined = [x * y for x in before for y in after]
-    return BendingTerm(EnergyTerm(energy, [turn * a, turn * b], curves), joined)
+    return EnergyTerm(energy, [turn * a, turn * b], curves), joined
 
 
 def air_volume(flat: FlatFilm, edge: int, at: Elements) -> EnergyTerm:

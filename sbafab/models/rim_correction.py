@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.models import least_energy
-from sbafab.models.balloon import Balloon, bonded_bending_stiffness
+from sbafab.models.balloon import Balloon, bonded_bending_stiffness, relative_change
 from sbafab.models.film_elements import ROOT_LENGTH, Array, Elements, air_volume
 from sbafab.models.least_energy import Descent
 
@@ -205,19 +205,6 @@ class Parts(NamedTuple):
     means: Array
 
 
-class WaveTotal(NamedTuple):
-    """Energy less the air's work of one film and its share of the rim, (rows,); its gradient by
-    coordinate (coordinates, rows), and the tangent stiffness as a band of freedoms. Energy stored
-    in the films, uJ; the air on the film's side of the middle plane, ul.
-    """
-
-    energy: Array
-    gradient: Array
-    band: Array
-    stored: Array
-    volume: Array
-
-
 class Waves:
     """Energies of waving films, as a ``least_energy.Potential``: coordinates (nodes x places,
     rows). Round the hoop films bend in the direction that is normal to the mean meridian at
@@ -237,7 +224,7 @@ class Waves:
         self.stretch = length / balloon.film.lengths
 
     def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
-        return Descent(*self.total(x, rows)[:3])
+        return self.total(x, rows)[0]
 
     def newton_step(self, state: Descent, damping: Array) -> Array:
         band = state.matrix.copy()
@@ -249,15 +236,15 @@ class Waves:
 
     def change(self, x: Array, ahead: Array) -> Array:
         """Return the largest relative change of an element of the mean meridian: (rows,)."""
-        length, by = (
-            np.hypot(np.diff(y[R::PLACES], axis=0), np.diff(y[Z::PLACES], axis=0))
-            for y in (x, ahead)
-        )
-        neck_edge = self.of.balloon.neck_edge
-        return np.asarray((by[neck_edge:] / length[neck_edge:]).max(0))
+        first, rows = self.of.balloon.neck_edge, x.shape[1]
+        mean = (y.reshape(-1, PLACES, rows)[first:, :2].reshape(-1, rows) for y in (x, ahead))
+        return relative_change(*mean)
 
-    def total(self, x: Array, rows: NDArray[np.int_]) -> WaveTotal:
-        """Return the energy at coordinates ``x`` of these rows."""
+    def total(self, x: Array, rows: NDArray[np.int_]) -> tuple[Descent, Array, Array]:
+        """Return the energies of these rows at coordinates ``x``, those of one film and its share
+        of the rim, less the air's work; the energy stored in the films, uJ; and the air on the
+        film's side of the middle plane, ul.
+        """
         of, balloon = self.of, self.of.balloon
         p, edge, neck_edge = self.pressure[rows], balloon.edge, balloon.neck_edge
         places = (of.motion @ x[of.freedoms]).T.reshape(len(p), -1, PLACES)
@@ -287,7 +274,7 @@ class Waves:
         blocks = [diagonal, across, joined, -joined, -joined, joined]
         entries = np.concatenate([part.reshape(len(p), -1) for part in blocks], axis=1)
         energy = stored - p * volume + down * end**2
-        return WaveTotal(energy, slopes, of.packing.band(entries.T), stored, volume)
+        return Descent(energy, slopes, of.packing.band(entries.T)), stored, volume
 
     def _slices(self, change: Array, mean: Array) -> Slices:
         """Return the rates in each slice, with all derivatives 0."""

@@ -197,9 +197,8 @@ def wave_states(balloon: Balloon) -> FilmStates:
     if not grown.any():
         return none
     pressures = _rung_pressure(balloon, number)
-    total = Waves(of, pressures, x).total(x, number)
-    height = 2 * x[PLACES * balloon.neck_edge + Z]
-    rungs = FilmStates(height, 2 * total.stored, 2 * total.volume)
+    _, stored, volume = Waves(of, pressures, x).total(x, number)
+    rungs = FilmStates(2 * x[PLACES * balloon.neck_edge + Z], 2 * stored, 2 * volume)
     parts, jumps = [FilmStates(*(each[grown] for each in rungs))], []
     for k in np.flatnonzero(grown[:-1] | grown[1:]).tolist():
         if _are_one_branch(of, x[:, k], x[:, k + 1]):
@@ -260,12 +259,12 @@ def rippled(balloon: Balloon, pressure: ArrayLike, waves: int | None = None) -> 
         rungs = _rung_pressure(balloon, at.astype(np.int_))
         each = (_continued(of, x[:, [i]], rungs[which], p[which]) for i, which in enumerate(row))
         x = np.concatenate(list(each), 1)
-    energy = problem.total(x, np.arange(len(row))).energy
+    energy = problem.at(x, np.arange(len(row))).energy
     x = x[:, [min(np.flatnonzero(row == i), key=energy.__getitem__) for i in range(len(p))]]
-    state = Waves(of, p, x).total(x, np.arange(len(p)))
+    _, stored, volume = Waves(of, p, x).total(x, np.arange(len(p)))
     r, z = (np.ascontiguousarray(x[k::PLACES].T) for k in (R, Z))
     z[:, : balloon.neck_edge] = z[:, balloon.neck_edge, None]
-    shapes = Shapes(p, 2 * z[:, 0], 2 * state.volume, np.zeros(len(p)), 2 * state.stored, r, z)
+    shapes = Shapes(p, 2 * z[:, 0], 2 * volume, np.zeros(len(p)), 2 * stored, r, z)
     return Rippled(shapes, of.waves, *_amplitudes(balloon, x))
 
 
@@ -341,7 +340,7 @@ def _rung_of_paper(balloon: Balloon, waves: int, k: int) -> tuple[Array, bool]:
         x[UP::PLACES, 1] += math.copysign(KICK, x[edge + UP, 1]) * _film_wave(of)
     x = _continued(of, x, p[0] / STEP, p[0])
     rows = np.arange(x.shape[1])
-    energy = Waves(of, np.repeat(p, len(rows)), x).total(x, rows).energy
+    energy = Waves(of, np.repeat(p, len(rows)), x).at(x, rows).energy
     # Of equal ones the plain start's: its waves are of the branch below.
     gains = bool(energy[-1] < energy[0] * (1 + CLEARLY))
     return x[:, -1 if gains else 0], in_step or gains
