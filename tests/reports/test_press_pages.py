@@ -18,9 +18,7 @@ from sbafab.reports.prints import seams_pdf
 from sbafab.reports.traveller.lay_up import beds
 from sbafab.reports.traveller.lay_up import pitch as pitch_of
 from sbafab.reports.traveller.page import (
-    FoldPage,
     PressPage,
-    SeamPage,
     joint_pages,
     step_pages,
     straight_run,
@@ -166,14 +164,11 @@ def test_names_in_the_top_view_are_apart(design: tuple[str, ...]) -> None:
 def test_a_fold_is_placed_on_the_loose_part() -> None:
     """The line is at y = -12 and the mouth at y = 24 of the design."""
     fold, *seams = joint_pages(work_of("folded"))
-    assert isinstance(fold, FoldPage)
-    assert fold.lengths[0] == pytest.approx(36.0)
+    assert fold["lengths"][0] == pytest.approx(36.0)
     for number, (seam, name) in enumerate(zip(seams, ("left", "right"), strict=True), 1):
-        assert isinstance(seam, SeamPage)
-        assert seam.path == f"layers/seam_{number:03d}_{name}.dxf"
+        assert seam["path"] == f"layers/seam_{number:03d}_{name}.dxf"
     # From (-19, -13) on films with their lower left corner at (-20, -12).
-    assert isinstance(seams[0], SeamPage)
-    assert seams[0].start == pytest.approx((1.0, -1.0))
+    assert seams[0]["start"] == pytest.approx((1.0, -1.0))
 
 
 def seam_pages(cap: str, tmp_path: Path) -> list[Any]:
@@ -186,17 +181,17 @@ def seam_pages(cap: str, tmp_path: Path) -> list[Any]:
 def test_a_film_under_a_joined_stack_is_laid_on_the_work_turned_over(tmp_path: Path) -> None:
     """From above the tool would melt the cap, which lies over the seam of the other two films."""
     upper, lower = seam_pages("pe", tmp_path)
-    assert (upper.step.from_below, lower.step.from_below) == (False, True)
-    assert lower.held == 3
-    assert [(layer.index, is_under) for layer, is_under in lower.lays] == [(1, False)]
+    assert (upper["step"].from_below, lower["step"].from_below) == (False, True)
+    assert lower["held"] == 3
+    assert [(layer.index, is_under) for layer, is_under in lower["lays"]] == [(1, False)]
     # It begins at x = -2, 18 mm from the left edge at -20 and 24 mm from the right one at 22.
-    assert (upper.start[0], lower.start[0]) == pytest.approx((18.0, 24.0))
-    assert '<g transform="matrix(-' in lower.picture
-    assert '<g transform="matrix(-' not in upper.picture
+    assert (upper["start"][0], lower["start"][0]) == pytest.approx((18.0, 24.0))
+    assert '<g transform="matrix(-' in lower["picture"]
+    assert '<g transform="matrix(-' not in upper["picture"]
     # Under a film that stays solid it is laid as it lies.
     _, solid = seam_pages("pet", tmp_path)
-    assert not solid.step.from_below
-    assert [(layer.index, is_under) for layer, is_under in solid.lays] == [(1, True)]
+    assert not solid["step"].from_below
+    assert [(layer.index, is_under) for layer, is_under in solid["lays"]] == [(1, True)]
 
 
 def test_the_channel_of_a_drawn_tab_runs_straight_up_to_its_first_corner() -> None:

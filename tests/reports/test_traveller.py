@@ -127,15 +127,15 @@ def test_the_cut_list_counts_every_pattern(sheet_files: Any) -> None:
         for _, pattern, count in sheet.counts:
             on_sheets[pattern] += count
     for row in cut_list(work):
-        assert row.parts * row.pieces == on_sheets[row.pattern]
-    assert sum(row.parts for row in cut_list(work)) == 3 * len(work.laminate.layers)
+        assert row["parts"] * row["pieces"] == on_sheets[row["pattern"]]
+    assert sum(row["parts"] for row in cut_list(work)) == 3 * len(work.laminate.layers)
     # Two spares of two patterns, each in three pieces.
     more = {"P02": 6, "P06": 6}
     sheets = [
         replace(sheet, counts=tuple((d, p, n + more.get(p, 0)) for d, p, n in sheet.counts))
         for sheet in work.sheets
     ]
-    spares = {row.pattern: row.spares for row in cut_list(replace(work, sheets=sheets))}
+    spares = {row["pattern"]: row["spares"] for row in cut_list(replace(work, sheets=sheets))}
     assert {pattern: n for pattern, n in spares.items() if n} == {"P02": 2, "P06": 2}
 
 
@@ -166,11 +166,11 @@ def test_pieces_that_come_off_the_sheet() -> None:
     assert (tip["loose"], tip["spare"]) == (45, 6)
     # One part and one spare, of 21.3 cm2 of LDPE, 0.1 mm thick, 0.92 mg/mm3; each half weighs 98.
     [folded] = held_films([work_of("folded")])
-    assert (folded.parts, round(folded.lightest or 0)) == (2, 197)
+    assert (folded["parts"], round(folded["lightest"] or 0)) == (2, 197)
     # A separator of 1dof-5mm: a disc of 5 + 2 x 0.75 + 2 x 0.5 mm less its bore, 0.025 thick.
     disc = math.pi / 4 * 5**2 * 0.025 * 2200 / 1000
-    [mask] = [held for held in held_films([work_of("1dof-5mm")]) if held.film.is_mask]
-    assert 0.9 * disc < (mask.lightest or 0) < 2 * disc
+    [mask] = [held for held in held_films([work_of("1dof-5mm")]) if held["film"].is_mask]
+    assert 0.9 * disc < (mask["lightest"] or 0) < 2 * disc
 
 
 def test_narrow_holes_are_tried_on_their_pins_before_the_press() -> None:

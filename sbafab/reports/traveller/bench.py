@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from operator import itemgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 from sbafab.assemblies.build import Assembled
 from sbafab.cutting.fixture import plate_corner, whole_plate
@@ -29,19 +29,10 @@ from sbafab.rules.pin_fit import most_on_a_pin
 # Cutting: how films are held, and how parts are taken off the sheet.
 
 
-class HeldFilm(NamedTuple):
-    """A film under the beam: how it is held, the number of parts and the mass of the lightest, mg;
-    None if its density is unknown.
+def held_films(works: Sequence[Work]) -> Iterator[dict[str, Any]]:
+    """Yield every film of sheets whose parts all come free: how it is held, the number of parts and
+    the mass of the ``lightest``, mg, None if its density is unknown. Masks are held like PTFE.
     """
-
-    film: Film
-    hold: HoldDown
-    parts: int
-    lightest: float | None
-
-
-def held_films(works: Sequence[Work]) -> Iterator[HeldFilm]:
-    """Yield every film of sheets whose parts all come free; masks are held like PTFE."""
     for film in films_of(works):
         count, area = 0, math.inf
         for work in works:
@@ -55,7 +46,8 @@ def held_films(works: Sequence[Work]) -> Iterator[HeldFilm]:
                     count += len(shape.pieces) * (needed + work.design.order.spare_parts(needed))
                     area = min(area, *(piece.area for piece in shape.pieces))
         mass = None if film.density is None else area * film.thickness * film.density / 1000
-        yield HeldFilm(film, _hold(works[0], film), count, mass)
+        hold = _hold(works[0], film)
+        yield {"film": film, "hold": hold, "parts": count, "lightest": mass}
 
 
 def _hold(work: Work, film: Film) -> HoldDown:

@@ -643,60 +643,36 @@ START = 0.9  # mm on the page: radius of the dot where a path begins
 SEAM_INK = "#d1495b"
 
 
-class SeamPage(NamedTuple):
-    """A seam on the page.
-
-    ``start`` of its path is mm to the right of and above the lower left corner of the films as they
-    lie. ``lays`` are the layers laid for it, each with whether the work so far is laid on it;
-    ``held`` is the highest layer of that work.
-    """
-
-    step: SeamStep
-    path: str
-    start: Point
-    lays: list[tuple[Layer, bool]]
-    held: int
-    picture: str
-
-
-class FoldPage(NamedTuple):
-    """A fold on the page, its film unfolded: the lengths of the lower and the upper half
-    perpendicular to the line, mm, and their ends in text.
-    """
-
-    step: FoldStep
-    lengths: tuple[float, float]
-    ends: list[str]
-    picture: str
-
-
-def joint_pages(work: Work) -> list[SeamPage | FoldPage]:
+def joint_pages(work: Work) -> list[dict[str, Any]]:
     """Return the seams and folds of a laminate, by step number."""
     seams = {seam.name: seam for seam in work.laminate.seams}
     folds = {(fold.lower, fold.upper): fold for fold in work.laminate.folds}
-    pages: list[SeamPage | FoldPage] = []
-    pages += [_seam_page(work.laminate, s, seams[s.seam]) for s in work.schedule.seams]
+    pages = [_seam_page(work.laminate, step, seams[step.seam]) for step in work.schedule.seams]
     pages += [_fold_page(work.laminate, step, folds[step.layers]) for step in work.schedule.folds]
-    return sorted(pages, key=lambda page: page.step.step)
+    return sorted(pages, key=lambda page: int(page["step"].step))
 
 
-def _seam_page(laminate: Laminate, step: SeamStep, seam: Seam) -> SeamPage:
+def _seam_page(laminate: Laminate, step: SeamStep, seam: Seam) -> dict[str, Any]:
+    """Return a seam: the ``start`` of its path mm to the right of and above the lower left corner
+    of the films as they lie; the layers laid for it (``lays``), each with whether the work so far
+    is laid on it; the highest layer of that work (``held``).
+    """
     layers_below = [index for index in step.layers if index not in step.adds]
     is_under = bool(layers_below) and not step.from_below
     films = [laminate.layer(index) for index in step.layers]
     x, y = seam.path[0][0].start
     low_x, low_y, high_x, _ = box_round([layer.profile.bounds for layer in films])
-    return SeamPage(
-        step,
-        seam_path(seam),
-        ((high_x - x if step.from_below else x - low_x), y - low_y),
-        [
+    return {
+        "step": step,
+        "path": seam_path(seam),
+        "start": ((high_x - x if step.from_below else x - low_x), y - low_y),
+        "lays": [
             (laminate.layer(index), is_under and index < min(layers_below))
             for index in sorted(step.adds, reverse=step.from_below)
         ],
-        max(layers_below, default=0),
-        _seam_picture(films, step, seam),
-    )
+        "held": max(layers_below, default=0),
+        "picture": _seam_picture(films, step, seam),
+    }
 
 
 def _plan_of(
@@ -731,7 +707,10 @@ def _seam_picture(films: Sequence[Layer], step: SeamStep, seam: Seam) -> str:
     return picture.svg()
 
 
-def _fold_page(laminate: Laminate, step: FoldStep, fold: Fold) -> FoldPage:
+def _fold_page(laminate: Laminate, step: FoldStep, fold: Fold) -> dict[str, Any]:
+    """Return a fold, its film unfolded: the lengths of the lower and the upper half perpendicular
+    to the line, mm, and their ends in text.
+    """
     (x0, y0), (x1, y1) = fold.line
     degrees = math.degrees(math.atan2(y1 - y0, x1 - x0))
     lower, upper = (laminate.layer(index) for index in (fold.lower, fold.upper))
@@ -747,7 +726,8 @@ def _fold_page(laminate: Laminate, step: FoldStep, fold: Fold) -> FoldPage:
         for length in lengths
     ]
     words = [f"{end} of half {half.index}" for end, half in zip(ends, (lower, upper), strict=True)]
-    return FoldPage(step, lengths, words, _fold_picture(lower, upper, halves, lengths, step.step))
+    picture = _fold_picture(lower, upper, halves, lengths, step.step)
+    return {"step": step, "lengths": lengths, "ends": words, "picture": picture}
 
 
 def _fold_picture(

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.sheets import SheetFile
@@ -96,28 +96,20 @@ def times(work: Work) -> Times:
     return Times(warm, cool, cure, test, HANDLING_MINUTES + pressed + len(steps) * (warm + cool))
 
 
-class AssemblyTimes(NamedTuple):
-    """Minutes of all designs of an assembly: ``waited`` for plates to warm and cool, ``worked``
-    until all tubes are glued, and the longest ``cure``; ``is_known``: all press minutes are stated.
+def assembly_times(works: Sequence[Work]) -> dict[str, Any]:
+    """Return the minutes that an assembly takes before its parts can be joined: ``waited`` for
+    plates to warm and cool, ``worked`` until all tubes are glued, and the longest ``cure``;
+    ``is_known``: all press minutes are stated.
     """
-
-    waited: float
-    worked: float
-    cure: float
-    is_known: bool
-
-
-def assembly_times(works: Sequence[Work]) -> AssemblyTimes:
-    """Return the times that an assembly takes before its parts can be joined."""
-    waited = handled = pressed = cure = 0.0
+    waited = handled = cure = 0.0
     for work in works:
         each, count = times(work), work.cycles.count
         waited += count * len(work.schedule.steps) * (each.warm + each.cool)
-        pressed += count * (work.schedule.total_press_minutes or 0.0)
+        handled += count * (work.schedule.total_press_minutes or 0.0)
         handled += HANDLING_MINUTES * work.cycles.copies
         cure = max(cure, each.cure)
     is_known = all(work.schedule.total_press_minutes is not None for work in works)
-    return AssemblyTimes(waited, handled + pressed + waited, cure, is_known)
+    return {"waited": waited, "worked": handled + waited, "cure": cure, "is_known": is_known}
 
 
 # Materials: films, tubes and press supplies.
@@ -335,22 +327,7 @@ def turns_over(work: Work) -> bool:
 # The parts to cut.
 
 
-class Cut(NamedTuple):
-    """A row of the cut list: one pattern. ``cut_length`` in mm, of one layer."""
-
-    pattern: str
-    picture: str
-    material: str
-    roles: str
-    layers: str
-    parts: int
-    spares: int
-    pieces: int
-    cut_length: float
-    sheets: str
-
-
-def cut_list(work: Work) -> list[Cut]:
+def cut_list(work: Work) -> list[dict[str, Any]]:
     """Return every pattern that is cut, once, in the order of its first layer."""
     return [
         _cut(work, layers)
@@ -359,7 +336,7 @@ def cut_list(work: Work) -> list[Cut]:
     ]
 
 
-def _cut(work: Work, same: Sequence[Layer]) -> Cut:
+def _cut(work: Work, same: Sequence[Layer]) -> dict[str, Any]:
     """Return the row of layers of the same pattern; halves of a folded film are one part."""
     laminate, first = work.laminate, same[0]
     halves = [half for half in laminate.layers if laminate.cut_with(half) == first.index]
@@ -373,18 +350,19 @@ def _cut(work: Work, same: Sequence[Layer]) -> Cut:
         if (design, pattern) == (work.design.name, first.pattern)
     }
     needed = (len(layers) - len(halves) + 1) * work.copies
-    return Cut(
-        first.pattern,
-        thumbnail(first.pattern, is_flat, first.film, profile.bounds),
-        first.film.material,
-        ", ".join(dict.fromkeys(layer.role.replace("-", " ") for layer in layers)),
-        layer_numbers([layer.index for layer in layers]),
-        needed,
-        max(0, sum(on_sheets.values()) // len(first.profile.pieces) - needed),
-        len(profile.pieces),
-        _cut_length(work, first),
-        ", ".join(on_sheets),
-    )
+    return {
+        "pattern": first.pattern,
+        "picture": thumbnail(first.pattern, is_flat, first.film, profile.bounds),
+        "material": first.film.material,
+        "roles": ", ".join(dict.fromkeys(layer.role.replace("-", " ") for layer in layers)),
+        "layers": layer_numbers([layer.index for layer in layers]),
+        "parts": needed,
+        "spares": max(0, sum(on_sheets.values()) // len(first.profile.pieces) - needed),
+        "pieces": len(profile.pieces),
+        # mm, of one layer
+        "cut_length": _cut_length(work, first),
+        "sheets": ", ".join(on_sheets),
+    }
 
 
 def _cut_length(work: Work, layer: Layer) -> float:
