@@ -294,16 +294,14 @@ def _are_apart(columns: NDArray[Any]) -> bool:
 
 
 def _left_by_rounding(scatter: float, resolution: float) -> float:
-    """The standard uncertainty that rounding to a step leaves in a mean of readings.
+    """Return the standard uncertainty that rounding to a step leaves in a mean of readings.
 
     A mean of Gaussian readings of deviation s, rounded to steps d, is off by up to d / pi *
     exp(-2 (pi s / d)^2) (B. Widrow, I. Kollar, Quantization Noise, 2008): of readings that all
     agree, a step's whole width remains in doubt, and of those that scatter by half a step nothing.
     """
-    if resolution == 0:
-        return 0.0
-    variance = max(scatter - resolution**2 / 12, 0.0)
-    return resolution / math.sqrt(12) * math.exp(-2 * math.pi**2 * variance / resolution**2)
+    steps = max(scatter - resolution**2 / 12, 0.0) / resolution**2 if resolution else 0.0
+    return resolution / math.sqrt(12) * math.exp(-2 * math.pi**2 * steps)
 
 
 @cache
@@ -363,13 +361,11 @@ class CouponFrame(NamedTuple):
         return rectangle((x, y), (x + width, y + height)) - window
 
 
-FRAMES = tuple(
-    CouponFrame(name, corner, outer, window)
-    for (outer, window), names in (
-        (((24.0, 20.0), (14.0, 10.0)), {"A": (4.0, 34.0), "B": (32.0, 34.0)}),
-        (((16.0, 12.0), (8.0, 6.0)), {"C": (8.0, 12.0), "D": (36.0, 12.0)}),
-    )
-    for name, corner in names.items()
+FRAMES = (
+    CouponFrame("A", (4.0, 34.0), (24.0, 20.0), (14.0, 10.0)),
+    CouponFrame("B", (32.0, 34.0), (24.0, 20.0), (14.0, 10.0)),
+    CouponFrame("C", (8.0, 12.0), (16.0, 12.0), (8.0, 6.0)),
+    CouponFrame("D", (36.0, 12.0), (16.0, 12.0), (8.0, 6.0)),
 )
 
 

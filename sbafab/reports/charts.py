@@ -166,12 +166,8 @@ def _plot(panel: Panel, begin: float) -> _Plot:
     """Return the plot of a panel; the wider the numbers, the further right its axes."""
     items: list[ChartCurve | ChartPoints | ChartSpecks]
     items = [*panel.curves, *panel.points, *panel.specks]
-    ends = [
-        y + sign * error
-        for points in panel.points
-        for y, error in zip(points.y, points.error, strict=True)
-        for sign in (-1, 1)
-    ]
+    bars = [pair for each in panel.points for pair in zip(each.y, each.error, strict=True)]
+    ends = [y + sign * error for y, error in bars for sign in (-1, 1)]
     if panel.bars:
         every = max(1, len(panel.names) // MOST_NAMES)
         ticks = list(enumerate(panel.names))[::every]

@@ -88,8 +88,7 @@ def other_hands(laminate: Laminate, design: Design) -> tuple[Hand, ...]:
 def _by_hand(design: Design, factor: float) -> Design:
     """Return a design whose hand is ``factor`` times as rough, and whose yield is a slope's."""
     errors = design.registration
-    names = ("hand_placement", "hand_turn")
-    hand = {name: factor * getattr(errors, name) for name in names}
+    hand = {name: factor * getattr(errors, name) for name in ("hand_placement", "hand_turn")}
     rules = design.rules.model_copy(update={"yield_builds": BUILDS})
-    registration = errors.model_copy(update=hand)
-    return design.model_copy(update={"registration": registration, "rules": rules})
+    more = {"registration": errors.model_copy(update=hand), "rules": rules}
+    return design.model_copy(update=more)

@@ -60,11 +60,6 @@ def whole_minutes(value: float | None) -> str:
     return minutes(None) if value is None else f"{value:.0f} min = {value / 60:.2f} h"
 
 
-def plain(value: float | None, count: int = 1) -> str:
-    """Return ``count`` times a number without its unit, a blank for None."""
-    return BLANK if value is None else f"{count * value:g}"
-
-
 def millimetres(value: float) -> str:
     return f"{round(value, 3) + 0.0:g} mm"
 
@@ -75,16 +70,6 @@ def size(width: float, length: float) -> str:
 
 def count(number: int, noun: str, plural: str = "") -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {plural or noun + 's'}"
-
-
-def stacks(number: int) -> str:
-    """Return the noun phrase after a definite article: stack, 3 stacks."""
-    return "stack" if number == 1 else f"{number} stacks"
-
-
-def milligrams(mass: float) -> str:
-    """Return a mass to two digits, whole above 99."""
-    return f"{mass:.2g}" if mass < 99.5 else f"{mass:.0f}"
 
 
 def toward(inlet: Inlet) -> str:
@@ -100,16 +85,19 @@ FILTERS = {
     "newtons": force,
     "minutes": minutes,
     "whole_minutes": whole_minutes,
-    "plain": plain,
+    # ``many`` times a number without its unit
+    "plain": lambda value, many=1: BLANK if value is None else f"{many * value:g}",
     "g": lambda value: f"{value:g}",
     "fixed": lambda value, digits: f"{value:.{digits}f}",
     "count": count,
     "spaces": lambda words: words.__class__(" ".join(words.split())),
-    "stacks": stacks,
+    # after a definite article
+    "stacks": lambda number: "stack" if number == 1 else f"{number} stacks",
     "toward": toward,
     "named": layer_words,
     "face_down": face_down,
-    "mg": milligrams,
+    # to two digits, whole above 99
+    "mg": lambda mass: f"{mass:.2g}" if mass < 99.5 else f"{mass:.0f}",
     "joined": lambda words: joined_words(list(words)),
     "numbers": layer_numbers,
     "indices": lambda layers: [layer.index for layer in layers],

@@ -26,7 +26,6 @@ from sbafab.laminate.lay_up import LayUpStep, distinct_layers, stack_count
 from sbafab.markup import escape, quoteattr
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import layer_numbers
-from sbafab.reports.traveller.formatting import stacks
 from sbafab.reports.traveller.lay_up import Bed, Round, inlets_in, rounds
 
 Matrix = tuple[float, ...]
@@ -391,7 +390,8 @@ def _tilted(bounds: Bounds, levels: int) -> _Tilted:
 def _levels(laminate: Laminate, bed: Bed) -> Iterator[Level]:
     if bed.made_in is not None:
         words = f"layers {layer_numbers(bed.layers)}"
-        detail = f"the {stacks(stack_count(laminate, bed.layers))} from step {bed.made_in}"
+        count = stack_count(laminate, bed.layers)
+        detail = f"the {'stack' if count == 1 else f'{count} stacks'} from step {bed.made_in}"
         yield Level(distinct_layers(laminate, bed.layers)[:4], words, detail, True)
         return
     for turn in rounds([laminate.layer(index) for index in bed.layers]):
