@@ -259,18 +259,6 @@ class Unknowns(NamedTuple):
     at: Array
     forces: Array
 
-    @property
-    def pressures(self) -> Array:
-        """Pressures in kPa: (n, chambers)."""
-        return pressure_at(self.x)
-
-    @classmethod
-    def of(cls, column: Column, load: Load | None, x: Array, freedoms: Array) -> Unknowns:
-        """Return the run that begins at freedoms (n, levels, 3)."""
-        wall = None if load is None else load.wall
-        points = 0 if wall is None else len(wall.local)
-        return cls(x, column.rows_of(freedoms, load), np.full((len(x), points), np.nan))
-
 
 Ahead = Callable[[Any, Linearised, Array, Array], Array]
 """The steps of the pressures' coordinates (n, chambers) of some of the states, by the states
@@ -280,25 +268,29 @@ linearised, the coordinates, and the moves of the freedoms to equilibrium and by
 
 @np.errstate(over="ignore", invalid="ignore")
 def together(
-    column: Column,
-    load: Load | None,
-    run: Unknowns,
+    begin: BatchPoses,
     ahead: Ahead,
     ends: tuple[float, float],
     steps: int,
     enough: float = LAST_ERROR,
-) -> tuple[Unknowns, BatchPoses]:
-    """Return the states after Newton's method for freedoms and pressures, and as poses those whose
-    steps became smaller than ``enough``; the pressures' coordinates stays within ``ends``.
+    forces: Array | None = None,
+) -> tuple[Array, BatchPoses]:
+    """Return the states after Newton's method for freedoms and pressures together: an outer plate's
+    contact forces (n, points) in mN, and as found those whose steps became smaller than ``enough``.
 
-    A plate's contact forces are additional unknowns.
+    Coordinates of pressures stay within ``ends``. Contact ``forces`` are additional unknowns.
     """
-    end = Unknowns(*(part.copy() for part in run))
-    live, before, last = np.arange(len(run.x)), np.zeros_like(run.x), np.zeros(len(run.x))
-    is_found, is_stable = np.zeros((2, len(run.x)), dtype=bool)
+    column, load = begin.column, begin.load
+    if forces is None:
+        points = 0 if load is None or load.wall is None else len(load.wall.local)
+        forces = np.full((len(begin), points), np.nan)
+    run = Unknowns(place_of(begin.pressures), column.rows_of(begin.freedoms, load), forces)
+    end, live = Unknowns(*(part.copy() for part in run)), np.arange(len(begin))
+    before, last = np.zeros_like(run.x), np.zeros(len(begin))
+    is_found, is_stable = np.zeros((2, len(begin)), dtype=bool)
     for _ in range(steps if len(live) else 0):
-        forces = None if np.isnan(run.forces).any() else run.forces
-        now = linearised(column, load, run.pressures, run.at, forces=forces)
+        known = None if np.isnan(run.forces).any() else run.forces
+        now = linearised(column, load, pressure_at(run.x), run.at, forces=known)
         try:
             move, dx, deeper = _step(run, now, lambda *parts, live=live: ahead(live, *parts))
         except np.linalg.LinAlgError:
@@ -324,9 +316,10 @@ def together(
             break
         last = np.where(share == 1, largest, 0.0)[goes]
         run, live, before = Unknowns(*(part[goes] for part in run)), live[goes], before[goes]
-    pushes = np.zeros(len(end.x)) if load is None else end.forces[:, :WALL_POINTS].sum(1)
     freedoms = end.at if load is not None else end.at[:, column.levels]
-    return end, BatchPoses(column, load, end.pressures, freedoms, pushes, is_stable, is_found)
+    pushes = end.forces[:, :WALL_POINTS].sum(1)
+    pressures = pressure_at(end.x)
+    return end.forces, BatchPoses(column, load, pressures, freedoms, pushes, is_stable, is_found)
 
 
 def _step(

@@ -13,7 +13,7 @@ nearly linear. Arrays have one row per place.
 from __future__ import annotations
 
 import math
-from itertools import permutations, product
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ from sbafab.errors import DesignError, UnreachableError
 from sbafab.models.column import BatchPoses, Column, Pose
 from sbafab.models.derivatives import (
     Linearised,
-    Unknowns,
     linearised_poses,
     place_of,
     pressure_at,
@@ -35,8 +34,6 @@ from sbafab.models.stack_loads import Load, OuterPlate, crossing
 
 NEAR, MET = 1e-4, 1e-3
 """Distances in mm from the place at which a search ends, and at which the tip has reached it."""
-STRANDED = 0.5
-"""Distance in mm from the place within which a failed search is repeated from nearby places."""
 STEPS = 25
 """Maximum Newton steps of freedoms and pressures."""
 SOFT, ROUGH, SOFT_STEPS = (3e2, 3e3, 3e4), 0.3, 4
@@ -78,7 +75,8 @@ class Search:
     """
 
     def __init__(self, column: Column, load: Load | None, places: Array, most: float) -> None:
-        self.column, self.load, self.places, self.most = column, load, places, most
+        self.column, self.load, self.places = column, load, places
+        self.most, self.ends = most, (0.0, most)
         self.wall = None if load is None else load.wall
         count = len(places)
         self.best = column.states(load, np.zeros((count, column.chambers)), None)
@@ -117,22 +115,6 @@ class Search:
         self._newton(self.rest, x, at)
         self._settle_for_met()
 
-    def _look_about(self) -> None:
-        """Search from near the best states: descents end at a contact change.
-
-        These are itself, with a chamber's pressure changed, and with one raised as another is
-        lowered, as it is along the edge of a contact.
-        """
-        each = np.eye(self.column.chambers)
-        changes = [size * one for size, one in product((0.05, -0.05, 0.2, -0.2, 0.6, -0.6), each)]
-        changes += [0.15 * (first - second) for first, second in permutations(each, 2)]
-        for change in (0.0 * each[0], *changes):
-            rest = self.rest[self.away[self.rest] < STRANDED]
-            if not rest.size:
-                break
-            x = np.clip(place_of(self.best.pressures) + change, 0.0, self.most)
-            self._newton(rest, x, self.best.freedoms)
-
     # Freedoms and pressures together.
 
     def _newton(
@@ -143,16 +125,17 @@ class Search:
         """
         if not rest.size:
             return
-        run, ends = Unknowns.of(self.column, self.load, x[rest], at[rest]), (0.0, self.most)
+        found, forces = self.column.states(self.load, pressure_at(x[rest]), at[rest]), None
 
         def ahead(which: NDArray[np.int_], now: Linearised, x: Array, moves: Array) -> Array:
             return self._ahead(self.places[rest[which]], now, x, moves)
 
         for stiffness in soft:
             assert self.load is not None
-            softer = self.load._replace(stiffness=stiffness)
-            run, _ = together(self.column, softer, run, ahead, ends, SOFT_STEPS, ROUGH)
-        _, found = together(self.column, self.load, run, ahead, ends, STEPS)
+            found = replace(found, load=self.load._replace(stiffness=stiffness))
+            forces, found = together(found, ahead, self.ends, SOFT_STEPS, ROUGH, forces)
+        found = replace(found, load=self.load)
+        _, found = together(found, ahead, self.ends, STEPS, forces=forces)
         # A straight column that would buckle, unless a stable equilibrium is near.
         unstable = np.flatnonzero(found.is_found & ~found.is_stable)
         if unstable.size:
@@ -221,8 +204,6 @@ class Search:
             damping[still] = math.inf
             x = np.where(good[:, None], np.clip(x + ahead, 0.0, self.most), x)
             now = now.replaced(good, tried.part(good))
-        if self.wall is not None:
-            self._look_about()
         self._settle_for_met()
 
     def _equilibria(self, x: Array, start: Array | None) -> BatchPoses:

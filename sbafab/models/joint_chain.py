@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -37,24 +35,6 @@ def axis_of(joint: str) -> str:
     return AXES[joint.removesuffix(UPPER)[-1]]
 
 
-def number(value: float) -> str:
-    """Return nine digits, without a minus before a zero."""
-    return f"{float(value) + 0.0:.9g}"
-
-
-def numbers(values: Iterable[float]) -> str:
-    """Return numbers with spaces between them."""
-    return " ".join(map(number, values))
-
-
-def document(root: ET.Element, note: str) -> str:
-    """Return a file of XML that begins with a comment."""
-    ET.indent(root, " ")
-    # Two hyphens in a row would end the comment.
-    text = note.replace("--", "- -")
-    return f'<?xml version="1.0"?>\n<!--\n{text}\n-->\n{ET.tostring(root, encoding="unicode")}\n'
-
-
 def plate_mass(stack: Stack) -> float | None:
     """Return the mass in kg of films that move with each plate, None if a density is unknown."""
     return None if stack.weight is None else stack.weight / GRAVITY / 1000
@@ -65,20 +45,11 @@ def disc_inertia(mass: float, radius: float, height: float) -> tuple[float, floa
     return mass * (3 * radius**2 + height**2) / 12, mass * radius**2 / 2
 
 
-class _Limits(NamedTuple):
-    """Largest rise of a level in mm and tilt in rad, and the largest force in N and moment in N mm
-    that its balloons have there.
-    """
+def _limits(stack: Stack, kind: int) -> tuple[float, float, float]:
+    """Return the largest rise of a level in mm and tilt in rad, and the largest force in N.
 
-    rise: float
-    tilt: float
-    force: float
-    moment: float
-
-
-def _limits(stack: Stack, kind: int) -> _Limits:
-    """Return the limits of a level. At the largest tilt for any rise and direction, rims just meet
-    on one side, and a balloon on the other side is as high as its map.
+    At the largest tilt for any rise and direction, rims just meet on one side, and a balloon on the
+    other side is as high as its map.
     """
     balloon = stack.maps[kind]
     turns = np.radians(np.arange(360))
@@ -87,28 +58,34 @@ def _limits(stack: Stack, kind: int) -> _Limits:
     rims = stack.rims[kind][:, [2, 1]] * (-1, 1)
     across = (-(rims @ ways)).max(0) + (stack.axes @ ways).max(0)
     force = stack.chambers * float(balloon.force(balloon.most_pressure, 0.0)) / 1000
-    tilt = balloon.most_height / float(across.min())
-    return _Limits(balloon.most_height, tilt, force, force * stack.outline)
+    return balloon.most_height, balloon.most_height / float(across.min()), force
 
 
 def urdf_text(name: str, stack: Stack) -> str:
     """Return a stack as URDF, in m, kg and rad: ``plate_<i>`` ends level i, the last is the tip."""
     root = ET.Element("robot", {"name": name})
-    ET.SubElement(root, "link", {"name": "plate_0"})
-    mass = plate_mass(stack)
+    _add(root, "link", name="plate_0")
     for level, kind in enumerate(stack.levels.tolist(), start=1):
         limits, parent = _limits(stack, kind), f"plate_{level - 1}"
         for joint in JOINTS:
-            title = f"level{level}_{joint}"
-            child = f"plate_{level}" if joint == JOINTS[-1] else f"{title}_link"
-            link = ET.SubElement(root, "link", {"name": child})
-            if mass is not None:
-                _add_mass(link, stack, mass / len(JOINTS))
-            if joint == JOINTS[-1]:
-                _add_plate(link, stack)
-            _add_joint(root, title, joint, (parent, child), limits, stack.pitch)
+            title, is_plate = f"level{level}_{joint}", joint == JOINTS[-1]
+            child = f"plate_{level}" if is_plate else f"{title}_link"
+            _add_link(root, child, stack, is_plate)
+            _add_joint(root, title, joint, (parent, child), limits, stack)
             parent = child
-    return document(root, _note(name, stack, mass))
+    ET.indent(root, " ")
+    # Two hyphens in a row would end the comment.
+    note = _note(name, stack).replace("--", "- -")
+    return f'<?xml version="1.0"?>\n<!--\n{note}\n-->\n{ET.tostring(root, encoding="unicode")}\n'
+
+
+def _add(parent: ET.Element, tag: str, **attributes: str | float) -> ET.Element:
+    """Add an element; numbers get nine digits, without a minus before a zero."""
+    texts = {
+        key: value if isinstance(value, str) else f"{float(value) + 0.0:.9g}"
+        for key, value in attributes.items()
+    }
+    return ET.SubElement(parent, tag, texts)
 
 
 def _add_joint(
@@ -116,49 +93,44 @@ def _add_joint(
     title: str,
     joint: str,
     links: tuple[str, str],
-    limits: _Limits,
-    pitch: float,
+    limits: tuple[float, float, float],
+    stack: Stack,
 ) -> None:
-    slides = joint == "rise"
-    element = ET.SubElement(
-        root, "joint", {"name": title, "type": "prismatic" if slides else "revolute"}
-    )
-    ET.SubElement(element, "parent", {"link": links[0]})
-    ET.SubElement(element, "child", {"link": links[1]})
+    slides, (rise, tilt, force) = joint == "rise", limits
+    element = _add(root, "joint", name=title, type="prismatic" if slides else "revolute")
+    _add(element, "parent", link=links[0])
+    _add(element, "child", link=links[1])
     if slides:
-        ET.SubElement(element, "origin", {"xyz": numbers((0, 0, pitch / 1000)), "rpy": "0 0 0"})
-    ET.SubElement(element, "axis", {"xyz": axis_of(joint)})
+        _add(element, "origin", xyz=f"0 0 {stack.pitch / 1000:.9g}", rpy="0 0 0")
+    _add(element, "axis", xyz=axis_of(joint))
     # Both hinges of a tilt have half of it.
-    ends = (0.0, limits.rise / 1000) if slides else (-limits.tilt / 2, limits.tilt / 2)
-    effort = limits.force if slides else limits.moment / 1000
-    limit = {"lower": ends[0], "upper": ends[1], "effort": effort, "velocity": VELOCITY}
-    ET.SubElement(element, "limit", {key: number(value) for key, value in limit.items()})
+    lower, upper = (0.0, rise / 1000) if slides else (-tilt / 2, tilt / 2)
+    effort = force if slides else force * stack.outline / 1000
+    _add(element, "limit", lower=lower, upper=upper, effort=effort, velocity=VELOCITY)
     if joint.endswith(UPPER):
-        ET.SubElement(element, "mimic", {"joint": title.removesuffix(UPPER)})
+        _add(element, "mimic", joint=title.removesuffix(UPPER))
 
 
-def _add_mass(link: ET.Element, stack: Stack, mass: float) -> None:
-    inertial = ET.SubElement(link, "inertial")
-    ET.SubElement(inertial, "mass", {"value": number(mass)})
-    across, along = disc_inertia(mass, stack.outline / 1000, stack.pitch / 1000)
-    moments = {"ixx": across, "ixy": 0, "ixz": 0, "iyy": across, "iyz": 0, "izz": along}
-    each = {key: number(value) for key, value in moments.items()}
-    ET.SubElement(inertial, "inertia", each)
+def _add_link(root: ET.Element, name: str, stack: Stack, is_plate: bool) -> None:
+    """Add a link with its share of the level's mass; a plate is seen."""
+    link, mass = _add(root, "link", name=name), plate_mass(stack)
+    radius, height = stack.outline / 1000, stack.pitch / 1000
+    if mass is not None:
+        inertial, share = _add(link, "inertial"), mass / len(JOINTS)
+        _add(inertial, "mass", value=share)
+        across, along = disc_inertia(share, radius, height)
+        _add(inertial, "inertia", ixx=across, ixy=0, ixz=0, iyy=across, iyz=0, izz=along)
+    if is_plate:
+        visual = _add(link, "visual")
+        _add(visual, "origin", xyz=f"0 0 {-height / 2:.9g}", rpy="0 0 0")
+        _add(_add(visual, "geometry"), "cylinder", radius=radius, length=height)
 
 
-def _add_plate(link: ET.Element, stack: Stack) -> None:
-    height = stack.pitch / 1000
-    visual = ET.SubElement(link, "visual")
-    ET.SubElement(visual, "origin", {"xyz": numbers((0, 0, -height / 2)), "rpy": "0 0 0"})
-    size = {"radius": number(stack.outline / 1000), "length": number(height)}
-    ET.SubElement(ET.SubElement(visual, "geometry"), "cylinder", size)
-
-
-def _note(name: str, stack: Stack, mass: float | None) -> str:
-    tilts = [math.degrees(_limits(stack, kind).tilt) for kind in set(stack.levels.tolist())]
+def _note(name: str, stack: Stack) -> str:
+    tilts = [math.degrees(_limits(stack, kind)[1]) for kind in set(stack.levels.tolist())]
     masses = (
         "not known, a film has no density"
-        if mass is None
+        if stack.weight is None
         else "the films', a fifth of a level's on each of its links"
     )
     return f"""\

@@ -1,7 +1,8 @@
 """Stacks in time: chambers that fill through their lines, in equilibrium at every instant.
 
-Freedoms and pressures of many states are found together by Newton's method; a step that it does not
-solve is gone in parts. Lengths mm, pressures kPa, volumes ul. Arrays have one row per state.
+Freedoms and pressures of many states are found together by Newton's method; states that it does not
+solve soon go from equilibrium to equilibrium. Lengths mm, pressures kPa, volumes ul. Arrays have
+one row per state.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ from sbafab.errors import DesignError
 from sbafab.models.column import CHUNK, LOADED_CHUNK, BatchPoses, Column, Pose
 from sbafab.models.derivatives import (
     Linearised,
-    Unknowns,
     linearised_poses,
     place_of,
     pressure_at,
@@ -31,32 +31,48 @@ from sbafab.runtime import one_blas_thread
 
 ROUNDING = 1e-11
 """Rounding of volumes in ul."""
-MOTION_STEPS = 16
-"""Maximum Newton steps of freedoms and pressures together."""
+MOTION_STEPS, TRIALS = 16, 100
+"""Maximum Newton steps of freedoms and pressures together, and equilibria thereafter."""
 LONGEST_STEP = 2.0
-"""Largest change of the pressures' coordinates in one of them."""
+"""Largest change of the pressures' coordinates in one step."""
+OVERSHOT, LEAST_SHARE = 0.5, 1e-5
+"""Share of a step's first slope that its last one may rise to, unless so small a share of the step
+is left."""
 SUCTION = 90.0
 """Limit of suction in kPa for a shut chamber, before its fluid boils or leaks."""
-MOST_STEPS, HALVINGS = 40, 20
-OVERSHOT = 0.5
-"""Share of a step's first slope that its last one may rise to, in the line search."""
 TOLERANCE, LEAST_CONTENT = 1e-5, 20.0
 """Tolerance as a share of a chamber's content; in ul, the least content it is taken of."""
 
 
-class Supply(NamedTuple):
-    """What n states take in during a step: the ``contents`` (n, chambers) that they then have in ul
-    (of a gas at the atmosphere) but for the flow of ``acts`` (n, 1) s from ``sources`` (n,
-    chambers) in kPa, if these are valves; pumps may suck down to ``least`` kPa.
+class Intake(NamedTuple):
+    """What n states take in from where they ``begin``: the ``contents`` (n, chambers) that they
+    have in ul at the end (of a gas at the atmosphere) but for the flow of ``acts`` (n, 1) s from
+    ``sources`` (n, chambers) in kPa, if these are valves; pumps may suck down to ``least`` kPa.
 
-    The content of a chamber's ``line`` counts as its own.
+    The content of a chamber's ``line`` counts as its own. The excess of volumes is the gradient of
+    one function of the pressures, whose minimum is sought: volumes are slopes of a concave
+    potential, and more pressure lets less in. Pressures stay at or above the least, and a chamber
+    that would need less draws in the rest.
     """
 
+    begin: BatchPoses
     line: Line
     contents: Array
     acts: Array
     sources: Array | None
     least: float
+
+    @classmethod
+    def of(
+        cls, begin: BatchPoses, line: Line, acts: Array, sources: Array | None, flows: Any = 0.0
+    ) -> Intake:
+        """Return that of valves at sources, or of pumps with ``flows`` (n, chambers) in ul/s."""
+        # A pump that stands still is shut: its chamber may come to suction where a load bends it
+        # open.
+        least = -SUCTION if sources is None else 0.0
+        empty = cls(begin, line, np.zeros_like(begin.pressures), acts, sources, least)
+        held = (begin.volumes + empty.more) * empty.squeezed(begin.pressures)
+        return empty._replace(contents=held + acts * flows)
 
     @property
     def more(self) -> float:
@@ -81,47 +97,24 @@ class Supply(NamedTuple):
             own = own + whole / ATMOSPHERE_KPA
         return whole - (self.contents + self.acts * flow) / squeezed, own / squeezed
 
-    def at(self, where: Any) -> Supply:
+    def at(self, where: Any) -> Intake:
         """Return that of some of the states."""
         sources = None if self.sources is None else self.sources[where]
-        return self._replace(contents=self.contents[where], acts=self.acts[where], sources=sources)
-
-
-def moved(begin: BatchPoses, supply: Supply) -> BatchPoses:
-    """Return the poses after a step. Raises DesignError for the first state that has none.
-
-    Freedoms and pressures together first; then, where that does not converge, from equilibrium to
-    equilibrium.
-    """
-    held = (begin.volumes + supply.more) * supply.squeezed(begin.pressures)
-    supply, found = supply._replace(contents=supply.contents + held), begin
-    size = CHUNK if begin.load is None else LOADED_CHUNK
-    for first in range(0, len(begin), size):
-        part = np.arange(len(begin))[first : first + size]
-        step = Intake(begin.part(part), supply.at(part))
-        found = found.replaced(part, step.together())
-    rest = np.flatnonzero(~found.is_met)
-    if rest.size:
-        found = found.replaced(rest, Intake(begin.part(rest), supply.at(rest)).descent())
-    return found
-
-
-class Intake(NamedTuple):
-    """States that take in a supply from where they ``begin``.
-
-    The excess of volumes is the gradient of one function of the pressures, whose minimum is sought:
-    volumes are slopes of a concave potential, and more pressure lets less in. Pressures stay at or
-    above the least, and a chamber that would need less draws in the rest.
-    """
-
-    begin: BatchPoses
-    supply: Supply
+        contents, acts = self.contents[where], self.acts[where]
+        return Intake(self.begin.part(where), self.line, contents, acts, sources, self.least)
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Least and largest the pressures' coordinates."""
-        top = self.begin.column.most_pressure
-        return float(place_of(self.supply.least)), float(place_of(top))
+        """Least and largest coordinate of a pressure."""
+        return float(place_of(self.least)), float(place_of(self.begin.column.most_pressure))
+
+    def taken(self) -> BatchPoses:
+        """Return the poses at the end. Raises DesignError for the first state that has none."""
+        size = CHUNK if self.begin.load is None else LOADED_CHUNK
+        parts = [slice(first, first + size) for first in range(0, len(self.begin), size)]
+        found = BatchPoses.joined([self.at(part).together() for part in parts])
+        rest = np.flatnonzero(~found.is_met)
+        return found.replaced(rest, self.at(rest).descent()) if rest.size else found
 
     def ahead(self, which: Any, now: Linearised, x: Array, moves: Array) -> Array:
         """Return Newton's steps of the pressures' coordinates (n, chambers) of some of the states,
@@ -131,7 +124,7 @@ class Intake(NamedTuple):
         symmetric and positive definite.
         """
         rate, filled = pressure_rate(x), now.filled(moves)
-        wrong, own = self.supply.at(which).excess(now.volumes + filled[..., 0], pressure_at(x))
+        wrong, own = self.at(which).excess(now.volumes + filled[..., 0], pressure_at(x))
         # A shut valve leaves a pressure of exactly 0.
         wrong[np.abs(wrong) < ROUNDING] = 0.0
         matrix = filled[..., 1:] / rate[:, None]
@@ -145,80 +138,47 @@ class Intake(NamedTuple):
 
     def together(self) -> BatchPoses:
         """Return the states by Newton's method for freedoms and pressures together."""
-        begin = self.begin
-        run = Unknowns.of(begin.column, begin.load, place_of(begin.pressures), begin.freedoms)
-        _, found = together(begin.column, begin.load, run, self.ahead, self.ends, MOTION_STEPS)
-        top = begin.column.most_pressure
-        return replace(
-            found, is_found=found.is_found & found.is_stable & (found.pressures < top).all(1)
-        )
+        _, found = together(self.begin, self.ahead, self.ends, MOTION_STEPS)
+        is_within = (found.pressures < self.begin.column.most_pressure).all(1)
+        return replace(found, is_found=found.is_found & found.is_stable & is_within)
 
     def descent(self) -> BatchPoses:
-        """Return the states, from equilibrium to equilibrium. Raises DesignError for the first that
-        has none.
+        """Return the states, from equilibrium to equilibrium by Newton's method with a line search.
+        Raises DesignError for the first that has none.
         """
-        begin, top = self.begin, self.begin.column.most_pressure
-        x = np.maximum(place_of(begin.pressures), self.ends[0])
-        now = self._equilibria(x, begin.freedoms).met()
-        live = np.arange(len(x))
-        for _ in range(MOST_STEPS):
-            wrong, lin = self._excess(now), linearised_poses(now)
-            lacks = (x >= self.ends[1]) & (wrong < 0)
-            counts = ~((x <= self.ends[0]) & (wrong >= 0)) & ~lacks
-            close = TOLERANCE * np.maximum(np.abs(self.supply.contents), LEAST_CONTENT)
-            goes = ((np.abs(wrong) > close) & counts).any(1)
-            if not goes.any():
-                if lacks.any():
-                    raise DesignError(
-                        f"the chambers would need more than {top:g} kPa; ask for less"
-                    )
+        ends, top = self.ends, self.begin.column.most_pressure
+        x, share = np.maximum(place_of(self.begin.pressures), ends[0]), np.ones(len(self.begin))
+        now = self._equilibria(x, self.begin.freedoms).met()
+        close = TOLERANCE * np.maximum(np.abs(self.contents), LEAST_CONTENT)
+        for _ in range(TRIALS):
+            wrong, _ = self.excess(now.volumes, now.pressures)
+            lacks = (x >= ends[1]) & (wrong < 0)
+            rests = (np.abs(wrong) <= close) | (x <= ends[0]) & (wrong >= 0) | lacks
+            if rests.all() and lacks.any():
+                raise DesignError(f"the chambers would need more than {top:g} kPa; ask for less")
+            if rests.all():
                 return now
-            filling = lin.filling * pressure_rate(x)[:, None]
-            moves = lin.energy.solved(filling)
-            still = np.zeros((*moves.shape[:2], 1))
-            ahead = self.ahead(live, lin, x, np.concatenate([still, moves], axis=-1))
-            ahead[~goes] = 0.0
-            x, now = self._downhill(x, now, wrong, ahead)
+            at, rate = linearised_poses(now), pressure_rate(x)
+            moves = at.energy.solved(at.filling * rate[:, None])
+            moves = np.concatenate([np.zeros((*moves.shape[:2], 1)), moves], axis=-1)
+            ahead = self.ahead(slice(None), at, x, moves) * ~rests.all(1)[:, None]
+            tried = np.clip(x + share[:, None] * ahead, *ends)
+            found = self._equilibria(tried, now.freedoms)
+            missed, _ = self.excess(found.volumes, found.pressures)
+            still = (tried > ends[0]) & (tried < ends[1])
+            slope = np.where(still, missed * pressure_rate(tried) * ahead, 0.0).sum(1)
+            steep = (wrong * rate * ahead).sum(1)
+            good = found.is_met & ((slope <= -OVERSHOT * steep) | (share < LEAST_SHARE))
+            less = np.clip(steep / np.minimum(steep - slope, -1e-300), 0.1, 0.7)
+            share = np.where(good, 1.0, share * np.where(found.is_met, less, 0.5))
+            x, now = np.where(good[:, None], tried, x), now.replaced(good, found.part(good))
         raise DesignError(
             "no equilibrium of the stack found at the end of this step; try a shorter one"
         )
 
-    def _downhill(
-        self, x: Array, now: BatchPoses, wrong: Array, ahead: Array
-    ) -> tuple[Array, BatchPoses]:
-        """Return the states at the end of steps, by a line search."""
-        steep = (wrong * pressure_rate(x) * ahead).sum(1)
-        share, begin = np.ones(len(x)), x
-        rest = np.flatnonzero(ahead.any(1))
-        for _ in range(HALVINGS):
-            tried = np.clip(begin + share[:, None] * ahead, *self.ends)[rest]
-            found = Intake(now.part(rest), self.supply.at(rest))._equilibria(
-                tried, now.freedoms[rest]
-            )
-            good = found.is_met
-            slope = np.zeros(len(rest))
-            alone = Intake(found, self.supply.at(rest))
-            still = (tried > self.ends[0]) & (tried < self.ends[1])
-            parts = alone._excess(found) * pressure_rate(tried) * ahead[rest]
-            slope = np.where(still, parts, 0.0).sum(1)
-            over = steep[rest] / np.minimum(steep[rest] - slope, -1e-300)
-            good &= slope <= -OVERSHOT * steep[rest]
-            x = x.copy()
-            x[rest[good]] = tried[good]
-            now = now.replaced(rest[good], found.part(good))
-            less = np.where(found.is_met, np.clip(over, 0.1, 0.7), 0.5)
-            share[rest] *= np.where(good, 1.0, less)
-            rest = rest[~good]
-            if not rest.size:
-                break
-        return x, now
-
     def _equilibria(self, x: Array, start: Array) -> BatchPoses:
         p = np.minimum(pressure_at(x), self.begin.column.most_pressure)
         return self.begin.column.equilibria(p, self.begin.load, start, sucked=True)
-
-    def _excess(self, poses: BatchPoses) -> Array:
-        return self.supply.excess(poses.volumes, poses.pressures)[0]
 
 
 @dataclass
@@ -259,14 +219,9 @@ class Motion:
         if values.shape != (self.stack.chambers,) or not np.isfinite(values).all():
             raise DesignError(f"a step takes {self.stack.chambers} finite numbers, one a chamber")
         acts = np.array([[max(0.0, min(dt, self.time + dt - self.line.delay))]])
-        if flows is None:
-            supply = Supply(self.line, np.zeros((1, len(values))), acts, values[None], 0.0)
-        else:
-            # A pump that stands still is shut: its chamber may come to suction where a load bends
-            # it open.
-            supply = Supply(self.line, acts * values, acts, None, -SUCTION)
         begin = self.stack.states_of(self.pose, self.stack.acting(self.load))
-        self.pose = moved(begin, supply).pose()
+        asked = (values[None], 0.0) if flows is None else (None, values)
+        self.pose = Intake.of(begin, self.line, acts, *asked).taken().pose()
         self.sources = tuple(values.tolist())
         if flows is not None:
             self.sources = tuple(
@@ -312,8 +267,7 @@ class BatchMotion:
         _refuse_time(dt)
         sources = self.poses.column.table(pressures, len(self.times))
         acts = np.clip(self.times + dt - self.line.delay, 0.0, dt)[:, None]
-        supply = Supply(self.line, np.zeros_like(sources), acts, sources, 0.0)
-        self.poses = moved(self.poses, supply)
+        self.poses = Intake.of(self.poses, self.line, acts, sources).taken()
         self.times = self.times + dt
 
 
