@@ -364,11 +364,9 @@ class Column:
 
     def states_of(self, pose: Pose, load: Load | None) -> BatchPoses:
         """Return a pose under a load as one state."""
-        found = np.array([[pose.stable], [True]])
+        found, p = np.array([[pose.stable], [True]]), np.array([pose.pressures])
         pushes = np.array([1000 * pose.force])
-        return BatchPoses(
-            self, load, np.array([pose.pressures]), pose.freedoms[None], pushes, *found
-        )
+        return BatchPoses(self, load, p, pose.freedoms[None], pushes, *found)
 
     def equilibria(
         self,
@@ -451,57 +449,41 @@ class Column:
             )
         return self.weight
 
+    def table(self, pressures: ArrayLike, rows: int | None = None) -> Array:
+        """Return pressures (rows, chambers) in kPa. Raises DesignError if they are invalid."""
+        states = "a row a state" if rows is None else f"{rows} rows"
+        sentence = f"pressures in kPa must be finite numbers, {states} of {self.chambers}"
+        return numbers_of(pressures, (rows, self.chambers), sentence)
+
     def acting(self, arguments: dict[str, Any]) -> Load | None:
-        """Return the load that arguments of ``pose`` beside pressures are. Raises DesignError."""
+        """Return the load that arguments of ``pose`` beside pressures are, None without any. Raises
+        DesignError.
+        """
         unknown = sorted(set(arguments) - {*LOADS, "sucked"})
         if unknown:
             raise DesignError(
                 f"a load has no {unknown[0]}; give tip_load, gravity or plate, as of Stack.pose"
             )
-        return self.load(*(arguments.get(name, value) for name, value in LOADS.items()))
-
-    def table(self, pressures: ArrayLike, rows: int | None = None) -> Array:
-        """Return pressures (rows, chambers) in kPa. Raises DesignError if they are invalid."""
-        try:
-            table = np.asarray(pressures, dtype=float)
-        except (TypeError, ValueError):
-            table = np.zeros(0)
-        shape = (len(table) if rows is None and table.ndim else rows, self.chambers)
-        if table.shape != shape or not np.isfinite(table).all():
-            states = "a row a state" if rows is None else f"{rows} rows"
-            raise DesignError(
-                f"pressures in kPa must be finite numbers, {states} of {self.chambers}"
-            )
-        return table
-
-    def load(
-        self,
-        tip_load: Sequence[float],
-        gravity: bool | Sequence[float],
-        plate: float | Plate | None,
-    ) -> Load | None:
-        """Return the external loads of ``pose``'s arguments, or None without any. Raises
-        DesignError.
-        """
-        force, weight = 1000 * vector_of(tip_load, "tip_load in N"), None
+        tip_load, gravity, plate = ({**LOADS, **arguments}[name] for name in LOADS)
+        force, weight, wall = 1000 * vector_of(tip_load, "tip_load in N"), None, None
         if not isinstance(gravity, (bool, np.bool_)):
             weight = self.level_weight * direction_of(gravity, "the direction of gravity")
         elif gravity:
             weight = np.array([0.0, 0.0, -self.level_weight])
-        if not force.any() and weight is None and plate is None:
-            return None
-        if plate is None:
-            return Load(force, weight, None)
-        outer = plate if isinstance(plate, Plate) else Plate.at(plate)
-        point = vector_of(outer.point, "the plate's point in mm")
-        normal = direction_of(outer.normal, "the plate's normal")
-        wall = OuterPlate.of(point, normal, outer.sticks, self.outline)
-        if wall.normal[2] > 1 - 1e-9 and wall.point[2] < self.flat_height - 1e-9:
+        if plate is not None:
+            wall = self._outer_plate(plate if isinstance(plate, Plate) else Plate.at(plate))
+        is_loaded = force.any() or weight is not None or wall is not None
+        return Load(force, weight, wall) if is_loaded else None
+
+    def _outer_plate(self, plate: Plate) -> OuterPlate:
+        point = vector_of(plate.point, "the plate's point in mm")
+        normal = direction_of(plate.normal, "the plate's normal")
+        if normal[2] > 1 - 1e-9 and point[2] < self.flat_height - 1e-9:
             raise DesignError(
-                f"a plate {wall.point[2]:g} mm high is lower than the flat stack; give at least "
+                f"a plate {point[2]:g} mm high is lower than the flat stack; give at least "
                 f"{self.flat_height:.4g} mm"
             )
-        return Load(force, weight, wall)
+        return OuterPlate.of(point, normal, plate.sticks, self.outline)
 
     def within(self, pose: Pose) -> bool:
         """Return True if the maps hold for all balloons of a pose: within 3 % of balloons between
@@ -534,15 +516,25 @@ def _gaps(points: Array) -> Array:
     return np.stack([np.ones_like(x), y, -x], -1)
 
 
+def numbers_of(values: ArrayLike, shape: tuple[int | None, ...], sentence: str) -> Array:
+    """Return finite numbers of a shape, in which None is any length. Raises DesignError with a
+    sentence if they are not.
+    """
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise DesignError(sentence) from None
+    fits = len(shape) == array.ndim
+    fits = fits and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
+    if not fits or not np.isfinite(array).all():
+        raise DesignError(sentence)
+    return array
+
+
 def vector_of(values: Sequence[float], quantity: str) -> Array:
     """Return three numbers (3,). Raises DesignError if they are not three, or not finite."""
-    try:
-        vector = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        vector = np.zeros(0)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise DesignError(f"{quantity} must be three finite numbers, such as (0, 0, -0.1)")
-    return vector
+    sentence = f"{quantity} must be three finite numbers, such as (0, 0, -0.1)"
+    return numbers_of(values, (3,), sentence)
 
 
 def direction_of(values: Sequence[float], quantity: str) -> Array:

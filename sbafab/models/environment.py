@@ -18,6 +18,9 @@ from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import Line
 from sbafab.models.stack import Stack, StackBatch
 
+Stepped = tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+"""Observations, rewards, which arrived, which have no time left, and the times in s."""
+
 
 class ReachEnvironment(gymnasium.Env[Any, Any]):
     """Task of moving the tip of a stack to a point that it can reach.
@@ -93,15 +96,12 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self.single_observation_space = box(least, most, dtype=np.float64)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.num_envs, self.load = num_envs, load
+        self.num_envs, self.batch, self.load = num_envs, StackBatch(stack), load
         self.most_pressure, self.dt, self.steps, self.near = most_pressure, dt, steps, near
-        self.batch = StackBatch(stack)
         self._motion = self.batch.motion(num_envs, line, **load)
         self.random = [np_random()[0] for _ in range(num_envs)]
-        self._targets = np.zeros((num_envs, 3))
-        self._left = np.zeros(num_envs, dtype=int)
-        self._is_over = np.ones(num_envs, dtype=bool)
-        self._has_begun = False
+        self._targets, self._left = np.zeros((num_envs, 3)), np.zeros(num_envs, dtype=int)
+        self._is_over, self._has_begun = np.ones(num_envs, dtype=bool), False
 
     def reset(
         self,
@@ -123,48 +123,43 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self._has_begun = True
         return self._observations(), {}
 
-    def step(
-        self, actions: Any
-    ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+    def step(self, actions: Any) -> Stepped:
         """Return observations ``dt`` s later, rewards, which arrived, and which have no time left.
 
         Environments whose episode was over start the next one instead, with the reward 0.
         """
-        anew = self._is_over
-        if not (self._has_begun and anew.any()):
-            return self.moved(actions)
-        self._begin(anew)
-        resting = np.where(anew[:, None], -1.0, np.asarray(actions, dtype=float))
-        _, rewards, is_there, is_late, info = self.moved(resting)
-        self._motion.restart(anew)
-        self._left[anew] = self.steps
-        is_there, is_late = is_there & ~anew, is_late & ~anew
-        self._is_over = is_there | is_late
-        info["time"] = self._motion.times.copy()
-        return self._observations(), np.where(anew, 0.0, rewards), is_there, is_late, info
+        anew = self._is_over & self._has_begun
+        if anew.any():
+            self._begin(anew)
+            actions = np.where(anew[:, None], -1.0, np.asarray(actions, dtype=float))
+        seen, rewards, is_there, is_late, info = self.moved(actions)
+        if anew.any():
+            self._motion.restart(anew)
+            self._left[anew] = self.steps
+            is_there, is_late = is_there & ~anew, is_late & ~anew
+            seen, rewards = self._observations(), np.where(anew, 0.0, rewards)
+            self._is_over, info = is_there | is_late, {"time": self._motion.times.copy()}
+        return seen, rewards, is_there, is_late, info
 
-    def moved(
-        self, actions: Any
-    ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+    def moved(self, actions: Any) -> Stepped:
         """Return what ``step`` does, without restarts."""
         if not self._has_begun:
             raise DesignError("the environment is at no place yet; call reset first")
         shares = (np.clip(np.asarray(actions, dtype=float), -1.0, 1.0) + 1) / 2
         self._motion.step(self.dt, shares * self.most_pressure)
         self._left -= 1
-        observations = self._observations()
-        away = np.sqrt((observations[:, 6:9] ** 2).sum(1))
+        seen = self._observations()
+        away = np.linalg.norm(seen[:, 6:9], axis=1)
         is_there, is_late = away <= self.near, self._left <= 0
         self._is_over = is_there | is_late
-        return observations, -away, is_there, is_late, {"time": self._motion.times.copy()}
+        return seen, -away, is_there, is_late, {"time": self._motion.times.copy()}
 
     def _begin(self, which: NDArray[np.bool_], target: Any = None) -> None:
         """Begin an episode of some of the environments."""
         if target is None:
-            count, most = self.batch.stack.chambers, self.most_pressure
-            drawn = [
-                self.random[number].uniform(0.0, most, count) for number in np.flatnonzero(which)
-            ]
+            size = (self.batch.stack.chambers,)
+            numbers = [self.random[number] for number in np.flatnonzero(which)]
+            drawn = [one.uniform(0.0, self.most_pressure, size) for one in numbers]
             target = self.batch.poses(np.stack(drawn), **self.load).tips
         self._targets[which] = target
         self._motion.restart(which)

@@ -27,7 +27,7 @@ from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.balloons import balloons_of
-from sbafab.models.column import BatchPoses, Column, Plate, Pose, vector_of
+from sbafab.models.column import BatchPoses, Column, Plate, Pose, numbers_of, vector_of
 from sbafab.models.derivatives import Derivatives, derivatives
 from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
@@ -90,7 +90,7 @@ class Stack(Column):
                 f"{values.size} pressures are given for {self.chambers} chambers; give one a "
                 "chamber"
             )
-        load = self.load(tip_load, gravity, plate)
+        load = self.acting({"tip_load": tip_load, "gravity": gravity, "plate": plate})
         start = None if near is None else near.freedoms[None]
         return self.equilibria(values[None], load, start, sucked).pose()
 
@@ -177,7 +177,8 @@ class StackBatch:
         ``load`` are keyword arguments of ``Stack.pose`` beside pressures. Raises UnreachableError
         and DesignError as ``Stack.reach`` does, for the first place that is not met.
         """
-        places, most = _places(tips), self.stack.reach_limit(most_pressure)
+        sentence = "positions of the tip in mm must be finite numbers, one row of three for each"
+        places, most = numbers_of(tips, (None, 3), sentence), self.stack.reach_limit(most_pressure)
         return reached(self.stack, self.stack.acting(load), places, most, None).met()
 
     def motion(
@@ -196,19 +197,6 @@ class StackBatch:
         start = self.stack.states_of(self.stack.pose(begin, **load), self.stack.acting(load))
         poses = BatchPoses.joined([start] * count)
         return BatchMotion(line or Line(), start, poses, np.zeros(count))
-
-
-def _places(tips: ArrayLike) -> Array:
-    """Return places (N, 3) in mm. Raises DesignError if they are invalid."""
-    try:
-        places = np.asarray(tips, dtype=float)
-    except (TypeError, ValueError):
-        places = np.zeros(0)
-    if places.ndim != 2 or places.shape[1] != 3 or not np.isfinite(places).all():
-        raise DesignError(
-            "positions of the tip in mm must be finite numbers, one row of three for each"
-        )
-    return places
 
 
 def stack(

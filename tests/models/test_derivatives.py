@@ -106,7 +106,8 @@ def test_second_derivatives_are_those_of_the_energy(plate: Plate | None) -> None
     """And first ones; far from equilibrium too, where forces turn all levels."""
     stack = stack_of("three chambers")
     springs = stack.springs(np.array([[8.0, 5.0, 2.0]]), by_level=True)
-    load = stack.load((0.1, 0.2, -0.3), (0.0, 0.3, -1.0), plate)
+    loads = {"tip_load": (0.1, 0.2, -0.3), "gravity": (0.0, 0.3, -1.0), "plate": plate}
+    load = stack.acting(loads)
     at = np.random.default_rng(1).uniform(-0.2, 0.2, (1, 15, 3))
     at[..., 0] += 0.8
     now = energy(springs, stack.pitch, load, at)

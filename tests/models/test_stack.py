@@ -256,7 +256,7 @@ def test_a_stack_that_slips_far_under_a_plate_has_a_pose(pressures: Any) -> None
     plate = Plate((0.5, 0.0, 14.0), (0.1, 0.0, 1.0), sticks=False)
     pose = stack.pose(pressures, plate=plate)
     assert pose.stable
-    load = stack.load((0.0, 0.0, 0.0), False, plate)
+    load = stack.acting({"plate": plate})
     assert load is not None
     springs = stack.springs(np.array([pressures]), by_level=True)
     now = energy(springs, stack.pitch, load, pose.freedoms[None])
