@@ -59,10 +59,11 @@ def fitted(design: AnyDesign, fits: Fits, build: Callable[[AnyDesign], Laminate]
         laminate = plan(steps)
         if isinstance(laminate, DesignError):
             return -math.inf
-        return max(measure(laminate) - limit for _, limit, measure in _limits(fits))
+        return max(size - limit for _, limit, size in _sizes(fits, laminate))
 
     # An actuator is wider than its chamber, and one that is too small cannot be built.
-    most = int(min(limit for _, limit, _ in _limits(fits)) / STEP) + 1
+    limits = fits.model_dump(exclude_none=True)
+    most = int(min(limits.values()) / STEP) + 1
     steps = bisect_right(range(1, most + 1), ROUNDING, key=excess)
     largest = plan(max(steps, 1))
     if isinstance(largest, Laminate) and steps:
@@ -70,7 +71,7 @@ def fitted(design: AnyDesign, fits: Fits, build: Callable[[AnyDesign], Laminate]
     smallest = plan(steps + 1)
     if isinstance(smallest, DesignError):
         raise smallest
-    text = " and ".join(f"fits.{key} = {limit:g}" for key, limit, _ in _limits(fits))
+    text = " and ".join(f"fits.{key} = {limit:g}" for key, limit in limits.items())
     raise DesignError(
         f"no chamber fits {text}: the smallest that can be built, chamber.diameter = "
         f"{(steps + 1) * STEP:.2f}, is {excess(steps + 1):.3f} mm too wide; {_room(fits, smallest)}"
@@ -81,9 +82,8 @@ def refuse_unfit(design: Design, fits: Fits, laminate: Laminate) -> str | None:
     """A note on the size of a laminate that fits; None without limits. Raises DesignError."""
     over = beyond_the_outline(laminate)
     sizes = []
-    for key, limit, measure in _limits(fits):
+    for key, limit, size in _sizes(fits, laminate):
         scope = f"{'with' if key == 'diameter' else 'without'} {over}"
-        size = measure(laminate)
         if size > limit + ROUNDING:
             raise DesignError(
                 f"{design.name} measures {size:.3f} mm across {scope}, and fits.{key} = {limit:g}; "
@@ -94,14 +94,11 @@ def refuse_unfit(design: Design, fits: Fits, laminate: Laminate) -> str | None:
     return "; ".join(sizes) or None
 
 
-def _limits(fits: Fits) -> list[tuple[str, float, Callable[[Laminate], float]]]:
-    """Key, limit in mm, and measure of every limit that is set."""
+def _sizes(fits: Fits, laminate: Laminate) -> list[tuple[str, float, float]]:
+    """Key, limit and size of the laminate, mm, for every limit that is set."""
     measures = {"diameter": overall_diameter, "outline": outline_diameter}
-    return [
-        (key, limit, measures[key])
-        for key, limit in (("diameter", fits.diameter), ("outline", fits.outline))
-        if limit is not None
-    ]
+    limits = fits.model_dump(exclude_none=True)
+    return [(key, limit, measures[key](laminate)) for key, limit in limits.items()]
 
 
 def _with_chamber(design: AnyDesign, diameter: float) -> AnyDesign:
@@ -114,7 +111,7 @@ def _room(fits: Fits, laminate: Laminate) -> str:
     also = {"diameter": " (or shorten inlet.tab_length)", "outline": ""}
     remedies = [
         f"fits.{key} at least {math.ceil((size - ROUNDING) * 1000) / 1000:.3f}{also[key]}"
-        for key, limit, measure in _limits(fits)
-        if (size := measure(laminate)) > limit + ROUNDING
+        for key, limit, size in _sizes(fits, laminate)
+        if size > limit + ROUNDING
     ]
     return f"make {' and '.join(remedies)}"

@@ -278,18 +278,15 @@ NEAR = 0.05
 """Radians: edges that leave a point at a smaller angle are compared farther along."""
 
 
-class _Leaving:
+class _Leaving(NamedTuple):
     """A piece as it leaves a point: its direction there, its chord, its bend, its end."""
 
-    __slots__ = ("bend", "chord", "edge", "end", "half", "heading")
-
-    def __init__(self, half: int, edge: Edge, heading: float, chord: float, bend: float) -> None:
-        self.half = half
-        self.edge = edge
-        self.heading = heading
-        self.chord = chord
-        self.bend = bend
-        self.end = edge.start if half & 1 else edge.end
+    half: int
+    edge: Edge
+    end: Point
+    heading: float
+    chord: float
+    bend: float
 
     def to_left(self, p: Point) -> float:
         """Return the distance of ``p`` to the left of the piece's line or circle, mm."""
@@ -308,10 +305,10 @@ def _leaving(half: int, edge: Edge) -> _Leaving:
     chord = math.hypot(x1 - x0, y1 - y0)
     straight = math.atan2(y1 - y0, x1 - x0)
     if not isinstance(edge, Arc):
-        return _Leaving(half, edge, straight, chord, 0.0)
+        return _Leaving(half, edge, end, straight, chord, 0.0)
     lean = (-edge.sweep if half & 1 else edge.sweep) / 2
     heading = math.remainder(straight - lean, math.tau)
-    return _Leaving(half, edge, heading, chord, 2 * math.sin(lean) / chord)
+    return _Leaving(half, edge, end, heading, chord, 2 * math.sin(lean) / chord)
 
 
 class Arrangement:

@@ -169,7 +169,7 @@ Kerf = float | tuple[float, float]
 """Full width of the cut, mm: the same everywhere, or measured along x and along y."""
 Fate = Literal["vanishes", "splits in parts", "runs into another"]
 
-FINE, ALONG = 1e-6, 3e-6
+FINE, ALONG = 1e-6, 2e-6
 """Farthest an arc may lie off a stretched edge, and off the stretched path, mm."""
 SMOOTH, SIMILAR = 1e-6, 2.0
 """Radians a smooth run may turn from arc to arc, and the most that their radii differ by."""

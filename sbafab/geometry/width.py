@@ -387,16 +387,16 @@ ROUNDED = 0.1
 """Degrees a corner may miss its angle by: coordinates read from a file are rounded."""
 
 
-class _Run:
+class _Run(NamedTuple):
     """Consecutive edges on one line or circle, and their turn (radians, left positive)."""
 
-    __slots__ = ("first", "last", "radius", "sweep")
+    first: Edge
+    last: Edge
+    sweep: float
 
-    def __init__(self, first: Edge, last: Edge, sweep: float) -> None:
-        self.first = first
-        self.last = last
-        self.sweep = sweep
-        self.radius = first.radius if isinstance(first, Arc) else math.inf
+    @property
+    def radius(self) -> float:
+        return self.first.radius if isinstance(self.first, Arc) else math.inf
 
     def corner(self, after: _Run) -> float:
         """Return the turn of the path from this run to the next."""
@@ -465,8 +465,12 @@ def inscribed_disc(region: Region) -> InscribedDisc:
     """
     if len(region.edges) > MANY_EDGES:
         # Offsets of many edges that meet near one point take minutes: a disc in 75 chords 38 s.
-        centre = region.widest_place()
-        return InscribedDisc(region.distance_to_edge(centre), centre)
+        # Imported here only.
+        import shapely
+
+        polygon = region.shapely(1e-5)
+        x, y = shapely.maximum_inscribed_circle(polygon, 1e-5).coords[0]
+        return InscribedDisc(region.distance_to_edge((x, y)), (x, y))
     circles = [None if region.holes else outer.circle for outer in region.outers]
     widest = max((c for c in circles if c), key=lambda c: c[1], default=((0.0, 0.0), 0.0))
     low, high, core = widest[1], 0.0, Region()
