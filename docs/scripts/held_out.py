@@ -104,7 +104,7 @@ def _stated(
 ) -> Sequence[tuple[float, float] | None]:
     rest, _ = usable_curves([source])
     sizes = sizes_of_groups([curve for curve in rest if curve.test != measured.test])
-    calibration = as_calibration(NAME, "", film_of(measured), [source], posterior, [], sizes)
+    calibration = as_calibration(NAME, film_of(measured), [source], posterior, [], sizes)
     intervals = curve_intervals(measured, uncertainty_for(measured, calibration))
     return intervals or [None] * len(measured.y)
 

@@ -20,7 +20,7 @@ from sbafab.lab.evidence import load_source
 from sbafab.models.calibration import NONE, UNKNOWNS, load_calibration, shipped_names
 from sbafab.validation.comparison import ComparisonDocument, compare, table_lines
 from sbafab.validation.evidence import shipped_evidence
-from sbafab.validation.fit import Fit, HeldOutPoint, calibration_text, fit
+from sbafab.validation.fit import CalibrationFit, HeldOutPoint, calibration_text, fit
 from sbafab.validation.paper_table import PAPER, TITLE, PaperTable
 from sbafab.validation.paper_table import as_json as table_json
 
@@ -92,8 +92,8 @@ def _print_comparison(source: str, name: str, as_json: bool) -> None:
         click.echo()
     points = [point for curve in curves for point in curve.points]
     predicted = sum(point.model is not None for point in points)
-    bounded = [point for point in points if point.is_within is not None]
-    inside = sum(point.is_within is True for point in bounded)
+    bounded = [point for point in points if point.within is not None]
+    inside = sum(point.within is True for point in bounded)
     show.verdict(
         f"{source} compared: {predicted} of {len(points)} values in {len(curves)} curves predicted"
         + (f", {inside} of {len(bounded)} in their 90 % intervals" if bounded else "")
@@ -101,20 +101,6 @@ def _print_comparison(source: str, name: str, as_json: bool) -> None:
 
 
 # Fits.
-
-
-class HeldOutEntry(Document):
-    """A measured value, and its prediction with 90 % interval by a fit without its test."""
-
-    curve: str
-    place: float | None
-    """on the curve's axis"""
-    measured: float
-    median: float
-    low: float
-    high: float
-    unit: str
-    inside: bool = attribute("is_inside")
 
 
 class OpenEntry(Document):
@@ -130,7 +116,7 @@ class CalibrateDocument(Document, schema="sbafab/calibrate@1"):
     file: Path
     calibration: dict[str, Any]
     """contents of the file"""
-    held_out: list[HeldOutEntry] = attribute("points")
+    held_out: list[HeldOutPoint] = attribute("points")
     left_open: list[OpenEntry]
     not_fitted: list[dict[str, str]]
 
@@ -183,7 +169,7 @@ def _check_name(name: str) -> None:
         )
 
 
-def _print(fitted: Fit) -> None:
+def _print(fitted: CalibrationFit) -> None:
     calibration = fitted.calibration
     rows = []
     for unknown in UNKNOWNS:
@@ -210,5 +196,5 @@ def _print(fitted: Fit) -> None:
 def _held_out(point: HeldOutPoint) -> Sequence[str]:
     at = "" if point.place is None else f" at {point.place:g}"
     interval = f"{point.low:.3g} to {point.high:.3g} {point.unit}".rstrip()
-    outside = "" if point.is_inside else "outside"
+    outside = "" if point.inside else "outside"
     return point.curve + at, f"{point.measured:.3g}", f"{point.median:.3g}", interval, outside

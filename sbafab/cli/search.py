@@ -252,7 +252,7 @@ def _print_quantities(result: FoundDesign) -> None:
         for flag in result.flags.get(name, ()):
             show.wrapped(f"({FLAGS[flag]})", indent="    ")
         if name in result.measured:
-            show.wrapped(f"({result.measured[name].sentence()})", indent="    ")
+            show.wrapped(f"({result.measured[name].sentence})", indent="    ")
     if goal.quantity.label in result.intervals or (result.intervals and not is_sure):
         hint = "" if is_sure else "; --sure 0.9 requires each requirement with that probability"
         note = f"in parentheses the 90 % interval of what would be measured{hint}"
@@ -283,7 +283,7 @@ def _print_front(result: FoundDesign) -> None:
         figures = ", ".join(f"{name} {value:.4g}" for name, value in trial.figures.items())
         show.line(f"  {format_keys(trial.values)}: {figures}")
     for name, measured in result.measured.items():
-        show.wrapped(f"({name}: {measured.sentence()})", indent="    ")
+        show.wrapped(f"({name}: {measured.sentence})", indent="    ")
 
 
 # Sweeps.

@@ -190,7 +190,9 @@ def burst_uncertainty(estimate: Burst, share: float = SHARE) -> tuple[Ends, floa
 # The file.
 
 
-class _HeldOut(Section):
+class HeldOut(Section):
+    """Measured values that the calibration was not fitted to, and how many lay in its intervals."""
+
     points: int = Field(ge=0)
     inside: int = Field(ge=0)
 
@@ -216,7 +218,7 @@ class ModelCalibration(Section):
     sentences: _Texts
     discrepancy: dict[str, Annotated[float, Field(ge=0, le=10)]]
     sizes: dict[str, SizeRange]
-    held_out: _HeldOut
+    held_out: HeldOut
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Self:
@@ -475,17 +477,37 @@ class Uncertainty:
         value_at: Callable[[Factors], float],
         share: float = SHARE,
         term: str = "",
+        may_be_negative: bool = False,
     ) -> tuple[float, Ends]:
         """Return a value at the median, and the interval that holds what would be measured with a
         probability of ``share``; ``value_at`` gives the value with other factors. ``term`` is the
         field of an unknown that is one summand of the value, such as the delay of a time.
+
+        A clearance, which may be negative, is linear in the unknowns; so is a value that has almost
+        vanished with other factors, such as a force near the end of the stroke.
         """
         value = value_at(self.factors)
-        moved = [
-            (change, value if change == 0 else value_at(factors))
-            for change, factors in self.shifted()
+        moved = [(change, value_at(of) if change else value) for change, of in self.shifted()]
+        values = [value, *(each for _, each in moved)]
+        least, most = min(values), max(values)
+        is_log = least > 0 and most < LOG_RANGE * value < LOG_RANGE**2 * least
+        is_log = is_log and not may_be_negative
+        slopes = [
+            (math.log(each / value) if is_log else each - value) / change if change else 0.0
+            for change, each in moved
         ]
-        return value, self._interval(group, value, moved, self._terms(value, term), share)
+        # The unknowns that change no design may be a term of the value, or all of it.
+        slope = 0.0 if not term or term in self._given else 1.0
+        slope *= self.calibration.values[term] / value if slope and term != "loss_share" else 1.0
+        slopes += [slope if name == term else 0.0 for name in FIELDS[DESIGN_UNKNOWNS:]]
+        low, high = self.calibration.interval(
+            group, value, slopes, is_log, share, self.farther(group)
+        )
+        if group == FLAT and self.laminate is not None:
+            # From all films flown away to the films as bought.
+            folded = folded_height(self.laminate, 1.0, self.calibration.film)
+            return value, (max(low, folded.solid), min(high, folded.nominal))
+        return value, (max(low, 0.0) if value >= 0 and not may_be_negative else low, high)
 
     def bounded(
         self, items: Sequence[FigureItem], moved: Iterable[Sequence[FigureItem]]
@@ -506,59 +528,20 @@ class Uncertainty:
 
     def _bounded(self, figure: Figure, moved: Sequence[float]) -> Figure:
         """Return a figure with its interval, from its values at each of the ``moved`` factors."""
-        group, value = discrepancy_group(figure), figure.value
+        group, value, quantity = discrepancy_group(figure), figure.value, figure.quantity
         if group is None or not all(map(math.isfinite, moved)):
             return figure
         if group == FLAT and all(each == value for each in moved):
             return figure
-        values = iter(moved)
-        pairs = [(change, next(values) if change else value) for change, _ in self.shifted()]
-        terms = self._terms(
-            value / (100 if figure.unit == "%" else 1), TERMS.get(figure.quantity, "")
+        values = dict(zip((self.factors, *self.moved), (value, *moved), strict=True))
+        _, interval = self.interval_of(
+            group,
+            values.__getitem__,
+            term=TERMS.get(quantity, ""),
+            may_be_negative=quantity in CLEARANCES,
         )
-        is_signed = figure.quantity in CLEARANCES
-        interval = self._interval(group, value, pairs, terms, SHARE, is_signed)
         flags = (*figure.flags, *flags_at(self.farther(group)))
         return replace(figure, interval=interval, flags=flags)
-
-    def _interval(
-        self,
-        group: str,
-        value: float,
-        moved: Sequence[tuple[float, float]],
-        terms: Sequence[float],
-        share: float,
-        may_be_negative: bool = False,
-    ) -> Ends:
-        """Return the interval of a value, from changes of the design unknowns, each with the value
-        that it gives, and the slopes by the others (``terms``). A clearance, which may be negative,
-        is linear in them; so is a value that has almost vanished with other factors, such as a
-        force near the end of the stroke.
-        """
-        values = [value, *(each for _, each in moved)]
-        least, most = min(values), max(values)
-        is_log = (
-            not may_be_negative and least > 0 and most < LOG_RANGE * value < LOG_RANGE**2 * least
-        )
-        slopes = [
-            (math.log(each / value) if is_log else each - value) / change if change else 0.0
-            for change, each in moved
-        ]
-        low, high = self.calibration.interval(
-            group, value, [*slopes, *terms], is_log, share, self.farther(group)
-        )
-        if group == FLAT and self.laminate is not None:
-            # From all films flown away to the films as bought.
-            folded = folded_height(self.laminate, 1.0, self.calibration.film)
-            return max(low, folded.solid), min(high, folded.nominal)
-        return (max(low, 0.0) if value >= 0 and not may_be_negative else low), high
-
-    def _terms(self, value: float, term: str) -> list[float]:
-        """Return slopes of a value's logarithm by the logarithms of the unknowns that change no
-        design; one of them may be a ``term`` of it. 0 without one, or if the user gave it.
-        """
-        slope = 0.0 if not term or term in self._given else self.calibration.values[term] / value
-        return [slope if name == term else 0.0 for name in FIELDS[DESIGN_UNKNOWNS:]]
 
 
 def given_factors(overrides: Mapping[str, float | None]) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, product
 from typing import Any, NamedTuple, TypeVar
 
@@ -210,7 +211,9 @@ def _bent_poses(
     if not isinstance(whole, Stack):
         return {}
     return {
-        Conditions(kpa=kpa, chambers=count): _attempt(whole.pose, _pressures(whole, count, kpa))
+        Conditions(kpa=kpa, chambers=count): _attempt(
+            whole.pose, chamber_pressures(whole, count, kpa)
+        )
         for kpa, count in product(pressures, range(1, whole.chambers))
     }
 
@@ -360,8 +363,11 @@ def stack_figures(
     are outside the valid range of a map. Poses that ``guides`` lack are added.
     """
     assert isinstance(state.stack, Stack)
-    stack = state.stack
-    rows = list(_posed_figures(state, stack, request, guides, checks_films))
+    stack, factors = state.stack, state.actuator.factors
+    rows = list(_forces(state.actuator, request, stack, checks_films))
+    if state.actuator.form.is_parallel:
+        rows += [*_bends(state, stack), *_bent_forces(request, stack, guides, factors)]
+    rows += [*_times(request, stack, factors), *_stiffness(request, stack, factors)]
     poses = list({id(pose): pose for _, pose in rows if pose and checks_maps}.values())
     outside = {id(pose) for pose, holds in zip(poses, stack.hold(poses), strict=True) if not holds}
     for item, pose in rows:
@@ -370,22 +376,6 @@ def stack_figures(
             yield replace(item, model=replace(item.model, trust=trust))
         else:
             yield item
-
-
-def _posed_figures(
-    state: Inflated,
-    stack: Stack,
-    request: PredictionRequest,
-    guides: Guides,
-    checks_films: bool,
-) -> Iterator[PosedItem]:
-    factors = state.actuator.factors
-    yield from _forces(state.actuator, request, stack, checks_films)
-    if state.actuator.form.is_parallel:
-        yield from _bends(state, stack)
-        yield from _bent_forces(request, stack, guides, calibrated(FORCE, factors))
-    yield from _times(request, stack, factors)
-    yield from _stiffness(request, stack, factors)
 
 
 def _forces(
@@ -418,26 +408,23 @@ def _level_pose(stack: Stack, pressure: float, stroke: float) -> Pose | None:
     """Return the straight pose below a level plate that holds a stack at a stroke in mm; None
     without one. A column that would buckle there is not stable.
     """
-    try:
-        plate = stack.flat_height + stroke
-        return stack.pose(_pressures(stack, stack.chambers, pressure), plate=plate)
-    except DesignError:
-        return None
+    pressures, plate = (pressure,) * stack.chambers, stack.flat_height + stroke
+    pose = _attempt(partial(stack.pose, plate=plate), pressures)
+    return pose if isinstance(pose, Pose) else None
 
 
-def _pressures(
+def chamber_pressures(
     stack: Stack, chambers: int, pressure: float, rest: float = 0.0
 ) -> tuple[float, ...]:
+    """Return the pressures in kPa with some chambers filled, the others at ``rest``."""
     return (pressure,) * chambers + (rest,) * (stack.chambers - chambers)
 
 
 def _bends(state: Inflated, stack: Stack) -> Iterator[PosedItem]:
     bends, contacts = (calibrated(model, state.actuator.factors) for model in (BEND, CONTACT))
-    left_out = {at: bent for at, bent in state.bent.items() if isinstance(bent, DesignError)}
-    for at, error in left_out.items():
-        yield LeftOut(Quantity.BEND.named(at), str(error), (Quantity.BEND,)), None
     for at, bent in state.bent.items():
         if isinstance(bent, DesignError):
+            yield LeftOut(Quantity.BEND.named(at), str(bent), (Quantity.BEND,)), None
             continue
         pose, room = bent
         for quantity, value, model in (
@@ -465,7 +452,7 @@ def pose_bent_by(
         share = below / (below - above)
         middle = low * (high / low) ** (share if math.isfinite(share) else 0.5)
         try:
-            pose = stack.pose(_pressures(stack, chambers, middle), near=pose)
+            pose = stack.pose(chamber_pressures(stack, chambers, middle), near=pose)
         except DesignError:
             high, above, before = middle, math.nan, 0.0
             continue
@@ -482,12 +469,13 @@ def pose_bent_by(
 
 
 def _bent_forces(
-    request: PredictionRequest, stack: Stack, guides: Guides, model: Model
+    request: PredictionRequest, stack: Stack, guides: Guides, factors: Factors
 ) -> Iterator[PosedItem]:
     """Yield forces on a plate square to the bent tip, its chambers pressurised further."""
     if not request.pressures_kpa:
         return
-    quantity, pressure = Quantity.BENT_FORCE, max(request.pressures_kpa)
+    quantity, model = Quantity.BENT_FORCE, calibrated(FORCE, factors)
+    pressure = max(request.pressures_kpa)
     for chambers, angle in product(range(1, min(stack.chambers, 3)), ANGLES):
         at = Conditions(kpa=pressure, chambers=chambers, angle=angle)
         pose, guide = None, guides.get(at)
@@ -516,7 +504,7 @@ def pressed_further(
     """
     (x, y, z), (across, aside, along) = bent.tip.tolist(), bent.frames[1][-1][:, 2].tolist()
     plate = Plate((x, y, z), (across, aside, along))
-    return stack.pose(_pressures(stack, chambers, pressure), plate=plate, near=near or bent)
+    return stack.pose(chamber_pressures(stack, chambers, pressure), plate=plate, near=near or bent)
 
 
 def time_to_fill(

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, PlainSerializer, WithJsonSchema
 
@@ -155,9 +155,7 @@ class Figure:
     @property
     def counterpart(self) -> str:
         """The measured counterpart as a clause; empty without one."""
-        if self.measured is None:
-            return ""
-        return self.measured.sentence(bool(self.model.factors))
+        return self.measured.sentence if self.measured else ""
 
     @property
     def range(self) -> str:
@@ -184,12 +182,6 @@ class Figure:
         """False where another model gives the same quantity, and that one is to design with."""
         return not self.other
 
-    @property
-    def counterpart_entry(self) -> CounterpartEntry | None:
-        """The measured counterpart for programs."""
-        is_calibrated = bool(self.model.factors)
-        return self.measured.entry(is_calibrated) if self.measured else None
-
     def as_dict(self) -> dict[str, Any]:
         """Return the figure as ``predict.json`` holds it."""
         return PredictedFigure.of(self)
@@ -197,15 +189,15 @@ class Figure:
 
 @dataclass(frozen=True)
 class Trace:
-    """A predicted curve; a measured one of the paper if it has no model.
-
-    The labels of the relation contain the unit of ``x`` and the unit of ``y``.
+    """A predicted curve; a measured one of the paper, or points each +- its ``error`` (0 where it
+    gives none), if it has no model. The labels of the relation contain the units.
     """
 
     label: str
     x: Sequence[float]
     y: Sequence[float]
     model: Model | None = None
+    error: Sequence[float] = ()
 
     @property
     def title(self) -> str:
@@ -219,19 +211,6 @@ class Trace:
 
 
 @dataclass(frozen=True)
-class Points:
-    """Measured points of the paper, each +- its error (0 where it gives none).
-
-    The labels of the relation contain the unit of ``x``, and the unit of ``y`` and its ``error``.
-    """
-
-    label: str
-    x: Sequence[float]
-    y: Sequence[float]
-    error: Sequence[float]
-
-
-@dataclass(frozen=True)
 class Relation:
     """One quantity against another: ``name`` is a file's stem, labels carry their units."""
 
@@ -239,25 +218,18 @@ class Relation:
     title: str
     x_label: str
     y_label: str
-    lines: tuple[Trace, ...]
-    points: tuple[Points, ...] = ()
+    lines: Sequence[Trace]
+    points: Sequence[Trace] = ()
 
     @property
     def rows(self) -> list[dict[str, Any]]:
         """One flat row per point of each curve, and per measurement: ``x`` and ``y`` in the units
         of ``x_label`` and ``y_label``, ``error`` of y only for measurements.
         """
-        curves = [
-            *(
-                (line.label, line.title, line.x, line.y, [None] * len(line.x))
-                for line in self.lines
-            ),
-            *((each.label, MEASURED, each.x, each.y, each.error) for each in self.points),
-        ]
         return [
-            {"curve": label, "x": float(x), "y": float(y), "error": error, "model": model}
-            for label, model, xs, ys, errors in curves
-            for x, y, error in zip(xs, ys, errors, strict=True)
+            {"curve": of.label, "x": float(x), "y": float(y), "error": error, "model": of.title}
+            for of in (*self.lines, *self.points)
+            for x, y, error in zip(of.x, of.y, of.error or (None,) * len(of.x), strict=True)
         ]
 
     def frame(self) -> DataFrame:
@@ -269,16 +241,18 @@ class Relation:
         return frame
 
 
+QuantityKey = Annotated[str, WithJsonSchema({"enum": [quantity.key for quantity in Quantity]})]
+QuantityEntry = Annotated[Quantity, PlainSerializer(attrgetter("key"), return_type=QuantityKey)]
+
+
 @dataclass(frozen=True)
 class LeftOut:
-    """A description of omitted figures, and the reason; with the ``quantities`` if they are
-    specific ones.
-    """
+    """What is not given, and why; with the ``quantities`` if they are specific ones."""
 
     name: str
     reason: str
-    quantities: tuple[Quantity, ...] = ()
-    group = ""
+    quantities: tuple[QuantityEntry, ...] = ()
+    group: ClassVar = ""
 
 
 FigureItem = Figure | LeftOut
@@ -596,8 +570,6 @@ def chosen(
 
 
 Rounded = Annotated[float, AfterValidator(_rounded)]
-QuantityKey = Annotated[str, WithJsonSchema({"enum": [quantity.key for quantity in Quantity]})]
-QuantityEntry = Annotated[Quantity, PlainSerializer(attrgetter("key"), return_type=QuantityKey)]
 FlagList = Annotated[
     tuple[Flag, ...],
     Field(description="; ".join(f"{flag}: {words}" for flag, words in FLAGS.items())),
@@ -639,7 +611,7 @@ class PredictedFigure(Document):
     trust: str = attribute("model.trust")
     design_with: bool
     """false where another model gives the same quantity, and that one is to design with"""
-    measured: CounterpartEntry | None = attribute("counterpart_entry")
+    measured: CounterpartEntry | None
     between: tuple[Rounded, Rounded] | None
     """bounds of a drawn pocket that is taken for a disc"""
     interval: tuple[Rounded, Rounded] | None
@@ -647,14 +619,6 @@ class PredictedFigure(Document):
     pressure_kpa: PlainNumber | None
     """gauge, a vacuum below 0; null at none"""
     flags: FlagList
-
-
-class LeftOutEntry(Document):
-    """What is not given, and why."""
-
-    name: str
-    reason: str
-    quantities: list[QuantityEntry]
 
 
 class TraceEntry(Document):
@@ -695,5 +659,5 @@ class PredictionDocument(Document):
     asked: AskedEntry
     verdict: list[VerdictLine]
     figures: list[PredictedFigure]
-    left_out: list[LeftOutEntry]
+    left_out: list[LeftOut]
     relations: list[RelationEntry]

@@ -134,6 +134,8 @@ class Counterpart:
     of_papers: bool
     at: Conditions
     at_least: Conditions
+    beside_factors: bool = False
+    """True beside a figure of a model with the user's factors."""
 
     def stands_beside(
         self, quantity: Quantity, at: Conditions, model: ModelId, is_parallel: bool
@@ -154,9 +156,10 @@ class Counterpart:
         """The model's value over the measured one."""
         return self.gave / self.measured.value
 
-    def sentence(self, is_calibrated: bool = False) -> str:
-        """Return the clause that stands in parentheses beside a figure."""
-        by = "this model without factors" if is_calibrated else "this model"
+    @property
+    def sentence(self) -> str:
+        """The clause that stands in parentheses beside a figure."""
+        by = "this model without factors" if self.beside_factors else "this model"
         at = f" {self.where}" if self.where else ""
         return (
             f"the paper measured {self.measured} {self.state} on its {self.actuator}; "
@@ -173,10 +176,6 @@ class Counterpart:
     def brief(self) -> str:
         """The counterpart in parentheses, for a line of sizes."""
         return f"(paper's {self.actuator} {self.measured.value:g}, not {self.gave:.4g})"
-
-    def entry(self, is_calibrated: bool = False) -> CounterpartEntry:
-        """Return the row for programs, its sentence first."""
-        return CounterpartEntry.read(self, sentence=self.sentence(is_calibrated))
 
 
 class CounterpartEntry(Document):

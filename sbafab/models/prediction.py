@@ -50,7 +50,6 @@ from sbafab.models.figures import (
     Flag,
     LeftOut,
     Model,
-    Points,
     Prediction,
     PredictionRequest,
     Relation,
@@ -164,11 +163,12 @@ def _measured(figure: Figure, actuator: Actuator) -> paper.Counterpart | None:
     model, form = figure.model, actuator.form
     if model.id is ModelId.FILMS and model.factors:
         return None
-    of_papers, calibration = (
+    is_papers, calibration = (
         is_the_papers_3dof(form, actuator.laminate),
         actuator.factors.calibration,
     )
-    return counterpart(form, figure.quantity, figure.at, model.id, calibration, of_papers)
+    row = counterpart(form, figure.quantity, figure.at, model.id, calibration, is_papers)
+    return row and replace(row, beside_factors=bool(model.factors))
 
 
 def _within_burst(
@@ -304,11 +304,10 @@ def _by_disc(model: Model, discs: NearDiscs) -> Model:
 
 
 def _relation_by_disc(relation: Relation, discs: NearDiscs) -> Relation:
-    lines = (
-        replace(line, model=_by_disc(line.model, discs)) if line.model else line
-        for line in relation.lines
-    )
-    return replace(relation, title=f"{relation.title}, {BY_DISC}", lines=tuple(lines))
+    lines = [
+        replace(line, model=line.model and _by_disc(line.model, discs)) for line in relation.lines
+    ]
+    return replace(relation, title=f"{relation.title}, {BY_DISC}", lines=lines)
 
 
 def _flat_forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
@@ -612,9 +611,9 @@ def _level(label: str, most: float, measured: Measured) -> Trace:
     return Trace(label, [0.0, most], [measured.value] * 2)
 
 
-def _points(label: str, x: Sequence[float], measured: Sequence[Measured]) -> Points:
+def _points(label: str, x: Sequence[float], measured: Sequence[Measured]) -> Trace:
     values, errors = [each.value for each in measured], [each.error for each in measured]
-    return Points(label, x, values, errors)
+    return Trace(label, x, values, error=errors)
 
 
 def _is_full_3dof(actuator: Actuator) -> bool:
@@ -633,19 +632,13 @@ def _stroke_relation(actuator: Actuator) -> Relation:
             label = f"paper: Eq. 4 within {error.value:g} mm a balloon to here ({fluid})"
             stroke_there = float(actuator.pockets[0].stroke(volume))
             slack = error.value * actuator.balloons
-            points.append(Points(label, [volume], [stroke_there], [slack]))
+            points.append(Trace(label, [volume], [stroke_there], error=[slack]))
     if _is_full_3dof(actuator):
         most, high = max(k.largest_volume for k in actuator.pockets), paper.FULL_HEIGHT
         lines.append(_level(f"paper: {high.value:g} mm high when full", most, high))
-    volume_label = "mean volume" if len(set(actuator.radii)) > 1 else "volume"
-    return Relation(
-        "stroke",
-        "Stroke against volume",
-        f"{volume_label} a balloon, ul",
-        "stroke of the stack, mm",
-        tuple(lines),
-        tuple(points),
-    )
+    mean = "mean volume" if len(set(actuator.radii)) > 1 else "volume"
+    axes = f"{mean} a balloon, ul", "stroke of the stack, mm"
+    return Relation("stroke", "Stroke against volume", *axes, lines, points)
 
 
 def _force_relation(
@@ -666,14 +659,9 @@ def _force_relation(
         if actuator.is_like_paper(stacks, 2.5)
     ]
     each = " of one SBA" if _each(actuator) else ""
-    return Relation(
-        "force",
-        f"Blocked force{each} against stroke, by virtual work",
-        "stroke at which it is blocked, mm",
-        f"blocked force{each}, N",
-        (*lines, *traces),
-        tuple(points),
-    )
+    title = f"Blocked force{each} against stroke, by virtual work"
+    axes = "stroke at which it is blocked, mm", f"blocked force{each}, N"
+    return Relation("force", title, *axes, [*lines, *traces], points)
 
 
 def _bending_relation(actuator: Actuator, request: PredictionRequest) -> Relation:
@@ -694,14 +682,8 @@ def _bending_relation(actuator: Actuator, request: PredictionRequest) -> Relatio
             most = max(times)
         label = f"paper: largest bend, {largest.value:g} +- {largest.error:g} deg"
         lines.append(_level(label, most, largest))
-    return Relation(
-        "bending",
-        "Bending against time",
-        f"time with {flow:g} ml/min into each inflated chamber, s",
-        "bend of the top, deg",
-        tuple(lines),
-        tuple(points),
-    )
+    axes = f"time with {flow:g} ml/min into each inflated chamber, s", "bend of the top, deg"
+    return Relation("bending", "Bending against time", *axes, lines, points)
 
 
 def workspace_relation(actuator: Actuator, traces: Sequence[Trace] = ()) -> Relation:
@@ -709,25 +691,17 @@ def workspace_relation(actuator: Actuator, traces: Sequence[Trace] = ()) -> Rela
     constant curvature where the reference stroke is not known.
     """
     rests = (("flat", False), ("full", True)) if actuator.has_reference else ()
-    lines = [
-        _trace(
-            f"{chamber_count(path.chambers)}, the others {rest}", path.aside, path.height, CURVATURE
-        )
-        for rest, others_full in rests
-        for path in _paths(actuator, others_full)
-    ]
+    lines = []
+    for rest, others_full in rests:
+        for path in _paths(actuator, others_full):
+            label = f"{chamber_count(path.chambers)}, the others {rest}"
+            lines.append(_trace(label, path.aside, path.height, CURVATURE))
     points = []
     if _is_full_3dof(actuator):
         high = paper.FULL_HEIGHT.value
-        points.append(Points(f"paper: all full, {high:g} mm", [0.0], [high], [0.0]))
-    return Relation(
-        "workspace",
-        "Paths of the tip",
-        "reach aside, mm",
-        "height of the tip, mm",
-        (*lines, *traces),
-        tuple(points),
-    )
+        points.append(Trace(f"paper: all full, {high:g} mm", [0.0], [high], error=[0.0]))
+    axes = "reach aside, mm", "height of the tip, mm"
+    return Relation("workspace", "Paths of the tip", *axes, [*lines, *traces], points)
 
 
 def _diameter_relation(actuator: Actuator, tube: float) -> Relation:
@@ -739,10 +713,5 @@ def _diameter_relation(actuator: Actuator, tube: float) -> Relation:
     if (actuator.form.pockets, actuator.balloons) == (PAPER_SLOTS, 1):
         label = f"paper: about {full.value:g} mm inflated"
         lines.append(_level(label, k.largest_volume, full))
-    return Relation(
-        "diameter",
-        "Diameter round the tube against volume",
-        "volume a balloon, ul",
-        "diameter, mm",
-        tuple(lines),
-    )
+    axes = "volume a balloon, ul", "diameter, mm"
+    return Relation("diameter", "Diameter round the tube against volume", *axes, lines)

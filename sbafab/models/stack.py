@@ -62,7 +62,7 @@ class Stack(Column):
     def counterparts(self) -> dict[str, str]:
         """Measured counterparts of the "height" and the "bend" of a pose, a clause each."""
         rows = counterparts_of_pose(self.chambers, self.calibration)
-        return {quantity: row.sentence() for quantity, row in rows.items()}
+        return {quantity: row.sentence for quantity, row in rows.items()}
 
     def pose(
         self,

@@ -209,7 +209,7 @@ def _arm_figures(
         # The measured value beside a figure is that of a design's own prediction.
         by = ModelId.FILMS if quantity is Quantity.FOLDED_HEIGHT else model
         beside = counterpart(design.form, quantity, where, by, arm.calibration, is_papers)
-        measured = beside.sentence() if beside else ""
+        measured = beside.sentence if beside else ""
         yield AssemblyFigure(placed.name, words, value, unit, model.words, paper, measured)
 
 

@@ -530,7 +530,7 @@ def find_document(outcome: FoundDesign, origin: str, target: Path) -> dict[str, 
         file=str(target) if outcome.holds else None,
         started_from=origin,
         requirements=rows,
-        measured={name: row.entry() for name, row in outcome.measured.items()},
+        measured=outcome.measured,
     )
 
 
@@ -564,7 +564,7 @@ def found_toml(
     for subject, value, what in told:
         interval = outcome.interval_text(subject, "; 90 % interval {}")
         head.append(f"{subject.quantity.label} = {value} ({what}{interval})")
-    head += [f"{name}: {measured.sentence()}" for name, measured in outcome.measured.items()]
+    head += [f"{name}: {measured.sentence}" for name, measured in outcome.measured.items()]
     head += [f"{name}: {FLAGS[flag]}" for name, flags in outcome.flags.items() for flag in flags]
     comments = "".join(f"# {line}".rstrip() + "\n" for line in head)
     return f"{comments}\n{tomli_w.dumps(first | data)}"

@@ -430,7 +430,7 @@ def _trade_offs(
         figure = table.figures.get(objective.column)
         beside = figure and counterpart(design.form, *figure, calibration)
         if beside:
-            measured.append(f"{objective.label}: {beside.sentence()}.")
+            measured.append(f"{objective.label}: {beside.sentence}.")
     yield PageSection("Trade-offs", measured, trades)
     listed = sorted(best)[:MOST_ROWS]
     names = [*keys, *(objective.column for objective in objectives)]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import starmap
+from typing import NamedTuple
 
 from sbafab.documents import Document, Short, attribute
 from sbafab.errors import DesignError
@@ -13,54 +14,63 @@ from sbafab.models.calibration import SHARE, Ends, ModelCalibration, Uncertainty
 from sbafab.models.figures import Factors
 from sbafab.validation.evidence import Evidence, MeasuredCurve
 from sbafab.validation.fit import GROUP_OF, MIDDLES, relative_errors, term_of
-from sbafab.validation.model_values import ModelledActuator, ModelValues, NoModel, model_values
+from sbafab.validation.model_values import ModelledActuator, ModelValue, model_values
 
 WIDTH = 100
 
 
-@dataclass(frozen=True)
-class ComparedPoint:
-    """A measured value beside the models' range over the set-ups that its source leaves open.
+ShortEnds = tuple[Short, Short] | None
 
-    ``error`` is the measured value's standard error. ``model`` is None if no model has a value;
-    ``interval`` is the prediction's, None if it has no interval.
-    """
+
+class ComparedPoint(Document):
+    """A measured value beside the models' range over the set-ups that its source leaves open."""
 
     x: float | None
     measured: float
-    error: float | None
-    model: Ends | None
-    interval: Ends | None
+    error: Short | None
+    """standard error"""
+    model: ShortEnds
+    """least and largest over the assumptions"""
+    deviation: ShortEnds
+    """model minus measured"""
+    interval: ShortEnds
+    """90 % interval of the measured value"""
+    within: bool | None
 
-    @property
-    def deviation(self) -> Ends | None:
-        """Least and largest of model minus measured."""
-        if self.model is None:
-            return None
-        return self.model[0] - self.measured, self.model[1] - self.measured
+    @classmethod
+    def at(
+        cls,
+        x: float | None,
+        measured: float,
+        error: float | None,
+        model: Ends | None = None,
+        interval: Ends | None = None,
+    ) -> ComparedPoint:
+        """Return a point; without a model or an interval there is nothing to compare with."""
+        return cls(
+            x=x,
+            measured=measured,
+            error=error,
+            model=model,
+            deviation=model and (model[0] - measured, model[1] - measured),
+            interval=interval,
+            within=interval and interval[0] <= measured <= interval[1],
+        )
 
-    @property
-    def is_within(self) -> bool | None:
-        """True if the measured value lies in the interval; None without one."""
-        if self.interval is None:
-            return None
-        return self.interval[0] <= self.measured <= self.interval[1]
 
-
-@dataclass(frozen=True)
-class ComparedCurve:
+class ComparedCurve(NamedTuple):
     """A measured curve with its points.
 
-    ``assumptions`` are the assumptions behind the model's range; ``reason`` explains a missing
+    ``assumptions`` are the assumptions behind the model's range; ``no_model`` explains a missing
     model.
     """
 
     source: str
     curve: MeasuredCurve
-    points: tuple[ComparedPoint, ...]
-    model: str
-    assumptions: tuple[str, ...]
-    reason: str
+    points: Sequence[ComparedPoint]
+    model: str = ""
+    assumptions: Sequence[str] = ()
+    no_model: str = ""
 
 
 def compare(evidence: Evidence, calibration: ModelCalibration | None = None) -> list[ComparedCurve]:
@@ -73,19 +83,19 @@ def compare(evidence: Evidence, calibration: ModelCalibration | None = None) -> 
 def _compared(
     source: str, curve: MeasuredCurve, calibration: ModelCalibration | None
 ) -> ComparedCurve:
-    uncertainty = None if calibration is None else uncertainty_for(curve, calibration)
-    answer = model_values(curve, uncertainty.factors if uncertainty else None)
-    if isinstance(answer, NoModel):
-        points = tuple(ComparedPoint(*point, None, None) for point in curve.points())
-        return ComparedCurve(source, curve, points, "", (), answer.reason)
-    intervals = curve_intervals(curve, uncertainty) if uncertainty else None
-    points = tuple(
-        ComparedPoint(*point, model, interval)
-        for point, model, interval in zip(
-            curve.points(), answer.ranges(), intervals or [None] * len(curve.y), strict=True
-        )
-    )
-    return ComparedCurve(source, curve, points, answer.model, (*filter(None, answer.series),), "")
+    uncertainty = calibration and uncertainty_for(curve, calibration)
+    points = list(curve.points())
+    try:
+        answer = model_values(curve, uncertainty.factors if uncertainty else None)
+    except DesignError as error:
+        plain = list(starmap(ComparedPoint.at, points))
+        return ComparedCurve(source, curve, plain, no_model=str(error))
+    intervals = (uncertainty and curve_intervals(curve, uncertainty)) or [None] * len(points)
+    compared = [
+        ComparedPoint.at(*point, model, interval)
+        for point, model, interval in zip(points, answer.ranges(), intervals, strict=True)
+    ]
+    return ComparedCurve(source, curve, compared, answer.model, [*filter(None, answer.series)])
 
 
 def uncertainty_for(curve: MeasuredCurve, calibration: ModelCalibration) -> Uncertainty:
@@ -110,18 +120,22 @@ def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends
     deviation away.
     """
     group = GROUP_OF.get(curve.quantity)
-    median = None if group is None else model_values(curve, uncertainty.factors)
-    if group is None or not isinstance(median, ModelValues):
+    if group is None:
         return None
-    series = {uncertainty.factors: median.series}
-    for change, factors in uncertainty.shifted():
-        moved = model_values(curve, factors) if change else median
-        series[factors] = moved.series if isinstance(moved, ModelValues) else {}
+    series: dict[Factors, Mapping[str, tuple[ModelValue, ...]]] = {}
+    for factors in (uncertainty.factors, *uncertainty.moved):
+        try:
+            series[factors] = model_values(curve, factors).series
+        except DesignError:
+            series[factors] = {}
+    median = series[uncertainty.factors]
+    if not median:
+        return None
     unreached = (None,) * len(curve.y)
     intervals: list[Ends | None] = []
     for point, error in enumerate(relative_errors(curve).tolist()):
         ends: list[Ends] = []
-        for phrase in (name for name, values in median.series.items() if values[point] is not None):
+        for phrase in (name for name, values in median.items() if values[point] is not None):
             answered = {of: values.get(phrase, unreached)[point] for of, values in series.items()}
             reached = {of: value for of, value in answered.items() if value is not None}
             if len(reached) < len(answered):
@@ -164,7 +178,7 @@ def table_lines(curves: Sequence[ComparedCurve]) -> Iterator[str]:
                 measured_text(point),
                 span(point.model) or "-",
                 _deviation(point),
-                {None: "-", True: "yes", False: "no"}[point.is_within],
+                {None: "-", True: "yes", False: "no"}[point.within],
             ).rstrip()
         yield from _remarks(compared)
 
@@ -193,8 +207,8 @@ def _deviation(point: ComparedPoint) -> str:
 
 def _remarks(compared: ComparedCurve) -> Iterator[str]:
     notes = []
-    if compared.reason:
-        notes.append(f"{compared.reason[:1].upper()}{compared.reason[1:]}.")
+    if compared.no_model:
+        notes.append(f"{compared.no_model[:1].upper()}{compared.no_model[1:]}.")
     if compared.assumptions:
         notes.append(f"Not stated, so assumed: {'; '.join(compared.assumptions)}.")
     if not compared.curve.comparable:
@@ -202,25 +216,6 @@ def _remarks(compared: ComparedCurve) -> Iterator[str]:
     indent = " " * 4
     for note in notes:
         yield from textwrap.wrap(note, WIDTH, initial_indent=indent, subsequent_indent=indent)
-
-
-ShortEnds = tuple[Short, Short] | None
-
-
-class PointDocument(Document):
-    """A measured value beside the model's."""
-
-    x: float | None
-    measured: float
-    error: Short | None
-    """standard error"""
-    model: ShortEnds
-    """least and largest over the assumptions"""
-    deviation: ShortEnds
-    """model minus measured"""
-    interval: ShortEnds
-    """90 % interval of the measured value"""
-    within: bool | None = attribute("is_within")
 
 
 class CurveDocument(Document):
@@ -237,8 +232,8 @@ class CurveDocument(Document):
     unknown: list[str] = attribute("curve.unknown")
     model: str
     assumptions: list[str]
-    no_model: str = attribute("reason")
-    points: list[PointDocument]
+    no_model: str
+    points: list[ComparedPoint]
 
 
 class SourceDocument(Document):

@@ -6,20 +6,28 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import tomli_w
 
+from sbafab.documents import Document
 from sbafab.errors import DesignError
-from sbafab.models.calibration import GROUPS, SHARE, UNKNOWNS, ModelCalibration, SizeRange, sizes_of
+from sbafab.models.calibration import (
+    FIELDS,
+    GROUPS,
+    SHARE,
+    UNKNOWNS,
+    ModelCalibration,
+    SizeRange,
+    sizes_of,
+)
 from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
 from sbafab.runtime import Progress
 from sbafab.validation.evidence import QUANTITIES, Evidence, MeasuredCurve
-from sbafab.validation.model_values import ModelledActuator, ModelValues, NoModel, model_values
+from sbafab.validation.model_values import ModelledActuator, model_values
 from sbafab.validation.posterior import (
     LEAST_ERROR,
     NODE_COORDINATES,
@@ -37,37 +45,30 @@ IMPOSSIBLE = 1e-3
 """Share of a curve's measured values that stands for a state which an actuator cannot reach."""
 
 
-@dataclass(frozen=True)
-class HeldOutPoint:
-    """A measured value, and its prediction with 90 % interval by a fit without its test; ``place``
-    is its place on the curve's axis, None without one.
-    """
+class HeldOutPoint(Document):
+    """A measured value, and its prediction with 90 % interval by a fit without its test."""
 
     curve: str
     place: float | None
+    """on the curve's axis"""
     measured: float
     median: float
     low: float
     high: float
     unit: str
-
-    @property
-    def is_inside(self) -> bool:
-        """True if the measured value lies in the interval."""
-        return self.low <= self.measured <= self.high
+    inside: bool
 
 
-@dataclass(frozen=True)
-class Fit:
+class CalibrationFit(NamedTuple):
     """A calibration, its held-out points, and the curves that were not fitted, each with its
     reason; ``open_set_ups`` are the set-ups that a curve's source leaves open: each assumed phrase
     with its probability by the fit, from equal prior ones.
     """
 
     calibration: ModelCalibration
-    points: tuple[HeldOutPoint, ...]
+    points: Sequence[HeldOutPoint]
     open_set_ups: Mapping[str, Mapping[str, float]]
-    left_out: tuple[tuple[str, str], ...]
+    left_out: Sequence[tuple[str, str]]
 
 
 GROUP_OF = {name: each.group for name, each in QUANTITIES.items() if each.group}
@@ -87,12 +88,13 @@ def usable_curves(
             if not reason and min(curve.y) <= 0:
                 reason = "its values are not all above 0"
             if not reason:
-                answer = model_values(curve, Factors(**MIDDLES))
-                reason = answer.reason if isinstance(answer, NoModel) else ""
+                try:
+                    model_values(curve, Factors(**MIDDLES))
+                    curves.append(curve)
+                except DesignError as error:
+                    reason = str(error)
             if reason:
                 left_out.append((curve.id, reason))
-            else:
-                curves.append(curve)
     return curves, left_out
 
 
@@ -100,7 +102,7 @@ MIDDLES: dict[str, Any] = {unknown.field: unknown.middle for unknown in UNKNOWNS
 """Values in the middle of the priors."""
 
 
-def fit(name: str, sources: Sequence[Evidence], progress: Progress, about: str = "") -> Fit:
+def fit(name: str, sources: Sequence[Evidence], progress: Progress) -> CalibrationFit:
     """Return the calibration of sources of evidence.
 
     Raises DesignError if no curve of theirs can be fitted, or without emcee.
@@ -125,11 +127,11 @@ def fit(name: str, sources: Sequence[Evidence], progress: Progress, about: str =
         for point in predicted_points(source, curve, rest, seed)
     ]
     sizes = sizes_of_groups(usable)
-    return Fit(
-        as_calibration(name, about, films[0], sources, posterior, points, sizes),
-        tuple(points),
+    return CalibrationFit(
+        as_calibration(name, films[0], sources, posterior, points, sizes),
+        points,
         open_set_ups(usable, curves, posterior),
-        tuple(left_out),
+        left_out,
     )
 
 
@@ -139,10 +141,10 @@ def open_set_ups(
     """Return the set-ups of each curve whose source leaves some open, with their probabilities."""
     shares = {}
     for source, curve in zip(measured, curves, strict=True):
-        answer = model_values(source, Factors(**MIDDLES))
-        if isinstance(answer, ModelValues) and len(answer.series) > 1:
+        series = model_values(source, Factors(**MIDDLES)).series
+        if len(series) > 1:
             probabilities = set_up_probabilities(curve, posterior).tolist()
-            shares[source.id] = dict(zip(answer.series, probabilities, strict=True))
+            shares[source.id] = dict(zip(series, probabilities, strict=True))
     return shares
 
 
@@ -153,7 +155,6 @@ def film_of(curve: MeasuredCurve) -> str:
 
 def sampled_curves(curves: Sequence[MeasuredCurve], progress: Progress) -> list[SampledCurve]:
     """Return curves in the form for the posterior: the models' values at all nodes."""
-    fields = [unknown.field for unknown in UNKNOWNS]
     tables: list[dict[tuple[int, ...], Array]] = [{} for _ in curves]
     # Maps of balloons hang on the pocket loss alone.
     for loss, ratio, press in np.ndindex(NODES[1], NODES[0], NODES[2]):
@@ -163,7 +164,7 @@ def sampled_curves(curves: Sequence[MeasuredCurve], progress: Progress) -> list[
             unknown.value(float(nodes[at]))
             for unknown, nodes, at in zip(UNKNOWNS, NODE_COORDINATES, place, strict=False)
         ]
-        factors = Factors(**dict(zip(fields, values, strict=False)))  # type: ignore[arg-type]
+        factors = Factors(**dict(zip(FIELDS, values, strict=False)))  # type: ignore[arg-type]
         for table, curve in zip(tables, curves, strict=True):
             table[place] = logarithms(curve, factors)
     sampled_ones = []
@@ -176,7 +177,7 @@ def sampled_curves(curves: Sequence[MeasuredCurve], progress: Progress) -> list[
                 joined.reshape(*NODES, *joined.shape[1:]),
                 np.log(curve.y),
                 relative_errors(curve),
-                fields.index(term) if (term := term_of(curve)) else -1,
+                FIELDS.index(term) if (term := term_of(curve)) else -1,
             )
         )
     return sampled_ones
@@ -188,10 +189,11 @@ def logarithms(curve: MeasuredCurve, factors: Factors) -> Array:
     A state that an actuator does not reach has IMPOSSIBLE times the measured value. Raises
     DesignError if no model gives the curve.
     """
-    answer = model_values(curve, factors, shares_maps=True)
-    if isinstance(answer, NoModel):
-        raise DesignError(f"{curve.id}: {answer.reason}")
-    rows = [[value or 0.0 for value in values] for values in answer.series.values()]
+    try:
+        series = model_values(curve, factors, shares_maps=True).series
+    except DesignError as error:
+        raise DesignError(f"{curve.id}: {error}") from None
+    rows = [[value or 0.0 for value in values] for values in series.values()]
     return np.asarray(np.log(np.maximum(rows, IMPOSSIBLE * np.array(curve.y))))
 
 
@@ -233,11 +235,19 @@ def predicted_points(
     """Return a curve's points with their intervals by a posterior."""
     drawn = posterior.predicted(values, np.random.default_rng(seed))
     ends = (1 - SHARE) / 2, 0.5, (1 + SHARE) / 2
-    low, median, high = np.exp(np.quantile(drawn, ends, axis=0))
-    places: Sequence[float | None] = curve.x or (None,) * len(curve.y)
+    columns = np.exp(np.quantile(drawn, ends, axis=0)).T.tolist()
     return [
-        HeldOutPoint(curve.id, place, y, float(m), float(a), float(b), curve.y_unit)
-        for place, y, m, a, b in zip(places, curve.y, median, low, high, strict=True)
+        HeldOutPoint(
+            curve=curve.id,
+            place=place,
+            measured=y,
+            median=median,
+            low=low,
+            high=high,
+            unit=curve.y_unit,
+            inside=low <= y <= high,
+        )
+        for (place, y, _), (low, median, high) in zip(curve.points(), columns, strict=True)
     ]
 
 
@@ -253,7 +263,6 @@ def sizes_of_groups(curves: Sequence[MeasuredCurve]) -> dict[str, SizeRange]:
 
 def as_calibration(
     name: str,
-    about: str,
     film: str,
     sources: Sequence[Evidence],
     posterior: Posterior,
@@ -264,17 +273,17 @@ def as_calibration(
     table = {
         "schema": "sbafab/calibration@2",
         "name": name,
-        "about": about,
+        "about": "",
         "film": film,
         "evidence": [source.id for source in sources],
-        "unknowns": [unknown.field for unknown in UNKNOWNS],
+        "unknowns": FIELDS,
         "mean": posterior.mean.round(DIGITS).tolist(),
         "covariance": posterior.covariance.round(DIGITS + 2).tolist(),
         "discrepancy": {
             group: round(each, DIGITS) for group, each in posterior.discrepancy.items()
         },
         "sizes": {group: each.model_dump(exclude_none=True) for group, each in sizes.items()},
-        "held_out": {"points": len(points), "inside": sum(point.is_inside for point in points)},
+        "held_out": {"points": len(points), "inside": sum(point.inside for point in points)},
         "sentences": list(correlated(posterior.covariance)),
     }
     return ModelCalibration.model_validate(table)

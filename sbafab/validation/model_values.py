@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.calibration import UNKNOWNS
 from sbafab.models.closed_forms import modulus, second_moments
-from sbafab.models.figures import Factors, Figure, PredictionRequest
+from sbafab.models.figures import Factors, Model, PredictionRequest
 from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line, usual_pressures
 from sbafab.models.prediction import plate_of, predict
@@ -68,29 +67,21 @@ class ModelValues:
         return [(min(values), max(values)) if values else None for values in known]
 
 
-class NoModel(NamedTuple):
-    """The reason why no model has values of a curve."""
-
-    reason: str
-
-
 def model_values(
     curve: MeasuredCurve, factors: Factors | None = None, shares_maps: bool = False
-) -> ModelValues | NoModel:
-    """Return the values of the models at a curve's points, or why there are none.
+) -> ModelValues:
+    """Return the values of the models at a curve's points.
 
     ``factors`` come from a calibration; by default the models use none. For an open set-up, every
-    assumption that matters gives one series. ``shares_maps`` is for fits with many factors.
+    assumption that matters gives one series. ``shares_maps`` is for fits with many factors. Raises
+    DesignError with the reason if no model has values.
     """
     answer = ANSWERS.get(curve.quantity)
     if answer is None:
-        return NoModel(QUANTITIES[curve.quantity].without_model)
+        raise DesignError(QUANTITIES[curve.quantity].without_model)
     if not curve.is_described:
-        return NoModel("no design describes the actuator")
-    try:
-        return ModelValues(*answer(ModelledActuator(curve, factors or Factors(), shares_maps)))
-    except DesignError as error:
-        return NoModel(str(error))
+        raise DesignError("no design describes the actuator")
+    return ModelValues(*answer(ModelledActuator(curve, factors or Factors(), shares_maps)))
 
 
 @lru_cache(maxsize=64)
@@ -160,15 +151,9 @@ class ModelledActuator:
                 return moved
         return stack(self.design, self.laminate, factors=self.factors)
 
-    @property
-    def stack_model(self) -> str:
-        """The name of the elastic stack with its factors."""
-        return elastic.calibrated(elastic.FORCE, self.factors).name
-
-    @property
-    def balloon_model(self) -> str:
-        """The name of the elastic balloon with its factors."""
-        return elastic.calibrated(elastic.ELASTIC, self.factors).name
+    def model(self, model: Model = elastic.FORCE) -> str:
+        """Return the name of a model with the factors, by default the elastic stack."""
+        return elastic.calibrated(model, self.factors).name
 
     def balloons(self, modulus_ratio: float | None = None) -> list[Balloon]:
         """Return the balloons of one chamber, of their or another modulus ratio. Raises
@@ -179,11 +164,7 @@ class ModelledActuator:
 
     def free_pose(self, chambers: int, pressure: float) -> Pose:
         """Return the pose with some chambers at a pressure in kPa. Raises DesignError."""
-        return self.stack.pose(self.filled(chambers, pressure))
-
-    def filled(self, chambers: int, pressure: float) -> tuple[float, ...]:
-        """Return the pressures in kPa with some chambers filled."""
-        return (pressure,) * chambers + (0.0,) * (self.stack.chambers - chambers)
+        return self.stack.pose(elastic.chamber_pressures(self.stack, chambers, pressure))
 
     @property
     def chambers_that_bend(self) -> dict[str, int]:
@@ -196,17 +177,6 @@ class ModelledActuator:
         if not counts:
             raise DesignError("one chamber does not bend")
         return {chamber_count(count) if len(counts) > 1 else "": count for count in counts}
-
-    def figure(self, quantity: Quantity) -> Figure:
-        """Return the prediction's figure of a quantity. Raises DesignError if it does not exist."""
-        pressures = usual_pressures(self.design.form)[-1:]
-        request = PredictionRequest(pressures, calibration=self.factors)
-        prediction = predict(self.design, request, self.laminate, quick=True)
-        for figure in prediction.figures:
-            if figure.quantity is quantity:
-                return figure
-        reasons = (item.reason for item in prediction.left_out if quantity in item.quantities)
-        raise DesignError(next(reasons, f"no {quantity.named(ANYWHERE)}"))
 
 
 NamedSeries = tuple[str, Series]
@@ -243,15 +213,16 @@ def _forces(of: ModelledActuator) -> NamedSeries:
     if curve.x_name == "bend_deg" or curve.setup.bend_deg is not None:
         return _bent_forces(of)
     pressures, pushing = _pressures(curve), curve.setup.chambers or of.actuator.form.pushing
-    series: Series = {}
-    for phrase, strokes in _blocked_states(of).items():
-        series[phrase] = tuple(
-            None
-            if stroke is None
-            else pushing * float(elastic.blocked_force(of.stack, pressure, stroke))
-            for stroke, pressure in zip(strokes, pressures, strict=True)
-        )
-    return of.stack_model, series
+
+    def force(stroke: ModelValue, pressure: float) -> ModelValue:
+        if stroke is None:
+            return None
+        return pushing * float(elastic.blocked_force(of.stack, pressure, stroke))
+
+    return of.model(), {
+        phrase: tuple(map(force, strokes, pressures))
+        for phrase, strokes in _blocked_states(of).items()
+    }
 
 
 def _pressures(curve: MeasuredCurve) -> tuple[float, ...]:
@@ -308,19 +279,17 @@ def _bent_forces(of: ModelledActuator) -> NamedSeries:
     stated = curve.setup.bend_deg or 0.0
     angles = curve.x if curve.x_name == "bend_deg" else (stated,) * len(curve.y)
     pairs = list(zip(angles, _pressures(curve), strict=True))
-    return of.stack_model, {
-        phrase: tuple(_bent_force(of, count, *pair) for pair in pairs)
+
+    def force(chambers: int, angle: float, pressure: float) -> float:
+        pose = elastic.pose_bent_by(of.stack, chambers, angle)
+        if pose is None or pose.pressures[0] > pressure:
+            raise DesignError("it does not bend so far")
+        return elastic.pressed_further(of.stack, chambers, pressure, pose).force
+
+    return of.model(), {
+        phrase: tuple(_tried(force, count, *pair) for pair in pairs)
         for phrase, count in counts.items()
     }
-
-
-def _bent_force(of: ModelledActuator, chambers: int, angle: float, pressure: float) -> ModelValue:
-    """Return N on a plate square to the tip at an angle; None if it does not bend that far."""
-    pose = elastic.pose_bent_by(of.stack, chambers, angle)
-    if pose is None or pose.pressures[0] > pressure:
-        return None
-    bent = pose
-    return _tried(lambda: elastic.pressed_further(of.stack, chambers, pressure, bent).force)
 
 
 # Strokes, heights and bends.
@@ -335,7 +304,7 @@ def _strokes(of: ModelledActuator) -> NamedSeries:
         kinds = Counter(of.balloons())
         flat = 0.0 if is_stroke else of.actuator.thickness
         rise = _by_pressure(curve, lambda p: flat + elastic.free_rise(kinds, p).stroke)
-        return of.balloon_model, rise
+        return of.model(elastic.ELASTIC), rise
     flat = of.stack.flat_height if is_stroke else 0.0
     chambers = {"": curve.setup.chambers or of.stack.chambers}
     return _risen(of, chambers, lambda pose: pose.height - flat)
@@ -358,7 +327,7 @@ def _risen(
         by_pressure = _by_pressure(of.curve, lambda p, n=count: value(of.free_pose(n, p)))  # type: ignore[misc]
         for assumed, values in by_pressure.items():
             series[", ".join(filter(None, (phrase, assumed)))] = values
-    return of.stack_model, series
+    return of.model(), series
 
 
 def _pose_with(of: ModelledActuator, chambers: int, volume: float) -> Pose | None:
@@ -388,10 +357,10 @@ def _balloon_strokes(of: ModelledActuator) -> NamedSeries:
     if of.curve.x_name == "volume_ul":
         # A stroke by its volume is the same for every modulus.
         drawn = of.balloons(modulus_ratio=1.0)[0]
-        return of.balloon_model, {"": _strokes_by_volume(drawn, of.curve.x)}
+        return of.model(elastic.ELASTIC), {"": _strokes_by_volume(drawn, of.curve.x)}
     balloon = of.balloons()[0]
     series = _by_pressure(of.curve, lambda p: float(free_shapes(balloon, p).height[0]))
-    return of.balloon_model, series
+    return of.model(elastic.ELASTIC), series
 
 
 def _strokes_by_volume(balloon: Balloon, volumes: tuple[float, ...]) -> tuple[ModelValue, ...]:
@@ -424,7 +393,7 @@ def _energies(of: ModelledActuator) -> NamedSeries:
     ratio, balloons = of.factors.modulus_ratio, of.balloons(modulus_ratio=1.0)
     stored = [sum(_stored(each, p / ratio) for each in balloons) for p in of.curve.x]
     stacks = of.design.form.stacks
-    return of.balloon_model, {"": tuple(ratio * each * stacks / 1000 for each in stored)}
+    return of.model(elastic.ELASTIC), {"": tuple(ratio * each * stacks / 1000 for each in stored)}
 
 
 @lru_cache(maxsize=1024)
@@ -444,38 +413,34 @@ def _losses(of: ModelledActuator) -> NamedSeries:
 
 def _loss_shares(of: ModelledActuator) -> NamedSeries:
     """Return the calibration's share of the input work that is lost; 0 without a calibration."""
-    return of.balloon_model, {"": (of.factors.loss_share,) * len(of.curve.y)}
+    return of.model(elastic.ELASTIC), {"": (of.factors.loss_share,) * len(of.curve.y)}
 
 
 def _times(of: ModelledActuator) -> NamedSeries:
     setup, until = of.curve.setup, of.curve.x
     if setup.flow_ml_min is None:
         raise DesignError("the set-up names no flow")
-    flow = setup.flow_ml_min
-    if of.curve.x_name == "bend_deg":
-        delay = of.factors.air_delay if setup.fluid == "air" else of.factors.water_delay
-        return f"{of.stack_model}, no tube", {
+    flow, bore = setup.flow_ml_min, setup.tube_bore_mm or TUBE_DIAMETER
+    is_bend = of.curve.x_name == "bend_deg"
+    is_water = setup.fluid == "water" or (is_bend and setup.fluid != "air")
+    delay = of.factors.water_delay if is_water else of.factors.air_delay
+    if is_bend:
+        return f"{of.model()}, no tube", {
             phrase: tuple(_time_to_bend(of, count, angle, flow, delay) for angle in until)
             for phrase, count in of.chambers_that_bend.items()
         }
     tubes = {"no tube": NO_TUBE, f"{TUBE_LENGTH:g} mm of tube": TUBE_LENGTH}
     if setup.tube_mm is not None:
         tubes = {"": max(setup.tube_mm, NO_TUBE)}
-    bore = setup.tube_bore_mm or TUBE_DIAMETER
-    if setup.fluid == "water":
-        if bore != TUBE_DIAMETER:
-            raise DesignError(f"times of water are of a tube of {TUBE_DIAMETER:g} mm bore")
-        delay = of.factors.water_delay
+    if is_water and bore != TUBE_DIAMETER:
+        raise DesignError(f"times of water are of a tube of {TUBE_DIAMETER:g} mm bore")
 
-        def time(kpa: float, length: float) -> float:
+    def time(kpa: float, length: float) -> float:
+        if is_water:
             return elastic.time_to_fill(of.stack, flow, kpa, length)[0] + delay
-    else:
-        delay = of.factors.air_delay
+        return elastic.air_time(of.stack, flow, kpa, Line(AIR, length, bore)) + delay
 
-        def time(kpa: float, length: float) -> float:
-            return elastic.air_time(of.stack, flow, kpa, Line(AIR, length, bore)) + delay
-
-    return f"{of.stack_model} in time", {
+    return f"{of.model()} in time", {
         phrase: tuple(time(kpa, length) for kpa in until) for phrase, length in tubes.items()
     }
 
@@ -501,12 +466,19 @@ def _moduli(of: ModelledActuator) -> NamedSeries:
         tip, height = elastic.shut_stiffness(of.stack, pressure)
         return modulus(tip, 1.0, height, second)
 
-    return f"{of.stack_model}, chambers shut", _by_pressure(of.curve, at)
+    return f"{of.model()}, chambers shut", _by_pressure(of.curve, at)
 
 
 def _of_prediction(quantity: Quantity, of: ModelledActuator) -> NamedSeries:
-    figure = of.figure(quantity)
-    return figure.model.name, {"": (figure.value,) * len(of.curve.y)}
+    """Return the prediction's figure of a quantity. Raises DesignError if it does not exist."""
+    pressures = usual_pressures(of.design.form)[-1:]
+    request = PredictionRequest(pressures, calibration=of.factors)
+    prediction = predict(of.design, request, of.laminate, quick=True)
+    for figure in prediction.figures:
+        if figure.quantity is quantity:
+            return figure.model.name, {"": (figure.value,) * len(of.curve.y)}
+    reasons = (item.reason for item in prediction.left_out if quantity in item.quantities)
+    raise DesignError(next(reasons, f"no {quantity.named(ANYWHERE)}"))
 
 
 ANSWERS: dict[str, Callable[[ModelledActuator], NamedSeries]] = {

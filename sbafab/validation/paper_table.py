@@ -24,7 +24,7 @@ from sbafab.laminate.lay_up import FoldedHeight
 from sbafab.markup import environment
 from sbafab.models import paper
 from sbafab.models.balloons import balloons_of
-from sbafab.models.calibration import UNKNOWNS, ModelCalibration, load_calibration
+from sbafab.models.calibration import UNKNOWNS, HeldOut, ModelCalibration, load_calibration
 from sbafab.models.closed_forms import eq_4, eqs_1_to_3, modulus
 from sbafab.models.elastic import air_time, pose_bent_by, time_to_fill
 from sbafab.models.figures import Factors, Prediction, PredictionRequest
@@ -182,7 +182,7 @@ class PaperTable:
     @property
     def summary(self) -> str:
         """The number of values that lie in their intervals."""
-        within = [p.is_within for curve in self.curves for p in curve.points if p.interval]
+        within = [p.within for curve in self.curves for p in curve.points if p.interval]
         return f"{sum(map(bool, within))} of {len(within)} in the 90 % intervals of the calibration"
 
     def page(self) -> str:
@@ -239,7 +239,7 @@ def _calibrated_rows(curves: Sequence[ComparedCurve]) -> Iterator[tuple[str, ...
                 compared.curve.place,
                 f"{span(point.model)} {unit}".rstrip(),
                 span(point.interval, digits=3),
-                {True: "yes", False: "no", None: "-"}[point.is_within],
+                {True: "yes", False: "no", None: "-"}[point.within],
                 "; ".join(compared.assumptions),
             )
 
@@ -365,13 +365,6 @@ class RowDocument(Document):
     predicted: Short | None
     model: str
     why: str
-
-
-class HeldOut(Document):
-    """Measured values that the calibration was not fitted to, and how many lay in its intervals."""
-
-    points: int
-    inside: int
 
 
 class CalibratedDocument(Document):

@@ -111,7 +111,7 @@ def test_the_reproduction_is_of_its_schema() -> None:
     measured = Measured(1.0, 0.1, "mm", "Sec. 2")
     table = PaperTable()
     table.__dict__["rows"] = [Row("one", "x", measured, value, "m", "w") for value in (1.1, None)]
-    points = (ComparedPoint(1.0, 0.5, 0.1, (0.4, 0.6), (0.3, 0.7)),)
+    points = (ComparedPoint.at(1.0, 0.5, 0.1, (0.4, 0.6), (0.3, 0.7)),)
     curve = ComparedCurve("paper", load_evidence("paper").curves[0], points, "m", ("a",), "")
     table.__dict__["curves"] = (curve,)
     hold("reproduction", as_json(table))

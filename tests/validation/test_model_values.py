@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,7 +15,7 @@ from sbafab.lab.evidence import from_lab_records
 from sbafab.lab.store import Lab
 from sbafab.models.figures import Factors
 from sbafab.models.stack import Stack
-from sbafab.validation.comparison import compare, table_lines
+from sbafab.validation.comparison import ComparedPoint, compare, table_lines
 from sbafab.validation.evidence import (
     QUANTITIES,
     Evidence,
@@ -27,8 +26,6 @@ from sbafab.validation.evidence import (
 )
 from sbafab.validation.model_values import (
     ANSWERS,
-    ModelValues,
-    NoModel,
     model_values,
 )
 from tests.site.formats import hold
@@ -61,9 +58,7 @@ def curve(
 def values(
     of: MeasuredCurve, factors: Factors | None = None
 ) -> dict[str, tuple[float | None, ...]]:
-    answer = model_values(of, factors)
-    assert isinstance(answer, ModelValues), answer
-    return dict(answer.series)
+    return dict(model_values(of, factors).series)
 
 
 def test_every_quantity_has_a_model_or_a_reason() -> None:
@@ -138,7 +133,6 @@ def test_shares_of_the_height_have_five_readings_and_strokes_have_none(three: St
 def test_chambers_that_a_source_leaves_open_are_a_series_each(three: Stack) -> None:
     bend = load_evidence("paper").curve("largest-bend")
     answer = model_values(bend)
-    assert isinstance(answer, ModelValues)
     chambers = [name.split(",")[0] for name in answer.series]
     assert chambers == ["one chamber"] * 3 + ["2 chambers"] * 3
     states = [(p, q, 0.0) for p in (10.0, 30.0, 100.0) for q in (0.0, p)]
@@ -195,9 +189,8 @@ def test_work_is_the_integral_of_pressure_over_volume() -> None:
     ],
 )
 def test_what_has_no_value_says_why(of: MeasuredCurve, words: str) -> None:
-    answer = model_values(of)
-    assert isinstance(answer, NoModel)
-    assert words in answer.reason
+    with pytest.raises(DesignError, match=words):
+        model_values(of)
 
 
 # The comparison and its command.
@@ -207,11 +200,14 @@ def test_intervals_are_held_against_the_measured_values() -> None:
     flat = curve("flat_height_mm", y=(0.4, 0.5))
     lab = Evidence(id="lab", citation="a lab", curves=(flat,))
     (without,) = compare(lab)
-    assert without.points[0].is_within is None
+    assert without.points[0].within is None
     assert without.points[0].deviation == pytest.approx((0.331, 0.331))
-    points = tuple(replace(point, interval=(0.45, 0.6)) for point in without.points)
-    assert [point.is_within for point in points] == [False, True]
-    lines = list(table_lines([replace(without, points=points)]))
+    points = [
+        ComparedPoint.at(each.x, each.measured, each.error, each.model, (0.45, 0.6))
+        for each in without.points
+    ]
+    assert [point.within for point in points] == [False, True]
+    lines = list(table_lines([without._replace(points=points)]))
     assert [line.split()[-1] for line in lines[2:]] == ["no", "yes"]
 
 
@@ -276,7 +272,7 @@ def test_records_of_a_lab_are_curves_of_what_was_built(
     assert (curves["force_n"].x, curves["force_n"].y) == ((0.0,), (1.4,))
     assert curves["force_n"].setup.pressure_kpa == 100
     assert values(curves["flat_height_mm"])[""] == pytest.approx([4 * 0.038 + 3 * 0.025])
-    assert all(isinstance(model_values(of), ModelValues) for of in evidence.curves)
+    assert all(model_values(of).series for of in evidence.curves)
     code, out, _ = run(["reproduce", str(lab), "--json"], capsys)
     assert code == 0
     assert {of["quantity"] for of in json.loads(out)["curves"]} == curves.keys()

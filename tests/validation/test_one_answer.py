@@ -28,7 +28,7 @@ from sbafab.models.sizes import size_phrases, sizes
 from sbafab.search.quantities import Subject, read_quantity
 from sbafab.studio.jobs import elastic, motion
 from sbafab.validation.evidence import MeasuredCurve, Setup, StatedError
-from sbafab.validation.model_values import ModelValues, model_values
+from sbafab.validation.model_values import model_values
 from tests.studio.worked import job
 from tests.validation.commands import run_predict
 
@@ -129,7 +129,6 @@ def test_find_has_the_sizes_of_predict(name: str, quantities: set[str]) -> None:
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_measured_curves_have_it_beside_them(case: Case, prediction: Prediction) -> None:
     answer = model_values(case.curve, factors_of(sbafab.load(NAME)))
-    assert isinstance(answer, ModelValues)
     figure = _figure(prediction, case.figure)
     assert answer.model == figure.model.name
     assert answer.series == {"": (_near(figure),)}
@@ -140,7 +139,6 @@ def test_measured_curves_have_it_beside_them(case: Case, prediction: Prediction)
 def test_a_height_is_the_stroke_above_the_flat_one(prediction: Prediction) -> None:
     of = CASES["stroke"].curve.model_copy(update={"quantity": "height_mm"})
     answer = model_values(of, factors_of(sbafab.load(NAME)))
-    assert isinstance(answer, ModelValues)
     height = _figure(prediction, "free height at 10 kPa")
     assert answer.series == {"": (_near(height),)}
     flat = next(one for one in prediction.figures if one.name == "folded height")
