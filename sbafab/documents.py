@@ -10,13 +10,13 @@ from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
-    AfterValidator,
     AliasChoices,
     AliasPath,
     BaseModel,
     ConfigDict,
     Field,
     GetJsonSchemaHandler,
+    PlainSerializer,
     TypeAdapter,
     WithJsonSchema,
 )
@@ -137,5 +137,5 @@ def _short(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-Short = Annotated[float, AfterValidator(_short)]
-"""A number to seven digits."""
+Short = Annotated[float, PlainSerializer(_short, return_type=float)]
+"""A number that is written to seven digits."""

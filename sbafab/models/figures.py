@@ -189,8 +189,9 @@ class Figure:
 
 @dataclass(frozen=True)
 class Trace:
-    """A predicted curve; a measured one of the paper, or points each +- its ``error`` (0 where it
-    gives none), if it has no model. The labels of the relation contain the units.
+    """A predicted curve; without a model measured by the paper, and of points each +- its ``error``
+    (0 where it gives none). The labels of the relation contain the unit of ``x``, and the unit of
+    ``y`` and its ``error``.
     """
 
     label: str

@@ -117,7 +117,9 @@ def predict(
         asked = replace(asked, calibration=factors)
     subject = Actuator(design, flat, asked.factors, form)
     _check_request(subject, asked)
-    request, past = _within_burst(asked, flat)
+    burst_at = [(pressure, _past_burst(flat, pressure)) for pressure in asked.pressures_kpa]
+    past = [LeftOut(f"all figures at {kpa:g} kPa", why) for kpa, why in burst_at if why]
+    request = replace(asked, pressures_kpa=tuple(kpa for kpa, why in burst_at if not why))
     moved = uncertainty.moved if uncertainty else ()
     (state, *others), guides = _states(subject, moved, request, quick), elastic.Guides()
     items = _figures(state, request, guides, checks_maps=checks_maps)
@@ -171,20 +173,13 @@ def _measured(figure: Figure, actuator: Actuator) -> paper.Counterpart | None:
     return row and replace(row, beside_factors=bool(model.factors))
 
 
-def _within_burst(
-    request: PredictionRequest, laminate: Laminate
-) -> tuple[PredictionRequest, list[LeftOut]]:
-    """Return a request without the pressures past the estimated burst pressure, and notes on the
-    omitted ones.
-    """
-    within, past = [], []
-    for pressure in request.pressures_kpa:
-        try:
-            refuse_beyond_burst(laminate, pressure)
-            within.append(pressure)
-        except BeyondError as error:
-            past.append(LeftOut(f"all figures at {pressure:g} kPa", str(error)))
-    return replace(request, pressures_kpa=tuple(within)), past
+def _past_burst(laminate: Laminate, kpa: float) -> str:
+    """Return why there are no figures past the estimated burst pressure; "" below it."""
+    try:
+        refuse_beyond_burst(laminate, kpa)
+    except BeyondError as error:
+        return str(error)
+    return ""
 
 
 def _flagged(item: FigureItem, laminate: Laminate) -> FigureItem:
@@ -193,10 +188,9 @@ def _flagged(item: FigureItem, laminate: Laminate) -> FigureItem:
     """
     if isinstance(item, LeftOut) or item.pressure_kpa is None:
         return item
-    try:
-        refuse_beyond_burst(laminate, item.pressure_kpa)
-    except BeyondError as error:
-        return LeftOut(item.name, str(error), (item.quantity,))
+    past = _past_burst(laminate, item.pressure_kpa)
+    if past:
+        return LeftOut(item.name, past, (item.quantity,))
     is_near = is_near_burst(laminate, item.pressure_kpa)
     return replace(item, flags=(*item.flags, NEAR_BURST)) if is_near else item
 

@@ -57,134 +57,96 @@ ANYWHERE = Conditions()
 
 
 class Quantity(Enum):
-    """Quantities of figures: ``key`` for programs, ``group`` in the output, ``unit``, and the
-    ``words`` of their names, with places for texts of the conditions.
+    """Quantities of figures: ``key`` for programs (the name in small letters), ``group`` in the
+    output, ``unit``, and the ``words`` of their names, with places for texts of the conditions.
     """
 
-    key: str
-    group: str
-    unit: str
-    words: str
+    def __init__(self, group: str, unit: str, words: str) -> None:
+        self.key = self.name.lower()
+        self.group, self.unit, self.words = group, unit, words
 
-    def __init__(self, key: str, group: str, unit: str, words: str) -> None:
-        self.key, self.group, self.unit, self.words = key, group, unit, words
+    OVERALL_DIAMETER = "size", "mm", "overall diameter"
+    OUTLINE_DIAMETER = "size", "mm", "outline diameter"
+    DEFLATED_DIAMETER = "size", "mm", "deflated diameter"
+    REACHED_DIAMETER = "size", "mm", "reached diameter"
+    INFLATED_DIAMETER = "size", "mm", "inflated diameter"
+    PITCH = "size", "mm", "pitch"
+    WIDTH = "size", "mm", "width"
+    LENGTH = "size", "mm", "length"
+    FOLDED_HEIGHT = "size", "mm", "folded height"
+    FOLDED_DIAMETER = "size", "mm", "folded diameter"
+    MASS = "size", "g", "mass"
+    BEAM_DIAMETER = "size", "mm", "inflated diameter of a beam{of}"
 
-    OVERALL_DIAMETER = "overall_diameter", "size", "mm", "overall diameter"
-    OUTLINE_DIAMETER = "outline_diameter", "size", "mm", "outline diameter"
-    DEFLATED_DIAMETER = "deflated_diameter", "size", "mm", "deflated diameter"
-    REACHED_DIAMETER = "reached_diameter", "size", "mm", "reached diameter"
-    INFLATED_DIAMETER = "inflated_diameter", "size", "mm", "inflated diameter"
-    PITCH = "pitch", "size", "mm", "pitch"
-    WIDTH = "width", "size", "mm", "width"
-    LENGTH = "length", "size", "mm", "length"
-    FOLDED_HEIGHT = "folded_height", "size", "mm", "folded height"
-    FOLDED_DIAMETER = "folded_diameter", "size", "mm", "folded diameter"
-    MASS = "mass", "size", "g", "mass"
-    BEAM_DIAMETER = "beam_diameter", "size", "mm", "inflated diameter of a beam{of}"
+    LARGEST_TUBE = "inlet", "mm", "largest tube that the inlet opens to"
+    TUBE_ROOM = "inlet", "mm", "room round the tube of {tube} mm"
 
-    LARGEST_TUBE = "largest_tube", "inlet", "mm", "largest tube that the inlet opens to"
-    TUBE_ROOM = "tube_room", "inlet", "mm", "room round the tube of {tube} mm"
+    BURST = "strength", "kPa", "burst pressure"
 
-    BURST = "burst", "strength", "kPa", "burst pressure"
+    REFERENCE_STROKE = "stroke", "mm", "reference stroke"
+    REFERENCE_HEIGHT = "stroke", "mm", "reference height"
+    REFERENCE_VOLUME = "stroke", "ul", "volume a balloon at the reference stroke"
+    LARGEST_VOLUME = "stroke", "ul", "largest volume a balloon"
+    LARGEST_STROKE = "stroke", "mm", "stroke at the largest volume"
+    BALLOON_DIAMETER = "stroke", "mm", "balloon's diameter at the largest volume"
+    VOLUME_STROKE = "stroke", "mm", "stroke at {volume} ul a balloon"
+    FREE_STROKE = "stroke", "mm", "free stroke at {kpa} kPa"
+    FREE_HEIGHT = "stroke", "mm", "free height at {kpa} kPa"
+    BALLOON_VOLUME = "stroke", "ul", "volume a balloon at {kpa} kPa"
+    CONTRACTION = "stroke", "mm", "free contraction{of}"
+    CONTRACTION_SHARE = "stroke", "%", "free contraction{of}, share"
 
-    REFERENCE_STROKE = "reference_stroke", "stroke", "mm", "reference stroke"
-    REFERENCE_HEIGHT = "reference_height", "stroke", "mm", "reference height"
-    REFERENCE_VOLUME = (
-        "reference_volume", "stroke", "ul", "volume a balloon at the reference stroke",
-    )  # fmt: skip
-    LARGEST_VOLUME = "largest_volume", "stroke", "ul", "largest volume a balloon"
-    LARGEST_STROKE = "largest_stroke", "stroke", "mm", "stroke at the largest volume"
-    BALLOON_DIAMETER = (
-        "balloon_diameter", "stroke", "mm", "balloon's diameter at the largest volume",
-    )  # fmt: skip
-    VOLUME_STROKE = "volume_stroke", "stroke", "mm", "stroke at {volume} ul a balloon"
-    FREE_STROKE = "free_stroke", "stroke", "mm", "free stroke at {kpa} kPa"
-    FREE_HEIGHT = "free_height", "stroke", "mm", "free height at {kpa} kPa"
-    BALLOON_VOLUME = "balloon_volume", "stroke", "ul", "volume a balloon at {kpa} kPa"
-    CONTRACTION = "contraction", "stroke", "mm", "free contraction{of}"
-    CONTRACTION_SHARE = "contraction_share", "stroke", "%", "free contraction{of}, share"
+    BLOCKED_FORCE = "force", "N", "blocked force{of}{each} at {kpa} kPa, {stroke}"
+    FORCE_BOUND = "force", "N", "blocked force{of}{each} at {kpa} kPa, flat, at most"
+    BENT_FORCE = "force", "N", "force at {kpa} kPa in {chambers}, bent by {angle} deg"
+    PULL = "force", "N", "pull{of} at {kpa} kPa, {percent} % shorter"
+    MOMENT = "force", "N mm", "moment{of} at {kpa} kPa, {bent}"
+    WRINKLING_LOAD = "force", "N", "load that wrinkles a beam{of} at {kpa} kPa"
+    COLLAPSE_LOAD = "force", "N", "load that collapses a beam{of} at {kpa} kPa"
+    SLIP_LOAD = "force", "N", "load that slips{of} at {kpa} kPa"
 
-    BLOCKED_FORCE = (
-        "blocked_force", "force", "N", "blocked force{of}{each} at {kpa} kPa, {stroke}",
-    )  # fmt: skip
-    FORCE_BOUND = (
-        "force_bound", "force", "N", "blocked force{of}{each} at {kpa} kPa, flat, at most",
-    )  # fmt: skip
-    BENT_FORCE = (
-        "bent_force", "force", "N", "force at {kpa} kPa in {chambers}, bent by {angle} deg",
-    )  # fmt: skip
-    PULL = "pull", "force", "N", "pull{of} at {kpa} kPa, {percent} % shorter"
-    MOMENT = "moment", "force", "N mm", "moment{of} at {kpa} kPa, {bent}"
-    WRINKLING_LOAD = (
-        "wrinkling_load", "force", "N", "load that wrinkles a beam{of} at {kpa} kPa",
-    )  # fmt: skip
-    COLLAPSE_LOAD = (
-        "collapse_load", "force", "N", "load that collapses a beam{of} at {kpa} kPa",
-    )  # fmt: skip
-    SLIP_LOAD = "slip_load", "force", "N", "load that slips{of} at {kpa} kPa"
-
-    TOTAL_VOLUME = (
-        "total_volume", "actuation", "ul", "volume of all chambers at the reference stroke",
-    )  # fmt: skip
-    REFERENCE_TIME = (
-        "reference_time", "actuation", "s", "time to the reference stroke at {flow} ml/min",
-    )  # fmt: skip
-    VOLUME_TIME = (
-        "volume_time", "actuation", "s", "time to {volume} ul a balloon at {flow} ml/min",
-    )  # fmt: skip
-    WORK_BOUND = "work_bound", "actuation", "mJ", "pneumatic input work at {kpa} kPa"
-    FREE_WORK = "free_work", "actuation", "mJ", "pneumatic input work at {kpa} kPa, free"
-    LOST_WORK = "lost_work", "actuation", "%", "input work lost in a cycle"
+    TOTAL_VOLUME = "actuation", "ul", "volume of all chambers at the reference stroke"
+    REFERENCE_TIME = "actuation", "s", "time to the reference stroke at {flow} ml/min"
+    VOLUME_TIME = "actuation", "s", "time to {volume} ul a balloon at {flow} ml/min"
+    WORK_BOUND = "actuation", "mJ", "pneumatic input work at {kpa} kPa"
+    FREE_WORK = "actuation", "mJ", "pneumatic input work at {kpa} kPa, free"
+    LOST_WORK = "actuation", "%", "input work lost in a cycle"
     POWER_DENSITY = (
-        "power_density", "actuation", "W/kg",
+        "actuation",
+        "W/kg",
         "power density, blocked force flat at {kpa} kPa and {litres} l/min of air",
-    )  # fmt: skip
-    WATER_TIME = (
-        "water_time", "actuation", "s",
-        "time to {kpa} kPa at the pump, water at {flow} ml/min in all",
-    )  # fmt: skip
-    WATER_HEIGHT = (
-        "water_height", "actuation", "mm", "height when the water's pump shows {kpa} kPa",
-    )  # fmt: skip
-    CONTRACTION_VOLUME = (
-        "contraction_volume", "actuation", "ul", "volume at free contraction{of}",
-    )  # fmt: skip
+    )
+    WATER_TIME = "actuation", "s", "time to {kpa} kPa at the pump, water at {flow} ml/min in all"
+    WATER_HEIGHT = "actuation", "mm", "height when the water's pump shows {kpa} kPa"
+    CONTRACTION_VOLUME = "actuation", "ul", "volume at free contraction{of}"
 
     REFERENCE_BEND = (
-        "reference_bend", "bending", "deg",
+        "bending",
+        "deg",
         "bend with {chambers} at the reference stroke, the others flat",
-    )  # fmt: skip
-    LARGEST_ASIDE = "largest_aside", "bending", "mm", "maximum lateral tip displacement"
-    BEND = "bend", "bending", "deg", "bend at {kpa} kPa in {chambers}, the others empty"
+    )
+    LARGEST_ASIDE = "bending", "mm", "maximum lateral tip displacement"
+    BEND = "bending", "deg", "bend at {kpa} kPa in {chambers}, the others empty"
     RIM_ROOM = (
-        "rim_room", "bending", "mm",
+        "bending",
+        "mm",
         "room between rims on the inner side, {kpa} kPa in {chambers}, the others empty",
-    )  # fmt: skip
+    )
     CHAMBER_CLEARANCE = (
-        "chamber_clearance", "bending", "mm",
+        "bending",
+        "mm",
         "clearance between chambers, {kpa} kPa in {chambers}, the others empty",
-    )  # fmt: skip
-    ASIDE = (
-        "aside", "bending", "mm",
-        "lateral tip displacement at {kpa} kPa in {chambers}, the others empty",
-    )  # fmt: skip
-    FREE_BEND = "free_bend", "bending", "deg", "free bend{of}{hinges}"
+    )
+    ASIDE = "bending", "mm", "lateral tip displacement at {kpa} kPa in {chambers}, the others empty"
+    FREE_BEND = "bending", "deg", "free bend{of}{hinges}"
 
-    SECOND_MOMENT = "second_moment", "stiffness", "mm4", "second moment of area of the plate"
-    REFERENCE_STIFFNESS = (
-        "reference_stiffness", "stiffness", "N/mm", "lateral tip stiffness, inflated",
-    )  # fmt: skip
-    HELD_STIFFNESS = (
-        "held_stiffness", "stiffness", "N/mm",
-        "lateral tip stiffness at {kpa} kPa, pressure held",
-    )  # fmt: skip
-    SHUT_STIFFNESS = (
-        "shut_stiffness", "stiffness", "N/mm",
-        "lateral tip stiffness at {kpa} kPa, chambers shut",
-    )  # fmt: skip
-    JAMMING_RATIO = "jamming_ratio", "stiffness", "", "jammed over loose stiffness{of}"
-    LOOSE_STIFFNESS = "loose_stiffness", "stiffness", "N mm2", "bending stiffness{of}, loose"
-    JAMMED_STIFFNESS = "jammed_stiffness", "stiffness", "N mm2", "bending stiffness{of}, jammed"
+    SECOND_MOMENT = "stiffness", "mm4", "second moment of area of the plate"
+    REFERENCE_STIFFNESS = "stiffness", "N/mm", "lateral tip stiffness, inflated"
+    HELD_STIFFNESS = "stiffness", "N/mm", "lateral tip stiffness at {kpa} kPa, pressure held"
+    SHUT_STIFFNESS = "stiffness", "N/mm", "lateral tip stiffness at {kpa} kPa, chambers shut"
+    JAMMING_RATIO = "stiffness", "", "jammed over loose stiffness{of}"
+    LOOSE_STIFFNESS = "stiffness", "N mm2", "bending stiffness{of}, loose"
+    JAMMED_STIFFNESS = "stiffness", "N mm2", "bending stiffness{of}, jammed"
 
     def named(self, at: Conditions) -> str:
         """Return the figure's display name."""

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -68,51 +68,46 @@ CHARTS = {
 """Template and relation by the name of a chart's file."""
 
 
-class Row(NamedTuple):
-    """A figure of the paper; ``predicted`` is None if no model predicts it."""
+class Row(Document):
+    """A figure of the paper beside the prediction."""
 
     section: str
     figure: str
-    measured: paper.Measured
-    predicted: float | None
+    unit: str
+    where: str
+    paper: PlainNumber | None
+    error: PlainNumber | None
+    predicted: Short | None
     model: str
     why: str
 
     @property
-    def paper(self) -> float | None:
-        """The paper's value; None if it is a word."""
-        return self.measured.value if self.measured.unit else None
-
-    @property
-    def error(self) -> float | None:
-        """The paper's error; None if it does not state one."""
-        return self.measured.error or None
-
-    @property
     def measured_text(self) -> str:
         """The paper's value with error and unit; empty for a word."""
-        return str(self.measured) if self.measured.unit else ""
+        if self.paper is None:
+            return ""
+        return str(paper.Measured(self.paper, self.error or 0.0, self.unit, self.where))
 
     @property
     def predicted_text(self) -> str:
         """The prediction with its unit; empty without one."""
-        return "" if self.predicted is None else f"{self.predicted:.4g} {self.measured.unit}"
+        return "" if self.predicted is None else f"{self.predicted:.4g} {self.unit}"
 
     @property
     def residual_text(self) -> str:
         """Prediction minus paper, absolute, relative, and in the paper's errors."""
-        if self.predicted is None:
+        if self.predicted is None or self.paper is None:
             return ""
-        apart = self.predicted - self.measured.value
-        share = f"{apart:+.3g}, {apart / self.measured.value:+.1%}"
+        apart = self.predicted - self.paper
+        share = f"{apart:+.3g}, {apart / self.paper:+.1%}"
         return share + (f" ({abs(apart) / self.error:.1f} errors)" if self.error else "")
 
     @property
     def cells(self) -> tuple[str, ...]:
         """The cells of the page's table, by COLUMNS."""
-        predicted, measured = self.predicted_text or "not", self.measured_text
-        where, residual = self.measured.where, self.residual_text
-        return self.figure, measured, where, predicted, residual, self.model, self.why
+        predicted, residual = self.predicted_text or "not", self.residual_text
+        texts = self.figure, self.measured_text, self.where, predicted, residual
+        return *texts, self.model, self.why
 
 
 def predicted(
@@ -142,16 +137,20 @@ class PaperTable:
             return tuple(self._row(cells, values) for cells in csv.DictReader(opened))
 
     def _row(self, cells: Mapping[str, str], values: Mapping[str, float]) -> Row:
-        value, error = float(cells["value"]), float(cells["error"] or 0)
-        measured = paper.Measured(value, error, cells["unit"], cells["where"])
         template, _, key = cells["source"].partition(" ")
         figure = values[template] if template and not key else None
         if key:
             at = FigureKey.read(key)
             prediction = self.predictions[template]
             figure = prediction.value(at.quantity.key, at.model, **at.at.as_dict())
-        why = cells["why"].format_map(values)
-        return Row(cells["section"], cells["figure"], measured, figure, cells["model"], why)
+        return Row(
+            **{name: cells[name] for name in ("section", "figure", "unit", "where", "model")},
+            # A figure without a unit is a word.
+            paper=float(cells["value"]) if cells["unit"] else None,
+            error=float(cells["error"]) if cells["error"] else None,
+            predicted=figure,
+            why=cells["why"].format_map(values),
+        )
 
     @property
     def sections(self) -> dict[str, list[Row]]:
@@ -353,20 +352,6 @@ def _factors(predictions: Mapping[str, Prediction]) -> Iterator[tuple[str, str, 
 # The documents.
 
 
-class RowDocument(Document):
-    """A figure of the paper beside the prediction."""
-
-    section: str
-    figure: str
-    unit: str = attribute("measured.unit")
-    where: str = attribute("measured.where")
-    paper: PlainNumber | None
-    error: PlainNumber | None
-    predicted: Short | None
-    model: str
-    why: str
-
-
 class CalibratedDocument(Document):
     """The section of calibrated models for programs."""
 
@@ -380,7 +365,7 @@ class CalibratedDocument(Document):
 class ReproductionDocument(Document, schema="sbafab/reproduction@1"):
     """The contents of ``reproduction.json``."""
 
-    rows: list[RowDocument]
+    rows: list[Row]
     calibrated: CalibratedDocument
     folder: str = ""
 

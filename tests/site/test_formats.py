@@ -103,14 +103,16 @@ def test_what_is_predicted_of_an_assembly_is_of_its_schema() -> None:
 
 
 def test_the_reproduction_is_of_its_schema() -> None:
-    from sbafab.models.paper import Measured
     from sbafab.validation.comparison import ComparedCurve, ComparedPoint
     from sbafab.validation.evidence import load_evidence
     from sbafab.validation.paper_table import PaperTable, Row, as_json
 
-    measured = Measured(1.0, 0.1, "mm", "Sec. 2")
+    row = Row(
+        section="one", figure="x", unit="mm", where="Sec. 2", paper=1.0, error=0.1, predicted=1.1,
+        model="m", why="w",
+    )  # fmt: skip
     table = PaperTable()
-    table.__dict__["rows"] = [Row("one", "x", measured, value, "m", "w") for value in (1.1, None)]
+    table.__dict__["rows"] = [row, row.model_copy(update={"predicted": None})]
     points = (ComparedPoint.at(1.0, 0.5, 0.1, (0.4, 0.6), (0.3, 0.7)),)
     curve = ComparedCurve("paper", load_evidence("paper").curves[0], points, "m", ("a",), "")
     table.__dict__["curves"] = (curve,)
