@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon_map import BalloonMap, holds_at
+from sbafab.models.balloon_map import DEGREE, BalloonMap, holds_at
 from sbafab.models.film_elements import Array
 from sbafab.models.stack_balance import descent
 from sbafab.models.stack_loads import (
@@ -206,9 +206,8 @@ class BatchPoses:
     @cached_property
     def excess(self) -> Array:
         """By how many mm a balloon rises above its map: (N,)."""
-        rows = self.column.rows(self.load)
-        gaps = self.column.rows_of(self.freedoms, self.load) @ self.column.centres
-        return np.asarray((gaps - self.column.tops[rows]).max((1, 2), initial=-math.inf))
+        above = self.freedoms @ self.column.centres - self.column.tops[self.column.levels]
+        return np.asarray(above.max((1, 2), initial=-math.inf))
 
     @property
     def is_met(self) -> NDArray[np.bool_]:
@@ -245,13 +244,7 @@ class BatchPoses:
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """Plates joined by balloons, in equilibrium at given pressures.
-
-    ``maps`` are the maps of the different balloons, ``levels`` the index of each level's map from
-    the base; ``axes`` (chambers, 2) the centres of the chambers, ``pitch`` the height of a flat
-    level and ``outline`` the radius of the plates, in mm; ``weight`` mN of each level, None if a
-    film's density is unknown.
-    """
+    """Plates joined by balloons, in equilibrium at given pressures. Fields as of ``Stack``."""
 
     maps: tuple[BalloonMap, ...]
     levels: NDArray[np.int_]
@@ -260,7 +253,6 @@ class Column:
     outline: float
     weight: float | None = 0.0
     calibration: str = ""
-    """Name of the calibration that its balloons have, if any."""
 
     @property
     def chambers(self) -> int:
@@ -318,14 +310,10 @@ class Column:
     def _first_levels(self) -> NDArray[np.int_]:
         return np.array([int(np.argmax(self.levels == kind)) for kind in range(len(self.maps))])
 
-    def rows(self, load: Load | None) -> NDArray[np.int_]:
-        """Return the kind of balloon of each row: all kinds without a load, the levels under
-        one.
-        """
-        return np.arange(len(self.maps)) if load is None else self.levels
-
     def rows_of(self, freedoms: Array, load: Load | None) -> Array:
-        """Return the freedoms (n, rows, 3) of levels' (n, levels, 3)."""
+        """Return the freedoms (n, rows, 3) of levels' (n, levels, 3): a row per kind of balloon
+        without a load, per level under one.
+        """
         return freedoms[:, self._first_levels] if load is None else freedoms
 
     def counts(self, load: Load | None) -> Array:
@@ -340,10 +328,16 @@ class Column:
         """Return the springs of each kind of balloon, or of each level, at pressures (n, chambers)
         in kPa. Raises DesignError for those outside the maps.
 
-        With ``sucked`` a chamber that is shut may stand below 0 kPa; three ``orders`` as of
-        ``Springs.pressed``.
+        With ``sucked`` a chamber that is shut may stand below 0 kPa; rates of volumes by pressure
+        need three ``orders``.
         """
-        return Springs.pressed(self.maps, pressures, self._places[by_level], sucked, orders)
+        tables = [kind.splines(pressures, orders, sucked)[:, :, None] for kind in self.maps]
+        table = tables[0] if len(tables) == 1 else np.concatenate(tables, axis=2)
+        places, size = self._places[by_level], pressures.size
+        states = np.arange(0, size, self.chambers)[:, None, None]
+        begins = states + (orders * size * places.kinds + places.chambers)
+        stride = len(tables) * orders * size
+        return Springs(table.reshape(DEGREE + 1, -1), begins, stride, size, places)
 
     def start_freedoms(self, pressures: Array) -> Array:
         """Return rise and tilt to start from at pressures (n, chambers), one row per kind of

@@ -78,11 +78,14 @@ class Linearised(NamedTuple):
             motions = (levels == np.arange(rows)[:, None]).astype(float) @ motions
         return plates.tip, motions.reshape(count, -1, 6)
 
-    def tip_motion(self) -> Array:
-        """Return the motion of the tip, then the turn of the top, by freedoms: (n, freedoms, 6)."""
+    def tip_motion(self) -> tuple[Array, Array]:
+        """Return tips (n, 3) in mm, and the motion of the tip, then the turn of the top, by
+        freedoms: (n, 6, freedoms).
+        """
         tip, motions = self.top()
         turns = motions[..., :3]
-        return np.concatenate([motions[..., 3:] - turns @ crossing(tip), turns], axis=-1)
+        motion = np.concatenate([motions[..., 3:] - turns @ crossing(tip), turns], axis=-1)
+        return tip, motion.swapaxes(1, 2)
 
     def filled(self, moves: Array) -> Array:
         """Return the volumes' changes (n, chambers, k) by moves (n, freedoms, k)."""
@@ -116,7 +119,7 @@ class Linearised(NamedTuple):
             raise DesignError(
                 "the stack is about to buckle and has no derivatives; change a pressure or load"
             ) from None
-        motion = self.tip_motion().swapaxes(1, 2) @ moves + tip
+        motion = self.tip_motion()[1] @ moves + tip
         pushes = ((self.pushed()[0][:, None] @ moves)[:, 0] + force) / 1000
         by_level = moves.reshape(*self.at.shape, -1)
         return Rates(motion[:, :3], motion[:, 3:], self.filled(moves) + volumes, pushes, by_level)
@@ -127,14 +130,12 @@ def linearised(
     load: Load | None,
     pressures: Array,
     at: Array,
-    by_level: bool = False,
     forces: Array | None = None,
 ) -> Linearised:
-    """Return n states linearised at pressures (n, chambers) in kPa and freedoms (n, rows, 3), each
-    kind of balloon without a load and each level under one, or ``by_level``; ``forces`` of an outer
-    plate as of ``energy``.
+    """Return n states linearised at pressures (n, chambers) in kPa and freedoms (n, rows, 3) of
+    levels, or of kinds of balloons without a load; ``forces`` of an outer plate as of ``energy``.
     """
-    by_level = by_level or load is not None
+    by_level = at.shape[1] == len(column.levels)
     springs = column.springs(pressures, sucked=True, by_level=by_level, orders=3)
     now = energy(springs, column.pitch, load, at, forces)
     volumes, filling = springs.order(at, 1)
@@ -152,7 +153,7 @@ def linearised_poses(poses: BatchPoses) -> Linearised:
     """
     at = poses.freedoms
     for _ in range(CORRECTIONS):
-        now = linearised(poses.column, poses.load, poses.pressures, at, by_level=True)
+        now = linearised(poses.column, poses.load, poses.pressures, at)
         room = RESIDUAL * (1 + 1e-3 * now.energy.push)
         if (np.abs(now.energy.gradient).max(1) < room).all():
             break
@@ -212,24 +213,23 @@ class Derivatives:
         return np.asarray((vectors * inverse) @ vectors.T * np.outer(scale, scale))
 
 
-def derivatives(poses: BatchPoses) -> list[Derivatives]:
-    """Return the derivatives of each pose under its load. Raises DesignError for a pose that is
-    about to buckle.
+def derivatives(poses: BatchPoses) -> Derivatives:
+    """Return the derivatives of the first of poses under its load. Raises DesignError for a pose
+    that is about to buckle.
     """
     now, chambers = linearised_poses(poses), poses.column.chambers
     pushed, hardness = now.pushed()
     has_plate = now.energy.touch is not None
-    pulls = [now.filling, 1000 * now.tip_motion(), pushed[..., None]][: 2 + has_plate]
+    pulls = [now.filling, 1000 * now.tip_motion()[1].swapaxes(1, 2), pushed[..., None]][
+        : 2 + has_plate
+    ]
     count = chambers + 6 + has_plate
     volumes = now.swelling[..., None] * np.eye(chambers, count)
     force = -hardness[:, None] * (np.arange(count) == chambers + 6)
     rates = now.rates(np.concatenate(pulls, axis=-1), volumes, force=force)
     parts = [slice(chambers), slice(chambers, chambers + 6), slice(chambers + 6, None)]
-    each = [[rates.part(number, part) for part in parts] for number in range(len(poses))]
-    return [
-        Derivatives(poses.pose(number), pressure, wrench, plate if has_plate else None)
-        for number, (pressure, wrench, plate) in enumerate(each)
-    ]
+    by_pressure, by_wrench, by_plate = (rates.part(0, part) for part in parts)
+    return Derivatives(poses.pose(), by_pressure, by_wrench, by_plate if has_plate else None)
 
 
 # Freedoms and pressures together.
@@ -290,7 +290,7 @@ def together(
     is_found, is_stable = np.zeros((2, len(begin)), dtype=bool)
     for _ in range(steps if len(live) else 0):
         known = None if np.isnan(run.forces).any() else run.forces
-        now = linearised(column, load, pressure_at(run.x), run.at, forces=known)
+        now = linearised(column, load, pressure_at(run.x), run.at, known)
         try:
             move, dx, deeper = _step(run, now, lambda *parts, live=live: ahead(live, *parts))
         except np.linalg.LinAlgError:

@@ -6,8 +6,8 @@ equilibrium, and the pressures' change is the least, within their limits, that b
 tip to the place (Nocedal and Wright, Numerical Optimization, Sec. 18.1). Outer plates are stiffened
 gradually: on soft ones the top's load shifts from point to point as it rolls, so rates hardly jump.
 Where these steps do not converge, Levenberg and Marquardt's method goes from equilibrium to
-equilibrium by the tip's derivatives. Pressures are counted in asinh(p / P0), in which heights are
-nearly linear. Arrays have one row per place.
+equilibrium by the tip's derivatives. Pressures are counted in coordinates in which heights are nearly
+linear (``place_of``). Arrays have one row per place.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from sbafab.models.derivatives import (
 )
 from sbafab.models.film_elements import Array
 from sbafab.models.stack_balance import bounded_solutions
-from sbafab.models.stack_loads import Load, OuterPlate, crossing
+from sbafab.models.stack_loads import Load, OuterPlate
 
 NEAR, MET = 1e-4, 1e-3
 """Distances in mm from the place at which a search ends, and at which the tip has reached it."""
@@ -40,7 +40,7 @@ SOFT, ROUGH, SOFT_STEPS = (3e2, 3e3, 3e4), 0.3, 4
 """Stiffness in mN/mm of an outer plate in the first solutions, their last step (mm, rad, asinh) and
 their most steps, converged or not."""
 LONGEST_STEP = 1.5
-"""Largest change of asinh(p / P0) in one step."""
+"""Largest change of a coordinate in one step."""
 POSES = 40
 """Maximum number of equilibria from one start."""
 DAMPING = 1e-3
@@ -70,8 +70,8 @@ def reached(
 
 
 class Search:
-    """The ``best`` poses of a column under a load for places (n, 3), with asinh(p / P0) up to
-    ``most``; how far ``away`` (n) their tips are in mm, and where the search is over.
+    """The ``best`` poses of a column under a load for places (n, 3), with coordinates of pressures
+    up to ``most``; how far ``away`` (n) their tips are in mm, and where the search is over.
     """
 
     def __init__(self, column: Column, load: Load | None, places: Array, most: float) -> None:
@@ -120,8 +120,8 @@ class Search:
     def _newton(
         self, rest: NDArray[np.int_], x: Array, at: Array, soft: tuple[float, ...] = ()
     ) -> None:
-        """Search from asinh(p / P0) (n, chambers) and freedoms (n, levels, 3), first against
-        ``soft`` plates.
+        """Search from pressures' coordinates (n, chambers) and freedoms (n, levels, 3), first
+        against ``soft`` plates.
         """
         if not rest.size:
             return
@@ -145,12 +145,11 @@ class Search:
         self._take(rest, found)
 
     def _ahead(self, places: Array, now: Linearised, x: Array, moves: Array) -> Array:
-        """Return the steps of asinh(p / P0) (n, chambers), as of ``together``."""
-        tip, motions = now.top()
-        tops, wall = motions.swapaxes(1, 2) @ moves, self.wall
-        motion = tops[:, 3:] - crossing(tip).swapaxes(1, 2) @ tops[:, :3]
-        rates, away = motion[..., 1:], places - tip
-        missing, share = away - motion[..., 0], np.full(len(tip), LEAST_DAMPING)
+        """Return the steps of coordinates (n, chambers), as of ``together``."""
+        (tip, motion), wall = now.tip_motion(), self.wall
+        moved = motion[:, :3] @ moves
+        rates, away = moved[..., 1:], places - tip
+        missing, share = away - moved[..., 0], np.full(len(tip), LEAST_DAMPING)
         if wall is not None:
             missing = movable(wall, missing)
             # Friction may prevent pressures from moving it further, and they would stray.
@@ -163,7 +162,7 @@ class Search:
 
     def _bounded(self, rates: Array, missing: Array, damping: Array, x: Array) -> Array:
         """Return the steps (n, chambers) with least |rates @ step - missing|^2 + damping |step|^2,
-        of rates (n, 3, chambers), that stay within the range of asinh(p / P0).
+        of rates (n, 3, chambers), that stay within the range.
         """
         turned = rates.swapaxes(1, 2)
         matrix = turned @ rates + damping[:, None, None] * np.eye(rates.shape[-1])
@@ -173,7 +172,7 @@ class Search:
     # From equilibrium to equilibrium.
 
     def _descend(self, x: Array, near: Array | None) -> None:
-        """Descend by Levenberg and Marquardt's method from the equilibria at asinh(p / P0) (n,
+        """Descend by Levenberg and Marquardt's method from the equilibria at coordinates (n,
         chambers), found from freedoms (n, levels, 3) if given.
         """
         rest = self.rest
@@ -191,8 +190,7 @@ class Search:
                 moves = at.energy.solved(at.filling)
             except (DesignError, np.linalg.LinAlgError):
                 break
-            rates = (at.tip_motion().swapaxes(1, 2) @ moves)[:, :3]
-            rates = rates * pressure_rate(x)[:, None]
+            rates = at.tip_motion()[1][:, :3] @ moves * pressure_rate(x)[:, None]
             missing = self.places[rest] - now.tips
             scale = (rates * rates).sum(1).max(1) + 1e-12
             ahead = self._bounded(rates, missing, damping * scale, x)
@@ -247,7 +245,7 @@ class Search:
     # Starts.
 
     def _guess(self) -> Array:
-        """Return asinh(p / P0) (n, chambers) of chambers as long as on arcs from the base to the
+        """Return coordinates (n, chambers) of chambers as long as on arcs from the base to the
         places: constant curvature (Webster and Jones 2010).
         """
         bend, length, ways = _arcs(self.places)

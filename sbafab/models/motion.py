@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sbafab.errors import DesignError
-from sbafab.models.column import CHUNK, LOADED_CHUNK, BatchPoses, Column, Pose
+from sbafab.models.column import CHUNK, LOADED_CHUNK, BatchPoses, Column, Pose, numbers_of
 from sbafab.models.derivatives import (
     Linearised,
     linearised_poses,
@@ -153,7 +153,7 @@ class Intake(NamedTuple):
         for _ in range(TRIALS):
             wrong, _ = self.excess(now.volumes, now.pressures)
             lacks = (x >= ends[1]) & (wrong < 0)
-            rests = (np.abs(wrong) <= close) | (x <= ends[0]) & (wrong >= 0) | lacks
+            rests: Any = (np.abs(wrong) <= close) | (x <= ends[0]) & (wrong >= 0) | lacks
             if rests.all() and lacks.any():
                 raise DesignError(f"the chambers would need more than {top:g} kPa; ask for less")
             if rests.all():
@@ -215,9 +215,10 @@ class Motion:
         _refuse_time(dt)
         if (pressures is None) == (flows is None):
             raise DesignError("a step takes either pressures or flows, one a chamber")
-        values = np.asarray(pressures if flows is None else flows, dtype=float)
-        if values.shape != (self.stack.chambers,) or not np.isfinite(values).all():
-            raise DesignError(f"a step takes {self.stack.chambers} finite numbers, one a chamber")
+        count, given = self.stack.chambers, flows if pressures is None else pressures
+        assert given is not None
+        sentence = f"a step takes {count} finite numbers, one a chamber"
+        values = numbers_of(given, (count,), sentence)
         acts = np.array([[max(0.0, min(dt, self.time + dt - self.line.delay))]])
         begin = self.stack.states_of(self.pose, self.stack.acting(self.load))
         asked = (values[None], 0.0) if flows is None else (None, values)

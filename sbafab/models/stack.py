@@ -100,8 +100,7 @@ class Stack(Column):
 
         Raises DesignError as ``pose`` does, and for a pose that is about to buckle.
         """
-        (found,) = derivatives(self.states_of(self.pose(pressures, **load), self.acting(load)))
-        return found
+        return derivatives(self.states_of(self.pose(pressures, **load), self.acting(load)))
 
     def stiffness(self, pressures: Sequence[float], **load: Any) -> Array:
         """Return the stiffness (6, 6) of the tip in N/mm, N and N mm, as of ``derivatives``."""

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sbafab.models.balloon_map import DEGREE, BalloonMap, horner
+from sbafab.models.balloon_map import BalloonMap, horner
 from sbafab.models.film_elements import Array
 
 SMALL = 1e-8
@@ -206,25 +206,6 @@ class Springs(NamedTuple):
     stride: int
     step: int
     places: GapPlaces
-
-    @classmethod
-    def pressed(
-        cls,
-        maps: Sequence[BalloonMap],
-        pressures: Array,
-        places: GapPlaces,
-        sucked: bool = False,
-        orders: int = 2,
-    ) -> Springs:
-        """Return the springs of maps at pressures (n, chambers), below 0 only where ``sucked``;
-        rates of volumes by pressure need three ``orders``.
-        """
-        parts = [kind.splines(pressures, orders, sucked)[:, :, None] for kind in maps]
-        table = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2)
-        states = np.arange(0, pressures.size, pressures.shape[1])[:, None, None]
-        begins = states + (orders * pressures.size * places.kinds + places.chambers)
-        stride = len(maps) * orders * pressures.size
-        return cls(table.reshape(DEGREE + 1, -1), begins, stride, pressures.size, places)
 
     def at(self, where: Any) -> Springs:
         """Return the springs of some of the states."""
