@@ -6,8 +6,8 @@ equilibrium, and the pressures' change is the least, within their limits, that b
 tip to the place (Nocedal and Wright, Numerical Optimization, Sec. 18.1). Outer plates are stiffened
 gradually: on soft ones the top's load shifts from point to point as it rolls, so rates hardly jump.
 Where these steps do not converge, Levenberg and Marquardt's method goes from equilibrium to
-equilibrium by the tip's derivatives. Pressures are counted in coordinates in which heights are nearly
-linear (``place_of``). Arrays have one row per place.
+equilibrium by the tip's derivatives. Pressures are counted in coordinates in which heights are
+nearly linear (``place_of``). Arrays have one row per place.
 """
 
 from __future__ import annotations
