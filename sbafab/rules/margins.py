@@ -29,7 +29,7 @@ from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Interface, Laminate, Pin
 from sbafab.rules.boundary import END_ROOM, STEEP, Facing, Reach
 from sbafab.rules.limits import TOLERANCE, holds
-from sbafab.rules.placement_errors import Freedom, Freedoms, Part, seam_part
+from sbafab.rules.placement_errors import Freedom, Freedoms, Part, seam_part, unshared
 from sbafab.rules.seam_overlaps import Overlap
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def group_interfaces(laminate: Laminate, facing: Iterable[Facing], moves: Freedo
         names: dict[int, int] = {}
         signature = tuple(
             tuple([(names.setdefault(id(way), len(names)), way.like()) for way in ways])
-            for ways in moves.unshared(seated(interface))
+            for ways in unshared(moves, seated(interface))
         )
         key = interface.pattern, interface.unbonded, signature
         groups.setdefault(key, []).append(interface)
@@ -162,7 +162,7 @@ def most_loss(interface: Interface, design: Design, moves: Freedoms) -> float:
 
     A place that is wider than the narrowest by more than this is never the worst.
     """
-    loose = {id(way): way for ways in moves.unshared(seated(interface)) for way in ways}.values()
+    loose = {id(way): way for ways in unshared(moves, seated(interface)) for way in ways}.values()
     box = interface.contact.bounds
     together = sum([freedom.most * _farthest(freedom, box) for freedom in loose], 0.0)
     return 2 * design.registration.cutting_error + together

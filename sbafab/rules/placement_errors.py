@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
-from itertools import combinations, pairwise
+from itertools import chain, combinations, count, pairwise, repeat, takewhile
 from typing import NamedTuple
 
 from sbafab.design.records import Design
@@ -67,25 +67,16 @@ class Freedom(NamedTuple):
 Ways = tuple[Freedom, ...]
 
 
-class Freedoms(dict[Part, Ways]):
-    """Freedoms of each piece of each layer; pieces that share a freedom share the object."""
+Freedoms = Mapping[Part, Ways]
+"""Freedoms of each piece of each layer; pieces that share a freedom share the object."""
 
-    def __init__(self, by_part: Mapping[Part, Ways]) -> None:
-        super().__init__(by_part)
-        self._of_layer: dict[int, list[Ways]] = {}
-        for part, ways in by_part.items():
-            self._of_layer.setdefault(part.layer, []).append(ways)
-        self._unshared: dict[tuple[int, ...], list[Ways]] = {}
 
-    def unshared(self, layers: tuple[int, ...]) -> list[Ways]:
-        """Freedoms of each piece of these layers, in order, without those shared by all pieces."""
-        if layers not in self._unshared:
-            every = [ways for layer in layers for ways in self._of_layer[layer]]
-            shared = set.intersection(*(set(map(id, ways)) for ways in every))
-            self._unshared[layers] = [
-                tuple([way for way in ways if id(way) not in shared]) for ways in every
-            ]
-        return self._unshared[layers]
+def unshared(moves: Freedoms, layers: Iterable[int]) -> list[Ways]:
+    """Freedoms of each piece of these layers, in order, without those shared by all pieces."""
+    parts = (takewhile(moves.__contains__, map(Part, repeat(layer), count())) for layer in layers)
+    every = [moves[part] for part in chain.from_iterable(parts)]
+    shared = set.intersection(*(set(map(id, ways)) for ways in every))
+    return [tuple([way for way in ways if id(way) not in shared]) for ways in every]
 
 
 class Laid(NamedTuple):
@@ -144,7 +135,7 @@ def freedoms(laminate: Laminate, design: Design, laid: Sequence[Laid]) -> Freedo
             by_part[part] += ways
     for seam in laminate.seams:
         by_part |= _of_seam(laminate, seam, by_part, design)
-    return Freedoms(by_part)
+    return by_part
 
 
 def seam_part(seam: Seam, piece: int = 0) -> Part:

@@ -162,13 +162,12 @@ def _finding(
 
 def _plate(failed: bool, laminate: Laminate, design: Design) -> Clause:
     """Return the command for a plate that a workshop can make, if several pins hold layers."""
-    sentence = "no-plate"
-    if design.plate_machine is None or len(laminate.pins) < 2:
-        sentence = "no-plate"
-    elif design.plate_machine == "cnc-mill":
-        sentence = "how-much" if failed else "no-plate"
-    else:
-        sentence = "jig-borer" if design.plate_machine == "jig-borer" else "mill"
+    machine = design.plate_machine if len(laminate.pins) > 1 else None
+    sentence = {
+        None: "no-plate",
+        "cnc-mill": "how-much" if failed else "no-plate",
+        "jig-borer": "jig-borer",
+    }.get(machine, "mill")
     command = f"`{for_a_cnc_mill('DESIGN')}`"
     return say(f"{NAME}.{sentence}", command=command, pin_error=design.pin_error)
 

@@ -21,7 +21,7 @@ from sbafab.rules.finding import Finding, Place, Verdict, judged
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.margins import Margins, seated
 from sbafab.rules.measures import Measures
-from sbafab.rules.placement_errors import Freedom, Freedoms
+from sbafab.rules.placement_errors import Freedom, Freedoms, unshared
 from sbafab.rules.rule import Rule
 from sbafab.rules.sentences import Clause, explained, say
 
@@ -296,7 +296,7 @@ def _renamed(
     from_layers, to_layers = seated(first), seated(target)
     layers = dict(zip(from_layers, to_layers, strict=True))
     twins: dict[int, Freedom] = {}
-    pairs = zip(moves.unshared(from_layers), moves.unshared(to_layers), strict=True)
+    pairs = zip(unshared(moves, from_layers), unshared(moves, to_layers), strict=True)
     for ours, theirs in pairs:
         twins.update(zip(map(id, ours), theirs, strict=True))
     return [

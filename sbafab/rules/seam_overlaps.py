@@ -21,7 +21,7 @@ from sbafab.laminate.folding import lies_on
 from sbafab.laminate.joints import Seam, SeamTool
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.boundary import edges_along, middle
-from sbafab.rules.voids import OUTSIDE, Cavity, VoidGraph, cavities, void_graph
+from sbafab.rules.voids import OUTSIDE, cavities, void_graph
 
 NEAR: Final = 1e-5
 """mm within which a void touches the corner of an overlap."""
@@ -70,24 +70,8 @@ def seam_ends(
         return [SeamEnds() for _ in interfaces]
     graph = void_graph(laminate)
     every = cavities(laminate, graph)
-    rows = [_Seams(gap, _Voids.of(gap, graph, every), error) for gap in interfaces]
-    return [
-        SeamEnds() if row.gap.pressed else SeamEnds(list(row.overlaps()), list(row.edge_bonds()))
-        for row in rows
-    ]
-
-
-class _Voids(NamedTuple):
-    """Cavities of an interface by name, and the outer edges of its contact, except folds.
-
-    Cavities open to the outside share one name, unless they are at an inlet.
-    """
-
-    cavities: Sequence[tuple[object, Region]]
-    rim: Sequence[Edge]
-
-    @staticmethod
-    def of(gap: Interface, graph: VoidGraph, every: Sequence[Cavity]) -> _Voids:
+    ends = []
+    for gap in interfaces:
         named: list[tuple[object, Region]] = []
         for number, cavity in enumerate(every):
             if cavity.interface == gap.index:
@@ -95,25 +79,24 @@ class _Voids(NamedTuple):
                 is_inlet = any(void.kind == "mouth" for void in beside)
                 name = OUTSIDE if OUTSIDE in beside and not is_inlet else number
                 named.append((name, cavity.region))
-        outer = [edge for contour in gap.contact.outers for edge in contour.edges]
-        return _Voids(named, [edge for edge in outer if not lies_on(edge, gap.fold_lines)])
-
-    def are_parted_by(self, overlap: Region, near: float) -> bool:
-        """Return True if an overlap touches two voids and one of them is the outside."""
-        names: set[object] = set()
-        for p in {edge.start for edge in overlap.edges}:
-            here = {name for name, void in self.cavities if void.distance_to_edge(p) <= near}
-            names |= here or (
-                {OUTSIDE} if any(distance_to(edge, p) <= NEAR for edge in self.rim) else set()
-            )
-        return len(names) > 1
+        outer = (edge for contour in gap.contact.outers for edge in contour.edges)
+        rim = [edge for edge in outer if not lies_on(edge, gap.fold_lines)]
+        seams = _Seams(gap, named, rim, error)
+        rows = () if gap.pressed else (list(seams.overlaps()), list(seams.edge_bonds()))
+        ends.append(SeamEnds(*rows))
+    return ends
 
 
 class _Seams(NamedTuple):
-    """The seams of an interface that is bonded by them alone, and the voids between them."""
+    """The seams of an interface that is bonded by them alone, and the voids between them.
+
+    ``cavities`` by name: those open to the outside share one, unless they are at an inlet; ``rim``:
+    the outer edges of the contact, except folds.
+    """
 
     gap: Interface
-    voids: _Voids
+    cavities: Sequence[tuple[object, Region]]
+    rim: Sequence[Edge]
     error: ToolError
 
     def overlaps(self) -> Iterator[Overlap]:
@@ -169,7 +152,13 @@ class _Seams(NamedTuple):
             if not (seam.region & overlap).is_empty:
                 near = max(near, off + self.error(seam.tool))
                 overlap -= shrink(seam.region, off + self.error(seam.tool))
-        return self.voids.are_parted_by(overlap, near)
+        # It touches two voids, and one of them is the outside.
+        names: set[object] = set()
+        for p in {edge.start for edge in overlap.edges}:
+            here = {name for name, void in self.cavities if void.distance_to_edge(p) <= near}
+            is_on_rim = not here and any(distance_to(edge, p) <= NEAR for edge in self.rim)
+            names |= {OUTSIDE} if is_on_rim else here
+        return len(names) > 1
 
 
 def _depth(seam: Seam, body: Region, piece: Region, reach: float) -> tuple[float, Point]:
