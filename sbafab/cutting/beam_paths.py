@@ -11,12 +11,18 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import accumulate
 from typing import NamedTuple, Protocol
 
-from sbafab.cutting.cut_settings import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE, LeadIns
-from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.cut_settings import ENGRAVE, LeadIns
+from sbafab.cutting.dxf_write import (
+    LaserRun,
+    Surroundings,
+    contour_runs,
+    layer_of,
+    stroke_run,
+)
 from sbafab.cutting.placements import edge_distance
 from sbafab.cutting.verify import TOLERANCE
 from sbafab.errors import DesignError
@@ -40,44 +46,8 @@ TINY = 1e-7
 """mm; no edge is cut so short."""
 
 
-class LaserRun(NamedTuple):
-    """Edges one after the other on a layer, whether they close, and whether they are a circle."""
-
-    layer: str
-    edges: tuple[Edge, ...]
-    closed: bool
-    circle: tuple[Point, float] | None = None
-
-
 KeepOff = tuple[float, float, float]
 """x, y and diameter of a pin that holds the sheet down."""
-
-
-def drawn(cuts: Iterable[LaserRun], sheet: Surroundings) -> Iterator[LaserRun]:
-    """Yield the content of a sheet in cutting order; the frame, which is not cut, comes last."""
-    for run in sheet.engraved:
-        yield stroke_run(ENGRAVE, run)
-    yield from cuts
-    for run in sheet.parting:
-        yield stroke_run(CUT_SHEET, run)
-    for run in sheet.frames:
-        yield stroke_run(REFERENCE, run)
-
-
-def stroke_run(layer: str, run: Sequence[Point]) -> LaserRun:
-    """Return a run of straight lines; one that ends where it began is closed."""
-    edges = tuple(map(Line, run[:-1], run[1:]))
-    return LaserRun(layer, edges, run[0] == run[-1])
-
-
-def contour_runs(contours: Iterable[Contour]) -> Iterator[LaserRun]:
-    """Yield contours as they are, on the layer of holes or of outlines."""
-    for contour in contours:
-        yield LaserRun(_layer(contour), contour.edges, True, contour.circle)
-
-
-def _layer(contour: Contour) -> str:
-    return CUT_INNER if contour.is_hole else CUT_OUTER
 
 
 def beam_runs(
@@ -119,7 +89,7 @@ def _contour_runs(
     for first, last in zip(stops[::2], stops[1::2], strict=True):
         edges = lap.stretch(first, last)
         yield LaserRun(
-            _layer(contour), (*([lead] if lead and first == start else []), *edges), False
+            layer_of(contour), (*([lead] if lead and first == start else []), *edges), False
         )
 
 

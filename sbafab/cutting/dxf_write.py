@@ -48,6 +48,42 @@ class Surroundings(NamedTuple):
         return (((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)),)
 
 
+class LaserRun(NamedTuple):
+    """Edges one after the other on a layer, whether they close, and whether they are a circle."""
+
+    layer: str
+    edges: tuple[Edge, ...]
+    closed: bool
+    circle: tuple[Point, float] | None = None
+
+
+def drawn(cuts: Iterable[LaserRun], sheet: Surroundings) -> Iterator[LaserRun]:
+    """Yield the content of a sheet in cutting order; the frame, which is not cut, comes last."""
+    for run in sheet.engraved:
+        yield stroke_run(ENGRAVE, run)
+    yield from cuts
+    for run in sheet.parting:
+        yield stroke_run(CUT_SHEET, run)
+    for run in sheet.frames:
+        yield stroke_run(REFERENCE, run)
+
+
+def stroke_run(layer: str, run: Sequence[Point]) -> LaserRun:
+    """Return a run of straight lines; one that ends where it began is closed."""
+    edges = tuple(map(Line, run[:-1], run[1:]))
+    return LaserRun(layer, edges, run[0] == run[-1])
+
+
+def contour_runs(contours: Iterable[Contour]) -> Iterator[LaserRun]:
+    """Yield contours as they are, on the layer of holes or of outlines."""
+    for contour in contours:
+        yield LaserRun(layer_of(contour), contour.edges, True, contour.circle)
+
+
+def layer_of(contour: Contour) -> str:
+    return CUT_INNER if contour.is_hole else CUT_OUTER
+
+
 _Entity = tuple[str, str, str, str]
 """One DXF entity: its type, layer, subclass marker and group codes."""
 
@@ -66,17 +102,16 @@ def dxf_text(
     has a cross at the origin on REFERENCE, after all cuts, and on the same layer the strokes of its
     ``notes``; a ``sheet`` has its engraving, parting cut and frame instead.
     """
-    cuts = _cuts(contours, profile)
+    cuts = contour_runs(contours)
     if sheet is None:
-        entities = [*cuts, *_datum_cross(), *(_stroke(REFERENCE, run) for run in notes)]
+        entities = [
+            *_entities(cuts, profile),
+            *_datum_cross(),
+            *_entities((stroke_run(REFERENCE, run) for run in notes), profile),
+        ]
         low, high = (-DATUM_ARM, -DATUM_ARM), (DATUM_ARM, DATUM_ARM)
     else:
-        entities = [
-            *(_stroke(ENGRAVE, run) for run in sheet.engraved),
-            *cuts,
-            *(_stroke(CUT_SHEET, run) for run in sheet.parting),
-            *(_stroke(REFERENCE, run) for run in sheet.frames),
-        ]
+        entities = list(_entities(drawn(cuts, sheet), profile))
         low, high = (0.0, 0.0), sheet.frame or (0.0, 0.0)
     return document_text(
         entities, [*(contour.bounds for contour in contours), (*low, *high)], properties
@@ -85,17 +120,14 @@ def dxf_text(
 
 def seam_text(path: Sequence[Sequence[Edge]], properties: Mapping[str, str]) -> str:
     """A DXF document of the path of a seam: its chains on SEAM, open or closed, in order."""
-    runs = [[part for edge in chain for part in _quarters(edge)] for chain in path]
-    entities = [*map(_seam_run, runs), *_datum_cross()]
+    runs = [
+        LaserRun(SEAM, tuple(chain), math.dist(chain[0].start, chain[-1].end) < EPSILON)
+        for chain in path
+    ]
     arm = (-DATUM_ARM, -DATUM_ARM, DATUM_ARM, DATUM_ARM)
-    boxes = [edge.bounds for run in runs for edge in run]
+    boxes = [part.bounds for run in runs for edge in run.edges for part in _quarters(edge)]
+    entities = [*_entities(runs), *_datum_cross()]
     return document_text(entities, [*boxes, arm], properties, has_seam=True)
-
-
-def _seam_run(edges: Sequence[Edge]) -> _Entity:
-    vertices = [(*edge.start, edge.bulge) for edge in edges]
-    closed = math.dist(edges[0].start, edges[-1].end) < EPSILON
-    return _polyline(SEAM, vertices if closed else [*vertices, (*edges[-1].end, 0.0)], closed)
 
 
 def document_text(
@@ -136,20 +168,17 @@ def _with_seam_layer(text: str, handle: int) -> str:
     return text[: engraving.end()] + record + text[engraving.end() :]
 
 
-def _cuts(contours: Iterable[Contour], profile: DxfProfile) -> Iterator[_Entity]:
-    for contour in contours:
-        layer = CUT_INNER if contour.is_hole else CUT_OUTER
-        if contour.circle is not None:
-            centre, radius = contour.circle
-            yield "CIRCLE", layer, "AcDbCircle", _round(centre, radius)
+def _entities(runs: Iterable[LaserRun], profile: DxfProfile = "bulges") -> Iterator[_Entity]:
+    for run in runs:
+        edges = [part for edge in run.edges for part in _quarters(edge)]
+        if run.circle is not None:
+            yield "CIRCLE", run.layer, "AcDbCircle", _round(*run.circle)
+        elif profile == "chords" and any(isinstance(edge, Arc) for edge in edges):
+            raise ValueError("an arc remains; convert the contours to chords first")
+        elif profile == "arcs" and run.layer in (CUT_INNER, CUT_OUTER):
+            yield from (_edge_entity(run.layer, edge) for edge in edges)
         else:
-            edges = [part for edge in contour.edges for part in _quarters(edge)]
-            if profile == "chords" and any(isinstance(edge, Arc) for edge in edges):
-                raise ValueError("an arc remains; convert the contours to chords first")
-            if profile == "arcs":
-                yield from (_edge_entity(layer, edge) for edge in edges)
-            else:
-                yield _polyline(layer, [(*edge.start, edge.bulge) for edge in edges])
+            yield _polyline(run.layer, edges, run.closed)
 
 
 def _quarters(edge: Edge) -> Sequence[Edge]:
@@ -159,16 +188,10 @@ def _quarters(edge: Edge) -> Sequence[Edge]:
     return quarter_arcs(edge.start, edge.end, edge.centre, edge.radius, edge.sweep)
 
 
-def _stroke(layer: str, run: Sequence[Point]) -> _Entity:
-    """A run of straight lines; one that ends where it began is closed."""
-    closed = run[0] == run[-1]
-    points = run[:-1] if closed else run
-    return _polyline(layer, [(x, y, 0.0) for x, y in points], closed)
-
-
-def _polyline(
-    layer: str, vertices: Sequence[tuple[float, float, float]], closed: bool = True
-) -> _Entity:
+def _polyline(layer: str, edges: Sequence[Edge], closed: bool) -> _Entity:
+    vertices = [(*edge.start, edge.bulge) for edge in edges]
+    if not closed:
+        vertices.append((*edges[-1].end, 0.0))
     rows = [f" 90\n{len(vertices)}\n 70\n{int(closed)}\n"]
     for x, y, bulge in vertices:
         rows.append(f" 10\n{number(x)}\n 20\n{number(y)}\n")

@@ -22,7 +22,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from sbafab.cutting.beam_paths import BeamCurve, BeamRun, LaserRun, run_difference
+from sbafab.cutting.beam_paths import BeamCurve, BeamRun, run_difference
 from sbafab.cutting.cut_settings import (
     COLOURS,
     CUT_INNER,
@@ -34,7 +34,7 @@ from sbafab.cutting.cut_settings import (
     Recipes,
 )
 from sbafab.cutting.dxf_read import drawn_entity
-from sbafab.cutting.dxf_write import number
+from sbafab.cutting.dxf_write import LaserRun, number
 from sbafab.cutting.verify import TOLERANCE
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import circle

@@ -11,9 +11,9 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from sbafab.cutting.beam_paths import beam_runs, contour_runs, drawn
+from sbafab.cutting.beam_paths import beam_runs
 from sbafab.cutting.cut_settings import PLAIN, CutSettings, file_properties, kerf_suffix
-from sbafab.cutting.dxf_write import Surroundings, dxf_text
+from sbafab.cutting.dxf_write import Surroundings, contour_runs, drawn, dxf_text
 from sbafab.cutting.laser_programs import (
     PROGRAMS,
     LaserSheet,

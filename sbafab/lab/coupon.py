@@ -23,9 +23,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.cutting.beam_paths import contour_runs, drawn
 from sbafab.cutting.cut_settings import kerf_properties
-from sbafab.cutting.dxf_write import Surroundings, dxf_text
+from sbafab.cutting.dxf_write import Surroundings, contour_runs, drawn, dxf_text
 from sbafab.cutting.laser_programs import svg_text
 from sbafab.cutting.lettering import Stroke, strokes
 from sbafab.cutting.sequence import cutting_sequence

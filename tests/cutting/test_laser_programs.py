@@ -14,9 +14,9 @@ import pytest
 import shapely
 import svgelements
 
-from sbafab.cutting.beam_paths import beam_runs, contour_runs, drawn
+from sbafab.cutting.beam_paths import beam_runs
 from sbafab.cutting.cut_settings import PLAIN, LeadIns
-from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.dxf_write import Surroundings, contour_runs, drawn
 from sbafab.cutting.laser_programs import (
     PROGRAMS,
     LaserSheet,

@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 import pytest
 import shapely
 
-from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
+from sbafab.cutting.beam_paths import beam_runs
 from sbafab.cutting.cut_settings import CUT_INNER, CUT_OUTER, ENGRAVE, PTFE_WARNING, LeadIns
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.dxf_write import LaserRun, Surroundings, drawn
 from sbafab.cutting.laser_programs import LaserSheet, laser_text
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.design.films import Recipe

@@ -20,10 +20,10 @@ from ezdxf.addons.drawing import Frontend, RenderContext, layout, svg
 from PIL import Image
 from pyogrio import raw
 
-from sbafab.cutting.beam_paths import beam_runs, drawn
+from sbafab.cutting.beam_paths import beam_runs
 from sbafab.cutting.cut_settings import PLAIN
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.dxf_write import Surroundings, drawn
 from sbafab.cutting.laser_programs import LaserSheet, laser_text
 from sbafab.cutting.sequence import cutting_sequence
 from tests.interop.made import BORDER, EXACT, LENGTH, PROFILES, WIDTH, Sheet, outline_bounds
