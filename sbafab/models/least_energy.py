@@ -269,8 +269,12 @@ def packing(
 def dense(band: Array) -> Array:
     """Return the full matrices: (rows, n, n)."""
     size, width, rows = band.shape
-    whole = np.zeros((rows, size, size))
-    for k in range(width):
-        i = np.arange(size - k)
-        whole[:, i, i + k] = whole[:, i + k, i] = band[: size - k, k].T
-    return whole
+    # Room beyond the end, where the band is 0.
+    whole = np.zeros((rows, size + width - 1, size + width - 1))
+    for half in (whole, whole.swapaxes(1, 2)):
+        row, step, across = half.strides
+        diagonals = np.lib.stride_tricks.as_strided(
+            half, (rows, size, width), (row, step + across, across)
+        )
+        diagonals[:] = band.transpose(2, 0, 1)
+    return whole[:, :size, :size]
