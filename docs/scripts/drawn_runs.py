@@ -209,7 +209,9 @@ def furthest_row(name: str, history: Result | None, folder: Path) -> list[str]:
         flying += f", as {SLOW[name]}" if name in SLOW else ""
         return [name, f"{pressure:g}", "", "", "", "", "", flying]
     last = settled[-1]
-    _, reached, _, _, *figures = row_of(name, replace(history, states=history.states[: last + 1]))
+    _, reached, _, _, *figures = row_of(
+        name, history.model_copy(update={"states": history.states[: last + 1]})
+    )
     ended = "reached"
     if history.stopped is not None:
         ended = "no convergence" if DIVERGED in history.stopped else f"{minutes:g} minutes"

@@ -24,7 +24,7 @@ from docs.scripts.tables import Table
 from sbafab.runtime import ignore_progress
 from sbafab.simulators.shell_model import Shell, round_stack
 from sbafab.simulators.simulator import Result, SimulationRequest
-from sbafab.simulators.sofa import scenes as scene_files
+from sbafab.simulators.sofa import run as scene_files
 from sbafab.simulators.sofa.run import run
 
 COMMAND = "python -m docs.scripts.sofa_runs"

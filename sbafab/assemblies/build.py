@@ -30,8 +30,8 @@ from sbafab.design.sections import rule_names
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.edges import unit
 from sbafab.laminate.laminate import Inlet, Laminate
+from sbafab.meshing.solid import bent_point
 from sbafab.meshing.surface import Vector
-from sbafab.meshing.wrap import bent_point
 
 Rows = tuple[Vector, Vector, Vector]
 

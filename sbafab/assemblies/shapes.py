@@ -11,9 +11,8 @@ from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.records import AnyPart, Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.solid import Slab, closed_surface, solid_slabs
+from sbafab.meshing.solid import Slab, TubeWrap, closed_surface, solid_slabs, wrapped
 from sbafab.meshing.surface import Surface
-from sbafab.meshing.wrap import TubeWrap, wrapped
 
 SAGITTA = 0.02
 """mm: an assembly is seen whole, so its arcs are coarser than a single solid's."""

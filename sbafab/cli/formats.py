@@ -131,7 +131,7 @@ FORMATS: Mapping[str, Format] = {
     "report": Format("lab.report:ReportDocument", "what `record --report --json` prints"),
     "sweep": Format("search.sweep:SweepDocument", "what `sweep --json` prints"),
     "simulate": Format(
-        "simulators.simulator:SimulateDocument",
+        "simulators.simulator:Result",
         "`result.json` of a simulator's folder, and what `simulate --json` prints",
     ),
     "assembly-predict": Format(

@@ -42,7 +42,7 @@ from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json
 from sbafab.runtime import Progress
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 from sbafab.simulators.simulator import (
-    SimulateDocument,
+    Result,
     SimulationRequest,
     simulator,
     under_vacuum,
@@ -430,7 +430,7 @@ _OWN: tuple[Artefact, ...] = (
             name,
             f"from `sbafab simulate --with {name}`: what it reads; `result.json` what it found",
             partial(_write_simulation, name),
-            SimulateDocument.SCHEMA,
+            Result.SCHEMA,
         )
         for name in SIMULATORS
     ),

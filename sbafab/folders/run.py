@@ -38,8 +38,8 @@ from sbafab.rules.finding import Finding, Findings
 from sbafab.runtime import Progress, ignore_progress
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 from sbafab.simulators.simulator import (
+    UNITS,
     Result,
-    SimulateDocument,
     SimulationRequest,
     refuse_unused,
     simulator,
@@ -233,19 +233,6 @@ def _extras(
 # A simulator run on a design, its results in the design's folder.
 
 
-UNITS = {
-    "length": "mm",
-    "pressure": "kPa",
-    "volume": "ul",
-    "stress": "MPa",
-    "work": "uJ",
-    "angle": "degrees",
-    "time": "s",
-    "rate": "steps/s",
-}
-"""Units of the values in ``result.json``."""
-
-
 @dataclass(frozen=True)
 class Simulated:
     """The outcome of a simulation; no result and no folder where a rule ``failed`` before.
@@ -267,7 +254,8 @@ class Simulated:
 
 def result_json(result: Result | None) -> dict[str, Any]:
     """Return the contents of ``result.json``, only its head if nothing has run."""
-    return SimulateDocument.of(None, units=UNITS, **({} if result is None else result.as_dict()))
+    document = Result(units=UNITS) if result is None else result
+    return {"schema": Result.SCHEMA, **document.model_dump(mode="json", exclude_unset=True)}
 
 
 def simulate(

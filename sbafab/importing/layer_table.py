@@ -29,10 +29,11 @@ from sbafab.importing.records import (
     Imported,
     json_of,
     key_name,
-    loaded,
+    layer_index,
     read_text,
+    read_yaml,
+    refuse_without_table,
     region_of,
-    yaml_of,
 )
 from sbafab.laminate.laminate import Role
 from sbafab.spreadsheet import table_rows
@@ -189,26 +190,17 @@ def polygon_layer(path: Path, layer: str) -> Region:
     Raises DesignError with the file, the layer and the unreadable geometry.
     """
     layers = _geometries(path, read_text(path, MOST_OF_POLYGONS))
-    if not layer.isdecimal() or not 1 <= int(layer) <= len(layers):
-        raise DesignError(
-            f"{path} has no layer {shown(layer)}; its layers are 1 to {len(layers)}, bottom to top"
-        )
-    geoms = layers[int(layer) - 1]
-    parts = [part for i, geom in enumerate(geoms, 1) for part in _parts(path, layer, i, geom)]
-    region = union(parts)
+    geoms = layers[layer_index(path, layer, len(layers))]
+    region = union(p for i, geom in enumerate(geoms, 1) for p in _parts(path, layer, i, geom))
     if region.is_empty:
         raise DesignError(f"{path}, layer {layer} holds no polygon; leave its row out")
     return region
 
 
-def refuse_without_table(path: Path) -> NoReturn:
+def refuse_polygons(path: Path) -> NoReturn:
     """Refuse a laminate of polygons that is imported without a table of its layers."""
     count = len(_geometries(path, read_text(path, MOST_OF_POLYGONS)))
-    raise DesignError(
-        f"{path} holds {count} layers of polygons and not what they are for; write {LAYERS} beside "
-        f'it, with a row "{path.name},ROLE,NUMBER" a layer under "file,role,layer", and import the '
-        "folder"
-    )
+    refuse_without_table(path, f"{count} layers of polygons", "NUMBER")
 
 
 @lru_cache(maxsize=4)
@@ -230,12 +222,15 @@ def _geometries(path: Path, text: str) -> list[list[str]]:
 def _document(path: Path, text: str) -> Any:
     if path.suffix.lower() == ".json":
         return json_of(path, text)
-    yaml = yaml_of(path)
-    # Objects of foldable_robotics are read as plain ones; no others are created.
+    return read_yaml(path, text, "plain values", _plain_loader)
+
+
+def _plain_loader(yaml: Any) -> Any:
+    """Objects of foldable_robotics are read as plain ones; no others are created."""
     loader: Any = type("Loader", (yaml.SafeLoader,), {})
     for tag in LAMINATE_TAGS:
         loader.add_constructor(tag, lambda made, node: made.construct_mapping(node, deep=True))
-    return loaded(path, text, loader, "plain values")
+    return loader
 
 
 def _parts(path: Path, layer: str, number: int, text: str) -> Iterator[Region]:

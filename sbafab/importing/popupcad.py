@@ -24,7 +24,14 @@ from sbafab.errors import DesignError
 from sbafab.geometry.edges import Line, Point, meeting_points
 from sbafab.geometry.offset import grow, swept
 from sbafab.geometry.region import Region, disc, polygon, union
-from sbafab.importing.records import LAYERS, MOST_NAMED, loaded, read_text, region_of, yaml_of
+from sbafab.importing.records import (
+    MOST_NAMED,
+    layer_index,
+    read_text,
+    read_yaml,
+    refuse_without_table,
+    region_of,
+)
 
 SUFFIX = ".cad"
 MOST_BYTES = 20_000_000
@@ -62,37 +69,29 @@ class CadRecord:
         return self.values.get(key)
 
 
-def _records(path: Path, text: str) -> Any:
-    """The document, as plain values and records only. Raises DesignError."""
-    yaml = yaml_of(path)
+def _record_loader(yaml: Any) -> Any:
+    """A loader of plain values and records only."""
     loader: Any = type("Loader", (getattr(yaml, "CSafeLoader", yaml.SafeLoader),), {})
 
-    def record(loader_of_tag: Any, suffix: str, node: Any) -> Iterator[CadRecord]:
+    def record(made: Any, suffix: str, node: Any) -> Iterator[CadRecord]:
         entry = CadRecord(suffix.rsplit(".", 1)[-1])
         yield entry
         if isinstance(node, yaml.MappingNode):
-            entry.values.update(loader_of_tag.construct_mapping(node))
+            entry.values.update(made.construct_mapping(node))
         elif isinstance(node, yaml.SequenceNode):
-            entry.items.extend(loader_of_tag.construct_sequence(node))
-
-    def items(loader_of_tag: Any, node: Any) -> tuple[Any, ...]:
-        return tuple(loader_of_tag.construct_sequence(node, deep=True))
+            entry.items.extend(made.construct_sequence(node))
 
     loader.add_multi_constructor(PYTHON, record)
-    loader.add_constructor(f"{PYTHON}tuple", items)
-    loader.add_constructor(
-        f"{PYTHON}unicode", lambda loader_of_tag, node: loader_of_tag.construct_scalar(node)
-    )
-    loader.add_constructor(
-        f"{PYTHON}long", lambda loader_of_tag, node: loader_of_tag.construct_yaml_int(node)
-    )
-    for vertex in VERTICES:
-        for form in ("", "_1"):
-            loader.add_constructor(
-                f"!{vertex}{form}",
-                lambda loader_of_tag, node, kind=vertex + form: record(loader_of_tag, kind, node),
-            )
-    return loaded(path, text, loader, "popupCAD")
+    constructors: dict[str, Callable[[Any, Any], Any]] = {
+        f"{PYTHON}tuple": lambda made, node: tuple(made.construct_sequence(node, deep=True)),
+        f"{PYTHON}unicode": lambda made, node: made.construct_scalar(node),
+        f"{PYTHON}long": lambda made, node: made.construct_yaml_int(node),
+    }
+    for kind in (vertex + form for vertex in VERTICES for form in ("", "_1")):
+        constructors[f"!{kind}"] = lambda made, node, kind=kind: record(made, kind, node)
+    for tag, constructor in constructors.items():
+        loader.add_constructor(tag, constructor)
+    return loader
 
 
 @contextmanager
@@ -518,9 +517,11 @@ def _similar(
 
 def _stretched(region: Region, point: Callable[[Point], Point]) -> Region:
     """A region of straight edges under an affine map, given by its effect on points."""
-    rings = [polygon([point(edge.start) for edge in c.edges]) for c in region.outers]
-    holes = [polygon([point(edge.start) for edge in c.edges]) for c in region.holes]
-    return union(rings) - union(holes)
+    outers, holes = (
+        union([polygon([point(edge.start) for edge in contour.edges]) for contour in contours])
+        for contours in (region.outers, region.holes)
+    )
+    return outers - holes
 
 
 def _frozen(design: CadDesign, operation: CadRecord) -> CadLayers:
@@ -553,7 +554,7 @@ OPERATIONS: Mapping[str, Callable[[CadDesign, CadRecord], CadLayers]] = {
 
 @lru_cache(maxsize=4)
 def _read(path: Path, text: str) -> CadDesign:
-    return CadDesign(_records(path, text), path.name)
+    return CadDesign(read_yaml(path, text, "popupCAD", _record_loader), path.name)
 
 
 def cad_design(path: Path) -> CadDesign:
@@ -570,12 +571,8 @@ def cad_layer(path: Path, layer: str) -> tuple[Region, list[str]]:
     design = cad_design(path)
     name, _, number = layer.rpartition("/")
     index = _operation(design, name, layer)
-    count = len(design.layers)
-    if not number.isdecimal() or not 1 <= int(number) <= count:
-        raise DesignError(
-            f"{path.name} has no layer {shown(number)}; its layers are 1 to {count}, bottom to top"
-        )
-    flat, film = design.stack(index)[int(number) - 1], design.layers[int(number) - 1]
+    place = layer_index(path.name, number, len(design.layers))
+    flat, film = design.stack(index)[place], design.layers[place]
     where = f"{design.places[index]}, layer {number}"
     remarks = [*design.remarks]
     loose = _within(flat, flat.region, False)
@@ -619,8 +616,5 @@ def refuse_alone(path: Path) -> NoReturn:
     ]
     more = "" if len(unread) <= MOST_NAMED else f" and {len(unread) - MOST_NAMED} more"
     strange = f"; operations that are not read: {', '.join(unread[:MOST_NAMED])}{more}"
-    raise DesignError(
-        f"{path} holds {len(design.layers)} layers and not what they are for; write {LAYERS} "
-        f'beside it, with a row "{path.name},ROLE,OPERATION/NUMBER" a layer under '
-        f'"file,role,layer", and import the folder{strange if unread else ""}'
-    )
+    layers = f"{len(design.layers)} layers"
+    refuse_without_table(path, layers, "OPERATION/NUMBER", strange if unread else "")

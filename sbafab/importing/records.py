@@ -7,12 +7,13 @@ import json
 import re
 import shutil
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from sbafab.actuators import build, load_design
+from sbafab.design.files import shown
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region, polygon, union
@@ -122,25 +123,39 @@ def json_of(path: Path, text: str) -> Any:
     raise DesignError(f"{path} is not valid JSON: {where}; correct it, or save it again")
 
 
-def yaml_of(path: Path) -> Any:
-    """Return PyYAML. Raises DesignError if the extra is not installed."""
+def read_yaml(path: Path, text: str, what: str, loader_of: Callable[[Any], Any]) -> Any:
+    """Return the content of YAML by the loader that is made of the module.
+
+    Raises DesignError if it is not ``what``, or the extra is not installed.
+    """
     try:
         import yaml
     except ImportError:
         raise DesignError(
             f'{path} is YAML, which takes PyYAML to read; pip install "sbafab[yaml]"'
         ) from None
-    return yaml
-
-
-def loaded(path: Path, text: str, loader: Any, what: str) -> Any:
-    """Return the content of YAML by a loader. Raises DesignError if it is not ``what``."""
-    yaml = yaml_of(path)
     try:
-        return yaml.load(text, loader)
+        return yaml.load(text, loader_of(yaml))
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         line = " ".join(str(error).split())
         raise DesignError(f"{path} is not valid YAML for {what}: {line}; save it again") from None
+
+
+def layer_index(path: Path | str, number: str, count: int) -> int:
+    """Return the index of a layer that a table names by its number. Raises DesignError."""
+    if not number.isdecimal() or not 1 <= int(number) <= count:
+        raise DesignError(
+            f"{path} has no layer {shown(number)}; its layers are 1 to {count}, bottom to top"
+        )
+    return int(number) - 1
+
+
+def refuse_without_table(path: Path, layers: str, layer: str, more: str = "") -> NoReturn:
+    """Refuse layers that are imported without a table of them."""
+    raise DesignError(
+        f"{path} holds {layers} and not what they are for; write {LAYERS} beside it, with a row "
+        f'"{path.name},ROLE,{layer}" a layer under "file,role,layer", and import the folder{more}'
+    )
 
 
 def region_of(drawn: shapely.Polygon) -> Region:

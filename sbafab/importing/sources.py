@@ -11,7 +11,7 @@ from sbafab import plugins
 from sbafab.design.laminate_file import SCHEMA
 from sbafab.errors import DesignError
 from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
-from sbafab.importing.layer_table import MOST_OF_POLYGONS, import_table, refuse_without_table
+from sbafab.importing.layer_table import MOST_OF_POLYGONS, import_table, refuse_polygons
 from sbafab.importing.parchmint import import_parchmint
 from sbafab.importing.popupcad import SUFFIX, refuse_alone
 from sbafab.importing.records import LAYERS, Imported, json_of, read_text
@@ -65,7 +65,7 @@ _OWN = (
     SourceFormat(
         "a laminate of polygons, with a table of its layers",
         _is_file(".yaml", ".yml", mark='"geoms"'),
-        refuse_without_table,
+        refuse_polygons,
     ),
     SourceFormat("a popupCAD design, with a table of its layers", _is_file(SUFFIX), refuse_alone),
 )

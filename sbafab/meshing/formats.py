@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbafab import plugins
-from sbafab.meshing.conforming.mesh import FACES, VTK_TYPES, ElementKind, Mesh
-from sbafab.meshing.surface import Surface
+from sbafab.meshing.conforming.mesh import VTK_TYPES, ElementKind, Mesh
+from sbafab.meshing.surface import Floats, Ints, Surface
 
 if TYPE_CHECKING:
-    Field = NDArray[np.float64] | NDArray[np.int64] | NDArray[np.int32] | NDArray[np.uint8]
+    Field = Floats | Ints | NDArray[np.int32] | NDArray[np.uint8]
 
 # Surfaces as STL, OBJ and PLY, and as GLB for viewers; trimesh writes them.
 
@@ -44,7 +44,6 @@ def write_stl(surface: Surface, path: Path, _material: str = "") -> None:
 
 
 def write_obj(surface: Surface, path: Path) -> None:
-    """Write OBJ in mm."""
     text = surface.trimesh().export(file_type="obj", header="mm", digits=9)
     path.write_text(text, encoding="ascii", newline="\n")
 
@@ -115,14 +114,17 @@ xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
 
 def write_3mf(surface: Surface, path: Path, material: str = "TPE") -> None:
     """Write the surface in mm, as one object of one material."""
-    vertices = _rows('<vertex x="%.6f" y="%.6f" z="%.6f"/>\n', surface.points)
-    triangles = _rows('<triangle v1="%d" v2="%d" v3="%d"/>\n', surface.faces)
+    vertices = _lines('<vertex x="%.6f" y="%.6f" z="%.6f"/>\n', surface.points)
+    triangles = _lines('<triangle v1="%d" v2="%d" v3="%d"/>\n', surface.faces)
     values = {"material": material, "vertices": vertices, "triangles": triangles}
     write_zip(path, {name: text.format(**values).encode() for name, text in THREE_MF.items()})
 
 
-def _rows(pattern: str, rows: NDArray[np.float64] | NDArray[np.int64]) -> str:
-    return "".join([pattern % tuple(row) for row in rows.tolist()])
+def _lines(pattern: str, rows: Floats | Ints, first: int | None = None) -> str:
+    """Rows of an array as text, numbered from ``first`` on if that is given."""
+    columns = rows.T.tolist()
+    numbers = [] if first is None else [range(first, first + len(rows))]
+    return "".join([pattern % row for row in zip(*numbers, *columns, strict=True)])
 
 
 def write_zip(path: Path, parts: Mapping[str, bytes]) -> None:
@@ -168,8 +170,8 @@ def write_cavity_vtu(mesh: Mesh, cavity: str, path: Path) -> None:
 def write_fields(
     path: Path,
     kind: str,
-    points: NDArray[np.float64],
-    cells: NDArray[np.int64],
+    points: Floats,
+    cells: Ints,
     of_points: Mapping[str, Field],
     of_cells: Mapping[str, Field],
     notes: Sequence[str] = (),
@@ -221,9 +223,9 @@ def write_vtk(mesh: Mesh, path: Path) -> None:
     with path.open("w", encoding="ascii", newline="\n") as file:
         file.write(f"# vtk DataFile Version 3.0\n{mesh.name} mesh in mm\nASCII\n")
         file.write(f"DATASET UNSTRUCTURED_GRID\nPOINTS {len(points)} double\n")
-        file.write(_rows("%.10g %.10g %.10g\n", points))
+        file.write(_lines("%.10g %.10g %.10g\n", points))
         file.write(f"CELLS {count} {cells.size + count}\n")
-        file.write(_rows(f"{size}" + " %d" * size + "\n", cells))
+        file.write(_lines(f"{size}" + " %d" * size + "\n", cells))
         kind = VTK_TYPES["tetra" if size == 4 else "triangle"]
         file.write(f"CELL_TYPES {count}\n" + f"{kind}\n" * count)
         file.write(f"CELL_DATA {count}\nSCALARS part int 1\nLOOKUP_TABLE default\n")
@@ -249,7 +251,7 @@ def write_msh(mesh: Mesh, path: Path) -> None:
     Bonds of films that lie on each other have no group: their nodes are shared.
     """
     groups: list[tuple[int, str]] = []
-    blocks: list[tuple[int, int, NDArray[np.int64]]] = []
+    blocks: list[tuple[int, int, Ints]] = []
     """Type, physical group and nodes of elements."""
     dimension = 2 if mesh.kind == "triangle6" else 3
     for name, cells in mesh.parts.items():
@@ -258,7 +260,8 @@ def write_msh(mesh: Mesh, path: Path) -> None:
         blocks.append((MSH_TYPES[mesh.kind], len(groups), nodes))
     for name, faces in mesh.face_sets.items() if dimension == 3 else ():
         groups.append((2, name))
-        blocks += [(kind, len(groups), nodes) for kind, nodes in _msh_walls(mesh, faces)]
+        for nodes in mesh.nodes_of(faces):
+            blocks.append((TRIANGLE6 if nodes.shape[1] == 6 else SQUARE8, len(groups), nodes))
     for name, chosen in mesh.node_sets.items():
         if not name.startswith("bond_"):
             groups.append((0, name))
@@ -268,29 +271,14 @@ def write_msh(mesh: Mesh, path: Path) -> None:
         for number, (of_dimension, name) in enumerate(groups, start=1):
             file.write(f'{of_dimension} {number} "{name}"\n')
         file.write(f"$EndPhysicalNames\n$Nodes\n{len(mesh.points)}\n")
-        file.write(_numbered("%d %.12g %.12g %.12g\n", 1, mesh.points))
+        file.write(_lines("%d %.12g %.12g %.12g\n", mesh.points, 1))
         file.write(f"$EndNodes\n$Elements\n{sum(len(nodes) for *_, nodes in blocks)}\n")
         first = 1
         for kind, group, nodes in blocks:
             pattern = f"%d {kind} 2 {group} {group}" + " %d" * nodes.shape[1] + "\n"
-            file.write(_numbered(pattern, first, nodes + 1))
+            file.write(_lines(pattern, nodes + 1, first))
             first += len(nodes)
         file.write("$EndElements\n")
-
-
-def _numbered(pattern: str, first: int, rows: NDArray[np.float64] | NDArray[np.int64]) -> str:
-    numbers = range(first, first + len(rows))
-    return "".join([pattern % row for row in zip(numbers, *rows.T.tolist(), strict=True)])
-
-
-def _msh_walls(mesh: Mesh, faces: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    """The nodes of faces, triangles before squares."""
-    kinds: dict[int, list[NDArray[np.int64]]] = {}
-    for number, local in enumerate(FACES[mesh.kind]):
-        nodes = mesh.cells[faces[faces[:, 1] == number, 0]][:, list(local)]
-        kinds.setdefault(TRIANGLE6 if len(local) == 6 else SQUARE8, []).append(nodes)
-    for kind, parts in kinds.items():
-        yield kind, np.concatenate(parts)
 
 
 # INP for Abaqus and CalculiX, every set written out.
@@ -318,11 +306,11 @@ def _inp_lines(mesh: Mesh) -> Iterator[str]:
     notes += [SHELL] if mesh.kind == "triangle6" else []
     yield "".join(f"** {note}\n" for note in notes)
     yield "*NODE, NSET=all_nodes\n"
-    yield _numbered("%d, %.10g, %.10g, %.10g\n", 1, mesh.points)
+    yield _lines("%d, %.10g, %.10g, %.10g\n", mesh.points, 1)
     pattern = ", ".join(["%d"] * (mesh.cells.shape[1] + 1)) + "\n"
     for name, cells in mesh.parts.items():
         yield f"*ELEMENT, TYPE={INP_TYPES[mesh.kind]}, ELSET={name}\n"
-        yield _rows(pattern, np.column_stack([cells, mesh.cells[cells]]) + 1)
+        yield _lines(pattern, np.column_stack([cells, mesh.cells[cells]]) + 1)
     for name, cells in mesh.cell_sets.items():
         if name not in mesh.parts:
             yield f"*ELSET, ELSET={name}\n"
@@ -339,7 +327,7 @@ def _inp_lines(mesh: Mesh) -> Iterator[str]:
             yield f"{cell + 1}, {side}\n"
 
 
-def _listed(numbers: NDArray[np.int64]) -> Iterable[str]:
+def _listed(numbers: Ints) -> Iterable[str]:
     texts = [str(number + 1) for number in numbers.tolist()]
     for first in range(0, len(texts), PER_LINE):
         yield ", ".join(texts[first : first + PER_LINE]) + "\n"

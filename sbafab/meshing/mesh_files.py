@@ -10,12 +10,10 @@ from typing import Literal
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Chamber, Laminate
 from sbafab.meshing.formats import mesh_formats, write_stl
-from sbafab.meshing.solid import SAGITTA, cavity, sealed, solid
+from sbafab.meshing.solid import TubeWrap, cavity, sealed, solid, tube_wrap, wrapped
 from sbafab.meshing.surface import Surface
-from sbafab.meshing.wrap import TubeWrap, tube_wrap, wrapped
 
 MeshKind = Literal["solid", "cavity", "volume", "shell", "skin"]
-Writer = Callable[[Surface, Path, str], None]
 
 
 @dataclass(frozen=True)
@@ -36,54 +34,49 @@ class MeshFile:
 
 
 def write_meshes(
-    laminate: Laminate,
-    folder: Path,
-    sagitta: float = SAGITTA,
-    progress: Callable[[int, int], None] | None = None,
+    laminate: Laminate, folder: Path, progress: Callable[[int, int], None] | None = None
 ) -> tuple[list[MeshFile], list[tuple[str, str]]]:
     """Write ``mesh/solid.stl``, ``.3mf``, ``.glb`` and ``mesh/cavity_<chamber>.stl``, all flat.
 
     A laminate on a tube also gets ``mesh/solid_wrapped.*``, ``mesh/cavity_<chamber>_wrapped.stl``.
-    ``folder`` is the output folder, ``sagitta`` the height in mm of an arc over its chord.
-    ``progress`` is called with the number of files done and the total. Return the files written,
-    and the omitted ones with the reason: a surface that is open, or whose volume is not the sum of
-    area x thickness.
+    ``folder`` is the output folder. ``progress`` is called with the number of files done and the
+    total. Return the files written, and the omitted ones with the reason: a surface that is open,
+    or whose volume is not the sum of area x thickness.
     """
     (folder / "mesh").mkdir(parents=True, exist_ok=True)
     wrap = tube_wrap(laminate)
     written: list[MeshFile] = []
     left_out: list[tuple[str, str]] = []
-    solids = [(row.ending, row.solid) for row in mesh_formats() if row.solid]
-    shapes: list[tuple[str, Chamber | None, list[tuple[str, Writer]]]] = [("solid", None, solids)]
-    shapes += [(f"cavity_{c.name}", c, [("stl", write_stl)]) for c in laminate.chambers]
-    suffixes = [""] if wrap is None else ["", "_wrapped"]
-    total = len(suffixes) * sum(len(writers) for *_, writers in shapes)
-    for stem, chamber, writers in shapes:
-        for suffix in suffixes:
-            files = [(f"mesh/{stem}{suffix}.{ending}", write) for ending, write in writers]
-            try:
-                surface = _surface(laminate, chamber, sagitta, wrap if suffix else None)
-            except OutputError as error:
-                left_out += [(file, str(error)) for file, _ in files]
-                continue
-            kind: MeshKind = "solid" if chamber is None else "cavity"
-            name = None if chamber is None else chamber.name
-            for file, write in files:
-                write(surface, folder / file, laminate.bonded_materials)
-                written.append(MeshFile(file, kind, name, 0.0, surface.volume, len(surface.faces)))
-                if progress is not None:
-                    progress(len(written), total)
+    solids = {row.ending: row.solid for row in mesh_formats() if row.solid}
+    shapes = [
+        (chamber, wrapping) for chamber in (None, *laminate.chambers) for wrapping in (None, wrap)
+    ]
+    if wrap is None:
+        shapes = shapes[::2]
+    total = sum(len(solids) if chamber is None else 1 for chamber, _ in shapes)
+    for chamber, wrapping in shapes:
+        name = None if chamber is None else chamber.name
+        stem = "solid" if name is None else f"cavity_{name}"
+        stem += "" if wrapping is None else "_wrapped"
+        writers = solids if name is None else {"stl": write_stl}
+        files = {f"mesh/{stem}.{ending}": write for ending, write in writers.items()}
+        try:
+            surface = _surface(laminate, chamber, wrapping)
+        except OutputError as error:
+            left_out += [(file, str(error)) for file in files]
+            continue
+        kind: MeshKind = "solid" if name is None else "cavity"
+        for file, write in files.items():
+            write(surface, folder / file, laminate.bonded_materials)
+            written.append(MeshFile(file, kind, name, 0.0, surface.volume, len(surface.faces)))
+            if progress is not None:
+                progress(len(written), total)
     return written, left_out
 
 
-def _surface(
-    laminate: Laminate, chamber: Chamber | None, sagitta: float, wrap: TubeWrap | None
-) -> Surface:
+def _surface(laminate: Laminate, chamber: Chamber | None, wrap: TubeWrap | None) -> Surface:
     step = 0.0 if wrap is None else wrap.step
-    if chamber is None:
-        surface = solid(laminate, sagitta, step)
-    else:
-        surface = cavity(laminate, chamber, sagitta, step)
+    surface = solid(laminate, step=step) if chamber is None else cavity(laminate, chamber, step)
     if wrap is None:
         return surface
     name = "the solid" if chamber is None else f"the cavity of chamber {chamber.name}"

@@ -1,4 +1,4 @@
-"""Partition of the plane by the edges of regions, prisms over it, and the flat solid and cavities.
+"""The flat solid and cavities, made of prisms over a partition of the plane; and bent round a tube.
 
 Every edge of every region is an edge of the partition, so surfaces assembled from its cells meet
 edge to edge.
@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour, facets
-from sbafab.geometry.edges import SAME, Point
+from sbafab.geometry.edges import SAME, Point, box_round
 from sbafab.geometry.region import Region, rectangle, strip, union
-from sbafab.laminate.laminate import Chamber, Interface, Laminate
-from sbafab.meshing.surface import Surface, open_edges
+from sbafab.laminate.laminate import Chamber, Interface, Laminate, Layer
+from sbafab.meshing.surface import Flags, Floats, Ints, Surface, Vector, open_edges
 
 if TYPE_CHECKING:
     import shapely
@@ -37,12 +37,12 @@ class Partition(NamedTuple):
     cells) bool: a mask of the cells of each region.
     """
 
-    points: NDArray[np.float64]
-    edges: NDArray[np.int64]
-    cells: NDArray[np.int64]
-    inside: NDArray[np.bool_]
+    points: Floats
+    edges: Ints
+    cells: Ints
+    inside: Flags
 
-    def boundary(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    def boundary(self, chosen: Flags) -> Ints:
         """Edges (k, 2) round the union of the chosen cells, the cells on their left."""
         edges = self.edges[chosen[self.cells]]
         size = len(self.points)
@@ -50,10 +50,10 @@ class Partition(NamedTuple):
         back = np.sort(edges[:, 1] * size + edges[:, 0])
         # Not np.isin, which loads masked arrays.
         place = np.searchsorted(back[:-1], forth)
-        outline: NDArray[np.int64] = edges[back[place] != forth]
+        outline: Ints = edges[back[place] != forth]
         return outline
 
-    def triangles(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    def triangles(self, chosen: Flags) -> Ints:
         """Triangles (k, 3), counter-clockwise, that fill the union of the chosen cells."""
         from manifold3d import triangulate
 
@@ -86,20 +86,21 @@ def partition(regions: Sequence[Region], sagitta: float) -> Partition:
 
 
 def _polygons(region: Region, sagitta: float) -> shapely.MultiPolygon:
+    """The region with arcs as chords that enclose its area."""
     import shapely
-
-    def ring(contour: Contour) -> shapely.LinearRing:
-        # As an array, which shapely takes without checking every number.
-        return shapely.linearrings(np.array(facets(contour, sagitta)))
 
     pieces = []
     for piece in region.pieces:
-        (outer,) = piece.outers
-        pieces.append(shapely.polygons(ring(outer), [ring(hole) for hole in piece.holes] or None))
+        # As arrays, which shapely takes without checking every number.
+        outer, *holes = (
+            shapely.linearrings(np.array(facets(contour, sagitta)))
+            for contour in (*piece.outers, *piece.holes)
+        )
+        pieces.append(shapely.polygons(outer, holes or None))
     return shapely.multipolygons(pieces)
 
 
-def loops_of(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def loops_of(edges: Ints) -> list[Ints]:
     """Closed chains formed by the directed edges, none passing a point twice."""
     following: defaultdict[int, list[int]] = defaultdict(list)
     for tail, head in edges.tolist():
@@ -155,26 +156,27 @@ def fuse(slabs: Sequence[Slab], sagitta: float, step: float = 0.0) -> Surface:
     tell apart.)
     """
     regions = list(dict.fromkeys(slab.region for slab in slabs))
-    strips = list(_strips(regions, step))
+    strips = list(_strips(regions, step)) if step else []
     plane = partition([*regions, *strips], sagitta)
-    heights, levels = _levels(slabs, regions, plane)
-    faces = _faces(plane, levels, plane.inside[len(regions) :])
-    count = len(plane.points)
-    used = np.zeros(count * len(heights), dtype=bool)
-    used[faces] = True
-    (corners,) = np.nonzero(used)
-    points = np.column_stack([plane.points[corners % count], heights[corners // count]])
-    return Surface(points, np.cumsum(used)[faces] - 1)
+    # Rounded to 1e-9 mm, so that touching faces have equal heights.
+    spans = [(round(slab.bottom, 9), round(slab.top, 9)) for slab in slabs]
+    heights = sorted({height for span in spans for height in span})
+    filled = np.zeros((len(heights) - 1, plane.inside.shape[1]), dtype=bool)
+    for slab, (bottom, top) in zip(slabs, spans, strict=True):
+        levels = slice(heights.index(bottom), heights.index(top))
+        filled[levels] |= plane.inside[regions.index(slab.region)]
+    faces = _faces(plane, filled, plane.inside[len(regions) :])
+    corners, faces = np.unique(faces, return_inverse=True)
+    level, corner = np.divmod(corners, len(plane.points))
+    points = np.column_stack([plane.points[corner], np.array(heights)[level]])
+    return Surface(points, faces.reshape(-1, 3))
 
 
 def _strips(regions: Sequence[Region], step: float) -> Iterator[Region]:
     """Yield the strips of the plane between the lines at multiples of ``step``."""
-    low_x, low_y, high_x, high_y = np.array([region.bounds for region in regions]).T
-    bottom, top = low_y.min() - 1, high_y.max() + 1
-    if not step:
-        return
-    for number in range(math.floor(low_x.min() / step), math.ceil(high_x.max() / step)):
-        yield rectangle((number * step, bottom), ((number + 1) * step, top))
+    low_x, bottom, high_x, top = box_round([region.bounds for region in regions])
+    for number in range(math.floor(low_x / step), math.ceil(high_x / step)):
+        yield rectangle((number * step, bottom - 1), ((number + 1) * step, top + 1))
 
 
 def closed_surface(name: str, slabs: Sequence[Slab], sagitta: float, step: float = 0.0) -> Surface:
@@ -204,50 +206,26 @@ def sealed(name: str, surface: Surface) -> Surface:
     return surface
 
 
-def _levels(
-    slabs: Sequence[Slab], regions: Sequence[Region], plane: Partition
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The heights at which slabs start or end, and the filled cells between successive heights."""
-    # Rounded to 1e-9 mm, so that touching faces have equal heights.
-    spans = [(round(slab.bottom, 9), round(slab.top, 9)) for slab in slabs]
-    heights = sorted({height for span in spans for height in span})
-    number = {height: index for index, height in enumerate(heights)}
-    row = {region: index for index, region in enumerate(regions)}
-    filled = np.zeros((len(heights) - 1, plane.inside.shape[1]), dtype=bool)
-    for slab, (bottom, top) in zip(slabs, spans, strict=True):
-        filled[number[bottom] : number[top]] |= plane.inside[row[slab.region]]
-    return np.array(heights), filled
-
-
-def _faces(
-    plane: Partition, levels: NDArray[np.bool_], strips: NDArray[np.bool_]
-) -> NDArray[np.int64]:
+def _faces(plane: Partition, levels: Flags, strips: Flags) -> Ints:
     """Triangles (k, 3) of indices point + level x number of points, levels from the lowest."""
-    walls: dict[bytes, NDArray[np.int64]] = {}
-    lids: dict[bytes, NDArray[np.int64]] = {}
+    walls: dict[bytes, Ints] = {}
+    lids: dict[bytes, Ints] = {}
     count = len(plane.points)
-    empty = np.zeros((1, levels.shape[1]), dtype=bool)
+    nothing = np.zeros((1, levels.shape[1]), dtype=bool)
     faces = []
-    for index, (below, here) in enumerate(
-        zip(np.vstack([empty, levels]), np.vstack([levels, empty]), strict=True)
-    ):
+    for index, (below, here) in enumerate(pairwise(np.vstack([nothing, levels, nothing]))):
         for chosen, order in ((below & ~here, (0, 1, 2)), (here & ~below, (0, 2, 1))):
             if (key := chosen.tobytes()) not in lids:
                 parts = [chosen & strip for strip in strips] if len(strips) else [chosen]
                 lids[key] = np.concatenate([plane.triangles(part) for part in parts])
             faces.append(lids[key][:, order] + index * count)
         if (key := here.tobytes()) not in walls:
-            walls[key] = _walls(plane.boundary(here), count)
+            # Two triangles per edge, from one height to the next.
+            (a, b), up = plane.boundary(here).T, count
+            halves = [a, b, b + up], [a, b + up, a + up]
+            walls[key] = np.concatenate([np.column_stack(half) for half in halves])
         faces.append(walls[key] + index * count)
     return np.concatenate(faces)
-
-
-def _walls(edges: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Two triangles per edge, from one height to the next."""
-    tails, heads = edges.T
-    lower = np.column_stack([tails, heads, heads + count])
-    upper = np.column_stack([tails, heads + count, tails + count])
-    return np.concatenate([lower, upper])
 
 
 # The flat solid: TPE films and the bonds that join them.
@@ -277,29 +255,31 @@ def parted(laminate: Laminate) -> Laminate:
     return replace(laminate, layers=tuple(layers)) if opened else laminate
 
 
-def folded_strips(laminate: Laminate, interface: Interface) -> Region:
+def folded_strips(interface: Interface) -> Region:
     """Return the strips along the folds of an interface, where film continues to the other half."""
-    layers = interface.below.index, interface.above.index
-    folds = [fold for fold in laminate.folds if (fold.lower, fold.upper) == layers]
-    strips = [strip(*fold.line, 2 * FOLD_WIDTH) for fold in folds]
+    strips = [strip(*line, 2 * FOLD_WIDTH) for line in interface.fold_lines]
     return interface.contact & union(strips) if strips else Region()
 
 
-def body_bond(laminate: Laminate, interface: Interface) -> Region:
+def body_bond(interface: Interface) -> Region:
     """Return the region in which the films of an interface are one body: bonds and fold strips."""
-    strips = folded_strips(laminate, interface)
-    return interface.bond if strips.is_empty else interface.bond | strips
+    return union([interface.bond, folded_strips(interface)])
+
+
+def _film_slab(layer: Layer) -> Slab:
+    return Slab(layer.profile, layer.z, layer.z + layer.film.thickness)
+
+
+def _gap_slab(interface: Interface, region: Region) -> Slab:
+    return Slab(region, interface.z, interface.z + interface.gap)
 
 
 def solid_slabs(laminate: Laminate) -> list[Slab]:
     """Every TPE layer, and every bond as the mask's thickness filled with TPE, bottom to top."""
     laminate = parted(laminate)
-    slabs = [
-        Slab(layer.profile, layer.z, layer.z + layer.film.thickness)
-        for layer in laminate.tpe_layers
-    ]
+    slabs = [_film_slab(layer) for layer in laminate.tpe_layers]
     slabs += [
-        Slab(body_bond(laminate, interface), interface.z, interface.z + interface.gap)
+        _gap_slab(interface, body_bond(interface))
         for interface in laminate.interfaces
         if interface.gap and not interface.bond.is_empty
     ]
@@ -329,13 +309,13 @@ def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
     if laminate.nets:
         # Chambers of nets pass through all drawn holes, not only bores.
         inner = laminate.tpe_layers[1:-1]
-        axes = [_middle(hole) for layer in inner for hole in layer.profile.holes]
+        boxes = [hole.bounds for layer in inner for hole in layer.profile.holes]
+        axes = [((a + c) / 2, (b + d) / 2) for a, b, c, d in boxes]
     levels = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
     pockets = [
-        Slab(Region(tuple(contours)), interface.z, interface.z + interface.gap)
+        _gap_slab(interface, Region(tuple(contours)))
         for balloon, interface in enumerate(levels, start=1)
-        if chamber.is_in(balloon)
-        and (contours := list(_pocket(laminate, interface, chamber.centres, axes)))
+        if chamber.is_in(balloon) and (contours := [*_pocket(interface, chamber.centres, axes)])
     ]
     if not pockets:
         x, y = chamber.centres[0]
@@ -343,96 +323,154 @@ def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
             f"Chamber {chamber.name} has no pocket at x {x:.3f}, y {y:.3f}; "
             "a chamber mask must cover that place."
         )
-    channels = (
-        _holes_between(laminate, pockets)
-        if laminate.nets
-        else _channels(laminate, chamber, axes, pockets[0].top, pockets[-1].bottom)
-    )
-    return sorted([*pockets, *channels], key=lambda slab: slab.bottom)
+    channels = _holes_between if laminate.nets else _channels
+    slabs = [*pockets, *channels(laminate, chamber, axes, pockets)]
+    return sorted(slabs, key=lambda slab: slab.bottom)
 
 
-def cavity(
-    laminate: Laminate,
-    chamber: Chamber,
-    sagitta: float = SAGITTA,
-    step: float = 0.0,
-) -> Surface:
+def cavity(laminate: Laminate, chamber: Chamber, step: float = 0.0) -> Surface:
     """The closed surface of a chamber's cavity, with normals that point out of it.
 
     Its volume equals the sum over :func:`cavity_slabs`. Faces are split every ``step`` mm of x.
     Raises OutputError if it does not close.
     """
     name = f"the cavity of chamber {chamber.name}"
-    return closed_surface(name, cavity_slabs(laminate, chamber), sagitta, step)
+    return closed_surface(name, cavity_slabs(laminate, chamber), SAGITTA, step)
 
 
 def _pocket(
-    laminate: Laminate, interface: Interface, centres: Sequence[Point], axes: Sequence[Point]
+    interface: Interface, centres: Sequence[Point], axes: Sequence[Point]
 ) -> Iterator[Contour]:
     """The unbonded pieces round the centres, open where a channel passes through them."""
-    strips = folded_strips(laminate, interface)
-    void = interface.unbonded if strips.is_empty else interface.unbonded - strips
+    void = interface.unbonded
+    if interface.folds:
+        void -= folded_strips(interface)
     # If a seam surrounds a pocket, the area outside the seam surrounds the pocket too.
     innermost = {
         min(round_it, key=lambda piece: piece.outers[0].area)
         for centre in centres
         if (round_it := [p for p in void.pieces if p.outers[0].winding(centre) != 0])
     }
-    for piece in void.pieces:
-        if piece in innermost:
-            yield piece.outers[0]
-            for hole in piece.holes:
-                on_axis = [axis for axis in axes if hole.winding(axis) != 0]
-                if not on_axis or interface.bond.contains(on_axis[0]):
-                    yield hole
+    for piece in (piece for piece in void.pieces if piece in innermost):
+        yield piece.outers[0]
+        for hole in piece.holes:
+            on_axis = [axis for axis in axes if hole.winding(axis) != 0]
+            if not on_axis or interface.bond.contains(on_axis[0]):
+                yield hole
 
 
 def _channels(
-    laminate: Laminate, chamber: Chamber, axes: Sequence[Point], low: float, high: float
+    laminate: Laminate, chamber: Chamber, axes: Sequence[Point], pockets: Sequence[Slab]
 ) -> Iterator[Slab]:
-    """The openings on the chamber's axes through bonded films between two heights in mm."""
-    films = [
-        (f"layer {layer.index}", layer.profile, layer.z, layer.z + layer.film.thickness)
-        for layer in laminate.tpe_layers
-    ]
-    bonds = [
-        (f"interface {gap.index}", gap.bond, gap.z, gap.z + gap.gap)
+    """The openings on the chamber's axes through the bonded films between its pockets."""
+    low, high = pockets[0].top, pockets[-1].bottom
+    slabs = [(f"layer {layer.index}", _film_slab(layer)) for layer in laminate.tpe_layers]
+    slabs += [
+        (f"interface {gap.index}", _gap_slab(gap, gap.bond))
         for gap in laminate.interfaces
         if gap.kind == "separator"
     ]
-    for place, region, bottom, top in films + bonds:
-        if not low <= (bottom + top) / 2 <= high:
-            continue
+    between = [(name, slab) for name, slab in slabs if low <= (slab.bottom + slab.top) / 2 <= high]
+    for name, slab in between:
         for x, y in axes:
-            opening = _opening(region.holes, (x, y))
-            if opening is None:
+            holes = [hole for hole in slab.region.holes if hole.winding((x, y)) != 0]
+            if not holes:
                 raise OutputError(
-                    f"The channel of chamber {chamber.name} is closed at {place}, "
+                    f"The channel of chamber {chamber.name} is closed at {name}, "
                     f"x {x:.3f}, y {y:.3f}; cut a bore there with a neck ring round it."
                 )
-            yield Slab(opening, bottom, top)
+            # The area of a hole is negative: this is the smallest.
+            smallest = max(holes, key=lambda hole: hole.area)
+            yield slab._replace(region=Region((smallest.reversed(),)))
 
 
-def _middle(contour: Contour) -> Point:
-    low_x, low_y, high_x, high_y = contour.bounds
-    return (low_x + high_x) / 2, (low_y + high_y) / 2
-
-
-def _holes_between(laminate: Laminate, pockets: Sequence[Slab]) -> Iterator[Slab]:
+def _holes_between(
+    laminate: Laminate, _chamber: Chamber, _axes: Sequence[Point], pockets: Sequence[Slab]
+) -> Iterator[Slab]:
     """The holes of films that open to a pocket below and to one above."""
-    for layer in laminate.tpe_layers:
-        top = layer.z + layer.film.thickness
-        below = [pocket.region for pocket in pockets if math.isclose(pocket.top, layer.z)]
-        above = [pocket.region for pocket in pockets if math.isclose(pocket.bottom, top)]
-        for hole in layer.profile.holes if below and above else ():
+    for film in map(_film_slab, laminate.tpe_layers):
+        below = [pocket.region for pocket in pockets if math.isclose(pocket.top, film.bottom)]
+        above = [pocket.region for pocket in pockets if math.isclose(pocket.bottom, film.top)]
+        for hole in film.region.holes:
             opening = Region((hole.reversed(),))
             if all(any(not (opening & r).is_empty for r in side) for side in (below, above)):
-                yield Slab(opening, layer.z, top)
+                yield film._replace(region=opening)
 
 
-def _opening(holes: Iterable[Contour], axis: Point) -> Region | None:
-    """Return the region that the smallest hole round the axis leaves open, or None."""
-    round_axis = [hole for hole in holes if hole.winding(axis) != 0]
-    if not round_axis:
+# A flat laminate bent round its tube: x becomes the circumference, z the radial direction.
+
+
+BENT_SAGITTA = 0.008
+"""mm by which a facet of a bent film may deviate from its cylinder; a fifth of a film."""
+RAMP = 1.5
+"""mm round the tube within which an overlapping end of the sheet climbs onto the other end."""
+Numbers = Floats | float
+
+
+class TubeWrap(NamedTuple):
+    """Placement of a flat body round a tube, whose axis is z.
+
+    ``radius`` is the tube's; lengths ``neutral`` mm above it are kept. An overlapping sheet is
+    raised by ``thickness`` at and past x = ``seam``. All mm.
+    """
+
+    radius: float
+    neutral: float = 0.0
+    seam: float = math.inf
+    thickness: float = 0.0
+
+    @property
+    def step(self) -> float:
+        """Distance in mm of the lines along the tube at which facets of a body are cut."""
+        return math.sqrt(8 * self.radius * BENT_SAGITTA)
+
+    def placed(self, points: Floats, middle: Numbers = 0.0, share: Numbers = 1.0) -> Floats:
+        """Points (n, 3) of the flat laminate, z from the tube's surface, round the tube.
+
+        A body fixed at x = ``middle`` may be bent by a ``share`` of the tube's curvature: 0 leaves
+        it straight, on the tangent. Both may be given for each point.
+        """
+        x, y, z = points.T
+        at, bend = middle / (self.radius + self.neutral), share / self.radius
+        angle = self.lean(x, middle, share) - at
+        safe = np.where(bend > 0, bend, 1.0)
+        # 2 sin^2(a/2) / bend is (1 - cos a) / bend without its cancellation.
+        sag = np.where(bend > 0, 2 * np.sin(angle / 2) ** 2 / safe, 0.0)
+        sine = np.where(bend > 0, np.sin(angle) / safe, x - middle)
+        out, aside = self.radius + z * np.cos(angle) - sag, sine + z * np.sin(angle)
+        cos, sin = np.cos(at), np.sin(at)
+        return np.column_stack([out * cos - aside * sin, out * sin + aside * cos, y])
+
+    def lean(self, x: Floats, middle: Numbers = 0.0, share: Numbers = 1.0) -> Floats:
+        """Angle in radians round the tube of the upright of a body at x."""
+        at, bend = middle / (self.radius + self.neutral), share / self.radius
+        return bend * (x - middle) / (1 + bend * self.neutral) + at
+
+    def raised(self, x: Floats) -> Floats:
+        """Height in mm by which the sheet is lifted by its overlapping end."""
+        return self.thickness * np.clip((x - self.seam) / RAMP + 1, 0, 1)
+
+
+def tube_wrap(laminate: Laminate) -> TubeWrap | None:
+    """Return the placement of a laminate round its tube, or None for one without a tube."""
+    if laminate.tube is None:
         return None
-    return Region((max(round_axis, key=lambda hole: hole.area).reversed(),))
+    sheet = laminate.tpe_layers[0]
+    radius, neutral = laminate.tube / 2, sheet.film.thickness / 2
+    low, _, high, _ = sheet.profile.bounds
+    # A full turn of the sheet, less the maximum width of a solid's facets.
+    seam = low + math.tau * (radius + neutral) - RAMP
+    thickness = 2 * (neutral + BENT_SAGITTA) if high > seam + RAMP else 0.0
+    return TubeWrap(radius, neutral, seam, thickness)
+
+
+def wrapped(surface: Surface, wrap: TubeWrap) -> Surface:
+    """The surface of a flat body, already cut every ``wrap.step``, wrapped round its tube."""
+    x, y, z = surface.points.T
+    return Surface(wrap.placed(np.column_stack([x, y, z + wrap.raised(x)])), surface.faces)
+
+
+def bent_point(p: Vector, radius: float) -> Vector:
+    """Return where a point of a flat body lies round a tube of this radius about z."""
+    x, y, z = TubeWrap(radius).placed(np.array([p]))[0].tolist()
+    return x, y, z

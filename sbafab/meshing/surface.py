@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 Vector = tuple[float, float, float]
 """A point or displacement in space, mm, or a direction."""
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +28,8 @@ class Surface:
     seen from outside.
     """
 
-    points: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    points: Floats
+    faces: Ints
 
     @cached_property
     def volume(self) -> float:
@@ -48,7 +51,7 @@ class Surface:
         return Manifold(Mesh64(np.ascontiguousarray(self.points), faces))
 
 
-def open_edges(surface: Surface) -> NDArray[np.float64]:
+def open_edges(surface: Surface) -> Floats:
     """Midpoints (k, 3) in mm of the edges that do not join exactly two consistently oriented faces.
 
     Points are merged as in a single-precision file. Empty for a watertight surface.
@@ -56,11 +59,11 @@ def open_edges(surface: Surface) -> NDArray[np.float64]:
     wrong = unpaired_edges(_merged(surface.points)[surface.faces])
     starts = surface.faces.ravel()[wrong]
     ends = np.roll(surface.faces, -1, axis=1).ravel()[wrong]
-    middles: NDArray[np.float64] = (surface.points[starts] + surface.points[ends]) / 2
+    middles: Floats = (surface.points[starts] + surface.points[ends]) / 2
     return middles
 
 
-def unpaired_edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def unpaired_edges(faces: Ints) -> Ints:
     """Indices, of all corners of faces (m, 3) in a row, at which an edge starts that does not join
     exactly two consistently oriented faces.
     """
@@ -75,11 +78,11 @@ def unpaired_edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
         return np.empty(0, dtype=np.int64)
     forth, back = tails * size + heads, heads * size + tails
     once, first, times = np.unique(forth, return_index=True, return_counts=True)
-    wrong: NDArray[np.int64] = first[(times != 1) | ~np.isin(once, back)]
+    wrong: Ints = first[(times != 1) | ~np.isin(once, back)]
     return wrong
 
 
-def _merged(points: NDArray[np.float64]) -> NDArray[np.int64]:
+def _merged(points: Floats) -> Ints:
     """A number for each point (n,), equal for points that coincide in single precision."""
     # Compare the bits of four-byte numbers; adding 0 turns -0 into 0.
     x, y, z = (points.astype(np.float32) + np.float32(0)).view(np.uint32).T.astype(np.uint64)

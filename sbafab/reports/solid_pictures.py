@@ -151,8 +151,8 @@ def _prisms(laminate: Laminate) -> Iterator[Prism]:
         if interface is None or not interface.gap:
             yield Prism(layer.pattern, layer.profile, Region(), layer.z, thickness, False)
             continue
-        name, bond = " ".join(interface.pattern), body_bond(laminate, interface)
-        void = interface.unbonded if bond is interface.bond else interface.contact - bond
+        name, bond = " ".join(interface.pattern), body_bond(interface)
+        void = interface.contact - bond if interface.folds else interface.unbonded
         yield Prism(name, layer.profile, void, layer.z, thickness, False)
         yield Prism(f"bond {name}", bond, Region(), interface.z, interface.gap, True)
 

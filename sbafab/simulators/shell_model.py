@@ -9,13 +9,12 @@ Lengths mm, volumes ul.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
 from sbafab.geometry.contour import Contour
@@ -23,10 +22,11 @@ from sbafab.geometry.edges import Arc, Point
 from sbafab.geometry.region import disc
 from sbafab.laminate.films import Film, density_of
 from sbafab.laminate.laminate import Interface, Laminate
+from sbafab.meshing.surface import Floats, Ints, Surface
 
-Triangles = NDArray[np.int64]
+Triangles = Ints
 """Node numbers (k, 3), counter-clockwise seen from outside."""
-Ring = NDArray[np.int64]
+Ring = Ints
 
 
 class FilmGroup(NamedTuple):
@@ -50,8 +50,8 @@ class Shell:
     axis of round pockets.
     """
 
-    rest: NDArray[np.float64]
-    position: NDArray[np.float64]
+    rest: Floats
+    position: Floats
     membranes: tuple[FilmGroup, ...]
     bending: tuple[FilmGroup, ...]
     cavities: Mapping[str, Triangles]
@@ -73,20 +73,15 @@ class Shell:
         """Height at the start in mm."""
         return float(self.position[:, 2].max())
 
-    def volume(self, chamber: str) -> float:
-        """Volume of the chamber's cavity at the start."""
-        return enclosed(self.position, self.cavities[chamber])
+    def volume(self, chamber: str, nodes: Floats | None = None) -> float:
+        """Volume of the chamber's cavity at the start, or with other places of the nodes."""
+        points = self.position if nodes is None else nodes
+        return Surface(points, self.cavities[chamber]).volume
 
 
-def enclosed(points: NDArray[np.float64], triangles: Triangles) -> float:
-    """Volume inside a closed surface whose normals point outward."""
+def areas(points: Floats, triangles: Triangles) -> Floats:
     a, b, c = points[triangles].transpose(1, 0, 2)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
-
-
-def areas(points: NDArray[np.float64], triangles: Triangles) -> NDArray[np.float64]:
-    a, b, c = points[triangles].transpose(1, 0, 2)
-    sizes: NDArray[np.float64] = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    sizes: Floats = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     return sizes
 
 
@@ -406,8 +401,7 @@ def _holding_most(neck: float, length: float) -> Meridian:
 # The web between the pockets of a lobed plate: half a sector is triangulated, then mirrored.
 
 
-@dataclass(frozen=True)
-class Web:
+class Web(NamedTuple):
     """Half a sector of a plate's web, from the direction of a lobe to the middle between two.
 
     Its nodes in order: the ``junction`` mm from the axis, where two lobes meet; on the lumen at
@@ -418,28 +412,6 @@ class Web:
     lumen_steps: int
     reach: int
     half: Triangles
-
-    def triangles(
-        self,
-        edges: Sequence[NDArray[np.int64]],
-        outlines: Sequence[NDArray[np.int64]],
-        junctions: NDArray[np.int64],
-        lumen: NDArray[np.int64],
-    ) -> Triangles:
-        """The web's triangles, counter-clockwise from above, from the nodes of all its edges."""
-        triangles = []
-        on_lumen, on_outline = np.arange(self.lumen_steps + 1), np.arange(self.reach + 1)
-        for k, (edge, outline) in enumerate(zip(edges, outlines, strict=True)):
-            for side in (1, -1):
-                nodes = [
-                    junctions[[k if side > 0 else k - 1]],
-                    lumen[(2 * k * self.lumen_steps + side * on_lumen) % len(lumen)],
-                    outline[self.reach + side * on_outline],
-                    edge[side * np.arange(len(edge) // 2 + 1) % len(edge)],
-                ]
-                corners = np.concatenate(nodes)[self.half]
-                triangles.append(corners if side > 0 else reverse(corners))
-        return np.concatenate(triangles)
 
 
 @cache
@@ -494,7 +466,7 @@ FILMS = {"bend_lower": 1, "bend_upper": 1, "bend_web": 2, "bend_neck": 2}
 """Groups of the coarse shell's triangles, and the number of films bonded in each."""
 
 
-def node_masses(shell: Shell, film: Film) -> NDArray[np.float64]:
+def node_masses(shell: Shell, film: Film) -> Floats:
     """True mass (n,) in kg of each node of a coarse shell: a third of each triangle's."""
     masses = np.zeros(len(shell.rest))
     dense = density_of(film, "a simulation")
@@ -538,8 +510,8 @@ class _Builder:
         # The axes follow as pockets draw in, or the web between them would tear.
         gaps = (p - m.edge for p, m in zip(stack.pockets, meridians, strict=True))
         self.shift = min(gaps) if stack.lobes > 1 else 0.0
-        self.rest: list[NDArray[np.float64]] = []
-        self.position: list[NDArray[np.float64]] = []
+        self.rest: list[Floats] = []
+        self.position: list[Floats] = []
         self.count = 0
         self.films: dict[str, list[Triangles]] = {
             name: [np.empty((0, 3), dtype=np.int64)] for name in FILMS
@@ -599,7 +571,7 @@ class _Builder:
         self.films[film].append(triangles)
         self.cavities[k].append(triangles)
 
-    def _nodes(self, flat: NDArray[np.float64], placed: NDArray[np.float64], z: float) -> Ring:
+    def _nodes(self, flat: Floats, placed: Floats, z: float) -> Ring:
         """Numbers of new nodes at flat places (k, 2), raised to others at a height."""
         self.rest.append(np.column_stack([flat, np.zeros(len(flat))]))
         self.position.append(np.column_stack([placed, np.full(len(placed), z)]))
@@ -656,7 +628,19 @@ class _Builder:
         junctions = self._round(stack.lobes, 0.5, web.junction, closer, z)
         steps = range(-web.reach, web.reach + 1)
         outlines = [self._ring(k, rim, drawn_in, z, steps) for k in range(stack.lobes)]
-        return web.triangles(edges, outlines, junctions, lumen)
+        triangles = []
+        for k, (edge, outline) in enumerate(zip(edges, outlines, strict=True)):
+            for side in (1, -1):
+                on_lumen = 2 * k * web.lumen_steps + side * np.arange(web.lumen_steps + 1)
+                nodes = [
+                    junctions[[k if side > 0 else k - 1]],
+                    lumen[on_lumen % len(lumen)],
+                    outline[web.reach + side * np.arange(web.reach + 1)],
+                    edge[side * np.arange(len(edge) // 2 + 1) % len(edge)],
+                ]
+                corners = np.concatenate(nodes)[web.half]
+                triangles.append(corners if side > 0 else reverse(corners))
+        return np.concatenate(triangles)
 
     def _tip(self, discs: list[list[Ring]]) -> Ring:
         """The cap's centres; with fewer than three, points of its neck rims."""

@@ -9,24 +9,23 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Literal, NamedTuple, Protocol, cast
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from sbafab import plugins
 from sbafab.documents import Document, PlainNumber
 from sbafab.errors import DesignError, OutputError, VoidError
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.surface import Vector
+from sbafab.meshing.surface import Floats, Ints
 from sbafab.plugins import Plugins
 from sbafab.runtime import Progress
-from sbafab.simulators.shell_model import Shell, enclosed, pocket_radii, why_not_round
+from sbafab.simulators.shell_model import Shell, pocket_radii, why_not_round
 
 SIMULATORS = Plugins(
     plugins.SIMULATORS,
@@ -92,30 +91,17 @@ class SimulationRequest:
             raise DesignError(f"minutes = {self.minutes:g} must be a finite number above 0")
 
 
-@dataclass(frozen=True)
-class State:
-    """An actuator at one time in s of a run, in the form shared by all simulators.
-
-    ``pressures`` are kPa above the outside air by chamber (a vacuum is negative), empty if volumes
-    are imposed; ``volumes`` ul of air by chamber, empty if they were not recorded. ``tip`` is the
-    displacement in mm (x, y, z) of the middle of the tip from the flat state, ``height`` its height
-    in mm above the underside of the base, with films as thick as bought; ``tilt`` is in degrees.
-    These three are None round a tube, and the tilt is also None if the tip has only one axis.
-    """
-
-    time: float
-    pressures: Mapping[str, float]
-    height: float | None
-    tip: Vector | None
-    tilt: float | None
-    volumes: Mapping[str, float]
-
-    @property
-    def stroke(self) -> float:
-        """Growth in height in mm."""
-        return 0.0 if self.tip is None else self.tip[2]
-
-
+UNITS = {
+    "length": "mm",
+    "pressure": "kPa",
+    "volume": "ul",
+    "stress": "MPa",
+    "work": "uJ",
+    "angle": "degrees",
+    "time": "s",
+    "rate": "steps/s",
+}
+"""Units of the values in ``result.json``."""
 FIGURES = {
     "drift": ("drift in the last 0.5 s", "mm"),
     "overlap": ("films through each other", "ul"),
@@ -130,64 +116,10 @@ SAME_TIME = 1e-6
 """s"""
 
 
-@dataclass(frozen=True)
-class Result:
-    """Result of a run: its ``states`` in order of time, and ``figures`` (mm, ul, MPa, uJ or
-    steps/s) by name of ``FIGURES``.
-
-    ``stopped`` is one sentence if it ended early; the results up to then are valid.
-    """
-
-    simulator: str
-    states: tuple[State, ...]
-    figures: Mapping[str, float] = field(default_factory=dict)
-    stopped: str | None = None
-
-    @property
-    def last(self) -> State:
-        """The final state; the properties below are its own."""
-        return self.states[-1]
-
-    @property
-    def pressures(self) -> Mapping[str, float]:
-        return self.last.pressures
-
-    @property
-    def height(self) -> float | None:
-        return self.last.height
-
-    @property
-    def tip(self) -> Vector | None:
-        return self.last.tip
-
-    @property
-    def tilt(self) -> float | None:
-        return self.last.tilt
-
-    @property
-    def volumes(self) -> Mapping[str, float]:
-        return self.last.volumes
-
-    @property
-    def rows(self) -> list[tuple[str, float, str]]:
-        """Label, value and unit of each printed line."""
-        last = self.last
-        rows = [(name, value, "kPa") for name, value in last.pressures.items()]
-        rows += [(f"tip {axis}", at, "mm") for axis, at in zip("xyz", last.tip or (), strict=False)]
-        rows += [] if last.height is None else [("height", last.height, "mm")]
-        rows += [] if last.tilt is None else [("tilt", last.tilt, "degrees")]
-        rows += [(f"air {name}", value, "ul") for name, value in last.volumes.items()]
-        labels = ((FIGURES[name], value) for name, value in self.figures.items())
-        return rows + [(label, value, unit) for (label, unit), value in labels]
-
-    def as_dict(self) -> dict[str, object]:
-        """For a JSON file: the last state, the figures, all states."""
-        head = {"simulator": self.simulator, **asdict(self.last), **self.figures}
-        return {**head, "states": list(map(asdict, self.states)), "stopped": self.stopped}
-
-
-class StateEntry(Document):
+class State(Document):
     """The actuator at one time of a run."""
+
+    model_config = ConfigDict(frozen=True)
 
     time: PlainNumber = 0.0
     pressures: Mapping[str, PlainNumber] = {}
@@ -204,9 +136,19 @@ class StateEntry(Document):
     work: PlainNumber = 0.0
     """calculix: of the air"""
 
+    @property
+    def stroke(self) -> float:
+        """Growth in height in mm."""
+        return 0.0 if self.tip is None else self.tip[2]
 
-class SimulateDocument(StateEntry, schema="sbafab/simulate@2"):
-    """The contents of ``result.json``, the last state first; only its head if nothing has run."""
+
+class Result(State, schema="sbafab/simulate@2"):
+    """Result of a run, and the contents of ``result.json``: the last state, then all ``states``.
+
+    Pressures are empty if volumes are imposed; height, tip and tilt are None round a tube, and the
+    tilt is also None if the tip has only one axis. If a run ended early, the results up to then
+    are valid, and ``stopped`` is one sentence. Only the units are given if nothing has run.
+    """
 
     units: Mapping[str, str]
     folder: str = ""
@@ -219,10 +161,44 @@ class SimulateDocument(StateEntry, schema="sbafab/simulate@2"):
     """sofa, round a tube: mm over the crowns"""
     rate: PlainNumber = 0.0
     """sofa, mujoco"""
-    states: Sequence[StateEntry] = ()
+    states: Sequence[State] = ()
     """in order of time"""
     stopped: str | None = None
     """why it ended early, if it did"""
+
+    @classmethod
+    def of_run(
+        cls,
+        simulator: str,
+        states: Sequence[State],
+        figures: Mapping[str, float],
+        stopped: str | None = None,
+    ) -> Result:
+        """Return the result of a run, with ``figures`` by name of ``FIGURES``."""
+        last = {name: getattr(states[-1], name) for name in states[-1].model_fields_set}
+        run = {"units": UNITS, "simulator": simulator, "states": tuple(states), "stopped": stopped}
+        return cls.model_validate({**last, **figures, **run})
+
+    @property
+    def last(self) -> State:
+        """The final state."""
+        return self.states[-1]
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """The results that this simulator gives, by name of ``FIGURES``."""
+        return {name: getattr(self, name) for name in FIGURES if name in self.model_fields_set}
+
+    @property
+    def rows(self) -> list[tuple[str, float, str]]:
+        """Label, value and unit of each printed line."""
+        rows = [(name, value, "kPa") for name, value in self.pressures.items()]
+        rows += [(f"tip {axis}", at, "mm") for axis, at in zip("xyz", self.tip or (), strict=False)]
+        rows += [] if self.height is None else [("height", self.height, "mm")]
+        rows += [] if self.tilt is None else [("tilt", self.tilt, "degrees")]
+        rows += [(f"air {name}", value, "ul") for name, value in self.volumes.items()]
+        labels = ((FIGURES[name], value) for name, value in self.figures.items())
+        return rows + [(label, value, unit) for (label, unit), value in labels]
 
 
 class Simulator(Protocol):
@@ -279,10 +255,7 @@ def under_vacuum(name: str, request: SimulationRequest) -> SimulationRequest:
 
 
 def chamber_pressures(
-    names: Sequence[str],
-    request: SimulationRequest,
-    default: float,
-    least: float = 0.0,
+    names: Sequence[str], request: SimulationRequest, default: float, least: float = 0.0
 ) -> dict[str, float]:
     """Return the pressure in kPa of every chamber: named, ``request.pressure`` elsewhere.
 
@@ -391,12 +364,7 @@ def _wrong(
             yield f"{alike} leans by {tilt:.1f} degrees (more than {MOST_LEAN:g})"
 
 
-def overlap(
-    points: NDArray[np.float64],
-    flat: NDArray[np.float64],
-    start: NDArray[np.float64],
-    triangles: NDArray[np.int64],
-) -> float:
+def overlap(points: Floats, flat: Floats, start: Floats, triangles: Ints) -> float:
     """Return the volume in ul in which films have passed through the films that lay on them.
 
     ``points``, ``flat`` and ``start`` are the positions (n, 3) of nodes at the end, when all films
@@ -448,10 +416,6 @@ class Stop(NamedTuple):
     words: str
 
 
-Ended = tuple[int, Stop | None]
-"""End of a program: its exit code, and the reason if it was stopped, else None."""
-
-
 def program_path(name: str, install: str) -> str:
     """Path of an installed program. Raises OutputError with instructions to ``install`` it."""
     path = shutil.which(name)
@@ -461,16 +425,14 @@ def program_path(name: str, install: str) -> str:
 
 
 def run_program(
-    command: Sequence[str],
-    log: Path,
-    limit: float | None,
-    look: Callable[[], None],
-) -> Ended:
+    command: Sequence[str], log: Path, limit: float | None, look: Callable[[], None]
+) -> tuple[int, Stop | None]:
     """Run a command in the folder of its ``log``, which receives its output.
 
     ``look`` is called while it runs; after ``limit`` seconds it is stopped. Ctrl-C and SIGTERM
     stop the run, not the program that started it, so that partial results can be kept. One
-    thread, unless OMP_NUM_THREADS says otherwise. Raises OutputError if it cannot be started.
+    thread, unless OMP_NUM_THREADS says otherwise. Return its exit code, and why it was stopped.
+    Raises OutputError if it cannot be started.
     """
     began = time.monotonic()
     stopped: Stop | None = None
@@ -544,23 +506,32 @@ class RecordedFilms:
 
     laminate: Laminate
     shell: Shell
-    middle: NDArray[np.int64]
+    middle: Ints
     pressures: Mapping[str, float]
     requested: Collection[float]
 
-    def state(self, time: float, nodes: NDArray[np.float64]) -> State:
+    def state(self, time: float, nodes: Floats) -> State:
         """The state at a time in s, with the nodes (n, 3) in mm."""
         on, shell = min(1.0, time / RAMP), self.shell
         pressures = {name: on * value for name, value in self.pressures.items()}
-        volumes = {name: enclosed(nodes, walls) for name, walls in shell.cavities.items()}
+        volumes = {name: shell.volume(name, nodes) for name in shell.cavities}
         if self.laminate.tube is not None:
-            return State(time, pressures, None, None, None, volumes)
+            return State(
+                time=time, pressures=pressures, height=None, tip=None, tilt=None, volumes=volumes
+            )
         moved = nodes[self.middle].mean(axis=0) - shell.rest[self.middle].mean(axis=0)
         x, y, z = moved.tolist()
         height = sum(layer.film.thickness for layer in self.laminate.tpe_layers) + z
-        return State(time, pressures, height, (x, y, z), tilt_of(nodes[shell.tip]), volumes)
+        return State(
+            time=time,
+            pressures=pressures,
+            height=height,
+            tip=(x, y, z),
+            tilt=tilt_of(nodes[shell.tip]),
+            volumes=volumes,
+        )
 
-    def figures(self, states: Sequence[State], nodes: NDArray[np.float64]) -> dict[str, float]:
+    def figures(self, states: Sequence[State], nodes: Floats) -> dict[str, float]:
         """Figures of a run by name of ``FIGURES``, from its states and its last nodes."""
         figures: dict[str, float] = {}
         if self.laminate.tube is None:
@@ -575,12 +546,12 @@ class RecordedFilms:
         return figures
 
 
-def read_nodes(path: Path) -> list[tuple[float, NDArray[np.float64]]]:
+def read_nodes(path: Path) -> list[tuple[float, Floats]]:
     """Times in s and places (n, 3) in mm of recorded nodes, in the format of SOFA's WriteState.
 
     They end before the first record that is truncated or not finite.
     """
-    records: list[tuple[float, NDArray[np.float64]]] = []
+    records: list[tuple[float, Floats]] = []
     lines = path.read_text("utf-8", "replace").splitlines(keepends=True) if path.is_file() else []
     time = math.nan
     for line in lines:
@@ -651,9 +622,9 @@ def run_model(
     record.unlink()
     if stopped is not None:
         reached = f"{name} ran to {last.time:g} of {seconds:g} s: {stopped.words}"
-        return Result(simulator, states, figures, f"{reached}; what it reached is kept")
+        return Result.of_run(simulator, states, figures, f"{reached}; what it reached is kept")
     progress(program, periods, periods)
-    return Result(simulator, states, figures | ({} if rate is None else {"rate": rate}))
+    return Result.of_run(simulator, states, figures | ({} if rate is None else {"rate": rate}))
 
 
 def _why_void(program: str, code: int, trouble: str | None) -> str:
@@ -665,7 +636,7 @@ def _why_void(program: str, code: int, trouble: str | None) -> str:
     return f"{program} ended with exit code {code}" if code > 0 else ""
 
 
-def tilt_of(points: NDArray[np.float64]) -> float:
+def tilt_of(points: Floats) -> float:
     """Angle in degrees between the normal of a polygon of points (n, 3) and the axis."""
     x, y, z = np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0).tolist()
     return math.degrees(math.atan2(math.hypot(x, y), z))

@@ -11,12 +11,10 @@ import pytest
 
 from sbafab.api import build
 from sbafab.errors import DesignError, OutputError
-from sbafab.meshing.conforming.crossing import check_apart, crossing
-from sbafab.meshing.conforming.element_mesh import skin
 from sbafab.meshing.conforming.fill import filled
-from sbafab.meshing.conforming.layup import MeshSettings, flat, layup
+from sbafab.meshing.conforming.layup import MeshSettings, check_apart, crossing, flat, layup
 from sbafab.meshing.conforming.mesh import FACES, Mesh
-from sbafab.meshing.conforming.meshes import conforming_meshes
+from sbafab.meshing.conforming.meshes import conforming_meshes, skin
 
 SETTINGS = MeshSettings(h=0.75)
 
@@ -25,7 +23,7 @@ def films(mesh: Mesh) -> list[manifold3d.Manifold]:
     """Each film as a solid of flat triangles through the corners of its wedges."""
     found = []
     for cells in (cells for name, cells in mesh.cell_sets.items() if name.startswith("film")):
-        part = Mesh("film", mesh.kind, mesh.points, mesh.cells[cells], {}, {}, {}, {})
+        part = Mesh("film", mesh.kind, mesh.points, mesh.cells[cells])
         outer, triangles = skin(part), []
         for number, local in enumerate(FACES["wedge15"]):
             corners = [node for node in local if node < 6]

@@ -11,10 +11,9 @@ import pytest
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.element_mesh import check_mesh
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.meshing.conforming.mesh import Mesh, volumes
-from sbafab.meshing.conforming.meshes import ConformingMeshes, conforming_meshes
+from sbafab.meshing.conforming.meshes import ConformingMeshes, check_mesh, conforming_meshes
 from sbafab.meshing.solid import cavity_slabs
 
 FILM = 0.038

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -16,11 +15,9 @@ from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
 from sbafab.meshing.conforming.mesh import Mesh
-from sbafab.simulators.calculix import run as results
 from sbafab.simulators.calculix.deck import DeckSettings
 from sbafab.simulators.calculix.run import (
     Frame,
-    LoadedState,
     deck_mesh,
     deformed_png,
     history,
@@ -29,6 +26,7 @@ from sbafab.simulators.calculix.run import (
     read_frd,
     write_deformed,
 )
+from sbafab.simulators.simulator import State
 
 pytest.importorskip("netgen")
 
@@ -100,7 +98,7 @@ def stretched(mesh: Mesh, by: float) -> Frame:
     return Frame(SETTINGS.ramp, (by - 1) * mesh.points, np.zeros((len(mesh.points), 6)))
 
 
-def states_of(symmetry: Symmetry, by: float = 2.0) -> tuple[Laminate, Mesh, list[LoadedState]]:
+def states_of(symmetry: Symmetry, by: float = 2.0) -> tuple[Laminate, Mesh, list[State]]:
     laminate, mesh = lone(symmetry)
     return (
         laminate,
@@ -178,10 +176,9 @@ def test_deformed_vtu_holds_moved_points_and_stress(tmp_path: Path) -> None:
     np.testing.assert_array_equal(grid.cells_dict[pyvista.CellType.QUADRATIC_WEDGE], mesh.cells)
 
 
-def test_picture_shows_the_stress_by_colour(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_picture_shows_the_stress_by_colour() -> None:
     from PIL import Image
 
-    monkeypatch.setattr(results, "ENLARGED", 1)
     _, mesh = lone("quarter")
     frame = stretched(mesh, 1.0)
     right = mesh.points[:, 0] > mesh.points[:, 0].mean()
@@ -200,8 +197,8 @@ def test_plot_draws_every_state_and_names_its_axes() -> None:
     pressures = {"left": 6.0, "right & up": 3.0}
     volumes = {"left": 19.0, "right & up": 9.0}
     states = [
-        replace(start, pressures=dict.fromkeys(pressures, 0.0), volumes=volumes),
-        replace(end, pressures=pressures, volumes=volumes),
+        start.model_copy(update={"pressures": dict.fromkeys(pressures, 0.0), "volumes": volumes}),
+        end.model_copy(update={"pressures": pressures, "volumes": volumes}),
     ]
     root = ET.fromstring(history_svg("a < b", states))
     texts = ["".join(text.itertext()) for text in root.iter("{http://www.w3.org/2000/svg}text")]

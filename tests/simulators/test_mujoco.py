@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import subprocess
 import sys
@@ -203,7 +202,7 @@ def test_it_is_one_of_the_simulators(tmp_path: Path) -> None:
     }
     rows = {name: value for name, value, _ in found.rows}
     assert rows["air chamber1"] == found.volumes["chamber1"]
-    json.dumps(found.as_dict())
+    found.model_dump_json()
 
 
 def test_a_balloon_holds_less_than_a_mylar_balloon_that_stretches() -> None:

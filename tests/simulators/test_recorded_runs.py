@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import time
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -26,8 +25,7 @@ from sbafab.simulators.simulator import (
     read_nodes,
     run_program,
 )
-from sbafab.simulators.sofa.run import read_log, run
-from sbafab.simulators.sofa.scenes import scenes_of
+from sbafab.simulators.sofa.run import read_log, run, scenes_of
 from tests.simulators.conftest import StandIn
 
 SOFA = """
@@ -178,7 +176,14 @@ def test_what_a_laminate_cannot_do_is_told() -> None:
     """
     two = sbafab.build("3dof-15mm", "stack.balloons=2")
     unlike = (5.0, 0.0, 0.0)
-    state = State(1.0, {"chamber1": 5.0}, 0.1, (-5.0, 0.0, -1.0), 100.0, {"chamber2": 1.0})
+    state = State(
+        time=1.0,
+        pressures={"chamber1": 5.0},
+        height=0.1,
+        tip=(-5.0, 0.0, -1.0),
+        tilt=100.0,
+        volumes={"chamber2": 1.0},
+    )
     for change, passed, words in (
         ({}, 0.19, None),
         ({}, 0.21, "passed through each other in 0.21 ul"),
@@ -187,9 +192,9 @@ def test_what_a_laminate_cannot_do_is_told() -> None:
         ({"tilt": math.nan}, 0.0, "not finite"),
         ({"volumes": {"chamber3": -62.046}}, 0.0, "chamber3 holds -62 ul of air, less than none"),
     ):
-        told = impossible(two, replace(state, **change), unlike, passed)  # type: ignore[arg-type]
+        told = impossible(two, state.model_copy(update=change), unlike, passed)
         assert (told is None) if words is None else (words in str(told))
-    high = replace(state, tip=(0.0, 0.0, 99.0))
+    high = state.model_copy(update={"tip": (0.0, 0.0, 99.0)})
     assert impossible(sbafab.build("radial-15mm"), high, (5.0,)) is None
 
 

@@ -13,7 +13,7 @@ from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.runtime import ignore_progress
 from sbafab.simulators.simulator import Result, SimulationRequest
-from sbafab.simulators.sofa import scenes
+from sbafab.simulators.sofa import run as scenes
 from sbafab.simulators.sofa.run import run
 
 pytestmark = pytest.mark.skipif(shutil.which("runSofa") is None, reason="runSofa is not installed")

@@ -19,10 +19,10 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.simulators.shell_model import round_stack
 from sbafab.simulators.simulator import SimulationRequest
-from sbafab.simulators.sofa.run import export
-from sbafab.simulators.sofa.scenes import (
+from sbafab.simulators.sofa.run import (
     beam_of,
     conforming_shell,
+    export,
     prism,
     scenes_of,
 )

@@ -9,20 +9,27 @@ balloon) and thin accordingly; the flat mesh is the rest position for a solver t
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc, Point
 from sbafab.laminate.laminate import Interface
-from sbafab.meshing.conforming.crossing import crossing, crossing_clause
-from sbafab.meshing.conforming.layup import FormedFilm, Layup, bodies, flat
+from sbafab.meshing.conforming.layup import (
+    FormedFilm,
+    Layup,
+    bodies,
+    crossing,
+    crossing_clause,
+    flat,
+)
 from sbafab.meshing.conforming.mesh import integrals
 from sbafab.meshing.conforming.plane import MISSING, Plane
+from sbafab.meshing.surface import Flags, Floats, Ints
 from sbafab.models.closed_forms import eqs_1_to_3, lens
 
 # The lift of one film: Poisson's equation on the triangles of a pocket.
@@ -36,16 +43,13 @@ class Lift(NamedTuple):
     disc, ``volumes`` (3,) the volumes that they enclose.
     """
 
-    shapes: NDArray[np.float64]
-    plateaus: NDArray[np.float64]
-    volumes: NDArray[np.float64]
+    shapes: Floats
+    plateaus: Floats
+    volumes: Floats
 
 
 def lift(
-    plane: Plane,
-    pocket: NDArray[np.bool_],
-    fixed: NDArray[np.int64],
-    discs: list[tuple[NDArray[np.int64], tuple[float, float]]],
+    plane: Plane, pocket: Flags, fixed: Ints, discs: list[tuple[Ints, tuple[float, float]]]
 ) -> Lift:
     """Return the rise of the film over a pocket: -lap w = 1, w = 0 at the ``fixed`` nodes.
 
@@ -97,8 +101,7 @@ NEAR = 1e-3
 """mm by which a round pocket may be off its chamber's axis."""
 
 
-@dataclass(frozen=True)
-class Pocket:
+class Pocket(NamedTuple):
     """One pocket of a chamber, under film ``ply``, with the lift of the films below and above.
 
     ``centres`` are its stacks, as indices of the layup's centres. ``share`` of each is meshed;
@@ -116,7 +119,7 @@ class Pocket:
     flat_ul: float
     largest_ul: float
 
-    def pressure(self, ul: float, lean: NDArray[np.float64]) -> float:
+    def pressure(self, ul: float, lean: Floats) -> float:
         """The amount of the even shape, in 1/mm, at which each balloon holds ``ul``.
 
         ``lean`` (2, 2) are the slopes of the lower and the upper neck disc. Raises DesignError
@@ -144,9 +147,8 @@ class Pocket:
 def pockets(stack: Layup) -> list[Pocket]:
     """The pockets of every chamber, bottom to top; equal ones are computed once."""
     lifts: dict[tuple[bytes, ...], Lift] = {}
-    limits: dict[tuple[bytes, bytes], float] = {}
     return [
-        _pocket(stack, chamber, ply, lifts, limits)
+        _pocket(stack, chamber, ply, lifts)
         for ply, interface in enumerate(stack.laminate.interfaces, start=1)
         if interface.kind == "chamber"
         for chamber, void in stack.voids.items()
@@ -154,51 +156,43 @@ def pockets(stack: Layup) -> list[Pocket]:
     ]
 
 
-def _pocket(
-    stack: Layup,
-    chamber: str,
-    ply: int,
-    lifts: dict[tuple[bytes, ...], Lift],
-    limits: dict[tuple[bytes, bytes], float],
-) -> Pocket:
-    plane, plies = stack.plane, stack.plies
-    cells = stack.voids[chamber].under[ply]
-    inner = stack.nodes(cells)
-    fixed = np.intersect1d(inner, stack.nodes(plies[ply].bonded))
+def _pocket(stack: Layup, chamber: str, ply: int, lifts: dict[tuple[bytes, ...], Lift]) -> Pocket:
+    plies, cells = stack.plies, stack.voids[chamber].under[ply]
+    fixed = np.intersect1d(stack.nodes(cells), stack.nodes(plies[ply].bonded))
     centres = tuple(i for i, (owner, _) in enumerate(stack.stacks) if owner == chamber)
     places = [stack.centres[i] for i in centres]
 
-    def lift_of(necks: NDArray[np.bool_]) -> Lift:
+    def lift_of(necks: Flags) -> Lift:
         key = cells.tobytes(), fixed.tobytes(), necks.tobytes()
         if key not in lifts:
-            discs = list(_discs(stack, necks, fixed, places))
-            lifts[key] = lift(plane, cells, fixed, discs)
+            lifts[key] = lift(stack.plane, cells, fixed, list(_discs(stack, necks, fixed, places)))
         return lifts[key]
 
+    def largest() -> float:
+        """A drawn pocket's volume over its inscribed disc's is the ratio of their even lifts."""
+        even = lift_of(cells & False)
+        offsets = stack.plane.points[fixed][:, None] - np.array(places)
+        half = float(np.linalg.norm(offsets, axis=2).min())
+        wider = float(even.volumes[0] / even.shapes[0].max()) / (math.pi * half**2 / 2)
+        return eqs_1_to_3(half).largest_volume * wider / len(places) / stack.shares[chamber]
+
     above = plies[ply + 1].bonded if ply + 1 < len(plies) else cells & False
-    lower = lift_of(cells & (plies[ply - 1].bonded | ~plies[ply - 1].cells))
-    upper = lift_of(cells & (above | ~plies[ply].cells))
-    share = stack.shares[chamber]
-    key = cells.tobytes(), fixed.tobytes()
-    if key not in limits:
-        interface = stack.laminate.interfaces[ply - 1]
-        limits[key] = _largest(stack, interface, lift_of(cells & False), fixed, places, share)
     return Pocket(
         chamber,
         ply,
         plies[ply].layer.index,
         centres,
-        lower,
-        upper,
-        share,
-        float(plane.areas()[cells].sum()) * plies[ply].gap,
-        limits[key],
+        lift_of(cells & (plies[ply - 1].bonded | ~plies[ply - 1].cells)),
+        lift_of(cells & (above | ~plies[ply].cells)),
+        stack.shares[chamber],
+        float(stack.plane.areas()[cells].sum()) * plies[ply].gap,
+        _largest(stack.laminate.interfaces[ply - 1], places[0]) or largest(),
     )
 
 
 def _discs(
-    stack: Layup, necks: NDArray[np.bool_], fixed: NDArray[np.int64], places: list[Point]
-) -> Iterator[tuple[NDArray[np.int64], Point]]:
+    stack: Layup, necks: Flags, fixed: Ints, places: list[Point]
+) -> Iterator[tuple[Ints, Point]]:
     """The nodes of each neck disc, and the axis it is on."""
     nodes = np.setdiff1d(stack.nodes(necks), fixed)
     offsets = stack.plane.points[nodes][:, None] - np.array(places)
@@ -208,56 +202,28 @@ def _discs(
             yield nodes[nearest == number], place
 
 
-def _largest(
-    stack: Layup,
-    interface: Interface,
-    even: Lift,
-    fixed: NDArray[np.int64],
-    places: list[Point],
-    share: float,
-) -> float:
-    """Most air in ul that a balloon can hold; ``share`` of it is meshed.
+def _largest(interface: Interface, centre: Point) -> float | None:
+    """Most air in ul that a round or oblong balloon round a centre can hold; None for others.
 
     A round pocket is two paraboloids whose meridian keeps its length (paper Eqs. 1 to 3), an oblong
-    one two arcs (as in ``predict``). A drawn pocket's volume over its inscribed disc's is the ratio
-    of their even lifts of equal height.
+    one two arcs (as in ``predict``). A circle on the centre is most of a round one's edge; a slot
+    ends in two of equal radius at equal distances on either side, if at least a third of a turn of
+    each remains beside inlet and manifold.
     """
-    ends = _round_ends(interface, places[0])
-    if len(ends) == 1:
-        return eqs_1_to_3(ends[0][1]).largest_volume
-    if len(ends) == 2:
-        (first, radius), (last, _) = ends
-        return lens(2 * radius, math.dist(first, last)).largest_volume
-    offsets = stack.plane.points[fixed][:, None] - np.array(places)
-    half = float(np.linalg.norm(offsets, axis=2).min())
-    disc = math.pi * half**2 / 2
-    wider = float(even.volumes[0] / even.shapes[0].max()) / disc
-    return eqs_1_to_3(half).largest_volume * wider / len(places) / share
-
-
-def _round_ends(interface: Interface, centre: Point) -> list[tuple[Point, float]]:
-    """Middles and radii of the circles that the pocket round a centre ends in.
-
-    One on the centre if most of the edge is that circle. Two of equal radius at equal distances on
-    either side for a slot, if at least a third of a turn of each remains beside inlet and manifold.
-    """
-    turns: dict[tuple[Point, float], float] = {}
-    for outer in interface.unbonded.outers:
-        for edge in outer.edges:
-            if isinstance(edge, Arc):
-                x, y = edge.centre
-                place = (round(x, 5), round(y, 5)), round(edge.radius, 5)
-                turns[place] = turns.get(place, 0.0) + abs(edge.sweep)
+    turns: defaultdict[tuple[Point, float], float] = defaultdict(float)
+    for edge in (edge for outer in interface.unbonded.outers for edge in outer.edges):
+        if isinstance(edge, Arc):
+            x, y = edge.centre
+            turns[(round(x, 5), round(y, 5)), round(edge.radius, 5)] += abs(edge.sweep)
     ends = sorted(place for place, turn in turns.items() if turn > math.tau / 3)
-    on_centre = [end for end in ends if math.dist(end[0], centre) < NEAR and turns[end] > math.pi]
-    if on_centre:
-        return on_centre[:1]
-    for number, (first, radius) in enumerate(ends):
-        for last, last_radius in ends[number + 1 :]:
-            middle = (first[0] + last[0]) / 2, (first[1] + last[1]) / 2
-            if abs(last_radius - radius) < NEAR and math.dist(middle, centre) < NEAR:
-                return [(first, radius), (last, last_radius)]
-    return []
+    for middle, radius in ends:
+        if math.dist(middle, centre) < NEAR and turns[middle, radius] > math.pi:
+            return eqs_1_to_3(radius).largest_volume
+    for (first, radius), (last, last_radius) in combinations(ends, 2):
+        middle = (first[0] + last[0]) / 2, (first[1] + last[1]) / 2
+        if abs(last_radius - radius) < NEAR and math.dist(middle, centre) < NEAR:
+            return lens(2 * radius, math.dist(first, last)).largest_volume
+    return None
 
 
 # Balloons set on each other by the planes of their neck discs.
@@ -267,18 +233,14 @@ FLATNESS = 0.01
 """Fraction of the lift by which necks may deviate from a common plane."""
 
 
-RigidMotion = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""A turn (3, 3), then a shift (3,) in mm."""
-
-
-def slopes_of(centres: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.float64]:
+def slopes_of(centres: Floats, heights: Floats) -> Floats:
     """Slopes along x and y of the plane through the heights at the centres (n, 2).
 
     Raises DesignError if they have no common plane.
     """
     offsets = centres - centres.mean(axis=0)
     rises = heights - heights.mean()
-    slopes: NDArray[np.float64] = np.linalg.lstsq(offsets, rises, rcond=1e-9)[0]
+    slopes: Floats = np.linalg.lstsq(offsets, rises, rcond=1e-9)[0]
     worst = float(np.abs(rises - offsets @ slopes).max())
     if worst > FLATNESS * float(np.abs(heights).max()):
         raise DesignError(
@@ -288,25 +250,7 @@ def slopes_of(centres: NDArray[np.float64], heights: NDArray[np.float64]) -> NDA
     return slopes
 
 
-def set_on(
-    below: RigidMotion,
-    centres: NDArray[np.float64],
-    top: NDArray[np.float64],
-    bottom: NDArray[np.float64],
-    gap: float,
-) -> RigidMotion:
-    """The pose of a balloon whose neck discs at heights ``bottom`` meet those at ``top`` of the
-    balloon below, ``gap`` mm apart.
-    """
-    turned, shift = below
-    middle = centres.mean(axis=0)
-    upright = turned @ _frame(slopes_of(centres, top))
-    turn = upright @ _frame(slopes_of(centres, bottom)).T
-    meeting = turned @ np.array([*middle, top.mean()]) + shift + gap * upright[:, 2]
-    return turn, meeting - turn @ np.array([*middle, bottom.mean()])
-
-
-def _frame(slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _frame(slopes: Floats) -> Floats:
     """The smallest rotation (3, 3) of the upright axis onto the normal of a plane."""
     normal = np.array([-slopes[0], -slopes[1], 1.0])
     x, y, z = (normal / np.linalg.norm(normal)).tolist()
@@ -355,10 +299,8 @@ def _least(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> Fill:
     most = max(fill.values())
 
     def raised(share: float) -> Fill:
-        def amount(ul: float) -> float:
-            return min(math.ceil(10 * (ul + share * (most - ul)) - 1e-6) / 10, most)
-
-        return {name: ul if ul == most else amount(ul) for name, ul in fill.items()}
+        amounts = {name: ul + share * (most - ul) for name, ul in fill.items()}
+        return {name: min(math.ceil(10 * ul - 1e-6) / 10, most) for name, ul in amounts.items()}
 
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
@@ -370,66 +312,48 @@ def _least(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> Fill:
 
 def formed(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> list[FormedFilm]:
     """Every film at the position that the air of these pockets gives it, even if films cross."""
-    body_of_node, body_of_centre = bodies(stack)
+    of_node, of_centre = bodies(stack)
     forms = [FormedFilm(form.base.copy(), form.up.copy()) for form in flat(stack)]
-    for body in np.unique(body_of_centre).tolist():
-        nodes = np.flatnonzero(body_of_node == body)
-        centres = np.flatnonzero(body_of_centre == body)
+    for body in np.unique(of_centre).tolist():
+        nodes, centres = np.flatnonzero(of_node == body), np.flatnonzero(of_centre == body)
+        places = np.array(stack.centres)[centres]
+        lifts = np.zeros((len(forms), len(of_node)))
+        # Height of each stack's neck disc on each film, above the film itself.
+        necks = np.zeros((len(forms), len(stack.centres)))
         of_body = [pocket for pocket in all_pockets if pocket.centres[0] in centres]
-        for k, form in _raised(stack, of_body, centres, fill).items():
-            forms[k].base[nodes] = form.base[nodes]
-            forms[k].up[nodes] = form.up[nodes]
-    return forms
-
-
-def _raised(
-    stack: Layup, of_body: list[Pocket], centres: NDArray[np.int64], fill: Fill
-) -> dict[int, FormedFilm]:
-    """The films of one body, by ply; sheets stay as they are."""
-    lifts = np.zeros((len(stack.plies), len(stack.plane.points)))
-    # Height of each stack's neck disc on each film, above the film itself.
-    necks = np.zeros((len(stack.plies), len(stack.centres)))
-    places = np.array(stack.centres)[centres]
-    for k in sorted({pocket.ply for pocket in of_body}):
-        there = [pocket for pocket in of_body if pocket.ply == k]
-        _lift(there, fill, centres, places, lifts, necks)
-    forms = {}
-    poses = _poses(stack, places, necks[:, centres])
-    for k, (ply, rise, (turn, shift)) in enumerate(zip(stack.plies, lifts, poses, strict=True)):
-        if ply.layer.role != "sheet":
-            local = np.column_stack([stack.plane.points, ply.z + rise])
-            up = np.broadcast_to(turn[:, 2], local.shape)
-            forms[k] = FormedFilm(local @ turn.T + shift, up)
+        for k in sorted({pocket.ply for pocket in of_body}):
+            there = [pocket for pocket in of_body if pocket.ply == k]
+            _lift(there, fill, centres, places, lifts, necks)
+        poses = _poses(stack, places, necks[:, centres])
+        for ply, form, rise, (turn, shift) in zip(stack.plies, forms, lifts, poses, strict=True):
+            if not ply.is_sheet:
+                local = np.column_stack([stack.plane.points[nodes], ply.z + rise[nodes]])
+                form.base[nodes], form.up[nodes] = local @ turn.T + shift, turn[:, 2]
     return forms
 
 
 def _fill(stack: Layup, fill_ul: float | Fill) -> Fill:
     names = [chamber.name for chamber in stack.laminate.chambers]
-    amounts_given = fill_ul if isinstance(fill_ul, Mapping) else dict.fromkeys(names, fill_ul)
-    unknown = [name for name in amounts_given if name not in names]
+    given = fill_ul if isinstance(fill_ul, Mapping) else dict.fromkeys(names, fill_ul)
+    unknown = [name for name in given if name not in names]
     if unknown:
         raise DesignError(
             f"fill names chamber {unknown[0]}, which is not there; "
             f"the chambers are {', '.join(names)}"
         )
-    amounts = {name: float(amounts_given.get(name, 0.0)) for name in names}
+    amounts = {name: float(given.get(name, 0.0)) for name in names}
     if stack.sector is not None and len(set(amounts.values())) > 1:
         raise DesignError(
             "a mesh of a part by symmetry has the same fill in every chamber; ask for symmetry full"
         )
     for name, value in amounts.items():
-        if not (math.isfinite(value) and value >= 0):
+        if not 0 <= value < math.inf:
             raise DesignError(f"fill of {name} = {value:g} ul must be 0 ul or more")
     return amounts
 
 
 def _lift(
-    there: list[Pocket],
-    fill: Fill,
-    centres: NDArray[np.int64],
-    places: NDArray[np.float64],
-    lifts: NDArray[np.float64],
-    necks: NDArray[np.float64],
+    there: list[Pocket], fill: Fill, centres: Ints, places: Floats, lifts: Floats, necks: Floats
 ) -> None:
     """Adds the lift of one balloon's two films, and of their necks."""
     lean = np.zeros((2, 2))
@@ -447,16 +371,21 @@ def _lift(
     necks[there[0].ply] = heights[1]
 
 
-def _poses(
-    stack: Layup, places: NDArray[np.float64], necks: NDArray[np.float64]
-) -> list[RigidMotion]:
-    """The pose of every film: a balloon's films move together, each balloon stands on the last."""
-    poses = [(np.eye(3), np.zeros(3))]
+def _poses(stack: Layup, places: Floats, necks: Floats) -> list[tuple[Floats, Floats]]:
+    """The pose of every film: a turn (3, 3), then a shift (3,) in mm.
+
+    A balloon's films move together; each balloon stands on the neck discs of the last.
+    """
+    turn, shift, middle = np.eye(3), np.zeros(3), places.mean(axis=0)
+    poses = [(turn, shift)]
     for k, interface in enumerate(stack.laminate.interfaces, start=1):
-        if interface.kind == "chamber":
-            poses.append(poses[-1])
-            continue
-        below, above = stack.plies[k - 1], stack.plies[k]
-        top = necks[k - 1] + below.z + below.thickness * stack.is_thick
-        poses.append(set_on(poses[-1], places, top, necks[k] + above.z, above.gap))
+        if interface.kind != "chamber":
+            below, above = stack.plies[k - 1], stack.plies[k]
+            top = necks[k - 1] + below.z + below.thickness * stack.is_thick
+            bottom = necks[k] + above.z
+            upright = turn @ _frame(slopes_of(places, top))
+            meeting = turn @ np.array([*middle, top.mean()]) + shift + above.gap * upright[:, 2]
+            turn = upright @ _frame(slopes_of(places, bottom)).T
+            shift = meeting - turn @ np.array([*middle, bottom.mean()])
+        poses.append((turn, shift))
     return poses

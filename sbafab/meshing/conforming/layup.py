@@ -5,19 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import Literal, NamedTuple
+from functools import cache, cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.edges import Bounds, Point, unit
 from sbafab.geometry.region import Region, disc, polygon, rectangle
 from sbafab.laminate.laminate import Chamber, Interface, Laminate, Layer
+from sbafab.meshing.conforming.mesh import TRIANGLE_PARTS
 from sbafab.meshing.conforming.plane import Plane, triangulation
-from sbafab.meshing.solid import body_bond, cavity_slabs, parted
-from sbafab.meshing.wrap import TubeWrap, tube_wrap
+from sbafab.meshing.solid import TubeWrap, body_bond, cavity_slabs, parted, tube_wrap
+from sbafab.meshing.surface import Flags, Floats, Ints
+
+if TYPE_CHECKING:
+    from shapely import STRtree
 
 Element = Literal["wedge", "tet"]
 Symmetry = Literal["full", "half", "quarter", "sector"]
@@ -49,8 +53,8 @@ class MeshSettings:
 SLACK = 1e-5
 """mm2 by which a profile may differ from its image."""
 ON_PLANE = 1e-6
-NEAR = 0.01
-"""Radius in mm about a chamber's centre: the chamber is meshed if any part of it is."""
+NEAR = 0.1
+"""Radius in mm of the disc about a chamber's centre that stands for the chamber."""
 
 
 class Sector(NamedTuple):
@@ -59,7 +63,7 @@ class Sector(NamedTuple):
     region: Region
     planes: tuple[tuple[str, Point], ...]
 
-    def on_planes(self, points: NDArray[np.float64]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+    def on_planes(self, points: Floats) -> Iterator[tuple[str, Flags]]:
         """Yield each plane's name and a mask of the points (n, 2) on it."""
         for name, (x, y) in self.planes:
             across = np.abs(points[:, 1] * x - points[:, 0] * y) < ON_PLANE
@@ -123,28 +127,31 @@ def _is_quarter(laminate: Laminate, region: Region, far: float) -> bool:
     return _covers(_flipped_y(away), away) and _covers(region, image)
 
 
+def meshed_shares(laminate: Laminate, part: Sector | None) -> dict[str, float]:
+    """The fraction of each chamber that is in the part."""
+    shares = {}
+    for chamber in laminate.chambers:
+        discs = [disc(centre, NEAR) for centre in chamber.centres]
+        meshed = discs if part is None else [place & part.region for place in discs]
+        shares[chamber.name] = sum(place.area for place in meshed) / sum(d.area for d in discs)
+    return shares
+
+
 def images(laminate: Laminate, symmetry: Symmetry) -> dict[str, str]:
     """For each chamber, the one meshed in its place: itself, or one that it is an image of."""
     part = sector(laminate, symmetry)
-    chambers = {chamber.name: chamber.centres for chamber in laminate.chambers}
-    if part is None:
-        return {name: name for name in chambers}
-    meshed = [
-        name
-        for name, centres in chambers.items()
-        if any(not (disc(centre, NEAR) & part.region).is_empty for centre in centres)
-    ]
-    _, (x, y) = part.planes[0]
+    places = {chamber.name: chamber.centres[0] for chamber in laminate.chambers}
+    meshed = [name for name, share in meshed_shares(laminate, part).items() if share]
 
     def meshed_for(name: str) -> str:
-        if name in meshed or symmetry != "half":
+        if name in meshed or symmetry != "half" or part is None:
             return name if name in meshed else meshed[0]
-        a, b = chambers[name][0]
-        along = a * x + b * y
-        image = 2 * along * x - a, 2 * along * y - b
-        return min(meshed, key=lambda twin: math.dist(image, chambers[twin][0]))
+        (a, b), (x, y) = places[name], part.planes[0][1]
+        along = 2 * (a * x + b * y)
+        image = along * x - a, along * y - b
+        return min(meshed, key=lambda twin: math.dist(image, places[twin]))
 
-    return {name: meshed_for(name) for name in chambers}
+    return {name: meshed_for(name) for name in places}
 
 
 # The layup: every TPE film over one triangulation of the plane, and the voids between them.
@@ -156,8 +163,7 @@ MOST_ELEMENTS = 3_000_000
 KINDS = ("separator", "chamber")
 
 
-@dataclass(frozen=True)
-class Ply:
+class Ply(NamedTuple):
     """One TPE film. ``cells`` are the triangles it covers, ``bonded`` the triangles bonded to the
     ply below, ``gap`` mm above it; ``area`` is its exact area in mm2.
     """
@@ -165,14 +171,18 @@ class Ply:
     layer: Layer
     z: float
     gap: float
-    cells: NDArray[np.bool_]
-    bonded: NDArray[np.bool_]
+    cells: Flags
+    bonded: Flags
     area: float
     bond_area: float
 
     @property
     def thickness(self) -> float:
         return self.layer.film.thickness
+
+    @property
+    def is_sheet(self) -> bool:
+        return self.layer.role == "sheet"
 
     @property
     def name(self) -> str:
@@ -182,8 +192,8 @@ class Ply:
 class MeshedVoid(NamedTuple):
     """Air of a chamber as triangles by ply: open in that film (``in_films``), or ``under`` it."""
 
-    in_films: Mapping[int, NDArray[np.bool_]]
-    under: Mapping[int, NDArray[np.bool_]]
+    in_films: dict[int, Flags]
+    under: dict[int, Flags]
 
 
 @dataclass(frozen=True)
@@ -198,12 +208,12 @@ class Layup:
     plane: Plane
     plies: tuple[Ply, ...]
     voids: Mapping[str, MeshedVoid]
-    seats: NDArray[np.bool_]
+    seats: Flags
     shares: Mapping[str, float]
     sector: Sector | None
     is_thick: bool = True
 
-    def nodes(self, cells: NDArray[np.bool_]) -> NDArray[np.int64]:
+    def nodes(self, cells: Flags) -> Ints:
         """The plane's nodes of some triangles."""
         return np.unique(self.plane.triangles[cells])
 
@@ -235,17 +245,17 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
 
     films = [clip(layer.profile) for layer in laminate.tpe_layers]
     bonds = [Region(), *(clip(_bond(laminate, interface)) for interface in laminate.interfaces)]
-    slabs = {chamber.name: list(_void_slabs(laminate, chamber)) for chamber in laminate.chambers}
-    seats = {chamber.name: list(_seats(laminate, chamber)) for chamber in laminate.chambers}
-    used = [*films, *bonds, *(clip(seat) for of_chamber in seats.values() for seat in of_chamber)]
-    used += [clip(region) for of_chamber in slabs.values() for _, _, region in of_chamber]
+    seats = [clip(seat) for chamber in laminate.chambers for seat in _seats(laminate, chamber)]
+    slabs = {chamber.name: cavity_slabs(laminate, chamber) for chamber in laminate.chambers}
+    used = [*films, *bonds, *seats]
+    used += [clip(slab.region) for of_chamber in slabs.values() for slab in of_chamber]
     regions = [region for region in dict.fromkeys(used) if not region.is_empty]
     plane = triangulation(regions, settings.h)
     row = {region: index for index, region in enumerate(regions)}
 
-    def cells(*whole: Region) -> NDArray[np.bool_]:
-        rows = [row[clip(region)] for region in whole if not clip(region).is_empty]
-        covered: NDArray[np.bool_] = np.any(plane.inside[rows], axis=0)
+    def cells(*clipped: Region) -> Flags:
+        rows = [row[region] for region in clipped if not region.is_empty]
+        covered: Flags = np.any(plane.inside[rows], axis=0)
         return covered
 
     plies: list[Ply] = []
@@ -255,30 +265,32 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
         places = (layer.z, gap) if settings.gaps else (z, 0.0)
         plies.append(Ply(layer, *places, cells(film), cells(bond), film.area, bond.area))
         _check_apart(plane, plies[-1])
-    voids, shares = {}, {}
+    films_at = {layer.z: k for k, layer in enumerate(laminate.tpe_layers)}
+    gaps_at = {interface.z: k for k, interface in enumerate(laminate.interfaces, start=1)}
+    voids = {}
     for name, of_chamber in slabs.items():
-        parts: tuple[dict[int, list[Region]], ...] = ({}, {})
-        for place, is_under, region in of_chamber:
-            parts[is_under].setdefault(place, []).append(region)
-        void = MeshedVoid(*({k: cells(*of) for k, of in each.items()} for each in parts))
+        void = MeshedVoid({}, {})
+        for slab in of_chamber:
+            at, z = slab.bottom in films_at, slab.bottom
+            place, k = (void.in_films, films_at[z]) if at else (void.under, gaps_at[z])
+            here = cells(clip(slab.region))
+            place[k] = place[k] | here if k in place else here
         if any(covered.any() for covered in void.under.values()):
             voids[name] = void
-            whole = sum(seat.area for seat in seats[name])
-            shares[name] = sum(clip(seat).area for seat in seats[name]) / whole
-    standing = cells(*(seat for of_chamber in seats.values() for seat in of_chamber))
-    return Layup(laminate, settings, plane, tuple(plies), voids, standing, shares, part)
+    shares = meshed_shares(laminate, part)
+    return Layup(laminate, settings, plane, tuple(plies), voids, cells(*seats), shares, part)
 
 
 def _check_size(laminate: Laminate, settings: MeshSettings) -> None:
     """Raises DesignError if h is larger than the narrowest ring, or far too small."""
     h = settings.h
     width, place = narrowest_ring(laminate) or (h, "")
-    if not 0 < h <= width * (1 + 1e-6):
+    if not h > 0:
+        raise DesignError(f"h = {h:g} mm is not a size for a mesh; ask for 0.35 mm")
+    if h > width * (1 + 1e-6):
         raise DesignError(
             f"h = {h:g} mm is larger than {place}, which is {width:.3f} mm wide; "
             f"ask for {width:.3f} mm at most"
-            if h > 0
-            else f"h = {h:g} mm is not a size for a mesh; ask for 0.35 mm"
         )
     covered = sum(layer.profile.area for layer in laminate.tpe_layers)
     elements = 2.31 * covered / h**2 * (3 if settings.element == "tet" else 1)
@@ -291,30 +303,24 @@ def _check_size(laminate: Laminate, settings: MeshSettings) -> None:
 
 
 def narrowest_ring(laminate: Laminate) -> tuple[float, str] | None:
-    """Width in mm of the narrowest bonded ring, which is the largest possible h, and its name."""
-    return min([*_rings(laminate)] or _open_rings(laminate), default=None)
+    """Width in mm of the narrowest bonded ring, which is the largest possible h, and its name.
 
-
-def _rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
-    """Yield the width of each bonded ring along x and y, and its name."""
+    A lone balloon's ring is open at its inlet, whose strip runs to the edge of the films: there it
+    is the bond beside the pocket.
+    """
+    rings: list[tuple[float, str]] = []
+    beside: list[tuple[float, str]] = []
     for interface in laminate.interfaces:
+        between = f"between layers {interface.below.index} and {interface.above.index}"
         ring = "the neck ring" if interface.kind == "separator" else "the bond round the pocket"
         for piece in interface.bond.pieces:
             for hole in piece.holes:
-                width = min(_margins(piece.outers[0].bounds, hole.bounds))
-                yield width, f"{ring} {_between(interface)}"
-
-
-def _open_rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
-    """Yield the widths of the bond beside each pocket, and its name.
-
-    A lone balloon's ring is open at its inlet, whose strip runs to the edge of the films.
-    """
-    for interface in laminate.interfaces:
+                widths = _margins(piece.outers[0].bounds, hole.bounds)
+                rings += [(width, f"{ring} {between}") for width in widths]
         for outer in interface.unbonded.outers:
-            for side in _margins(interface.contact.bounds, outer.bounds):
-                if side > EDGE:
-                    yield side, f"the bond beside the pocket {_between(interface)}"
+            widths = _margins(interface.contact.bounds, outer.bounds)
+            beside += [(width, f"the bond beside the pocket {between}") for width in widths]
+    return min(rings or [row for row in beside if row[0] > EDGE], default=None)
 
 
 def _margins(outer: Bounds, inner: Bounds) -> Bounds:
@@ -322,21 +328,19 @@ def _margins(outer: Bounds, inner: Bounds) -> Bounds:
     return e - a, f - b, c - g, d - h
 
 
-def _between(interface: Interface) -> str:
-    return f"between layers {interface.below.index} and {interface.above.index}"
-
-
 def _bond(laminate: Laminate, interface: Interface) -> Region:
     """Return the bond without snipped-off ears: only the neck rings between balloons."""
     if interface.kind != "separator":
-        return body_bond(laminate, interface)
+        return body_bond(interface)
     centres = [centre for chamber in laminate.chambers for centre in chamber.centres]
-    necks = [
-        piece
-        for piece in interface.bond.pieces
-        if any(piece.outers[0].winding(centre) for centre in centres)
-    ]
-    return Region(tuple(contour for piece in necks for contour in piece.contours))
+    return Region(
+        tuple(
+            contour
+            for piece in interface.bond.pieces
+            if any(piece.outers[0].winding(centre) for centre in centres)
+            for contour in piece.contours
+        )
+    )
 
 
 def _seats(laminate: Laminate, chamber: Chamber) -> Iterator[Region]:
@@ -349,17 +353,6 @@ def _seats(laminate: Laminate, chamber: Chamber) -> Iterator[Region]:
         else:
             rooms = [bond.distance_to_edge(centre) for bond in bonds["chamber"]]
             yield disc(centre, min(room for room in rooms if room > 0) / 2)
-
-
-def _void_slabs(laminate: Laminate, chamber: Chamber) -> Iterator[tuple[int, bool, Region]]:
-    """The chamber's slabs as (ply, True if under the ply instead of in it, region)."""
-    films = {layer.z: ply for ply, layer in enumerate(laminate.tpe_layers)}
-    gaps = {interface.z: ply for ply, interface in enumerate(laminate.interfaces, start=1)}
-    for slab in cavity_slabs(laminate, chamber):
-        if slab.bottom in films:
-            yield films[slab.bottom], False, slab.region
-        else:
-            yield gaps[slab.bottom], True, slab.region
 
 
 def _check_apart(plane: Plane, ply: Ply) -> None:
@@ -387,29 +380,25 @@ class FormedFilm(NamedTuple):
     over the flat film's, if it is bent round a tube.
     """
 
-    base: NDArray[np.float64]
-    up: NDArray[np.float64]
+    base: Floats
+    up: Floats
     growth: float = 0.0
 
-    def at(self, height: float) -> NDArray[np.float64]:
+    def at(self, height: float) -> Floats:
         """Points (n, 3) of the film ``height`` mm above its lower face."""
-        points: NDArray[np.float64] = self.base + height * self.up
+        points: Floats = self.base + height * self.up
         return points
 
 
-def flat(layup: Layup) -> list[FormedFilm]:
+def flat(stack: Layup) -> list[FormedFilm]:
     """Every film flat, at its height in the stack."""
-    return [level(layup, ply.z) for ply in layup.plies]
+    points = stack.plane.points
+    up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(points), 3))
+    levels = (np.full(len(points), ply.z) for ply in stack.plies)
+    return [FormedFilm(np.column_stack([points, z]), up) for z in levels]
 
 
-def level(layup: Layup, z: float) -> FormedFilm:
-    """A film flat at one height in mm."""
-    plane = layup.plane.points
-    up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(plane), 3))
-    return FormedFilm(np.column_stack([plane, np.full(len(plane), z)]), up)
-
-
-def bodies(stack: Layup) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def bodies(stack: Layup) -> tuple[Ints, Ints]:
     """Return the body of each node of the plane, and of each stack's centre.
 
     A body is a connected part above the sheet, such as each oblong balloon stack on it.
@@ -417,7 +406,7 @@ def bodies(stack: Layup) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    films = [ply.cells for ply in stack.plies if ply.layer.role != "sheet"]
+    films = [ply.cells for ply in stack.plies if not ply.is_sheet]
     triangles = stack.plane.triangles[np.any(films, axis=0)]
     count = len(stack.plane.points)
     rows, columns = np.repeat(triangles[:, 0], 5), triangles[:, 1:].ravel()
@@ -449,107 +438,226 @@ def round_tube(stack: Layup, forms: Sequence[FormedFilm]) -> list[FormedFilm]:
     wrap = tube_wrap(stack.laminate) if stack.settings.wrapped else None
     if wrap is None:
         return list(forms)
-    x = stack.plane.points[:, 0]
-    on_tube = list(_bodies(stack, wrap, forms))
-    placed: list[FormedFilm] = []
-    for k, (ply, form) in enumerate(zip(stack.plies, forms, strict=True)):
-        if ply.layer.role == "sheet":
-            lifted = form.base + np.outer(wrap.raised(x), (0.0, 0.0, 1.0))
-            whole = BodyOnTube(wrap, np.arange(len(x)), 0.0, 1.0)
-            moved = _moved(stack, ply, form._replace(base=lifted), whole)
-        else:
-            moved = form
-            for body in on_tube:
-                is_laid = stack.plies[k - 1].layer.role == "sheet"
-                moved = _moved(stack, ply, moved, body, is_laid)
-        placed.append(moved)
-    _check_room(stack, on_tube, placed)
-    return placed
+    tube = _Tube(stack, wrap, forms)
+    return [tube.film(k, form) for k, form in enumerate(forms)]
 
 
-class BodyOnTube(NamedTuple):
-    """Nodes of the plane of a body on the sheet, the x it is fixed at, its share of the bend."""
-
-    wrap: TubeWrap
-    nodes: NDArray[np.int64]
-    middle: float
-    share: float
-
-    @property
-    def at(self) -> float:
-        """The angle in radians round the tube at which it is fixed."""
-        return self.middle / (self.wrap.radius + self.wrap.neutral)
-
-    @property
-    def bend(self) -> float:
-        """Its curvature, 1/mm."""
-        return self.share / self.wrap.radius
-
-
-def _bodies(stack: Layup, wrap: TubeWrap, forms: Sequence[FormedFilm]) -> Iterator[BodyOnTube]:
-    of_node, of_centre = bodies(stack)
-    top = forms[-1].base[:, 2] + stack.plies[-1].thickness
-    x = np.array(stack.centres)[:, 0]
-    for body in np.unique(of_centre).tolist():
-        nodes, fixed_at = np.flatnonzero(of_node == body), x[of_centre == body]
-        # One body of several stacks, joined by a manifold, goes all round.
-        share = 1.0
-        if len(fixed_at) == 1:
-            share = min(1.0, stack.laminate.thickness / max(float(top[nodes].max()), 1e-9))
-        yield BodyOnTube(wrap, nodes, float(fixed_at.mean()), share)
-
-
-def _moved(
-    stack: Layup, ply: Ply, form: FormedFilm, body: BodyOnTube, is_laid: bool = False
-) -> FormedFilm:
-    """The film with the nodes of one body in place.
-
-    If it ``is_laid`` on the sheet, it is drawn down to the tube at its bond and near it.
+class _Tube:
+    """The bodies on the sheet of a layup, as masks of the plane's nodes; and for each node the x
+    at which its body is fixed, and the body's share of the tube's curvature.
     """
-    wrap, nodes, middle, share = body
-    flat = form.base[nodes]
-    base, up = form.base.copy(), np.array(form.up)
-    base[nodes] = wrap.placed(flat, middle, share)
-    lean = wrap.angle(flat[:, 0], middle, share) + body.at
-    up[nodes] = np.column_stack([np.cos(lean), np.sin(lean), np.zeros(len(lean))])
-    # Points farther out than the sheet's middle are stretched round the tube.
-    height = flat[:, 2] + (ply.thickness / 2 if stack.is_thick else 0.0)
-    longer = np.zeros(len(base))
-    longer[nodes] = (1 + body.bend * height) / (1 + body.bend * wrap.neutral) - 1
-    low, high = flat[:, 2].min(), flat[:, 2].max()
-    if is_laid and high - low > OVERLAP:
-        part = ((high - flat[:, 2]) / (high - low)) ** LAID
-        down = part * ((wrap.placed(flat, middle) - base[nodes]) * up[nodes]).sum(axis=1)
-        base[nodes] += down[:, None] * up[nodes]
-        longer[nodes] += body.bend * down
-    cells = stack.plane.triangles[ply.cells]
-    sizes = stack.plane.areas()[ply.cells]
-    # Only the mid-side nodes carry weight in a second-order triangle.
-    growth = float((longer[cells[:, 3:]].mean(axis=1) * sizes).sum() / sizes.sum())
-    return FormedFilm(base, up, form.growth + growth)
+
+    def __init__(self, stack: Layup, wrap: TubeWrap, forms: Sequence[FormedFilm]) -> None:
+        self.stack, self.wrap, self.sheet_radius = stack, wrap, wrap.radius
+        of_node, of_centre = bodies(stack)
+        top = forms[-1].base[:, 2] + stack.plies[-1].thickness
+        x = np.array(stack.centres)[:, 0]
+        self.bodies: list[Flags] = []
+        self.middle, self.share = np.zeros(len(of_node)), np.ones(len(of_node))
+        for label in np.unique(of_centre).tolist():
+            nodes, fixed_at = of_node == label, x[of_centre == label]
+            self.bodies.append(nodes)
+            self.middle[nodes] = fixed_at.mean()
+            # One body of several stacks, joined by a manifold, goes all round.
+            if len(fixed_at) == 1:
+                height = max(float(top[nodes].max()), 1e-9)
+                self.share[nodes] = min(1.0, stack.laminate.thickness / height)
+
+    def film(self, k: int, form: FormedFilm) -> FormedFilm:
+        """Return a film in its place. Raises DesignError if it runs into others."""
+        ply, x = self.stack.plies[k], form.base[:, 0]
+        if ply.is_sheet:
+            lift = np.outer(self.wrap.raised(x), (0.0, 0.0, 1.0))
+            thickness = ply.thickness if self.stack.is_thick else 0.0
+            self.sheet_radius = self.wrap.radius + ply.z + thickness
+            level = form._replace(base=form.base + lift)
+            return self._placed(ply, level, np.zeros_like(x), np.ones_like(x), np.zeros_like(x))
+        laid = np.zeros_like(x)
+        if self.stack.plies[k - 1].is_sheet:
+            z = form.base[:, 2]
+            for nodes in self.bodies:
+                low, high = z[nodes].min(), z[nodes].max()
+                if high - low > OVERLAP:
+                    laid[nodes] = ((high - z[nodes]) / (high - low)) ** LAID
+        placed = self._placed(ply, form, self.middle, self.share, laid)
+        self._check_room(ply, placed)
+        return placed
+
+    def _placed(
+        self, ply: Ply, form: FormedFilm, middle: Floats, share: Floats, laid: Floats
+    ) -> FormedFilm:
+        """The film wrapped, and drawn down to the tube by the share ``laid``."""
+        wrap, plane = self.wrap, self.stack.plane
+        x, _, z = form.base.T
+        base, lean = wrap.placed(form.base, middle, share), wrap.lean(x, middle, share)
+        up = np.column_stack([np.cos(lean), np.sin(lean), np.zeros(len(lean))])
+        down = laid * ((wrap.placed(form.base, middle) - base) * up).sum(axis=1)
+        # Points farther out than the sheet's middle are stretched round the tube.
+        bend = share / wrap.radius
+        height = z + (ply.thickness / 2 if self.stack.is_thick else 0.0)
+        longer = (1 + bend * height) / (1 + bend * wrap.neutral) - 1 + bend * down
+        # Only the mid-side nodes carry weight in a second-order triangle.
+        growth = longer[plane.triangles[ply.cells, 3:]].mean(axis=1)
+        mean = float(np.average(growth, weights=plane.areas()[ply.cells]))
+        return FormedFilm(base + down[:, None] * up, up, mean)
+
+    def _check_room(self, ply: Ply, form: FormedFilm) -> None:
+        """Raises DesignError if a film reaches past the middle between two, or into the sheet."""
+        wrap, room = self.wrap, math.pi / len(self.bodies)
+        nodes = self.stack.nodes(ply.cells)
+        x, y, _ = form.base[nodes].T
+        around = np.arctan2(y, x) - self.middle[nodes] / (wrap.radius + wrap.neutral)
+        aside = float(np.abs(np.angle(np.exp(1j * around))).max())
+        if (aside - room) * wrap.radius > OVERLAP:
+            raise DesignError(
+                f"filled balloons meet round the tube of {2 * wrap.radius:g} mm: film "
+                f"{ply.layer.index} reaches {math.degrees(aside):.1f} degrees round it "
+                f"where each has {math.degrees(room):.1f}; ask for less fill"
+            )
+        depth = self.sheet_radius - float(np.hypot(x, y).min())
+        if depth > OVERLAP:
+            raise DesignError(
+                f"film {ply.layer.index} would pass through its sheet by {depth:.3f} mm; "
+                "ask for another fill"
+            )
 
 
-def _check_room(stack: Layup, on_tube: list[BodyOnTube], placed: Sequence[FormedFilm]) -> None:
-    """Raises DesignError if balloons reach past the middle between them, or into the sheet."""
-    room, radius = math.pi / len(on_tube), on_tube[0].wrap.radius
-    least = radius
-    for ply, form in zip(stack.plies, placed, strict=True):
-        if ply.layer.role == "sheet":
-            least = radius + ply.z + (ply.thickness if stack.is_thick else 0.0)
-            continue
-        for body in on_tube:
-            nodes = np.intersect1d(stack.nodes(ply.cells), body.nodes)
-            x, y, _ = form.base[nodes].T
-            aside = np.abs(np.angle(np.exp(1j * (np.arctan2(y, x) - body.at))))
-            if len(on_tube) > 1 and float((aside - room).max() * radius) > OVERLAP:
-                raise DesignError(
-                    f"filled balloons meet round the tube of {2 * radius:g} mm: film "
-                    f"{ply.layer.index} reaches {math.degrees(aside.max()):.1f} degrees round it "
-                    f"where each has {math.degrees(room):.1f}; ask for less fill"
-                )
-            depth = least - float(np.hypot(x, y).min())
-            if depth > OVERLAP:
-                raise DesignError(
-                    f"film {ply.layer.index} would pass through its sheet by {depth:.3f} mm; "
-                    "ask for another fill"
-                )
+# Films of a mesh that pass through each other.
+#
+# Each film is a surface over the plane, seen along its own upright. A film must lie above the one
+# below it wherever both exist. For films farther apart in the stack, two neighbouring nodes of one
+# must not lie on opposite sides of the other.
+
+
+TOUCHING = 0.002
+"""mm of apparent overlap allowed between films: the error of chords on curved films."""
+
+
+class Crossing(NamedTuple):
+    """Two films, by their index in the layup, that pass ``depth`` mm through each other, and the
+    place of the deepest overlap on the flat laminate, in mm.
+    """
+
+    lower: int
+    upper: int
+    depth: float
+    x: float
+    y: float
+
+
+def check_apart(stack: Layup, forms: Sequence[FormedFilm]) -> None:
+    """Raises OutputError if films of a mesh cross; ``forms`` are not wrapped round a tube."""
+    if (deepest := crossing(stack, forms)) is not None:
+        raise OutputError(f"{crossing_clause(stack, deepest)}; ask for a more even fill")
+
+
+def crossing_clause(stack: Layup, worst: Crossing) -> str:
+    """Return a clause that says which films cross, how deep and where."""
+    lower, upper = (stack.plies[k].layer.index for k in (worst.lower, worst.upper))
+    return (
+        f"films {lower} and {upper} would pass through each other by {worst.depth:.2f} mm at "
+        f"x {worst.x:.3f}, y {worst.y:.3f}"
+    )
+
+
+def crossing(stack: Layup, forms: Sequence[FormedFilm]) -> Crossing | None:
+    """Return the deepest crossing of two films; None if all are apart or touch."""
+    films = [_Film(stack, k, form) for k, form in enumerate(forms)]
+    plane = _Plane(stack)
+    crossings = [each for pair in pairwise(films) for each in _between(plane, *pair)]
+    # Films farther apart matter only if neighbours are in order.
+    if not crossings:
+        far = ((lower, upper) for k, lower in enumerate(films) for upper in films[k + 2 :])
+        crossings = [each for pair in far for each in _between(plane, *pair)]
+    return max(crossings, key=lambda each: each.depth, default=None)
+
+
+class _Film:
+    """A film's faces, in space and in its own frame."""
+
+    def __init__(self, stack: Layup, k: int, form: FormedFilm) -> None:
+        ply = stack.plies[k]
+        self.number, self.cells = k, ply.cells
+        self.nodes = stack.nodes(ply.cells)
+        self.bottom = form.base[self.nodes]
+        self.top = form.at(ply.thickness if stack.is_thick else 0.0)[self.nodes]
+        up = form.up[self.nodes[0]]
+        flat = np.column_stack([stack.plane.points[self.nodes], np.ones(len(self.nodes))])
+        level = self.bottom - np.outer(self.bottom @ up, up)
+        ways, self.shift = np.split(np.linalg.lstsq(flat, level, rcond=None)[0], [2])
+        self.axes = np.vstack([ways, up])
+
+    def in_frame(self, points: Floats) -> Floats:
+        """Points (n, 3) in this film's frame: x and y of the flat laminate, and height."""
+        inside: Floats = (points - self.shift) @ self.axes.T
+        return inside
+
+
+class _Plane:
+    """The triangulation that all films are surfaces over."""
+
+    def __init__(self, stack: Layup) -> None:
+        self.points = stack.plane.points
+        triangles = stack.plane.triangles
+        self.parts = np.concatenate([triangles[:, list(part)] for part in TRIANGLE_PARTS])
+        self.cells = np.tile(np.arange(len(triangles)), len(TRIANGLE_PARTS))
+
+    @cached_property
+    def tree(self) -> STRtree:
+        from shapely import STRtree, linearrings, polygons
+
+        return STRtree(polygons(linearrings(self.points[self.parts])))
+
+    def _spread(self, film: _Film, values: Floats) -> Floats:
+        """Values of a film's nodes at all nodes of the plane; NaN beside the film."""
+        everywhere = np.full(len(self.points), np.nan)
+        everywhere[film.nodes] = values
+        return everywhere
+
+    def over(self, film: _Film, face: Floats, points: Floats) -> Floats:
+        """Height of points (n, 3), in a film's frame, over a face of it; NaN beside the film."""
+        from shapely import points as shapely_points
+
+        places, parts = self.tree.query(shapely_points(points[:, :2]), predicate="intersects")
+        part = np.full(len(points), -1, dtype=np.int64)
+        # On an edge, the first of the triangles that share it.
+        part[places[::-1]] = parts[::-1]
+        there = np.flatnonzero(part >= 0)
+        there = there[film.cells[self.cells[part[there]]]]
+        corners = self.parts[part[there]]
+        a, b, c = self.points[corners].transpose(1, 2, 0)
+        (ux, uy), (vx, vy), (x, y) = b - a, c - a, points[there, :2].T - a
+        twice = ux * vy - uy * vx
+        s, t = (x * vy - y * vx) / twice, (ux * y - uy * x) / twice
+        h = self._spread(film, film.in_frame(face)[:, 2])[corners]
+        gaps = np.full(len(points), np.nan)
+        gaps[there] = points[there, 2] - (h[:, 0] * (1 - s - t) + h[:, 1] * s + h[:, 2] * t)
+        return gaps
+
+    def pierced(self, film: _Film, gap: Floats) -> Flags:
+        """Return a mask of a film's nodes with a neighbour on the other side of the other film."""
+        ends = self.parts[:, [[0, 1], [1, 2], [2, 0]]]
+        sides = self._spread(film, gap)[ends]
+        pierced = np.zeros(len(self.points), dtype=bool)
+        pierced[ends[(sides.min(axis=2) < -TOUCHING) & (sides.max(axis=2) > TOUCHING)]] = True
+        return pierced[film.nodes]
+
+
+def _between(plane: _Plane, lower: _Film, upper: _Film) -> list[Crossing]:
+    """The deepest overlap of two films at the nodes of either; empty if they are apart."""
+    faces = [[film.in_frame(face) for face in (lower.top, upper.bottom)] for film in (lower, upper)]
+    if any(high[:, 2].min() >= low[:, 2].max() - TOUCHING for low, high in faces):
+        return []
+    crossings = []
+    for film, gap in (
+        (upper, plane.over(lower, lower.top, faces[0][1])),
+        (lower, -plane.over(upper, upper.bottom, faces[1][0])),
+    ):
+        depth = -gap
+        if upper.number > lower.number + 1:
+            depth = np.where(plane.pierced(film, gap), np.abs(gap), np.nan)
+        if (depth > TOUCHING).any():
+            deepest = int(np.nanargmax(depth))
+            x, y = plane.points[film.nodes[deepest]].tolist()
+            crossings.append(Crossing(lower.number, upper.number, float(depth[deepest]), x, y))
+    return crossings

@@ -5,7 +5,7 @@ Node order follows Abaqus and CalculiX: corners first, then the middles of the e
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
-from sbafab.meshing.surface import Surface
+from sbafab.meshing.surface import Floats, Ints, Surface
 
 if TYPE_CHECKING:
     import meshio
@@ -85,9 +85,7 @@ def _monomials(kind: ElementKind) -> tuple[tuple[int, ...], ...]:
 
 
 @cache
-def _shapes(
-    kind: ElementKind, integration: bool
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _shapes(kind: ElementKind, integration: bool) -> tuple[Floats, Floats]:
     """Shape functions (places, nodes) and their derivatives (places, nodes, dimensions).
 
     Places are the element's nodes, or its integration points.
@@ -106,25 +104,18 @@ def _shapes(
     return np.prod(places[:, None, :] ** powers, axis=2) @ shape, np.stack(slopes, axis=2)
 
 
-def jacobians(
-    kind: ElementKind,
-    points: NDArray[np.float64],
-    cells: NDArray[np.int64],
-    integration: bool = False,
-) -> NDArray[np.float64]:
+def jacobians(kind: ElementKind, points: Floats, cells: Ints, integration: bool = False) -> Floats:
     """Matrices (cells, places, space, dimensions) of the map from the reference element.
 
     Places are the element's nodes, or its integration points.
     """
-    matrices: NDArray[np.float64] = np.einsum(
+    matrices: Floats = np.einsum(
         "cni,pnj->cpij", points[cells], _shapes(kind, integration)[1], optimize=True
     )
     return matrices
 
 
-def scaled_jacobians(
-    kind: ElementKind, points: NDArray[np.float64], cells: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def scaled_jacobians(kind: ElementKind, points: Floats, cells: Ints) -> Floats:
     """Least scaled Jacobian of each cell at its nodes and integration points.
 
     Determinant over the product of the lengths of its columns: 1 for edges at right angles, 0.87
@@ -139,31 +130,27 @@ def scaled_jacobians(
     return least
 
 
-def volumes(
-    kind: ElementKind, points: NDArray[np.float64], cells: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def volumes(kind: ElementKind, points: Floats, cells: Ints) -> Floats:
     """Volume of each cell in mm3, or area in mm2 of triangles."""
     determinants = _determinant(jacobians(kind, points, cells, integration=True))
-    sizes: NDArray[np.float64] = np.sum(determinants, axis=1) * _GAUSS[kind][0]
+    sizes: Floats = np.sum(determinants, axis=1) * _GAUSS[kind][0]
     return sizes
 
 
-def aspects(
-    kind: ElementKind, points: NDArray[np.float64], cells: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def aspects(kind: ElementKind, points: Floats, cells: Ints) -> Floats:
     """Longest edge over shortest of each cell, between its corners."""
     lengths = np.stack(
         [np.linalg.norm(points[cells[:, a]] - points[cells[:, b]], axis=1) for a, b in EDGES[kind]]
     )
-    ratio: NDArray[np.float64] = lengths.max(axis=0) / np.maximum(lengths.min(axis=0), 1e-300)
+    ratio: Floats = lengths.max(axis=0) / np.maximum(lengths.min(axis=0), 1e-300)
     return ratio
 
 
-def _determinant(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+def _determinant(matrices: Floats) -> Floats:
     columns = np.moveaxis(matrices, -1, 0)
     if matrices.shape[-2:] == (2, 2):
         (a, b), (c, d) = np.moveaxis(columns, -1, 1)
-        flat: NDArray[np.float64] = a * d - b * c
+        flat: Floats = a * d - b * c
         return flat
     normals = np.cross(columns[0], columns[1])
     if len(columns) == 3:
@@ -172,13 +159,11 @@ def _determinant(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
         # A shell's normals are compared with their mean.
         third = normals.mean(axis=1, keepdims=True)
         third = third / np.linalg.norm(third, axis=2, keepdims=True)
-    solid: NDArray[np.float64] = np.sum(normals * third, axis=-1)
+    solid: Floats = np.sum(normals * third, axis=-1)
     return solid
 
 
-def integrals(
-    points: NDArray[np.float64], cells: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def integrals(points: Floats, cells: Ints) -> tuple[Floats, Floats]:
     """Stiffness (cells, 6, 6) and load (cells, 6) of Poisson's equation on plane triangles."""
     matrices = jacobians("triangle6", points, cells, integration=True)
     sizes = _determinant(matrices) * _GAUSS["triangle6"][0]
@@ -203,7 +188,7 @@ SIDE = (-1, 3, 5, 4)
 """The mid-edge node between two corners of a triangle, by the sum of their places."""
 
 
-def tetrahedra(prisms: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray[np.int64]:
+def tetrahedra(prisms: Ints, corners: Ints) -> Ints:
     """Three tetrahedra (3 x m, 10) of second order for each prism, in its order.
 
     ``corners`` (m, 3) are the plane's nodes under each prism: the diagonal of a side starts at its
@@ -232,6 +217,10 @@ TRIANGLE_PARTS = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
 """The four flat triangles through the nodes of a second-order one."""
 
 
+SQUARE_PARTS = ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6), (4, 6, 7))
+"""The flat triangles through the nodes of a square one."""
+
+
 # The mesh that every writer reads.
 
 
@@ -240,7 +229,7 @@ class Mesh:
     """Elements of one kind, and named parts of them.
 
     ``points`` (n, 3) mm; ``cells`` (m, nodes) indices of points. ``node_sets`` and ``cell_sets``
-    hold sorted indices; ``face_sets`` rows of cell and face number, as in ``elements.FACES``.
+    hold sorted indices; ``face_sets`` rows of cell and face number, as in ``FACES``.
     ``cavities`` are closed surfaces (k, 3) of flat triangles in this mesh's nodes, counter-
     clockwise seen from outside of the air; inlets are closed by a patch. ``thickness`` is a
     shell's, in mm, one value per cell set. ``notes`` are sentences for the reader of a mesh file.
@@ -251,29 +240,42 @@ class Mesh:
 
     name: str
     kind: ElementKind
-    points: NDArray[np.float64]
-    cells: NDArray[np.int64]
-    node_sets: Mapping[str, NDArray[np.int64]]
-    cell_sets: Mapping[str, NDArray[np.int64]]
-    face_sets: Mapping[str, NDArray[np.int64]]
-    cavities: Mapping[str, NDArray[np.int64]]
+    points: Floats
+    cells: Ints
+    node_sets: Mapping[str, Ints] = field(default_factory=dict)
+    cell_sets: Mapping[str, Ints] = field(default_factory=dict)
+    face_sets: Mapping[str, Ints] = field(default_factory=dict)
+    cavities: Mapping[str, Ints] = field(default_factory=dict)
     thickness: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     materials: Mapping[str, str] = field(default_factory=dict)
-    rest: NDArray[np.float64] | None = None
+    rest: Floats | None = None
 
     @property
-    def parts(self) -> dict[str, NDArray[np.int64]]:
+    def parts(self) -> dict[str, Ints]:
         """The cell sets that partition the cells: films and bonds, or a shell's thicknesses."""
         names = self.thickness or self.cell_sets
         return {name: self.cell_sets[name] for name in names}
 
-    def surface(self, triangles: NDArray[np.int64]) -> tuple[Surface, NDArray[np.int64]]:
+    def nodes_of(self, faces: Ints) -> Iterator[Ints]:
+        """Yield the nodes (n, 6 or 8) of faces (k, 2: cell and number), by their number."""
+        for number, local in enumerate(FACES[self.kind]):
+            yield self.cells[faces[faces[:, 1] == number, 0]][:, list(local)]
+
+    def flat_triangles(self, faces: Ints) -> Ints:
+        """Return faces (k, 2: cell and number) as flat triangles through all of their nodes."""
+        triangles = [np.empty((0, 3), dtype=np.int64)]
+        for nodes in self.nodes_of(faces):
+            parts = TRIANGLE_PARTS if nodes.shape[1] == 6 else SQUARE_PARTS
+            triangles += [nodes[:, list(part)] for part in parts]
+        return np.concatenate(triangles)
+
+    def surface(self, triangles: Ints) -> tuple[Surface, Ints]:
         """Triangles of nodes as a separate surface, and the node of each of its points."""
         nodes, faces = np.unique(triangles, return_inverse=True)
         return Surface(self.points[nodes], faces.reshape(-1, 3)), nodes
 
-    def cavity(self, name: str) -> tuple[Surface, NDArray[np.int64]]:
+    def cavity(self, name: str) -> tuple[Surface, Ints]:
         """A cavity as a separate surface, and the mesh node of each of its points."""
         return self.surface(self.cavities[name])
 
@@ -324,7 +326,7 @@ class Mesh:
         grid.cell_data.update(self.cell_fields())
         return grid
 
-    def linear(self) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    def linear(self) -> tuple[Floats, Ints, Ints]:
         """Points, and tetrahedra or triangles of first order through the corners; the cell of each.
 
         Wedges become three tetrahedra each.
@@ -341,7 +343,7 @@ class Mesh:
         return self.points[nodes], cells.reshape(corners.shape), owner
 
 
-def _marked(count: int, indices: NDArray[np.int64]) -> NDArray[np.uint8]:
+def _marked(count: int, indices: Ints) -> NDArray[np.uint8]:
     marks = np.zeros(count, dtype=np.uint8)
     marks[indices] = 1
     return marks

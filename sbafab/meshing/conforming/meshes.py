@@ -1,31 +1,434 @@
-"""The conforming meshes of a laminate, and the files they are written to."""
+"""Volume and shell mesh: the triangulation swept through every film, with named sets; and files.
+
+Bonded faces share their nodes. Each mesh is checked: elements, skin, volumes and cavities.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple, TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sbafab.errors import DesignError
+from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.element_mesh import (
-    shell_mesh,
-    skin_surface,
-    sweep,
-    thin,
-    volume_mesh,
-)
 from sbafab.meshing.conforming.fill import Fill, filled, formed, pockets
-from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshSettings, Symmetry, flat, layup
-from sbafab.meshing.conforming.mesh import Mesh, aspects, jacobians, scaled_jacobians, volumes
+from sbafab.meshing.conforming.layup import (
+    FormedFilm,
+    Layup,
+    MeshedVoid,
+    MeshSettings,
+    Symmetry,
+    check_apart,
+    flat,
+    layup,
+    round_tube,
+)
+from sbafab.meshing.conforming.mesh import (
+    CORNERS,
+    FACES,
+    ElementKind,
+    Mesh,
+    aspects,
+    jacobians,
+    scaled_jacobians,
+    tetrahedra,
+    volumes,
+)
 from sbafab.meshing.formats import conforming_endings, mesh_formats
 from sbafab.meshing.mesh_files import MeshFile, MeshKind
-from sbafab.meshing.surface import Surface
+from sbafab.meshing.solid import loops_of
+from sbafab.meshing.surface import Flags, Floats, Ints, unpaired_edges
+
+Sets = dict[str, Ints]
+
+# The sweep: nodes and prisms, or the triangles of a shell, of every film.
+
+
+class Sweep:
+    """Nodes and cells of the films of a layup, bottom to top.
+
+    If films lie on each other, they share the nodes in the closure of a bond; if gaps are kept,
+    prisms join them. Films of a thin layup are triangles; bonded ones share one.
+
+    ``lower``, ``middle`` and ``upper`` (plies, plane nodes) number the nodes of each film over
+    the plane's, -1 if absent; ``joints`` the nodes halfway up the bond under each film.
+    ``cell_of`` and ``joint_of`` (plies, triangles) number the cells of films and bonds.
+    """
+
+    def __init__(self, stack: Layup, forms: Sequence[FormedFilm]) -> None:
+        self.stack = stack
+        plies = len(stack.plies)
+        nodes, cells = (plies, len(stack.plane.points)), (plies, len(stack.plane.triangles))
+        self.lower, self.middle, self.upper, self.joints = np.full((4, *nodes), -1)
+        self.cell_of, self.joint_of = np.full((2, *cells), -1)
+        self._points = [np.empty((0, 3))]
+        self._cells: list[Ints] = []
+        self._counts = [0, 0]
+        for k in range(plies):
+            self._add(k, forms[k], forms[k - 1])
+
+    @cached_property
+    def beyond(self) -> Ints:
+        """The triangle (m, 3) beyond each side of each triangle, -1 without a neighbour."""
+        middles = self.stack.plane.triangles[:, 3:].ravel()
+        order = np.argsort(middles, kind="stable")
+        twins = np.flatnonzero(np.diff(middles[order]) == 0)
+        beyond = np.full(len(middles), -1)
+        beyond[order[twins]] = order[twins + 1] // 3
+        beyond[order[twins + 1]] = order[twins] // 3
+        return beyond.reshape(-1, 3)
+
+    @property
+    def points(self) -> Floats:
+        """Points (n, 3) mm."""
+        return np.concatenate(self._points)
+
+    @property
+    def cells(self) -> Ints:
+        """Prisms (m, 18): six nodes of a triangle below, halfway up and above; or triangles."""
+        return np.concatenate(self._cells)
+
+    def _add(self, k: int, form: FormedFilm, below: FormedFilm) -> None:
+        stack, ply = self.stack, self.stack.plies[k]
+        covered, bonded = stack.nodes(ply.cells), stack.nodes(ply.bonded)
+        lower, middle, upper, joints = self.lower[k], self.middle[k], self.upper[k], self.joints[k]
+        if not ply.gap:
+            lower[bonded] = self.upper[k - 1, bonded]
+        self._place(lower, covered[lower[covered] < 0], form.base)
+        if not stack.is_thick:
+            self.cell_of[k, ply.bonded] = self.cell_of[k - 1, ply.bonded]
+            self._fill(self.cell_of[k], ply.cells & ~ply.bonded, lower)
+            upper[:] = lower
+            return
+        if ply.gap:
+            top = below.at(stack.plies[k - 1].thickness)
+            self._place(joints, self._half_up(bonded), (top + form.base) / 2)
+            self._fill(self.joint_of[k], ply.bonded, self.upper[k - 1], joints, lower)
+        self._place(middle, self._half_up(covered), form.at(ply.thickness / 2))
+        self._place(upper, covered, form.at(ply.thickness))
+        self._fill(self.cell_of[k], ply.cells, lower, middle, upper)
+
+    def _half_up(self, nodes: Ints) -> Ints:
+        """Those with a node halfway up: mid-edge nodes have one for tetrahedra only."""
+        is_tet = self.stack.settings.element == "tet"
+        return nodes if is_tet else nodes[nodes < self.stack.plane.corners]
+
+    def _place(self, numbers: Ints, nodes: Ints, at: Floats) -> None:
+        """Add points over nodes of the plane."""
+        numbers[nodes] = self._counts[0] + np.arange(len(nodes))
+        self._points.append(at[nodes])
+        self._counts[0] += len(nodes)
+
+    def _fill(self, numbers: Ints, chosen: Flags, *levels: Ints) -> None:
+        """Add a cell over each chosen triangle."""
+        (over,) = np.nonzero(chosen)
+        numbers[over] = self._counts[1] + np.arange(len(over))
+        triangles = self.stack.plane.triangles[over]
+        self._cells.append(np.hstack([level[triangles] for level in levels]))
+        self._counts[1] += len(over)
+
+
+# Cavities: the faces of a mesh that the air of a chamber presses on, and a closed surface.
+
+
+BOTTOM, TOP, SIDES = 0, 1, 2
+"""Numbers of a wedge's faces; the sides follow the triangle's edges."""
+
+
+def _bordering(swept: Sweep, inside: Flags, beside: Flags) -> tuple[Ints, Ints]:
+    """Triangles of ``inside`` and their sides that lie against a triangle of ``beside``."""
+    # The last entry, False, stands for the outside of the plane.
+    cells, sides = np.nonzero(inside[:, None] & np.append(beside, False)[swept.beyond])
+    return cells, sides
+
+
+def _edges(swept: Sweep, triangles: Ints, sides: Ints) -> Ints:
+    """Nodes (k, 3) of the plane on sides of triangles: start, end, middle."""
+    places = np.column_stack([sides, (sides + 1) % 3, 3 + sides])
+    return np.take_along_axis(swept.stack.plane.triangles[triangles], places, axis=1)
+
+
+def wetted(swept: Sweep, void: MeshedVoid) -> Ints:
+    """Cells and their faces (k, 2) that the air of a void touches."""
+    parts: list[tuple[Ints, Ints | int]] = []
+    plies = swept.stack.plies
+    for k, cells in sorted(void.under.items()):
+        parts.append((swept.cell_of[k - 1][cells & plies[k - 1].cells], TOP))
+        parts.append((swept.cell_of[k][cells & plies[k].cells], BOTTOM))
+        if plies[k].gap:
+            bond, sides = _bordering(swept, plies[k].bonded, cells)
+            parts.append((swept.joint_of[k][bond], SIDES + sides))
+    for k, cells in sorted(void.in_films.items()) if swept.stack.is_thick else ():
+        film, sides = _bordering(swept, plies[k].cells, cells)
+        parts.append((swept.cell_of[k][film], SIDES + sides))
+    return np.concatenate([np.column_stack(np.broadcast_arrays(*part)) for part in parts])
+
+
+def mouths(swept: Sweep, void: MeshedVoid) -> list[Ints]:
+    """Triangles (k, 3) of mesh nodes over each place where a void ends without a bond."""
+    stack, patches = swept.stack, []
+    for k, cells in sorted(void.under.items()):
+        closed = np.append(cells | stack.plies[k].bonded, False)
+        edges = _edges(swept, *np.nonzero(cells[:, None] & ~closed[swept.beyond]))
+        if stack.sector is not None:
+            on_planes = np.array([on for _, on in stack.sector.on_planes(stack.plane.points)])
+            edges = edges[~on_planes[:, edges[:, :2]].all(axis=2).any(axis=0)]
+        if len(edges):
+            patches.append(_mouth_patch(swept, k, edges))
+    return patches
+
+
+def _mouth_patch(swept: Sweep, ply: int, edges: Ints) -> Ints:
+    """Triangles (k, 3) between the two films at a void's mouth, out of the void."""
+    low, high, half = swept.upper[ply - 1], swept.lower[ply], swept.joints[ply]
+    for k, level in ((ply - 1, low), (ply, high)):
+        _check_covered(swept, k, level, edges.ravel())
+    triangles = []
+    for a, b, m in edges.tolist():
+        ring = [low[b], half[b], high[b], high[m], high[a], half[a], low[a]]
+        sides = pairwise(int(node) for node in ring if node >= 0)
+        triangles += [(int(low[m]), p, q) for p, q in sides if len({int(low[m]), p, q}) == 3]
+    return np.array(triangles, dtype=np.int64).reshape(-1, 3)
+
+
+def lids(swept: Sweep, void: MeshedVoid) -> list[Ints]:
+    """Return triangles (k, 3) of mesh nodes over holes by which a void leaves it through a film.
+
+    Such a hole leads to another chamber of its net, or to a tube; its rim is the lid's.
+    """
+    covers = []
+    for k, cells in sorted(void.under.items()):
+        for ply, level, way in ((k - 1, swept.upper[k - 1], -1), (k, swept.lower[k], 1)):
+            hole = cells & ~swept.stack.plies[ply].cells
+            hole &= ~void.in_films.get(ply, np.zeros_like(hole))
+            edges = _edges(swept, *_bordering(swept, hole, ~hole))
+            for rim in loops_of(np.concatenate([edges[:, [0, 2]], edges[:, [2, 1]]])):
+                _check_covered(swept, ply, level, rim)
+                first, *rest = level[rim]
+                covers.append(np.array([(first, p, q)[::way] for p, q in pairwise(rest)]))
+    return covers
+
+
+def _check_covered(swept: Sweep, ply: int, level: Ints, nodes: Ints) -> None:
+    """Raises OutputError if a film ends at nodes of the plane round the opening of a pocket."""
+    if level[nodes].min() < 0:
+        x, y = swept.stack.plane.points[nodes[int(level[nodes].argmin())]]
+        raise OutputError(
+            f"Layer {swept.stack.plies[ply].layer.index} ends at x {x:.3f}, y {y:.3f}, beside an "
+            "open pocket; let the film go on round its hole, and both films end at a mouth."
+        )
+
+
+def _with_air(mesh: Mesh, swept: Sweep, faces_of: Callable[[Ints], Ints]) -> Mesh:
+    """The mesh with its sets and cavities; ``faces_of`` turns faces of prisms into its own."""
+    named, face_sets, cavities = node_sets(swept), {}, {}
+    for name, void in swept.stack.voids.items():
+        faces = faces_of(wetted(swept, void))
+        face_sets[f"cavity_{name}"] = faces
+        patches = mouths(swept, void)
+        if patches:
+            named[f"inlet_{name}"] = np.unique(np.concatenate(patches))
+        if swept.stack.sector is None:
+            walls = mesh.flat_triangles(faces)[:, ::-1]
+            cavities[name] = np.concatenate([walls, *patches, *lids(swept, void)])
+    return replace(mesh, node_sets=named, face_sets=face_sets, cavities=cavities)
+
+
+# Faces of elements.
+
+
+def faces_of_tetrahedra(prisms: Ints, tetrahedra: Ints, faces: Ints) -> Ints:
+    """Prism faces (k, 2) as the faces of the three tetrahedra of each prism that lie in them."""
+    wedge_corners = [[0, 1, 2], [12, 13, 14], [0, 1, 13, 12], [1, 2, 14, 13], [2, 0, 12, 14]]
+    rows_of_faces = []
+    for number, local in enumerate(wedge_corners):
+        owners = faces[faces[:, 1] == number, 0]
+        nodes = prisms[owners][:, None, None, local]
+        cells = 3 * owners[:, None] + np.arange(3)
+        for face, of_tetra in enumerate(FACES["tetra10"]):
+            corners = tetrahedra[cells][:, :, list(of_tetra[:3]), None]
+            chosen = cells[(corners == nodes).any(axis=3).all(axis=2)]
+            rows_of_faces.append(np.column_stack([chosen, np.full_like(chosen, face)]))
+    rows = np.concatenate(rows_of_faces)
+    return rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+
+
+def skin(mesh: Mesh) -> Ints:
+    """The faces (k, 2: cell and face number) that belong to one cell only."""
+    size, count = len(mesh.points), len(mesh.cells)
+    keys = []
+    for local in FACES[mesh.kind]:
+        corners = np.sort(mesh.cells[:, [n for n in local if n < CORNERS[mesh.kind]]], axis=1)
+        # Three corners identify a quadrilateral face.
+        keys.append((corners[:, 0] * size + corners[:, 1]) * size + corners[:, 2])
+    key = np.concatenate(keys)
+    order = np.argsort(key, kind="stable")
+    twin = np.append(False, np.diff(key[order]) == 0)
+    alone = order[~twin & ~np.append(twin[1:], False)]
+    return np.column_stack([alone % count, alone // count])
+
+
+# Named parts of a mesh.
+
+
+def bond_name(ply: int) -> str:
+    """The bond under a film, by its interface's index counted from 1."""
+    return f"bond_{ply:03d}"
+
+
+def node_sets(swept: Sweep) -> Sets:
+    """Bonds, base, tip and symmetry planes."""
+    sets, stack = {}, swept.stack
+    for k, ply in enumerate(stack.plies):
+        if ply.bonded.any():
+            nodes = stack.nodes(ply.bonded)
+            sets[bond_name(k)] = np.unique([swept.lower[k, nodes], swept.upper[k - 1, nodes]])
+    bottom, top = stack.plies[0], stack.plies[-1]
+    seat = bottom.cells if bottom.is_sheet else stack.seats & bottom.cells
+    sets["base"] = np.unique(swept.lower[0, stack.nodes(seat)])
+    sets["tip"] = np.unique(swept.upper[-1, stack.nodes(stack.seats & top.cells)])
+    if stack.sector is not None:
+        levels = np.concatenate([swept.lower, swept.middle, swept.upper, swept.joints])
+        for name, on_plane in stack.sector.on_planes(stack.plane.points):
+            numbers = levels[:, on_plane]
+            sets[name] = np.unique(numbers[numbers >= 0])
+    return sets
+
+
+# The checks of a mesh before it is written.
+
+
+VOLUME_TOLERANCE = 0.001
+
+
+def check_mesh(mesh: Mesh, expected: Mapping[str, float]) -> None:
+    """Raises OutputError if an element is inverted, skin or cavities are open, or a volume is off.
+
+    ``expected`` gives the exact volume in mm3 of cell sets.
+    """
+    least = scaled_jacobians(mesh.kind, mesh.points, mesh.cells)
+    worst = int(least.argmin())
+    if least[worst] <= 0:
+        x, y, z = mesh.points[mesh.cells[worst]].mean(axis=0)
+        raise OutputError(
+            f"{int((least <= 0).sum())} elements of the {mesh.name} mesh are inverted, the worst "
+            f"at x {x:.3f}, y {y:.3f}, z {z:.3f}; ask for a smaller h or less fill."
+        )
+    # Flat triangles through all nodes tell two sides between the same corners apart.
+    if mesh.kind != "triangle6" and len(unpaired_edges(mesh.flat_triangles(skin(mesh)))):
+        raise OutputError(
+            f"The skin of the {mesh.name} mesh is not closed and manifold; move apart profiles "
+            "that touch in one point, or change h."
+        )
+    sizes = volumes(mesh.kind, mesh.points, mesh.cells)
+    for name, volume in expected.items():
+        meshed = float(sizes[mesh.cell_sets[name]].sum())
+        if not abs(meshed - volume) <= VOLUME_TOLERANCE * volume:
+            raise OutputError(
+                f"The {mesh.name} mesh of {name} holds {meshed:.5f} mm3 where area x thickness "
+                f"is {volume:.5f} mm3; ask for a smaller h."
+            )
+    for name, triangles in mesh.cavities.items():
+        if gaps := len(unpaired_edges(triangles)):
+            raise OutputError(
+                f"The cavity {name} of the {mesh.name} mesh is open at {gaps} edges; move apart "
+                "profiles that touch in one point."
+            )
+
+
+# The shell mesh: mid-surfaces of second order, bonded films as one shell.
+
+
+def thin(stack: Layup) -> Layup:
+    """The layup with films of zero thickness: all mid-surfaces lie at z = 0."""
+    plies = tuple(ply._replace(z=0.0, gap=0.0) for ply in stack.plies)
+    return replace(stack, plies=plies, is_thick=False)
+
+
+def shell_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
+    """The mid-surfaces of a thin layup, with their sets and cavities.
+
+    Bonded films share one triangle, which carries the sum of their thicknesses. Cavities exclude
+    the neck rings, which have the same air on both sides. Raises OutputError if a check fails.
+    """
+    check_apart(stack, forms)
+    swept = Sweep(stack, round_tube(stack, forms))
+    films, thickness = {}, np.zeros(len(swept.cells))
+    for ply, numbers in zip(stack.plies, swept.cell_of, strict=True):
+        films[ply.name] = np.sort(numbers[numbers >= 0])
+        thickness[films[ply.name]] += ply.thickness
+    microns = np.round(thickness * 1000, 3)
+    names = {f"section_{um:g}um".replace(".", "p"): um for um in np.unique(microns).tolist()}
+    films |= {name: np.flatnonzero(microns == um) for name, um in names.items()}
+    parts = {name: um / 1000 for name, um in names.items()}
+    bare = Mesh("shell", "triangle6", swept.points, swept.cells, cell_sets=films, thickness=parts)
+    mesh = _with_air(bare, swept, _one_sided)
+    check_mesh(mesh, {})
+    return mesh
+
+
+def _one_sided(faces: Ints) -> Ints:
+    """The faces of cells that the air touches on one side only."""
+    _, first, times = np.unique(faces[:, 0], return_index=True, return_counts=True)
+    one_sided: Ints = faces[np.sort(first[times == 1])]
+    return one_sided
+
+
+# The volume mesh with its sets and cavities, checked.
+
+
+def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
+    """The volume mesh with its sets and cavities. Raises OutputError if a check fails."""
+    check_apart(stack, forms)
+    forms = round_tube(stack, forms)
+    swept = Sweep(stack, forms)
+    prisms = swept.cells
+    is_tet = stack.settings.element == "tet"
+    if is_tet:
+        cells = tetrahedra(prisms, _corners_under(swept))
+    else:
+        cells = prisms[:, [0, 1, 2, 12, 13, 14, 3, 4, 5, 15, 16, 17, 6, 7, 8]]
+
+    def faces_of(faces: Ints) -> Ints:
+        return faces_of_tetrahedra(prisms, cells, faces) if is_tet else faces
+
+    cell_sets, expected, materials = {}, {}, {}
+    for k, (ply, form) in enumerate(zip(stack.plies, forms, strict=True)):
+        films = [each.layer.film for each in stack.plies[max(k - 1, 0) : k + 1]]
+        # A bond takes the lower film's material if that melts.
+        bond = ([film for film in films if not film.stays_solid] or films)[0]
+        for name, numbers, volume, film in (
+            (bond_name(k), swept.joint_of[k], ply.bond_area * ply.gap, bond),
+            (ply.name, swept.cell_of[k], ply.area * ply.thickness, ply.layer.film),
+        ):
+            parts = 3 if is_tet else 1
+            of_part = np.sort(numbers[numbers >= 0])
+            if len(of_part):
+                cell_sets[name] = (parts * of_part[:, None] + np.arange(parts)).ravel()
+                expected[name] = volume * (1 + form.growth)
+                materials[name] = film.material
+    kind: ElementKind = "tetra10" if is_tet else "wedge15"
+    bare = Mesh("volume", kind, swept.points, cells, cell_sets=cell_sets, materials=materials)
+    mesh = _with_air(bare, swept, faces_of)
+    check_mesh(mesh, expected)
+    return mesh
+
+
+def _corners_under(swept: Sweep) -> Ints:
+    """The plane's corner nodes (prisms, 3) under each prism."""
+    under = np.empty((len(swept.cells), 3), dtype=np.int64)
+    for numbers in (*swept.cell_of, *swept.joint_of):
+        under[numbers[numbers >= 0]] = swept.stack.plane.triangles[numbers >= 0, :3]
+    return under
+
+
+# Both meshes of a laminate, and their files.
+
 
 HEIGHTS = {
     False: "Films lie on each other: heights are sums of the TPE films, without the masks.",
@@ -102,20 +505,17 @@ def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) 
     as_cut = replace(sheet, settings=replace(settings, wrapped=False))
     flat_shell = shell_mesh(as_cut, flat(sheet))
     fill = None if settings.fill_ul is None else filled(stack, settings.fill_ul)[0]
-    thick = _filled(stack, fill, volume_mesh)
+    volume = _filled(stack, fill, volume_mesh)
     shell = _filled(sheet, fill, shell_mesh)
     notes = tuple(_notes(laminate, settings, fill, thinning(shell, flat_shell)))
-    rests = sweep(stack, flat(stack)).points, flat_shell.points
-    heights = HEIGHTS[settings.gaps], HEIGHT_OF_SHELL
-    volume, shell = (
-        replace(
-            mesh,
-            notes=(height, *notes),
-            rest=None if np.array_equal(mesh.points, rest) else rest,
-        )
-        for mesh, rest, height in zip((thick, shell), rests, heights, strict=True)
-    )
+    volume = _noted(volume, Sweep(stack, flat(stack)).points, (HEIGHTS[settings.gaps], *notes))
+    shell = _noted(shell, flat_shell.points, (HEIGHT_OF_SHELL, *notes))
     return ConformingMeshes(laminate.name, settings, volume, shell, flat_shell, fill)
+
+
+def _noted(mesh: Mesh, rest: Floats, notes: tuple[str, ...]) -> Mesh:
+    is_at_rest = np.array_equal(mesh.points, rest)
+    return replace(mesh, notes=notes, rest=None if is_at_rest else rest)
 
 
 def _filled(
@@ -172,13 +572,11 @@ def write_conforming(
     (folder / "mesh").mkdir(parents=True, exist_ok=True)
     endings = formats or conforming_endings()
     jobs = [job for job in _jobs(meshes) if Path(job[0].file).suffix[1:] in endings]
-    written = []
-    for file, write in jobs:
+    for number, (file, write) in enumerate(jobs, start=1):
         write(folder / file.file)
-        written.append(file)
         if progress is not None:
-            progress(len(written), len(jobs))
-    return written
+            progress(number, len(jobs))
+    return [file for file, _ in jobs]
 
 
 def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path], None]]]:
@@ -186,27 +584,26 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
     fill = max(meshes.fill.values()) if meshes.fill is not None else 0.0
     kinds: tuple[tuple[MeshKind, Mesh], ...] = (("volume", meshes.volume), ("shell", meshes.shell))
     for kind, mesh in kinds:
-        size = meshes.statistics[mesh.name]["volume_mm3"]
+        size, count = meshes.statistics[kind]["volume_mm3"], len(mesh.cells)
         for row in mesh_formats():
             if row.elements:
-                file = f"mesh/{kind}.{row.ending}"
-                file_entry = MeshFile(file, kind, None, fill, size, len(mesh.cells))
-                yield file_entry, partial(row.elements, mesh)
+                file = MeshFile(f"mesh/{kind}.{row.ending}", kind, None, fill, size, count)
+                yield file, partial(row.elements, mesh)
     mesh = meshes.volume
     # Films that lie on each other enclose nothing: the surface would have no inside.
     air = [chamber for chamber in mesh.cavities if meshes.holds_air(chamber)]
-    surfaces: list[tuple[MeshKind, str | None, Surface]] = []
-    surfaces += [("skin", None, skin_surface(mesh))] if air else []
-    surfaces += [("cavity", chamber, mesh.cavity(chamber)[0]) for chamber in air]
-    for kind, chamber, surface in surfaces:
-        stem = kind if chamber is None else f"{kind}_{chamber}_conforming"
+    surfaces = {chamber: mesh.cavity(chamber)[0] for chamber in air}
+    skins = [mesh.surface(mesh.flat_triangles(skin(mesh)))[0]] if air else []
+    for chamber, surface in [*((None, each) for each in skins), *surfaces.items()]:
+        kind = "skin" if chamber is None else "cavity"
+        stem = "mesh/skin" if chamber is None else f"mesh/cavity_{chamber}_conforming"
+        size, count = surface.volume, len(surface.faces)
         for row in mesh_formats():
-            file = f"mesh/{stem}.{row.ending}"
-            file_entry = MeshFile(file, kind, chamber, fill, surface.volume, len(surface.faces))
+            file = MeshFile(f"{stem}.{row.ending}", kind, chamber, fill, size, count)
             if row.cavity and chamber is not None:
-                yield file_entry, partial(row.cavity, mesh, chamber)
+                yield file, partial(row.cavity, mesh, chamber)
             elif row.surface:
-                yield file_entry, partial(row.surface, surface)
+                yield file, partial(row.surface, surface)
 
 
 # Size and quality of a mesh.
@@ -244,15 +641,13 @@ def thinning(shell: Mesh, flat: Mesh) -> Thinning:
     thickness = np.zeros(len(shell.cells))
     for name, value in shell.thickness.items():
         thickness[shell.cell_sets[name]] = value
-
-    def areas(mesh: Mesh) -> NDArray[np.float64]:
-        slopes = jacobians(mesh.kind, mesh.points, mesh.cells[pockets], integration=True)
-        sizes: NDArray[np.float64] = np.linalg.norm(
-            np.cross(slopes[..., 0], slopes[..., 1]), axis=2
+    raised, before = (
+        np.linalg.norm(np.cross(slopes[..., 0], slopes[..., 1]), axis=2)
+        for slopes in (
+            jacobians(mesh.kind, mesh.points, mesh.cells[pockets], integration=True)
+            for mesh in (shell, flat)
         )
-        return sizes
-
-    raised, before = areas(shell), areas(flat)
+    )
     growth = np.maximum((raised / before).max(axis=1), 1.0)
     return Thinning(
         float(raised.sum() / before.sum()) - 1,

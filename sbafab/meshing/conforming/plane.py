@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.arrangement import Arrangement, by_owner
@@ -17,6 +16,7 @@ from sbafab.geometry.boolean import arranged
 from sbafab.geometry.edges import Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.region import Region
 from sbafab.meshing.conforming.mesh import scaled_jacobians, volumes
+from sbafab.meshing.surface import Flags, Floats, Ints
 
 # The plane cut up by the edges of several regions, arcs as arcs.
 
@@ -34,8 +34,7 @@ COARSE = 0.35
 """h in mm above which a coarser mesh does not move edges any farther."""
 
 
-@dataclass(frozen=True)
-class Border:
+class Border(NamedTuple):
     """An edge between two cells, and the regions that cover each side of it."""
 
     edge: Edge
@@ -62,11 +61,8 @@ def arrangement(regions: Sequence[Region], h: float) -> list[Border]:
     def labelled(plan: Arrangement) -> list[Border]:
         count = len(regions)
         sides = [tuple(n > 0 for n in by_owner(turns, count)) for turns in plan.left]
-        return [
-            Border(piece.edge, left, right)
-            for piece, left, right in zip(plan.pieces, sides[::2], sides[1::2], strict=True)
-            if left != right
-        ]
+        rows = zip(plan.pieces, sides[::2], sides[1::2], strict=True)
+        return [Border(piece.edge, left, right) for piece, left, right in rows if left != right]
 
     borders = arranged([region.edges for region in regions], labelled)
     return _without_cusps(borders, min(h, COARSE))
@@ -81,18 +77,14 @@ def _without_cusps(borders: list[Border], h: float) -> list[Border]:
     shortened: list[Border | None] = list(borders)
     added: list[Border] = []
     for corner, numbers in leaving.items():
-        for i, first in enumerate(numbers):
-            for second in numbers[i + 1 :]:
-                a, b = shortened[first], shortened[second]
-                if a is None or b is None or first == second:
-                    continue
-                if not (a.ends_at(corner) and b.ends_at(corner)):
-                    continue  # cut short by another cusp at this corner
+        for first, second in combinations(numbers, 2):
+            a, b = shortened[first], shortened[second]
+            # One may have been cut short by another cusp at this corner.
+            if first != second and a and b and a.ends_at(corner) and b.ends_at(corner):
                 joined = _joined(a.leaving(corner), b.leaving(corner), h)
                 if joined is not None:
                     common, shortened[first], bent, shortened[second] = joined
-                    added += [common] if common.left != common.right else []
-                    added.append(bent)
+                    added += [common, bent] if common.left != common.right else [bent]
     return [border for border in shortened if border is not None] + added
 
 
@@ -109,21 +101,16 @@ def _joined(a: Border, b: Border, h: float) -> tuple[Border, Border, Border, Bor
         return None
     end, b_end = apart
     # The cusp lies between the two: the common part keeps the outer side of both.
-    across = (b_end[0] - end[0]) * -ay + (b_end[1] - end[1]) * ax
-    b_is_left = across > 0
-    common = Border(
-        a.edge.part(a.edge.start, end),
-        b.left if b_is_left else a.left,
-        a.right if b_is_left else b.right,
-    )
+    b_is_left = (b_end[0] - end[0]) * -ay + (b_end[1] - end[1]) * ax > 0
+    left, right = (b.left, a.right) if b_is_left else (a.left, b.right)
     rest = b.edge.part(b_end, b.edge.end)
     whole = rest.length < 1.5 * h
     bent = rest if whole else rest.part(b_end, rest.at(h / rest.length))
     return (
-        common,
-        replace(a, edge=a.edge.part(end, a.edge.end)),
-        replace(b, edge=edge_from_bulge(end, bent.end, bent.bulge)),
-        None if whole else replace(b, edge=rest.part(bent.end, rest.end)),
+        Border(a.edge.part(a.edge.start, end), left, right),
+        a._replace(edge=a.edge.part(end, a.edge.end)),
+        b._replace(edge=edge_from_bulge(end, bent.end, bent.bulge)),
+        None if whole else b._replace(edge=rest.part(bent.end, rest.end)),
     )
 
 
@@ -163,10 +150,20 @@ def narrows(borders: Sequence[Border], h: float) -> list[float]:
     """
     import shapely
 
-    tails, heads, owner = _chords(borders, h / 2)
+    edges = [border.edge for border in borders]
+    counts = [max(2, math.ceil(2 * edge.length / h)) for edge in edges]
+    lines = np.array(
+        [
+            (edge.at(i / count), edge.at((i + 1) / count))
+            for edge, count in zip(edges, counts, strict=True)
+            for i in range(count)
+        ]
+    )
+    owner = np.repeat(np.arange(len(edges)), counts)
+    tails, heads = lines.transpose(1, 0, 2)
     numbers: dict[Point, int] = {}
     ends = np.array(
-        [[numbers.setdefault(p, len(numbers)) for p in (b.edge.start, b.edge.end)] for b in borders]
+        [[numbers.setdefault(p, len(numbers)) for p in (e.start, e.end)] for e in edges]
     )
     middles = (tails + heads) / 2
     along = heads - tails
@@ -174,8 +171,7 @@ def narrows(borders: Sequence[Border], h: float) -> list[float]:
     normals /= np.hypot(normals[:, 0], normals[:, 1])[:, None]
     far = normals * ACROSS * h
     rays = shapely.linestrings(np.stack([middles - far, middles + far], axis=1))
-    chords = shapely.linestrings(np.stack([tails, heads], axis=1))
-    ray, chord = shapely.STRtree(chords).query(rays, predicate="intersects")
+    ray, chord = shapely.STRtree(shapely.linestrings(lines)).query(rays, predicate="intersects")
     mine, theirs = ends[owner[ray]], ends[owner[chord]]
     apart = ~(mine[:, :, None] == theirs[:, None, :]).any(axis=(1, 2))
     ray, chord = ray[apart], chord[apart]
@@ -189,26 +185,9 @@ def narrows(borders: Sequence[Border], h: float) -> list[float]:
     reach = np.abs(np.einsum("ij,ij->i", a + share[:, None] * (b - a), across))
     widths = np.full(len(middles), math.inf)
     np.minimum.at(widths, ray, reach)
-    sizes = np.array(
-        [min(h, TURN * e.radius) if isinstance(e, Arc) else h for e in (b.edge for b in borders)]
-    )
+    sizes = np.array([min(h, TURN * e.radius) if isinstance(e, Arc) else h for e in edges])
     np.minimum.at(sizes, owner, np.maximum(widths / ACROSS, LEAST * h))
     return [float(size) for size in sizes]
-
-
-def _chords(
-    borders: Sequence[Border], step: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """The edges as chords of at most ``step`` mm: tails, heads, and the edge of each."""
-    tails, heads, owner = [], [], []
-    for number, border in enumerate(borders):
-        edge = border.edge
-        count = max(2, math.ceil(edge.length / step))
-        stops = [edge.at(i / count) for i in range(count + 1)]
-        tails += stops[:-1]
-        heads += stops[1:]
-        owner += [number] * count
-    return np.array(tails), np.array(heads), np.array(owner, dtype=np.int64)
 
 
 # One triangulation of the plane for all layers, arcs as arcs.
@@ -230,12 +209,12 @@ class Plane(NamedTuple):
     triangles of each region.
     """
 
-    points: NDArray[np.float64]
+    points: Floats
     corners: int
-    triangles: NDArray[np.int64]
-    inside: NDArray[np.bool_]
+    triangles: Ints
+    inside: Flags
 
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """Exact area of each curved triangle, mm2."""
         return volumes("triangle6", self.points, self.triangles)
 
@@ -250,21 +229,11 @@ def triangulation(regions: Sequence[Region], h: float) -> Plane:
     labels, points, triangles, cells, sides = _netgen(borders, h)
     points, triangles, cells = _crossings_halved(points, triangles, cells, sides)
     inside = np.array(labels, dtype=bool).T[:, cells]
-    corners = len(points)
     triangles, middles = _second_order(points, triangles, sides, borders)
-    plane = Plane(np.vstack([points, middles]), corners, triangles, inside)
-    return _straightened(plane)
+    return _straightened(Plane(np.vstack([points, middles]), len(points), triangles, inside))
 
 
-def _netgen(
-    borders: Sequence[Border], h: float
-) -> tuple[
-    list[Label],
-    NDArray[np.float64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-]:
+def _netgen(borders: Sequence[Border], h: float) -> tuple[list[Label], Floats, Ints, Ints, Ints]:
     """Labels of cells, points, triangles, each one's cell, and (start, end, border) of sides."""
     try:
         from netgen.geom2d import SplineGeometry
@@ -318,11 +287,8 @@ def _netgen(
 
 
 def _crossings_halved(
-    points: NDArray[np.float64],
-    triangles: NDArray[np.int64],
-    cells: NDArray[np.int64],
-    sides: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    points: Floats, triangles: Ints, cells: Ints, sides: Ints
+) -> tuple[Floats, Ints, Ints]:
     """Triangles with a node on each edge that crosses a cell from border to border.
 
     Otherwise two films bonded at both ends of such an edge, but not along it, would share it.
@@ -332,34 +298,26 @@ def _crossings_halved(
     edges = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2))
     crossing = {tuple(edge) for edge in edges[on_border[edges].all(axis=1)].tolist()}
     crossing -= {tuple(side) for side in np.sort(sides[:, :2]).tolist()}
-    crossing -= _sharp_corners(points, triangles, sides)
-    corners: list[list[int] | None] = list(triangles.tolist())
-    owners = cells.tolist()
-    added: list[NDArray[np.float64]] = []
+    halved = sorted(crossing - _sharp_corners(points, triangles, sides))
+    corners, owners = triangles.tolist(), cells.tolist()
     touched = np.flatnonzero(on_border[triangles].sum(axis=1) >= 2).tolist()
-    for a, b in sorted(crossing):
-        middle = len(points) + len(added)
-        added.append((points[a] + points[b]) / 2)
-        for number in list(touched):
-            triangle = corners[number]
-            if triangle is None or a not in triangle or b not in triangle:
-                continue
+    for middle, (a, b) in enumerate(halved, start=len(points)):
+        for number in [n for n in touched if a in corners[n] and b in corners[n]]:
+            touched += [len(corners), len(corners) + 1]
             for old in (a, b):
-                touched.append(len(corners))
-                corners.append([middle if node == old else node for node in triangle])
+                corners.append([middle if node == old else node for node in corners[number]])
                 owners.append(owners[number])
-            corners[number] = None
-    remaining = [number for number, triangle in enumerate(corners) if triangle is not None]
+            corners[number] = []
+    whole = [number for number, nodes in enumerate(corners) if nodes]
+    middles = points[np.array(halved, dtype=np.int64).reshape(-1, 2)].mean(axis=1)
     return (
-        np.vstack([points, *added]),
-        np.array([corners[number] for number in remaining], dtype=np.int64),
-        np.array(owners, dtype=np.int64)[remaining],
+        np.vstack([points, middles]),
+        np.array([corners[number] for number in whole], dtype=np.int64),
+        np.array(owners, dtype=np.int64)[whole],
     )
 
 
-def _sharp_corners(
-    points: NDArray[np.float64], triangles: NDArray[np.int64], sides: NDArray[np.int64]
-) -> set[tuple[int, int]]:
+def _sharp_corners(points: Floats, triangles: Ints, sides: Ints) -> set[tuple[int, int]]:
     """Edges across from a corner between two borders that is too sharp to halve."""
     size = len(points)
     border_edges = np.sort(sides[:, :2])
@@ -385,23 +343,22 @@ def _tangents_meet(arc: Arc) -> Point:
 
 
 def _second_order(
-    points: NDArray[np.float64],
-    corners: NDArray[np.int64],
-    sides: NDArray[np.int64],
-    borders: Sequence[Border],
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    points: Floats, corners: Ints, sides: Ints, borders: Sequence[Border]
+) -> tuple[Ints, Floats]:
     """Triangles with mid-edge nodes, and the mid-edge points: on the arc where an edge is one."""
     count = len(points)
     heads = np.roll(corners, -1, axis=1)
     keys = np.minimum(corners, heads) * count + np.maximum(corners, heads)
     edges, number = np.unique(keys, return_inverse=True)
     middles = (points[edges // count] + points[edges % count]) / 2
-    sides = sides[np.array([isinstance(borders[i].edge, Arc) for i in sides[:, 2]], dtype=bool)]
-    arcs = [borders[i].edge for i in sides[:, 2]]
-    centres = np.array([arc.centre for arc in arcs if isinstance(arc, Arc)]).reshape(-1, 2)
-    radii = np.array([arc.radius for arc in arcs if isinstance(arc, Arc)])
-    tails, heads = sides[:, 0], sides[:, 1]
+    rows = [
+        (tail, head, *arc.centre, arc.radius)
+        for tail, head, border in sides.tolist()
+        if isinstance(arc := borders[border].edge, Arc)
+    ]
+    tails, heads, x, y, radii = np.array(rows, dtype=float).reshape(-1, 5).T
     curved = np.searchsorted(edges, np.minimum(tails, heads) * count + np.maximum(tails, heads))
+    centres = np.column_stack([x, y])
     outward = middles[curved] - centres
     lengths = np.hypot(outward[:, 0], outward[:, 1])
     middles[curved] = centres + outward * (radii / lengths)[:, None]

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sbafab.laminate.films import PAPER_TPE, Film, density_of, in_order
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.meshing.formats import write_inp
+from sbafab.meshing.surface import Floats
 from sbafab.simulators.model_files import rendered, write_files
 from sbafab.simulators.shell_model import elastic_of
 from sbafab.simulators.simulator import LARGEST_VACUUM, SimulationRequest, chamber_pressures
@@ -111,7 +111,7 @@ WAVES = tuple((0.2 + 0.52 * n, (1.0, 1.7, 2.9)[n % 3], 2.4 * n**2) for n in rang
 0.35 mm resolves and films of 0.038 mm wrinkle at, in directions off a round pocket's symmetries."""
 
 
-def uneven(points: NDArray[np.float64], height: float) -> NDArray[np.float64]:
+def uneven(points: Floats, height: float) -> Floats:
     """Points (n, 3) of a stack laid on a wavy plate, up to ``height`` mm up or down.
 
     Films and bonds above each other move together: their thicknesses and gaps do not change.
@@ -229,10 +229,10 @@ def _on_plane(mesh: Mesh, name: str, is_free: bool) -> Iterator[str]:
         )
 
 
-def _normal(places: NDArray[np.float64]) -> NDArray[np.float64]:
+def _normal(places: Floats) -> Floats:
     """Unit normal of the upright plane through the axis and these points."""
     x, y = places[np.hypot(*places.T).argmax()]
-    normal: NDArray[np.float64] = np.array([-y, x]) / np.hypot(x, y)
+    normal: Floats = np.array([-y, x]) / np.hypot(x, y)
     return normal
 
 

@@ -10,21 +10,35 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from sbafab.errors import DesignError, OutputError, VoidError
-from sbafab.geometry.region import disc
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.element_mesh import flat_triangles, skin, volume_mesh
-from sbafab.meshing.conforming.layup import MeshSettings, Symmetry, flat, images, layup, sector
+from sbafab.meshing.conforming.layup import (
+    MeshSettings,
+    Symmetry,
+    flat,
+    images,
+    layup,
+    meshed_shares,
+    sector,
+)
 from sbafab.meshing.conforming.mesh import Mesh
+from sbafab.meshing.conforming.meshes import skin, volume_mesh
 from sbafab.meshing.formats import write_fields
-from sbafab.meshing.surface import Surface
-from sbafab.reports.canvas import AMBIENT, draw_length_bar, rasterize, view_of
+from sbafab.meshing.surface import Floats, Ints, Surface
+from sbafab.reports.canvas import (
+    AMBIENT,
+    ENLARGED,
+    draw_length_bar,
+    image_of,
+    png,
+    rasterize,
+    view_of,
+)
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
 from sbafab.runtime import Progress
 from sbafab.simulators.calculix.deck import (
@@ -47,7 +61,6 @@ from sbafab.simulators.simulator import (
 from sbafab.spreadsheet import csv_text
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
     from PIL.ImageDraw import ImageDraw as Draw
 
 COMPONENTS = {b"DISP": 3, b"STRESS": 6}
@@ -64,15 +77,15 @@ class Frame:
     """Fields at one time in s: displacement (n, 3) mm, stress (n, 6) MPa as xx yy zz xy yz zx."""
 
     time: float
-    displacement: NDArray[np.float64]
-    stress: NDArray[np.float64]
+    displacement: Floats
+    stress: Floats
 
     @property
-    def von_mises(self) -> NDArray[np.float64]:
+    def von_mises(self) -> Floats:
         """Equivalent stress (n,) in MPa."""
         xx, yy, zz, xy, yz, zx = self.stress.T
         direct = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-        equivalent: NDArray[np.float64] = np.sqrt(direct / 2 + 3 * (xy**2 + yz**2 + zx**2))
+        equivalent: Floats = np.sqrt(direct / 2 + 3 * (xy**2 + yz**2 + zx**2))
         return equivalent
 
 
@@ -111,7 +124,7 @@ def _unread(path: Path, fault: str) -> OutputError:
 
 def _blocks(
     path: Path, content: bytes, nodes: int, whole: bool
-) -> Iterator[tuple[float, bytes, NDArray[np.float64]]]:
+) -> Iterator[tuple[float, bytes, Floats]]:
     """Time, name and values (n, components) of each block of a known name."""
     for head in BLOCK.finditer(content):
         size = COMPONENTS.get(head[3])
@@ -155,31 +168,22 @@ NEAR = 0.5
 """mm from an axis within which a node of the tip represents it."""
 
 
-@dataclass(frozen=True)
-class LoadedState(State):
-    """A state with the largest von Mises ``stress`` in MPa and the ``work`` of the air in uJ."""
-
-    stress: float
-    work: float
-
-
 def history(
     mesh: Mesh,
     laminate: Laminate,
     symmetry: Symmetry,
     settings: DeckSettings,
     frames: Sequence[Frame],
-) -> list[LoadedState]:
+) -> list[State]:
     """The states of a run from the unloaded one on; ``mesh`` is the mesh of the run."""
     tips, bases = (_poles(mesh, laminate, name) for name in ("tip", "base"))
     walls = {name: _walls(mesh, name) for name in settings.pressures}
-    shares = {name: _share(laminate, name, symmetry) for name in settings.pressures}
+    shares = meshed_shares(laminate, sector(laminate, symmetry))
     stand = images(laminate, symmetry)
     flat = float(mesh.points[tips, 2].mean() - mesh.points[bases, 2].mean())
     start = np.zeros_like(mesh.points)
-    unloaded = Frame(0.0, start, np.zeros((len(start), 6)))
-    states: list[LoadedState] = []
-    for frame in (unloaded, *frames):
+    states: list[State] = []
+    for frame in (Frame(0.0, start, np.zeros((len(start), 6))), *frames):
         points = mesh.points + frame.displacement
         moved = frame.displacement[tips].mean(axis=0) - frame.displacement[bases].mean(axis=0)
         x, y, z = moved.tolist()
@@ -191,13 +195,22 @@ def history(
         if states:
             # The work of the air since the state before, in uJ (kPa x ul).
             before = states[-1]
-            means = {n: (before.pressures[n] + kpa) / 2 for n, kpa in pressures.items()}
-            came = {name: volumes[name] - before.volumes[name] for name in volumes}
-            work = before.work + sum(means[name] * ul for name, ul in came.items())
-        tilt = _tilt(mesh.points[tips], points[tips])
-        stress = float(frame.von_mises.max())
-        tip, height = (x, y, z), flat + z
-        states.append(LoadedState(frame.time, pressures, height, tip, tilt, volumes, stress, work))
+            work = before.work + sum(
+                (before.pressures[name] + pressures[name]) / 2 * (ul - before.volumes[name])
+                for name, ul in volumes.items()
+            )
+        states.append(
+            State(
+                time=frame.time,
+                pressures=pressures,
+                height=flat + z,
+                tip=(x, y, z),
+                tilt=_tilt(mesh.points[tips], points[tips]),
+                volumes=volumes,
+                stress=float(frame.von_mises.max()),
+                work=work,
+            )
+        )
     return states
 
 
@@ -218,7 +231,7 @@ def films_meet(mesh: Mesh, chamber: str, frame: Frame) -> bool:
     return bool((apart[facing] < 0).any())
 
 
-def _poles(mesh: Mesh, laminate: Laminate, name: str) -> NDArray[np.int64]:
+def _poles(mesh: Mesh, laminate: Laminate, name: str) -> Ints:
     """The node of a set nearest to each stack's axis, if the axis lies in the mesh."""
     nodes = mesh.node_sets[name]
     nearest = []
@@ -230,7 +243,7 @@ def _poles(mesh: Mesh, laminate: Laminate, name: str) -> NDArray[np.int64]:
     return np.array(nearest) if nearest else nodes
 
 
-def _tilt(before: NDArray[np.float64], after: NDArray[np.float64]) -> float | None:
+def _tilt(before: Floats, after: Floats) -> float | None:
     """Angle in degrees between the planes of three or more poles, before and after."""
     if len(before) < 3:
         return None
@@ -238,47 +251,35 @@ def _tilt(before: NDArray[np.float64], after: NDArray[np.float64]) -> float | No
     return math.degrees(math.acos(min(1.0, abs(float(normals[0] @ normals[1])))))
 
 
-def _walls(mesh: Mesh, chamber: str) -> NDArray[np.int64]:
+def _walls(mesh: Mesh, chamber: str) -> Ints:
     """Triangles (k, 3) round the air, counter-clockwise seen from outside of it."""
     if chamber in mesh.cavities:
         return mesh.cavities[chamber]
     faces = mesh.face_sets.get(f"cavity_{chamber}", np.empty((0, 2), dtype=np.int64))
-    return flat_triangles(mesh.kind, mesh.cells, faces)[:, ::-1]
+    return mesh.flat_triangles(faces)[:, ::-1]
 
 
-def _volume(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> float:
+def _volume(points: Floats, triangles: Ints) -> float:
     """Return the volume within triangles in mm3; open sides must be upright (symmetry planes)."""
     a, b, c = points[triangles].transpose(1, 0, 2)
     across = np.cross(b - a, c - a)[:, 2]
     return float(np.sum(across * (a + b + c)[:, 2]) / 6)
 
 
-def _share(laminate: Laminate, chamber: str, symmetry: Symmetry) -> float:
-    """The meshed fraction of a chamber; 1 if none of it is meshed."""
-    part = sector(laminate, symmetry)
-    if part is None:
-        return 1.0
-    (centres,) = (c.centres for c in laminate.chambers if c.name == chamber)
-    discs = [disc(centre, NEAR) for centre in centres]
-    meshed = sum((circle & part.region).area for circle in discs)
-    return meshed / sum(circle.area for circle in discs) or 1.0
-
-
-def history_csv(states: Sequence[LoadedState]) -> str:
+def history_csv(states: Sequence[State]) -> str:
     """The states as CSV, one row each; the headers contain the units."""
-    first = states[0]
-    head = ["time_s", *(f"pressure_{name}_kPa" for name in first.pressures)]
-    head += ["stroke_mm", "tip_x_mm", "tip_y_mm"]
-    head += ["tilt_deg"] if first.tilt is not None else []
-    head += [*(f"volume_{name}_ul" for name in first.volumes), "von_mises_max_MPa", "work_uJ"]
-    rows: list[Sequence[str]] = [head]
+    rows: list[dict[str, float]] = []
     for state in states:
-        values = [state.time, *state.pressures.values(), state.stroke, *(state.tip or ())[:2]]
-        values += [state.tilt] if state.tilt is not None else []
-        values += [*state.volumes.values(), state.stress, state.work]
-        # Adding 0.0 turns a rounded -0.0 into 0.0.
-        rows.append([f"{round(value, 6) + 0.0:.6g}" for value in values])
-    return csv_text(rows)
+        row = {"time_s": state.time}
+        row |= {f"pressure_{name}_kPa": kpa for name, kpa in state.pressures.items()}
+        row |= {"stroke_mm": state.stroke}
+        row |= dict(zip(("tip_x_mm", "tip_y_mm"), state.tip or (), strict=False))
+        row |= {} if state.tilt is None else {"tilt_deg": state.tilt}
+        row |= {f"volume_{name}_ul": ul for name, ul in state.volumes.items()}
+        rows.append(row | {"von_mises_max_MPa": state.stress, "work_uJ": state.work})
+    # Adding 0.0 turns a rounded -0.0 into 0.0.
+    cells = ([f"{round(value, 6) + 0.0:.6g}" for value in row.values()] for row in rows)
+    return csv_text([[*rows[0]], *cells])
 
 
 # The deformed mesh for ParaView, with the results at its nodes.
@@ -303,7 +304,6 @@ def write_deformed(mesh: Mesh, frame: Frame, path: Path) -> None:
 
 SIZE = 1100, 900
 MARGIN, FOOT = 60, 110
-ENLARGED = 2
 INK = (34, 34, 34)
 SCALE = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37)])
 """Viridis: even steps of lightness, readable by colour-blind people and in grey."""
@@ -316,10 +316,9 @@ ELEVATION, AZIMUTH = 28.0, -35.0
 
 def deformed_png(mesh: Mesh, frame: Frame, caption: str) -> bytes:
     """The deformed surface in oblique parallel view with a scale of von Mises stress."""
-    from PIL import Image, ImageDraw
+    from PIL import ImageDraw
 
-    triangles = flat_triangles(mesh.kind, mesh.cells, skin(mesh))
-    surface = Surface(mesh.points + frame.displacement, triangles)
+    surface = Surface(mesh.points + frame.displacement, mesh.flat_triangles(skin(mesh)))
     width, height = (side * ENLARGED for side in SIZE)
     edge, foot = MARGIN * ENLARGED, FOOT * ENLARGED
     view = view_of([surface], ELEVATION, AZIMUTH, (edge, edge, width - edge, height - edge - foot))
@@ -330,14 +329,12 @@ def deformed_png(mesh: Mesh, frame: Frame, caption: str) -> bytes:
     # Darken steep faces slightly: this shows wrinkles and keeps the colour readable.
     shade = 1 - DARKEST * (1 - buffer.light) / (1 - AMBIENT)
     rgb = np.where((buffer.body < 0)[..., None], 255, colours[buffer.face] * shade[..., None])
-    picture = Image.fromarray(rgb.round().astype(np.uint8), "RGB").reduce(ENLARGED)
+    picture = image_of(rgb)
     _write_key(ImageDraw.Draw(picture), caption, most, view.scale / ENLARGED)
-    out = BytesIO()
-    picture.save(out, "PNG", compress_level=6)
-    return out.getvalue()
+    return png(picture)
 
 
-def _coloured(share: NDArray[np.float64]) -> NDArray[np.float64]:
+def _coloured(share: Floats) -> Floats:
     """The scale's red, green and blue (n, 3) for shares of the largest stress."""
     steps = np.linspace(0, 1, len(SCALE))
     return np.column_stack([np.interp(share, steps, channel) for channel in SCALE.T])
@@ -362,7 +359,7 @@ def _write_key(draw: Draw, caption: str, most: float, pixels_per_mm: float) -> N
 # Stroke, air and wall stress against pressure as one SVG, for screen and print.
 
 
-def history_svg(title: str, states: Sequence[LoadedState]) -> str:
+def history_svg(title: str, states: Sequence[State]) -> str:
     """Three panels side by side; x is the chamber pressure farthest from 0."""
     last = states[-1]
     fullest = max(last.pressures, key=lambda name: abs(last.pressures[name]))
@@ -397,10 +394,6 @@ LOG = "ccx.log"
 DIVERGED = Stop("diverged", "its iterations no longer converge, however small the step")
 
 
-Ending = tuple[float, Stop | None]
-"""End of a run: the last converged time in s, and the reason if it was stopped, else None."""
-
-
 def find_ccx() -> str:
     """Path of the solver. Raises OutputError if it is not installed."""
     return program_path(
@@ -415,10 +408,11 @@ def run_ccx(
     end: float,
     timeout: float,
     report: Callable[[float], None] | None = None,
-) -> Ending:
+) -> tuple[float, Stop | None]:
     """Runs a deck in its folder to the time ``end``, for at most ``timeout`` seconds.
 
-    The output of ccx goes to ``ccx.log`` there; ``report`` is called with the time reached, in s.
+    Return the last converged time in s, and the reason if the run was stopped. The output of ccx
+    goes to ``ccx.log`` there; ``report`` is called with the time reached, in s.
     """
     sta = folder / f"{job}.sta"
 
@@ -523,8 +517,7 @@ def simulate(
             f"ccx stopped at {place}: {stop.words}; results up to {last} are kept; "
             f"{_advice(stop, settings)}"
         )
-    figures = {"stress": states[-1].stress, "work": states[-1].work}
-    return Result("calculix", tuple(states), figures, stopped)
+    return Result.of_run("calculix", states, {}, stopped)
 
 
 MEASURED_EQUATIONS, MEASURED_SECONDS, GROWTH = 147_513, 6.4, 1.5
@@ -558,7 +551,7 @@ def _first_wrong(
     laminate: Laminate,
     settings: DeckSettings,
     frames: Sequence[Frame],
-    states: Sequence[LoadedState],
+    states: Sequence[State],
 ) -> tuple[int, str] | None:
     """Return the index of the first impossible frame, and the reason; decks have no contact."""
     drawn_in = [name for name, pressure in settings.pressures.items() if pressure < 0]
@@ -592,7 +585,7 @@ def _write_results(
     mesh: Mesh,
     name: str,
     symmetry: Symmetry,
-    states: Sequence[LoadedState],
+    states: Sequence[State],
     last: Frame,
     folder: Path,
 ) -> None:

@@ -1,25 +1,480 @@
-"""SOFA: a scene run with runSofa in batch, and the interface of a simulator."""
+"""SOFA: the films of an actuator, its four scenes from templates, and a scene run with runSofa."""
 
 from __future__ import annotations
 
+import json
+import math
 import re
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
 
 from sbafab.errors import DesignError
+from sbafab.geometry.edges import Point
+from sbafab.laminate.films import density_of
 from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.conforming.layup import Layup, MeshSettings, flat, layup, narrowest_ring
+from sbafab.meshing.conforming.mesh import Mesh, volumes
+from sbafab.meshing.conforming.meshes import shell_mesh, thin
+from sbafab.meshing.surface import Floats, Ints
 from sbafab.runtime import Progress
-from sbafab.simulators.shell_model import elastic_of, why_not_round
+from sbafab.simulators.model_files import model_file, write_files
+from sbafab.simulators.shell_model import (
+    FilmGroup,
+    Meridian,
+    RoundStack,
+    Shell,
+    Start,
+    Triangles,
+    coarse_shell,
+    elastic_of,
+    holding,
+    nearly_flat,
+    pocket_radii,
+    round_stack,
+    standing,
+    why_not_round,
+)
 from sbafab.simulators.simulator import (
     DEFAULT_PRESSURE,
+    NODES_FILE,
     PERIOD,
+    RAMP,
+    RecordedFilms,
     Result,
     SimulationRequest,
     chamber_pressures,
     program_path,
     refuse_time,
+    refuse_unknown,
     run_model,
 )
-from sbafab.simulators.sofa.scenes import Scene, scenes_of, write_scenes
+
+# Stacks of round pockets use the coarse shell, others the conforming mesh.
+
+
+SECTORS = 12
+"""Nodes per ring in scene A. From 8 to 12 the height grows by 6.6 %, from 12 to 16 by 2.2 %."""
+COARSE_SECTORS = 8
+"""Nodes per ring in the other scenes."""
+
+
+def half_full(pocket: float, neck: float) -> Meridian:
+    """7.5 ul in a pocket of 5 mm: 80 ul more brings 15 balloons near their volume at 5 kPa."""
+    return holding(neck, pocket - neck, 7.5 * (pocket / 2.5) ** 3)
+
+
+def round_shell(stack: RoundStack, sectors: int = SECTORS, start: Start = nearly_flat) -> Shell:
+    """The shell of a stack of round pockets; its rings have the area of the circles."""
+    return coarse_shell(stack, sectors, start, is_fair=True)
+
+
+# The shell of any laminate, from its conforming mesh: drawn pockets, several films, tubes.
+
+
+STEPS_ACROSS = 3.0
+"""Triangle sides across the smallest pocket's radius, unless its bonds are narrower."""
+STRETCH, MASS, BENDING, RATIO, LOWEST = range(5)
+"""Properties of a cell: E t in mN/mm, kg/mm2, mN mm, Poisson's ratio, its lowest film."""
+
+
+def conforming_shell(laminate: Laminate) -> Shell:
+    """The shell of a laminate, flat at the start; a radial one is wrapped round its tube.
+
+    The mouths of inlets are open and free. Raises DesignError if a film's modulus is not known, or
+    the mesher is not installed.
+    """
+    for layer in laminate.tpe_layers:
+        elastic_of(layer.film)
+    radii = pocket_radii(laminate)
+    side = min(radii) / STEPS_ACROSS
+    ring = narrowest_ring(laminate)
+    h = side if ring is None else min(side, ring[0])
+    stack = thin(layup(laminate, MeshSettings(h, wrapped=False)))
+    mesh = shell_mesh(stack, flat(stack))
+    # Mid-edge nodes are left out.
+    used, corners = np.unique(mesh.cells[:, :3], return_inverse=True)
+    corners = corners.reshape(-1, 3)
+    number = np.full(len(mesh.points), -1)
+    number[used] = np.arange(len(used))
+    cells = _cells(stack, mesh)
+    # Adding 0.0 turns a rounded -0.0 into 0.0.
+    rest = position = mesh.points[used].round(6) + 0.0
+    start = "flat"
+    if laminate.tube is not None:
+        start = f"wrapped round a tube of {laminate.tube:.4g} mm, whose axis is z"
+        on_tube = replace(stack, settings=MeshSettings(h))
+        position = shell_mesh(on_tube, flat(on_tube)).points[used].round(6) + 0.0
+    base = number[mesh.node_sets["base"]]
+    cavities = {}
+    for chamber in laminate.chambers:
+        cell, side_of = mesh.face_sets[f"cavity_{chamber.name}"].T
+        walls = corners[cell]
+        # Face 0 of a triangle faces down, face 1 up, each into the air that touches it; normals of
+        # a cavity point out of the air.
+        cavities[chamber.name] = np.where(side_of[:, None] == 0, walls, walls[:, ::-1])
+    return Shell(
+        rest=rest,
+        position=position,
+        membranes=_membranes(corners, cells),
+        bending=_bending(corners, cells),
+        cavities=cavities,
+        fixed=base[base >= 0],
+        tip=number[_marks(stack, mesh, number)],
+        mass=float(volumes(mesh.kind, mesh.points, mesh.cells) @ cells[:, MASS]),
+        size=max(radii) / 2.5,
+        about=(
+            f"{len(rest)} nodes, {len(corners)} triangles, inlets and their strips among them.\n"
+            f"It starts {start}."
+        ),
+        roots=base[:0],
+        poles=base[:0],
+    )
+
+
+def _cells(stack: Layup, mesh: Mesh) -> Floats:
+    """Return the properties of each cell, one row each, for its stack of bonded films."""
+    properties = np.zeros((len(mesh.cells), 5))
+    thickness = np.zeros(len(mesh.cells))
+    properties[:, LOWEST] = -1
+    for k, ply in enumerate(stack.plies):
+        of_ply = mesh.cell_sets[ply.name]
+        young, ratio = elastic_of(ply.layer.film)
+        dense = density_of(ply.layer.film, "a simulation")
+        properties[of_ply, STRETCH] += 1000 * young * ply.thickness
+        properties[of_ply, MASS] += 1e-9 * dense * ply.thickness
+        properties[of_ply, RATIO] += ratio * ply.thickness
+        thickness[of_ply] += ply.thickness
+        properties[of_ply[properties[of_ply, LOWEST] < 0], LOWEST] = k
+    properties[:, RATIO] /= thickness
+    properties[:, BENDING] = (
+        properties[:, STRETCH] * thickness**2 / (12 * (1 - properties[:, RATIO] ** 2))
+    )
+    return properties.round(12)
+
+
+def _membranes(corners: Triangles, cells: Floats) -> tuple[FilmGroup, ...]:
+    kinds, kind = np.unique(cells[:, [STRETCH, RATIO]], axis=0, return_inverse=True)
+    return tuple(
+        FilmGroup(f"membrane{n + 1}", corners[kind.ravel() == n], float(stretch), float(ratio))
+        for n, (stretch, ratio) in enumerate(kinds)
+    )
+
+
+def _bending(corners: Triangles, cells: Floats) -> tuple[FilmGroup, ...]:
+    """Groups in which no edge has more than two triangles.
+
+    Cells with the same lowest film lie side by side; separate films share a group if they share no
+    node.
+    """
+    bins: list[tuple[float, Triangles]] = []
+    kinds, kind = np.unique(cells[:, [BENDING, LOWEST]], axis=0, return_inverse=True)
+    for n, (stiffness, _) in enumerate(kinds.tolist()):
+        of_kind = corners[kind.ravel() == n]
+        for place, (other, triangles) in enumerate(bins):
+            if other == stiffness and not np.isin(of_kind, triangles).any():
+                bins[place] = stiffness, np.concatenate([triangles, of_kind])
+                break
+        else:
+            bins.append((stiffness, of_kind))
+    return tuple(
+        FilmGroup(f"bend{n + 1}", triangles, stiffness, 0.0)
+        for n, (stiffness, triangles) in enumerate(bins)
+    )
+
+
+def _marks(stack: Layup, mesh: Mesh, number: Ints) -> list[int]:
+    """Nodes of the highest film: the axes of three stacks or more, or four round its middle."""
+    top = mesh.node_sets["tip"]
+    top = top[number[top] >= 0]
+    places = mesh.points[top][:, :2]
+    marks = np.array(stack.centres)
+    if len(marks) < 3:
+        middle = marks.mean(axis=0)
+        reach = np.abs(places - middle).max()
+        marks = middle + reach * np.array([(1, 0), (0, 1), (-1, 0), (0, -1)])
+    away = np.linalg.norm(places[:, None] - marks, axis=2)
+    return [int(node) for node in top[away.argmin(axis=0)]]
+
+
+# The files of scenes.
+
+
+SceneName = Literal["shell", "frames", "volume", "beam"]
+TEMPLATES = Path(__file__).parent / "templates"
+DATA, PYTHON = "actuator.json", "scene.py"
+
+PLUGINS = {
+    "AMDOrderingMethod": "Sofa.Component.LinearSolver.Ordering",
+    "BeamFEMForceField": "Sofa.Component.SolidMechanics.FEM.Elastic",
+    "CGLinearSolver": "Sofa.Component.LinearSolver.Iterative",
+    "EulerImplicitSolver": "Sofa.Component.ODESolver.Backward",
+    "FastTriangularBendingSprings": "Sofa.Component.SolidMechanics.Spring",
+    "FixedProjectiveConstraint": "Sofa.Component.Constraint.Projective",
+    "FreeMotionAnimationLoop": "Sofa.Component.AnimationLoop",
+    "GenericConstraintSolver": "Sofa.Component.Constraint.Lagrangian.Solver",
+    "LinearSolverConstraintCorrection": "Sofa.Component.Constraint.Lagrangian.Correction",
+    "MechanicalObject": "Sofa.Component.StateContainer",
+    "MeshTopology": "Sofa.Component.Topology.Container.Constant",
+    "RigidMapping": "Sofa.Component.Mapping.NonLinear",
+    "SkinningMapping": "Sofa.Component.Mapping.Linear",
+    "SparseLDLSolver": "Sofa.Component.LinearSolver.Direct",
+    "SubsetMapping": "Sofa.Component.Mapping.Linear",
+    "SurfacePressureConstraint": "SoftRobots",
+    "SurfacePressureForceField": "Sofa.Component.MechanicalLoad",
+    "TriangleSetTopologyContainer": "Sofa.Component.Topology.Container.Dynamic",
+    "TriangularFEMForceFieldOptim": "Sofa.Component.SolidMechanics.FEM.Elastic",
+    "UniformMass": "Sofa.Component.Mass",
+    "WriteState": "Sofa.Component.Playback",
+}
+"""The plugin that provides each component; DefaultAnimationLoop is built into SOFA."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A scene: its file, time step ``dt`` in s, and the values of the template of its name."""
+
+    name: SceneName
+    file: str
+    dt: float
+    films: RecordedFilms
+    values: Mapping[str, object]
+
+    def text(self, record: bool = False) -> str:
+        """The scene as a file, with a record of all nodes of its films if ``record``."""
+        common = {"dt": self.dt, "ramp": RAMP, "period": PERIOD, "nodes_file": NODES_FILE}
+        template = TEMPLATES / f"{self.name}.j2"
+        name = self.films.laminate.name
+        return model_file(template, name, _add_plugins, **common, **self.values, record=record)
+
+
+def _add_plugins(root: ET.Element) -> None:
+    plugins = {PLUGINS[each.tag] for each in root.iter() if each.tag in PLUGINS}
+    for place, plugin in enumerate(sorted(plugins)):
+        root.insert(place, ET.Element("RequiredPlugin", {"name": plugin}))
+
+
+# Scenes A and C: every film as a shell, driven by pressure or by volume.
+
+
+DT = 0.02
+NODAL_BY_PRESSURE = 3.0
+"""mN/mm per kPa: nodal mass / dt^2 in pockets of 5 mm. A step's matrix lacks the stiffness from air
+pressure; a tenth of this value is stable too, but a long stack then swings for longer."""
+LEAST_NODAL = 8.0
+"""Least value in mN/mm, for low pressures."""
+VOLUME = 80.0
+"""Volume in ul above the start in a chamber of 15 balloons of 5 mm."""
+VOLUME_PRESSURE = 10.0
+"""Design pressure in kPa of scene C's mass; its actual pressures are not known in advance."""
+
+
+def nodal_stiffness(highest: float, size: float) -> float:
+    """Nodal mass / dt^2 in mN/mm at which a shell under a pressure in kPa is stable."""
+    return max(LEAST_NODAL, NODAL_BY_PRESSURE * highest * size)
+
+
+def _mass(shell: Shell, highest: float) -> dict[str, float]:
+    """An artificial mass in kg, which keeps a shell stable under the highest pressure in kPa."""
+    mass = nodal_stiffness(highest, shell.size) * len(shell.rest) * DT**2
+    return {"highest": highest, "mass": mass}
+
+
+def usual_volume(stack: RoundStack) -> float:
+    """Volume in ul above the start to which a chamber is filled if no volumes are given."""
+    return float(f"{VOLUME * stack.balloons / 15 * stack.size**3:.3g}")
+
+
+def imposed_volumes(stack: RoundStack, volumes: Mapping[str, float] | None) -> dict[str, float]:
+    """The volume in ul of each chamber above its start; chambers that are not named have 0."""
+    if volumes is None:
+        return dict.fromkeys(stack.chambers, usual_volume(stack))
+    refuse_unknown(stack.chambers, volumes, "volume")
+    for name, value in volumes.items():
+        if not 0 <= value < math.inf:
+            raise DesignError(
+                f"volume of {name} = {value:g} ul must be 0 or more; vacuum has not been tried"
+            )
+    return {name: volumes.get(name, 0.0) for name in stack.chambers}
+
+
+# Scenes B and D: nine frames on the backbone that carry the films, or replace them.
+
+
+FRAMES = 9
+"""Reference frames on the backbone (paper, Sec. 3.2.2), if the stack has enough balloons: at most
+as many as levels, or a balloon would wave."""
+FRAMES_START = nearly_flat
+"""Nine frames cannot draw in a pocket's edge, so the start must not have it drawn in either."""
+FRAMES_DT = 0.05
+SOFTENING = 0.12
+"""Share of the true modulus at which 5 kPa lift 15 balloons as high as in scene A."""
+LEAST_LOBES = 3
+"""A beam with fewer chambers cannot bend, or bends in one plane only."""
+
+
+class Beam(NamedTuple):
+    """The surrogate of a stack, scaled from the fit for 15 balloons of 5 mm.
+
+    ``height`` (mm) without pressure, effective ``area`` (mm2) and ``spring`` (mN/mm) of a chamber;
+    ``radius`` (mm) and ``young`` (kPa) of the beam with the stiffness of the chambers' springs on
+    their axes.
+    """
+
+    height: float
+    area: float
+    spring: float
+    radius: float
+    young: float
+
+
+def beam_of(stack: RoundStack) -> Beam:
+    """EA = N k H0 and EI = N k R^2 H0 / 2 of a round bar: its radius is R times root 2."""
+    height = 7.2 * stack.balloons / 15 * stack.size
+    spring = 7.0 * 15 / stack.balloons
+    radius = stack.radius * math.sqrt(2)
+    young = stack.lobes * spring * height / (math.pi * radius**2)
+    return Beam(height, 14.4 * stack.size**2, spring, radius, young)
+
+
+def _framed(stack: RoundStack, shell: Shell) -> dict[str, object]:
+    count = min(FRAMES, stack.balloons + 1)
+    weights = [pair_of_frames(z, shell.height, count) for z in shell.position[:, 2].tolist()]
+    values = {"frames": count, "weights": weights, "poisson": stack.poisson}
+    return {**values, "membrane": stack.membrane, "share": SOFTENING}
+
+
+def pair_of_frames(
+    z: float, height: float, frames: int = FRAMES
+) -> tuple[tuple[int, int], tuple[float, float]]:
+    """The two frames next to a height and their weights, the nearer one first.
+
+    SkinningMapping reads a node's weights up to the first 0, so a 0 must come last.
+    """
+    place = z / height * (frames - 1)
+    below = min(frames - 2, max(0, math.floor(place)))
+    above = round(place - below, 6)
+    if above > 0.5:
+        return (below + 1, below), (above, round(1 - above, 6))
+    return (below, below + 1), (round(1 - above, 6), above)
+
+
+def prism(
+    axis: Point, area: float, height: float, frames: int = FRAMES
+) -> tuple[Floats, Triangles]:
+    """A closed square prism on a chamber's axis, four points per frame, normals outward."""
+    half = math.sqrt(area) / 2
+    corners = ((half, half), (-half, half), (-half, -half), (half, -half))
+    points = [
+        (axis[0] + x, axis[1] + y, height * i / (frames - 1))
+        for i in range(frames)
+        for x, y in corners
+    ]
+    top = 4 * (frames - 1)
+    triangles = [(0, 2, 1), (0, 3, 2)]
+    for start in range(0, top, 4):
+        for i in range(4):
+            a, b = start + i, start + (i + 1) % 4
+            # Alternate the diagonals: with a single direction air would twist the prism.
+            if i % 2:
+                triangles += [(a, b, b + 4), (a, b + 4, a + 4)]
+            else:
+                triangles += [(a, b, a + 4), (b, b + 4, a + 4)]
+    triangles += [(top, top + 1, top + 2), (top, top + 2, top + 3)]
+    return np.array(points), np.array(triangles)
+
+
+# The scenes of a design.
+
+
+def scenes_of(
+    laminate: Laminate, pressures: Mapping[str, float], volumes: Mapping[str, float] | None = None
+) -> dict[str, Scene]:
+    """The scenes of a laminate by name, the default one first.
+
+    ``pressures`` in kPa by chamber; ``volumes`` (scene C, above its start) in ul by chamber, 0 for
+    omitted ones, by default some 80 ul in each. Scenes B and C require round pockets of one film,
+    scene D also three chambers or more. Raises DesignError if a chamber is unknown, or if other
+    pockets need a mesher that is not installed.
+    """
+    scenes: dict[str, Scene] = {}
+
+    def add(name: SceneName, file: str, dt: float, shell: Shell, **values: object) -> None:
+        # The films of a beam bear nothing.
+        bearing = replace(shell, membranes=(), cavities={}) if name == "beam" else shell
+        kpa, loads = pressures, pressures.values()
+        if name == "volume":
+            kpa, loads = {}, imposed.values()
+        films = RecordedFilms(laminate, bearing, shell.tip, kpa, loads)
+        values |= {"shell": shell, "pressures": pressures}
+        scenes[name] = Scene(name, file, dt, films, values)
+
+    stack = None if why_not_round(laminate) else round_stack(laminate)
+    shell = conforming_shell(laminate) if stack is None else round_shell(stack)
+    add("shell", "actuator.scn", DT, shell, **_mass(shell, max(pressures.values())))
+    if stack is None:
+        return scenes
+    frames = round_shell(stack, COARSE_SECTORS, FRAMES_START)
+    add("frames", "actuator_frames.scn", FRAMES_DT, frames, **_framed(stack, frames))
+    imposed = imposed_volumes(stack, volumes)
+    half = round_shell(stack, COARSE_SECTORS, half_full)
+    told = {"volumes": imposed, "usual": usual_volume(stack), **_mass(half, VOLUME_PRESSURE)}
+    add("volume", "actuator_volume.scn", DT, half, **told)
+    if stack.lobes >= LEAST_LOBES:
+        beam = beam_of(stack)
+        upright = round_shell(stack, COARSE_SECTORS, standing(beam.height / stack.balloons))
+        framed = _framed(stack, upright)
+        prisms = {
+            name: prism(axis, beam.area, upright.height, min(FRAMES, stack.balloons + 1))
+            for name, axis in zip(stack.chambers, stack.axes, strict=True)
+        }
+        add("beam", "actuator_beam.scn", DT, upright, beam=beam, prisms=prisms, **framed)
+    return scenes
+
+
+def write_scenes(scenes: Mapping[str, Scene], folder: Path) -> list[Path]:
+    """Write the scenes of a design and the files they load; return them, the default one first."""
+    texts = {scene.file: scene.text() for scene in scenes.values()}
+    texts[DATA] = json.dumps(_data(scenes["shell"]), separators=(",", ":")) + "\n"
+    texts[PYTHON] = (TEMPLATES / f"{PYTHON}.txt").read_text("utf-8")
+    return write_files(texts, folder)
+
+
+def _data(scene: Scene) -> dict[str, object]:
+    shell, pressures = scene.values["shell"], scene.films.pressures
+    assert isinstance(shell, Shell)
+    return {
+        "schema": "sbafab/sofa@1",
+        "name": scene.films.laminate.name,
+        "units": {"length": "mm", "mass": "kg", "time": "s", "pressure": "kPa", "volume": "ul"},
+        "position": shell.position.tolist(),
+        "rest_position": shell.rest.tolist(),
+        "membranes": [_group(group) for group in shell.membranes],
+        "bending": [_group(group) for group in shell.bending],
+        "cavities": {name: walls.tolist() for name, walls in shell.cavities.items()},
+        "pressures": dict(pressures),
+        "fixed": shell.fixed.tolist(),
+        "tip": shell.tip.tolist(),
+        "true_mass": float(f"{shell.mass:.4g}"),
+        "nodal_mass_by_dt2": round(nodal_stiffness(max(pressures.values()), shell.size), 4),
+    }
+
+
+def _group(group: FilmGroup) -> dict[str, object]:
+    return {
+        "name": group.name,
+        "stiffness": float(f"{group.stiffness:.6g}"),
+        "poisson": group.poisson,
+        "triangles": group.triangles.tolist(),
+    }
+
+
+# The interface of a simulator: a scene run with runSofa in batch.
+
 
 RECORDED_SCENE = "recorded.scn"
 SECONDS = 8.0
