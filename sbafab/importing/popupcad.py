@@ -81,6 +81,9 @@ def _record_loader(yaml: Any) -> Any:
         elif isinstance(node, yaml.SequenceNode):
             entry.items.extend(made.construct_sequence(node))
 
+    def of_kind(kind: str) -> Callable[[Any, Any], Any]:
+        return lambda made, node: record(made, kind, node)
+
     loader.add_multi_constructor(PYTHON, record)
     constructors: dict[str, Callable[[Any, Any], Any]] = {
         f"{PYTHON}tuple": lambda made, node: tuple(made.construct_sequence(node, deep=True)),
@@ -88,7 +91,7 @@ def _record_loader(yaml: Any) -> Any:
         f"{PYTHON}long": lambda made, node: made.construct_yaml_int(node),
     }
     for kind in (vertex + form for vertex in VERTICES for form in ("", "_1")):
-        constructors[f"!{kind}"] = lambda made, node, kind=kind: record(made, kind, node)
+        constructors[f"!{kind}"] = of_kind(kind)
     for tag, constructor in constructors.items():
         loader.add_constructor(tag, constructor)
     return loader

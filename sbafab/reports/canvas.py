@@ -11,15 +11,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.meshing.surface import Surface
+from sbafab.meshing.surface import Floats, Ints, Surface
 
 if TYPE_CHECKING:
     from PIL.Image import Image
     from PIL.ImageDraw import ImageDraw as Draw
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 RGB = tuple[int, int, int]
 
 COLOURS: dict[str, RGB] = {

@@ -25,7 +25,7 @@ from sbafab.geometry.region import Region, polygon
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.formats import Node, write_glb, write_scene
 from sbafab.meshing.solid import body_bond, parted, solid
-from sbafab.meshing.surface import Surface
+from sbafab.meshing.surface import Floats, Surface
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.reports.canvas import (
     AMBIENT,
@@ -35,7 +35,6 @@ from sbafab.reports.canvas import (
     PAPER,
     RGB,
     Buffer,
-    Floats,
     View,
     draw_length_bar,
     edges,
