@@ -30,8 +30,7 @@ def sofa() -> Stepped | None:
     """Scene A, every film as a shell; None where runSofa is not there."""
     if shutil.which("runSofa") is None:
         return None
-    from sbafab.simulators.sofa.run import SECONDS, run
-    from sbafab.simulators.sofa.scenes import DT
+    from sbafab.simulators.sofa.run import DT, SECONDS, run
 
     laminate = sbafab.build(DESIGN)
     taken = []
