@@ -33,7 +33,7 @@ from sbafab.folders.build import Build, hole_notes
 from sbafab.folders.checks_json import Checks, checks
 from sbafab.folders.manifest import as_json
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.mesh_files import MeshFile, write_meshes
+from sbafab.meshing.formats import MeshFile, write_meshes
 from sbafab.models.calibration import FILE as CALIBRATION_FILE
 from sbafab.models.calibration import NONE, load_calibration, shipped_names
 from sbafab.models.figures import Prediction, PredictionDocument

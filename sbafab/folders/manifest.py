@@ -29,7 +29,7 @@ from sbafab.laminate.films import Film, Material
 from sbafab.laminate.joints import SeamKind, SeamTool
 from sbafab.laminate.laminate import InterfaceKind, Laminate, Layer, Role
 from sbafab.laminate.lay_up import lay_up_steps
-from sbafab.meshing.mesh_files import MeshFile
+from sbafab.meshing.formats import MeshFile
 from sbafab.models.sizes import sizes
 from sbafab.pressing.cycles import Runs
 from sbafab.version import GENERATOR

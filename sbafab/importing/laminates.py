@@ -85,33 +85,30 @@ def import_laminate(path: Path) -> Imported:
         if stock[names[film.material]].shade != film.shade:
             # Films of no layer still count when the other films get their colours.
             remarks.append(f"film {film.material}: has another colour in pictures")
-    name = name_of(laminate.name) or UNNAMED
-    tables: dict[str, Any] = {"name": name, "family": DRAWN, "kit": "paper"}
-    if films:
-        tables["films"] = films
-    tables["layup"] = _layup(laminate, names)
-    if laminate.bores:
-        tables["bore"] = {"diameter": laminate.bores[0].diameter}
     tubes = [inlet.tube_diameter for inlet in laminate.inlets]
     tubes += [port.tube_diameter for port in laminate.ports if port.tube_diameter is not None]
-    if tubes:
-        tables["inlet"] = {"tube_outer_diameter": tubes[0]}
     tube = None
     if laminate.tube is not None:
         tube = {"outer_diameter": laminate.tube, "pitch": _pitch(laminate), "glue": NO_GLUE}
         remarks.append("tube.glue: a laminate.json does not say what holds the sheet; write it")
-    if laminate.bonds:
-        keys = ("faces", "by", "temperature_c", "after")
-        tables["face_bonds"] = {
-            bond.name: without_none({key: getattr(bond, key) for key in keys})
-            for bond in laminate.bonds
-        }
-    tables["registration"] = {"method": laminate.registration}
-    if laminate.pins_in_full_bonds:
-        tables["registration"]["full_bond_pins"] = "in"
-    if laminate.middle_first:
-        tables["registration"]["sequence"] = "middle-first"
-    return _drawn(laminate, tables, stock, tube, {}, remarks)
+    keys = ("faces", "by", "temperature_c", "after")
+    bonds = {bond.name: {key: getattr(bond, key) for key in keys} for bond in laminate.bonds}
+    tables = {
+        "name": name_of(laminate.name) or UNNAMED,
+        "family": DRAWN,
+        "kit": "paper",
+        "films": films or None,
+        "layup": _layup(laminate, names),
+        "bore": {"diameter": laminate.bores[0].diameter} if laminate.bores else None,
+        "inlet": {"tube_outer_diameter": tubes[0]} if tubes else None,
+        "face_bonds": bonds or None,
+        "registration": {
+            "method": laminate.registration,
+            "full_bond_pins": "in" if laminate.pins_in_full_bonds else None,
+            "sequence": "middle-first" if laminate.middle_first else None,
+        },
+    }
+    return _drawn(laminate, without_none(tables), stock, tube, {}, remarks)
 
 
 def _beside(folder: Path) -> Path:
@@ -150,29 +147,21 @@ def _drawn(
     """Add the laminate, as keys of drawn layers, to ``tables``."""
     shapes = {pattern.lower(): {"file": FILE, "layer": pattern} for pattern in laminate.patterns}
     design = dict(tables)
-    registration = dict(design.pop("registration", {}))
     design["layers"] = list(_layer_rows(laminate, stock, design.get("layup", {})))
     design["chambers"] = [_chamber_row(laminate, chamber) for chamber in laminate.chambers]
     if not laminate.outline.is_empty:
         design["body"] = OUTLINE
         shapes[OUTLINE] = {"file": FILE, "layer": OUTLINE}
-    if laminate.lumen is not None:
-        design["lumen"] = laminate.lumen
     _add_joints(laminate, design, shapes, remarks)
-    design["pins"] = [
+    pins = [
         {"name": p.name, "at": [*p.centre], "diameter": p.diameter, "clearance": p.clearance}
         for p in laminate.pins
     ]
     notes = [note for note in laminate.notes if not note.startswith(OF_A_RUN)]
-    if notes:
-        design["notes"] = notes
-    design["shapes"] = shapes
-    if tube is not None:
-        design["tube"] = tube
-    if registration:
-        design["registration"] = registration
+    design |= {"pins": pins, "shapes": shapes}
+    others = {"lumen": laminate.lumen, "notes": notes or None, "tube": tube}
     text = laminate_json(laminate).encode()
-    return Imported(design, {FILE: text, **drawings}, tuple(remarks))
+    return Imported(design | without_none(others), {FILE: text, **drawings}, tuple(remarks))
 
 
 def _layer_rows(
@@ -180,16 +169,16 @@ def _layer_rows(
 ) -> Iterator[dict[str, Any]]:
     folded = {fold.upper for fold in laminate.folds}
     for layer in laminate.layers:
-        row: dict[str, Any] = {"role": layer.role, "shape": layer.pattern.lower()}
         usual = layup.get(layer.role.replace("-", "_"), "ptfe" if layer.is_mask else "tpe")
         table = layer.film.material.lower()
-        if table in stock and usual != table:
-            row["film"] = table
-        if layer.pieces != 1:
-            row["pieces"] = layer.pieces
-        if layer.turned and layer.index not in folded:
-            row["turned"] = True
-        yield row
+        row = {
+            "role": layer.role,
+            "shape": layer.pattern.lower(),
+            "film": table if table in stock and usual != table else None,
+            "pieces": layer.pieces if layer.pieces != 1 else None,
+            "turned": True if layer.turned and layer.index not in folded else None,
+        }
+        yield without_none(row)
 
 
 def _chamber_row(laminate: Laminate, chamber: Chamber) -> dict[str, Any]:

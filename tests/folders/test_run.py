@@ -18,7 +18,7 @@ from sbafab.errors import OutputError
 from sbafab.folders import artefacts
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import Conforming, RunRequest, generate
-from sbafab.meshing import mesh_files
+from sbafab.meshing import formats
 from sbafab.meshing.conforming.layup import MeshSettings
 from tests.quick import few
 
@@ -156,7 +156,7 @@ def test_a_mesh_that_fails_is_left_out_by_name_and_nothing_else(
     def fails(*_: object) -> None:
         raise OutputError("the mesh of the cavity is not closed")
 
-    monkeypatch.setattr(mesh_files, "cavity", fails)
+    monkeypatch.setattr(formats, "cavity", fails)
     run = generate(RunRequest(load_design("1dof-5mm"), tmp_path))
     name = "mesh/cavity_chamber1.stl"
     assert run.left_out == ((name, "the mesh of the cavity is not closed"),)

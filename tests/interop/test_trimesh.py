@@ -10,7 +10,7 @@ import trimesh
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.mesh_files import write_meshes
+from sbafab.meshing.formats import write_meshes
 from sbafab.meshing.solid import cavity_slabs, solid_slabs
 from tests.quick import few
 

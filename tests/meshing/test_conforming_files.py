@@ -18,7 +18,7 @@ from sbafab.meshing.conforming.meshes import (
     conforming_meshes,
     write_conforming,
 )
-from sbafab.meshing.mesh_files import MeshFile
+from sbafab.meshing.formats import MeshFile
 
 Written = tuple[ConformingMeshes, list[MeshFile], Path]
 

@@ -12,7 +12,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.mesh_files import write_meshes
+from sbafab.meshing.formats import write_meshes
 from sbafab.meshing.solid import MASKLESS_GAP, cavity_slabs, solid, solid_slabs
 
 
@@ -135,7 +135,7 @@ def test_same_bytes_again_under_another_hash_seed_and_time_zone(
     script = (
         "import sys; from pathlib import Path\n"
         "from sbafab.actuators import build, load_design\n"
-        "from sbafab.meshing.mesh_files import write_meshes\n"
+        "from sbafab.meshing.formats import write_meshes\n"
         "laminate = build(load_design('3dof-15mm', ['stack.balloons=3']))\n"
         "write_meshes(laminate, Path(sys.argv[1]))\n"
     )

@@ -15,7 +15,7 @@ from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import MeshSettings, flat, layup, round_tube
 from sbafab.meshing.conforming.meshes import conforming_meshes, write_conforming
-from sbafab.meshing.mesh_files import write_meshes
+from sbafab.meshing.formats import write_meshes
 
 
 @pytest.fixture(scope="module")

@@ -201,5 +201,5 @@ def test_abaqus_is_told_the_same_but_for_outputs_and_files_are_the_same_twice(
 def test_settings_of_a_design_take_its_density() -> None:
     laminate = build(load_design("1dof-5mm", ("films.tpe.density=1000",)))
     settings = deck_settings(laminate)
-    assert settings.film == pytest.approx((10, 0.2, 1e-9))
+    assert settings.films["TPE"] == pytest.approx((10, 0.2, 1e-9))
     assert settings.pressures == {"chamber1": 6.0}

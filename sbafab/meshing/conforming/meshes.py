@@ -39,8 +39,7 @@ from sbafab.meshing.conforming.mesh import (
     tetrahedra,
     volumes,
 )
-from sbafab.meshing.formats import conforming_endings, mesh_formats
-from sbafab.meshing.mesh_files import MeshFile, MeshKind
+from sbafab.meshing.formats import MeshFile, MeshKind, conforming_endings, mesh_formats
 from sbafab.meshing.solid import loops_of
 from sbafab.meshing.surface import Flags, Floats, Ints, unpaired_edges
 

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from sbafab.laminate.films import PAPER_TPE, Film, density_of, in_order
+from sbafab.laminate.films import PAPER_TPE, density_of, in_order
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.meshing.formats import write_inp
@@ -36,7 +36,7 @@ class Elastic(NamedTuple):
 
 
 TPE = Elastic(*PAPER_TPE, 1.122e-9)
-"""The paper's model. A laminate's film replaces the density."""
+"""The paper's film."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,7 @@ class DeckSettings:
     the way. They rise with the square of time, because a flat film yields quickly at first and then
     less and less. Films start ``imperfection`` mm off flat, since Newton's iteration cannot pass
     wrinkling as a bifurcation. "static" omits the inertia that carries a film from one wrinkle
-    pattern to the next, and usually stops there. ``film`` is TPE, ``others`` are further films by
-    material.
+    pattern to the next, and usually stops there. ``films`` are given by material.
     """
 
     pressures: Mapping[str, float]
@@ -56,8 +55,7 @@ class DeckSettings:
     ramp: float = 1.0
     outputs: int = 24
     imperfection: float = 0.010
-    film: Elastic = TPE
-    others: Mapping[str, Elastic] = field(default_factory=dict)
+    films: Mapping[str, Elastic] = field(default_factory=lambda: {"TPE": TPE})
     is_free: bool = False
     is_glued: bool = False
 
@@ -89,18 +87,14 @@ def deck_settings(
     pressures = chamber_pressures(
         names, request or SimulationRequest(), PAPER_PRESSURE, least=-LARGEST_VACUUM
     )
-    films = {layer.film.material: _elastic(layer.film) for layer in laminate.tpe_layers}
-    film = films.pop("TPE", TPE)
+    films = {"TPE": TPE}
+    for film in (layer.film for layer in laminate.tpe_layers):
+        density = 1e-12 * density_of(film, "CalculiX")
+        films[film.material] = Elastic(*elastic_of(film, "CalculiX"), density)
     is_stack = any(interface.kind == "separator" for interface in laminate.interfaces)
     # A balloon's outline excludes its tabs, and the paper's model has no tube.
     is_glued = not is_stack and laminate.outline.is_empty
-    return DeckSettings(
-        pressures, procedure, film=film, others=films, is_free=not is_stack, is_glued=is_glued
-    )
-
-
-def _elastic(film: Film) -> Elastic:
-    return Elastic(*elastic_of(film, "CalculiX"), 1e-12 * density_of(film, "CalculiX"))
+    return DeckSettings(pressures, procedure, films=films, is_free=not is_stack, is_glued=is_glued)
 
 
 # A start slightly off flat, which decides the direction of wrinkles.
@@ -136,19 +130,16 @@ INLET = "inlet_"
 FLAT = 1e-6
 
 
-def is_lone_balloon(mesh: Mesh) -> bool:
-    """Return True if the mesh has only two films: only the bonded ring can hold them."""
-    return sum(name.startswith("film_") for name in mesh.cell_sets) == 2
-
-
-def supports(mesh: Mesh, is_free: bool = False, is_glued: bool = False) -> Iterator[str]:
+def supports(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
     """The node set ``held``, and lines of ``*BOUNDARY`` and ``*EQUATION``.
 
     A stack stands on its base. A lone balloon bulges both ways, and its ring may ripple, as in the
-    paper's model: a few nodes of the ring prevent rigid-body motion only. The same applies if the
-    deck ``is_free``. If it ``is_glued``, inlets are shut by their tubes.
+    paper's model: only the ring of its two films can hold it, of which a few nodes prevent
+    rigid-body motion. The same applies if the deck ``is_free``. If it ``is_glued``, inlets are shut
+    by their tubes.
     """
-    is_free = is_free or is_lone_balloon(mesh)
+    is_lone = sum(name.startswith("film_") for name in mesh.cell_sets) == 2
+    is_free = settings.is_free or is_lone
     if is_free:
         fixed = list(_fixed_freedoms(mesh))
         nodes = sorted({node for node, _ in fixed})
@@ -158,7 +149,7 @@ def supports(mesh: Mesh, is_free: bool = False, is_glued: bool = False) -> Itera
         yield f"*NSET, NSET=held\n{BASE}\n*BOUNDARY\n{BASE}, 1, 3\n"
     for name in _planes(mesh):
         yield from _on_plane(mesh, name, is_free)
-    if is_glued:
+    if settings.is_glued:
         yield from _glued_lips(mesh)
 
 
@@ -212,12 +203,15 @@ def _fixed_freedoms(mesh: Mesh) -> Iterator[tuple[int, int]]:
 def _on_plane(mesh: Mesh, name: str, is_free: bool) -> Iterator[str]:
     """The nodes of one symmetry plane stay on it."""
     nodes = mesh.node_sets[name]
-    normal = _normal(mesh.points[nodes, :2])
+    places = mesh.points[nodes, :2]
+    # The unit normal of the upright plane through the axis and these points.
+    x, y = places[np.hypot(*places.T).argmax()]
+    normal = np.array([-y, x]) / np.hypot(x, y)
     if min(abs(normal)) < FLAT:
         yield f"*BOUNDARY\n{name}, {1 if abs(normal[0]) > FLAT else 2}\n"
         return
     fixed = np.empty(0, dtype=np.int64) if is_free else mesh.node_sets[BASE]
-    on_axis = nodes[np.hypot(*mesh.points[nodes, :2].T) < FLAT]
+    on_axis = nodes[np.hypot(*places.T) < FLAT]
     for node in np.setdiff1d(on_axis, fixed):
         yield f"*BOUNDARY\n{node + 1}, 1, 2\n"
     # The first term is eliminated, so it needs the larger factor.
@@ -227,13 +221,6 @@ def _on_plane(mesh: Mesh, name: str, is_free: bool) -> Iterator[str]:
             f"*EQUATION\n2\n{node + 1}, {first}, {normal[first - 1]:.12g}, "
             f"{node + 1}, {second}, {normal[second - 1]:.12g}\n"
         )
-
-
-def _normal(places: Floats) -> Floats:
-    """Unit normal of the upright plane through the axis and these points."""
-    x, y = places[np.hypot(*places.T).argmax()]
-    normal: Floats = np.array([-y, x]) / np.hypot(x, y)
-    return normal
 
 
 # The input of CalculiX for an actuator, ``actuator.inp``, its mesh, and the same for Abaqus.
@@ -261,7 +248,7 @@ def write_deck(mesh: Mesh, settings: DeckSettings, folder: Path) -> list[Path]:
         "mesh_file": MESH_FILE,
         "faces": list(_cavity_faces(run_mesh)),
         "films": list(_films(run_mesh, settings)),
-        "supports": "".join(supports(run_mesh, settings.is_free, settings.is_glued)),
+        "supports": "".join(supports(run_mesh, settings)),
     }
     programs = {f"{JOB}.inp": "ccx", ABAQUS_FILE: "abaqus"}
     texts = {name: rendered(TEMPLATE, program=of, **values) for name, of in programs.items()}
@@ -275,9 +262,9 @@ def started(mesh: Mesh, settings: DeckSettings) -> Mesh:
 
 def _films(mesh: Mesh, settings: DeckSettings) -> Iterator[tuple[str, Elastic, list[str]]]:
     """The name of each film, its material, and the parts of the mesh that are of it."""
-    films = {"TPE": settings.film, **settings.others}
-    for name in in_order(mesh.materials.values()) or ["TPE"]:
-        yield name, films[name], [part for part, of in mesh.materials.items() if of == name]
+    for name in in_order(mesh.materials.values()):
+        parts = [part for part, of in mesh.materials.items() if of == name]
+        yield name, settings.films[name], parts
 
 
 def _cavity_faces(mesh: Mesh) -> Iterator[tuple[str, int, list[int]]]:
