@@ -212,6 +212,10 @@ def _is_construction(shape: CadRecord) -> bool:
     return bool(shape.items[3] if _is_point(shape) and shape.items else shape.get("construction"))
 
 
+SHAPES = ["GenericLine", "GenericPolyline", "GenericCircle", "GenericTwoPointRect", "GenericPoly"]
+"""The supported shapes of several points, by class name."""
+
+
 def _shape(shape: CadRecord) -> Flat:
     """A shape of a sketch. Raises DesignError if it is not supported or crosses itself."""
     if _is_point(shape):
@@ -221,42 +225,26 @@ def _shape(shape: CadRecord) -> Flat:
     points = _points(shape["exterior"])
     if len(points) < 2:
         raise DesignError(f"is a {shape.kind} of {len(points)} points; remove it")
-    return SHAPES[shape.kind](points, shape)
-
-
-def _lines(points: Sequence[Point], shape: CadRecord) -> Flat:
+    if shape.kind == "GenericCircle":
+        return Flat(disc(points[0], math.dist(*points[:2])))
+    if shape.kind == "GenericTwoPointRect":
+        (x, y), (u, v), *_ = points
+        if min(abs(x - u), abs(y - v)) <= SAME:
+            raise DesignError("is a rectangle without area; remove it")
+        return Flat(polygon([(x, y), (x, v), (u, v), (u, y)]))
+    if shape.kind == "GenericPoly":
+        return Flat(_polygon(points, [_points(hole) for hole in shape.get("interiors") or ()]))
     return Flat(lines=tuple(Line(a, b) for a, b in pairwise(points)))
 
 
-def _circle(points: Sequence[Point], shape: CadRecord) -> Flat:
-    return Flat(disc(points[0], math.dist(*points[:2])))
-
-
-def _rectangle(points: Sequence[Point], shape: CadRecord) -> Flat:
-    (x, y), (u, v), *_ = points
-    if min(abs(x - u), abs(y - v)) <= SAME:
-        raise DesignError("is a rectangle without area; remove it")
-    return Flat(polygon([(x, y), (x, v), (u, v), (u, y)]))
-
-
-def _polygon(points: Sequence[Point], shape: CadRecord) -> Flat:
+def _polygon(points: Sequence[Point], holes: Sequence[Sequence[Point]]) -> Region:
     import shapely
 
-    drawn = shapely.Polygon(points, [_points(hole) for hole in shape.get("interiors") or ()])
+    drawn = shapely.Polygon(points, holes)
     if not drawn.is_valid:
         reason = shapely.is_valid_reason(drawn)
         raise DesignError(f"is a polygon with {reason}; draw it without that")
-    return Flat(region_of(drawn))
-
-
-SHAPES: Mapping[str, Callable[[Sequence[Point], CadRecord], Flat]] = {
-    "GenericLine": _lines,
-    "GenericPolyline": _lines,
-    "GenericCircle": _circle,
-    "GenericTwoPointRect": _rectangle,
-    "GenericPoly": _polygon,
-}
-"""The supported shapes of several points, by class name."""
+    return region_of(drawn)
 
 
 # The design, with its operations in order.

@@ -117,7 +117,13 @@ SAME_TIME = 1e-6
 
 
 class State(Document):
-    """The actuator at one time of a run."""
+    """The actuator at one time in s of a run, in the form shared by all simulators.
+
+    Pressures are kPa (a vacuum is negative), empty if volumes are imposed; volumes are ul, empty if
+    they were not recorded. Lengths are mm, with films as thick as bought; the tilt is in degrees.
+    Height, tip and tilt are None round a tube, and the tilt is also None if the tip has only one
+    axis.
+    """
 
     model_config = ConfigDict(frozen=True)
 
@@ -145,9 +151,9 @@ class State(Document):
 class Result(State, schema="sbafab/simulate@2"):
     """Result of a run, and the contents of ``result.json``: the last state, then all ``states``.
 
-    Pressures are empty if volumes are imposed; height, tip and tilt are None round a tube, and the
-    tilt is also None if the tip has only one axis. If a run ended early, the results up to then
-    are valid, and ``stopped`` is one sentence. Only the units are given if nothing has run.
+    ``figures`` are what only some simulators give (mm, ul, MPa, uJ or steps/s). If a run ended
+    early, the results up to then are valid, and ``stopped`` is one sentence. Only the units are
+    given if nothing has run.
     """
 
     units: Mapping[str, str]

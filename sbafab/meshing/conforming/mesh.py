@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
+from itertools import product
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -73,15 +74,13 @@ _GAUSS: dict[ElementKind, tuple[float, tuple[tuple[float, ...], ...]]] = {
 """Weight and places of the integration points that integrate a Jacobian exactly."""
 
 
-def _monomials(kind: ElementKind) -> tuple[tuple[int, ...], ...]:
-    plane = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-    if kind == "triangle6":
-        return plane
-    if kind == "wedge15":
-        flat = tuple((*p, t) for t in (0, 1) for p in plane)
-        return (*flat, *((*p, 2) for p in plane[:3]))
-    space = [(i, j, k) for i in range(3) for j in range(3) for k in range(3)]
-    return tuple(powers for powers in space if sum(powers) <= 2)
+_PLANE = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+_POWERS: dict[ElementKind, tuple[tuple[int, ...], ...]] = {
+    "triangle6": _PLANE,
+    "tetra10": tuple(powers for powers in product(range(3), repeat=3) if sum(powers) <= 2),
+    "wedge15": (*((*p, t) for t in (0, 1) for p in _PLANE), *((*p, 2) for p in _PLANE[:3])),
+}
+"""Exponents of the monomials that shape functions are made of."""
 
 
 @cache
@@ -92,7 +91,7 @@ def _shapes(kind: ElementKind, integration: bool) -> tuple[Floats, Floats]:
     """
     corners = np.array(_REFERENCE[kind], dtype=float)
     nodes = np.vstack([corners, [(corners[a] + corners[b]) / 2 for a, b in EDGES[kind]]])
-    powers = np.array(_monomials(kind))
+    powers = np.array(_POWERS[kind])
     shape = np.linalg.inv(np.prod(nodes[:, None, :] ** powers, axis=2))
     places = np.array(_GAUSS[kind][1]) if integration else nodes
     slopes = []
@@ -344,9 +343,7 @@ class Mesh:
 
 
 def _marked(count: int, indices: Ints) -> NDArray[np.uint8]:
-    marks = np.zeros(count, dtype=np.uint8)
-    marks[indices] = 1
-    return marks
+    return np.minimum(np.bincount(indices, minlength=count), 1).astype(np.uint8)
 
 
 def _library(name: str) -> Any:

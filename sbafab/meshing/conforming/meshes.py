@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple, TypedDict
+from typing import TypedDict
 
 import numpy as np
 
@@ -473,16 +473,12 @@ class ConformingMeshes:
 
         The fill does not preserve lengths: 0.01 at 5 ul in the paper's 5 mm balloon.
         """
-        return thinning(self.shell, self.flat_shell).mean
-
-    def holds_air(self, chamber: str) -> bool:
-        """Return True if the pockets of a chamber are open: filled, or kept open by gaps."""
-        return self.settings.gaps or (self.fill is not None and self.fill[chamber] > 0)
+        return thinning(self.shell, self.flat_shell)[0]
 
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
         """The figures of both meshes, for printing and the manifest."""
-        thin_mm = thinning(self.shell, self.flat_shell).thinnest_mm
+        thin_mm = thinning(self.shell, self.flat_shell)[2]
         return {mesh.name: mesh_statistics(mesh, thin_mm) for mesh in (self.volume, self.shell)}
 
 
@@ -543,7 +539,7 @@ def _filled(
 
 
 def _notes(
-    laminate: Laminate, settings: MeshSettings, fill: Fill | None, thin_films: Thinning
+    laminate: Laminate, settings: MeshSettings, fill: Fill | None, thin_films: tuple[float, ...]
 ) -> Iterator[str]:
     if settings.symmetry in PARTS:
         yield PARTS[settings.symmetry]
@@ -590,7 +586,8 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
                 yield file, partial(row.elements, mesh)
     mesh = meshes.volume
     # Films that lie on each other enclose nothing: the surface would have no inside.
-    air = [chamber for chamber in mesh.cavities if meshes.holds_air(chamber)]
+    is_open = {name: ul > 0 or meshes.settings.gaps for name, ul in (meshes.fill or {}).items()}
+    air = [chamber for chamber in mesh.cavities if is_open.get(chamber, meshes.settings.gaps)]
     surfaces = {chamber: mesh.cavity(chamber)[0] for chamber in air}
     skins = [mesh.surface(mesh.flat_triangles(skin(mesh)))[0]] if air else []
     for chamber, surface in [*((None, each) for each in skins), *surfaces.items()]:
@@ -624,35 +621,22 @@ class Statistics(TypedDict):
     thinnest_film_mm: float
 
 
-class Thinning(NamedTuple):
-    """Relative growth in area of films over the pockets, mean and largest, and their least
-    thickness in mm there: no film changes its volume.
+def thinning(shell: Mesh, flat: Mesh) -> tuple[float, float, float]:
+    """Return the relative growth in area of a shell's films over the pockets, mean and largest, and
+    their least thickness in mm there: no film changes its volume. ``flat`` is the shell when flat.
     """
-
-    mean: float
-    most: float
-    thinnest_mm: float
-
-
-def thinning(shell: Mesh, flat: Mesh) -> Thinning:
-    """Return the thinning of a shell's films against the same shell when flat."""
     pockets = np.unique(np.concatenate([faces[:, 0] for faces in shell.face_sets.values()]))
     thickness = np.zeros(len(shell.cells))
     for name, value in shell.thickness.items():
         thickness[shell.cell_sets[name]] = value
-    raised, before = (
-        np.linalg.norm(np.cross(slopes[..., 0], slopes[..., 1]), axis=2)
-        for slopes in (
-            jacobians(mesh.kind, mesh.points, mesh.cells[pockets], integration=True)
-            for mesh in (shell, flat)
-        )
+    slopes = (
+        jacobians(mesh.kind, mesh.points, mesh.cells[pockets], integration=True)
+        for mesh in (shell, flat)
     )
+    raised, before = (np.linalg.norm(np.cross(s[..., 0], s[..., 1]), axis=2) for s in slopes)
     growth = np.maximum((raised / before).max(axis=1), 1.0)
-    return Thinning(
-        float(raised.sum() / before.sum()) - 1,
-        float(growth.max()) - 1,
-        float((thickness[pockets] / growth).min()),
-    )
+    mean = float(raised.sum() / before.sum()) - 1
+    return mean, float(growth.max()) - 1, float((thickness[pockets] / growth).min())
 
 
 def mesh_statistics(mesh: Mesh, thinnest_film_mm: float) -> Statistics:

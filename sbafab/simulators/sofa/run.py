@@ -160,8 +160,8 @@ def _cells(stack: Layup, mesh: Mesh) -> Floats:
 def _membranes(corners: Triangles, cells: Floats) -> tuple[FilmGroup, ...]:
     kinds, kind = np.unique(cells[:, [STRETCH, RATIO]], axis=0, return_inverse=True)
     return tuple(
-        FilmGroup(f"membrane{n + 1}", corners[kind.ravel() == n], float(stretch), float(ratio))
-        for n, (stretch, ratio) in enumerate(kinds)
+        FilmGroup(f"membrane{n + 1}", corners[kind.ravel() == n], stretch, ratio)
+        for n, (stretch, ratio) in enumerate(kinds.tolist())
     )
 
 
@@ -171,20 +171,18 @@ def _bending(corners: Triangles, cells: Floats) -> tuple[FilmGroup, ...]:
     Cells with the same lowest film lie side by side; separate films share a group if they share no
     node.
     """
-    bins: list[tuple[float, Triangles]] = []
+    groups: list[FilmGroup] = []
     kinds, kind = np.unique(cells[:, [BENDING, LOWEST]], axis=0, return_inverse=True)
     for n, (stiffness, _) in enumerate(kinds.tolist()):
         of_kind = corners[kind.ravel() == n]
-        for place, (other, triangles) in enumerate(bins):
+        for place, (name, triangles, other, _) in enumerate(groups):
             if other == stiffness and not np.isin(of_kind, triangles).any():
-                bins[place] = stiffness, np.concatenate([triangles, of_kind])
+                together = np.concatenate([triangles, of_kind])
+                groups[place] = FilmGroup(name, together, stiffness, 0.0)
                 break
         else:
-            bins.append((stiffness, of_kind))
-    return tuple(
-        FilmGroup(f"bend{n + 1}", triangles, stiffness, 0.0)
-        for n, (stiffness, triangles) in enumerate(bins)
-    )
+            groups.append(FilmGroup(f"bend{len(groups) + 1}", of_kind, stiffness, 0.0))
+    return tuple(groups)
 
 
 def _marks(stack: Layup, mesh: Mesh, number: Ints) -> list[int]:
@@ -445,8 +443,7 @@ def write_scenes(scenes: Mapping[str, Scene], folder: Path) -> list[Path]:
 
 
 def _data(scene: Scene) -> dict[str, object]:
-    shell, pressures = scene.values["shell"], scene.films.pressures
-    assert isinstance(shell, Shell)
+    shell, pressures = scene.films.shell, scene.films.pressures
     return {
         "schema": "sbafab/sofa@1",
         "name": scene.films.laminate.name,
