@@ -51,7 +51,7 @@ Sets = dict[str, Ints]
 class Sweep:
     """Nodes and cells of the films of a layup, bottom to top.
 
-    If films lie on each other, they share the nodes in the closure of a bond; if gaps are kept,
+    Films that lie on each other share the nodes of a bond, its edge included; if gaps are kept,
     prisms join them. Films of a thin layup are triangles; bonded ones share one.
 
     ``lower``, ``middle`` and ``upper`` (plies, plane nodes) number the nodes of each film over
