@@ -84,6 +84,24 @@ def test_two_widths_move_straight_edges_exactly() -> None:
     )
 
 
+@pytest.mark.parametrize("kerf", [(0.188, 0.194), (0.193, 0.095), (0.05, 0.2)])
+@pytest.mark.parametrize("radius", [0.52, 1.24])
+def test_two_widths_leave_a_round_hole_to_ten_nanometres(
+    radius: float, kerf: tuple[float, float]
+) -> None:
+    """The path encloses pi R2 - R P + pi a b, with P the perimeter of the beam's ellipse."""
+    a, b = kerf[0] / 2, kerf[1] / 2
+    turns = [math.tau * (k + 0.5) / 2000 for k in range(2000)]
+    perimeter = math.tau / 2000 * sum(math.hypot(a * math.sin(t), b * math.cos(t)) for t in turns)
+    (hole,) = compensate(disc((0.0, 0.0), 4.0) - disc((0.0, 0.0), radius), kerf).holes
+    low_x, low_y, high_x, high_y = hole.bounds
+    sides = (radius - a, radius - b)
+    assert (high_x, high_y) == pytest.approx(sides, abs=1e-5)
+    assert (-low_x, -low_y) == pytest.approx(sides, abs=1e-5)
+    expected = math.pi * radius**2 - radius * perimeter + math.pi * a * b
+    assert -hole.area == pytest.approx(expected, abs=1e-5 * math.tau * radius)
+
+
 @pytest.mark.parametrize(
     ("kerf", "suffix"), [(None, ""), (0.12, "_kerf0.12"), ((0.12, 0.1), "_kerf0.12x0.1")]
 )
