@@ -274,9 +274,8 @@ _UNQUOTED = re.compile(r"[^=#]*=\s*([-+.\d]+\s*[A-Za-z\u00b5\u03bc]+)\s*(?:#.*)?
 
 def design_path(source: str | Path) -> Path:
     """Return the file behind a template's name or a path. Raises DesignError if there is none."""
-    names = template_names()
-    if str(source) in names:
-        return templates_folder() / f"{source}.toml"
+    if str(source) in template_names():
+        return _template(str(source))
     path = Path(source)
     try:
         if path.is_file():
@@ -526,13 +525,17 @@ def _designs_in(folder: Path) -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in folder.glob("*.toml")))
 
 
+def _template(name: str) -> Path:
+    """Return the file of a template. Raises DesignError if there is none."""
+    names = template_names()
+    if name not in names:
+        raise DesignError(f"{shown(name)} is not a template; {hint(name, names)}")
+    return templates_folder() / f"{name}.toml"
+
+
 def template_text(name: str) -> str:
     """Return the commented text of a template. Raises DesignError if there is none."""
-    if name not in template_names():
-        raise DesignError(
-            f"{shown(name)} is not a template; there are {', '.join(template_names())}"
-        )
-    return (templates_folder() / f"{name}.toml").read_text(encoding="utf-8")
+    return _template(name).read_text(encoding="utf-8")
 
 
 def template_summaries() -> dict[str, str]:
@@ -542,10 +545,7 @@ def template_summaries() -> dict[str, str]:
 
 def write_new(template: str, file: Path | None) -> Path:
     """Copy a template's commented file, named after the new file; never over an old one."""
-    names = template_names()
-    if template not in names:
-        raise DesignError(f"{shown(template)} is not a template; {hint(template, names)}")
-    return write_copy(templates_folder() / f"{template}.toml", file or Path(f"{template}.toml"))
+    return write_copy(_template(template), file or Path(f"{template}.toml"))
 
 
 def name_of(text: str) -> str:
