@@ -28,7 +28,6 @@ from sbafab.actuators.stacking import (
     CutFilm,
     bonded,
     check_neck,
-    drawn_pocket,
     stacked,
     tab_and_strip,
 )
@@ -200,7 +199,7 @@ def _slot(width: float, length: float) -> Region:
 
 
 def _pocket(design: RadialDesign) -> Region:
-    drawn = drawn_pocket(design)
+    drawn = next(design.outlines(), None)
     if drawn is not None:
         return drawn
     width, length = design.pocket

@@ -24,7 +24,6 @@ from sbafab.actuators.ears import (
     with_tails,
 )
 from sbafab.design.files import listed, shown
-from sbafab.design.outline import read_outline
 from sbafab.design.records import Design, Discs, Drawn, Free
 from sbafab.design.sections import Bore as BoreSection
 from sbafab.design.sections import Chamber as ChamberSection
@@ -306,14 +305,6 @@ def round_pockets(design: Design, chamber: RoundChamber) -> Discs | Drawn:
     return Drawn() if chamber.outline is not None else Discs(diameters(design, chamber))
 
 
-def drawn_pocket(design: Design) -> Region | None:
-    """Return the drawn pocket, or None. Raises DesignError if it cannot be read."""
-    if design.drawing is None:
-        return None
-
-    return read_outline(design.drawing)
-
-
 def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], tuple[int, ...]]:
     """Return the distinct pockets round (0, 0), and the index of each balloon's.
 
@@ -323,7 +314,7 @@ def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], 
         raise DesignError(
             "chamber.outline and a list in chamber.diameter exclude each other; remove one"
         )
-    drawn = drawn_pocket(design)
+    drawn = next(design.outlines(), None)
     if drawn is not None:
         check_neck(design, [drawn])
         return [drawn], (0,) * design.stack.balloons
