@@ -175,6 +175,11 @@ class Component(NamedTuple):
     def centre(self) -> Point:
         return self.corner[0] + self.span[0] / 2, self.corner[1] + self.span[1] / 2
 
+    @property
+    def corners(self) -> tuple[Point, Point]:
+        (x, y), (across, down) = self.corner, self.span
+        return (x, y), (x + across, y + down)
+
 
 class Circuit:
     """A placed and routed circuit. ``titles`` of layers by id, bottom to top; ``channels`` as
@@ -202,14 +207,7 @@ class Circuit:
         for number, connection in enumerate(file.connections):
             segments = [row for row in features if row.connection == connection.id]
             self._add_channels(connection, segments, number)
-        points = [
-            point
-            for part in self.components.values()
-            for point in (
-                part.corner,
-                (part.corner[0] + part.span[0], part.corner[1] + part.span[1]),
-            )
-        ]
+        points = [point for part in self.components.values() for point in part.corners]
         points += [point for _, route, _ in self.channels for point in route]
         if not points:
             raise DesignError("components and connections are empty; there is nothing to import")
@@ -303,12 +301,12 @@ class Circuit:
         return mask
 
     def _outline(self, component: Component) -> Region:
-        (x, y), (across, down) = component.corner, component.span
-        if max(across, down) > 0 and component.radius is not None:
+        if max(component.span) > 0 and component.radius is not None:
             return disc(self.point(component.centre), component.radius * MM)
-        if min(across, down) <= 0:
+        if min(component.span) <= 0:
             return Region()
-        return rectangle(self.point((x, y + down)), self.point((x + across, y)))
+        (left, top), (right, bottom) = component.corners
+        return rectangle(self.point((left, bottom)), self.point((right, top)))
 
     def _channel(self, route: Sequence[Point], width: float) -> Region:
         points = [self.point(p) for p in route]
