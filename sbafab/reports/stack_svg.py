@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Interval, Region, coord, section
@@ -30,6 +30,7 @@ STEEL = "#ccd2d8"
 SEAM = 1.0  # height of a bond without a gap on the page, mm
 PAST = 2.0  # a pin's axis and a fold's line extend past their ends by this, mm on the page
 Spans = Sequence[Interval]
+Shown = TypeVar("Shown", Layer, Interface)
 
 
 class SectionPlane(NamedTuple):
@@ -46,23 +47,12 @@ class SectionPlane(NamedTuple):
         return section(region, self.origin, self.direction)
 
 
-class SectionSlab(NamedTuple):
-    """A layer cut by the plane: the spans with film, and its heights on the page."""
+class Band(NamedTuple, Generic[Shown]):
+    """A layer cut by the plane with the spans that have film, or an interface with the spans where
+    its films are bonded, and its heights on the page.
+    """
 
-    layer: Layer
-    spans: Spans
-    bottom: float
-    top: float
-
-    @property
-    def middle(self) -> float:
-        return (self.bottom + self.top) / 2
-
-
-class Joint(NamedTuple):
-    """An interface cut by the plane: the spans where the films are bonded, and its heights."""
-
-    interface: Interface
+    of: Shown
     spans: Spans
     bottom: float
     top: float
@@ -120,7 +110,7 @@ class StackSection:
             self.low = self.lumen - beyond
         self._scale([layer.film.thickness for layer in layers])
         self.slabs = list(self._slabs(layers, cuts))
-        self.by_index = {slab.layer.index: slab for slab in self.slabs}
+        self.by_index = {slab.of.index: slab for slab in self.slabs}
         self.joints = list(self._joints(plane))
         inlet = next((inlet for inlet in laminate.inlets if inlet.chamber == self.chamber), None)
         mouth = plane.along(inlet.mouth) if inlet else 0.0
@@ -135,14 +125,14 @@ class StackSection:
         self.up = self.across * self.factor
         self.height = sum(films) * self.up + (BREAK if self.hidden else 0.0)
 
-    def _slabs(self, layers: Sequence[Layer], cuts: dict[str, Spans]) -> Iterator[SectionSlab]:
+    def _slabs(self, layers: Sequence[Layer], cuts: dict[str, Spans]) -> Iterator[Band[Layer]]:
         y = HEAD + self.height
         for layer in layers:
             top = y - layer.film.thickness * self.up
-            yield SectionSlab(layer, self._clipped(cuts[layer.pattern]), y, top)
+            yield Band(layer, self._clipped(cuts[layer.pattern]), y, top)
             y = top - BREAK * (layer.index == self.break_above)
 
-    def _joints(self, plane: SectionPlane) -> Iterator[Joint]:
+    def _joints(self, plane: SectionPlane) -> Iterator[Band[Interface]]:
         for gap in self.laminate.interfaces:
             levels = [mask.index for mask in gap.masks] or [*gap.layer_indices]
             if (gap.masks or gap.seams) and self.by_index.keys() >= {*levels}:
@@ -151,7 +141,7 @@ class StackSection:
                 half = 0.0 if gap.masks else SEAM / 2
                 top = bottom - gap.gap * self.up * bool(gap.masks)
                 spans = self._clipped(plane.cut(gap.bond))
-                yield Joint(gap, spans, bottom + half, top - half)
+                yield Band(gap, spans, bottom + half, top - half)
 
     def _fold_ends(self, plane: SectionPlane) -> Iterator[tuple[Fold, float, bool]]:
         """Yield the folds cut by the plane, if the films shown end at them: where, and whether the
@@ -182,8 +172,8 @@ class StackSection:
             for start, end in spans
         ]
 
-    def bonds(self, kind: str) -> list[Joint]:
-        return [joint for joint in self.joints if joint.interface.kind == kind and joint.spans]
+    def bonds(self, kind: str) -> list[Band[Interface]]:
+        return [joint for joint in self.joints if joint.of.kind == kind and joint.spans]
 
 
 def _plane(laminate: Laminate) -> tuple[str, SectionPlane]:
@@ -295,7 +285,7 @@ def _bonds(cut: StackSection, with_masks: bool) -> Iterator[str]:
 def _fold(fold: Fold, s: float, is_ahead: bool, cut: StackSection) -> Iterator[str]:
     """Yield the film that continues from one half to the other, and the line of the fold."""
     lower, upper, turn = cut.by_index[fold.lower], cut.by_index[fold.upper], int(not is_ahead)
-    film, thick, outer = lower.layer.film, lower.bottom - lower.top, (lower.bottom - upper.top) / 2
+    film, thick, outer = lower.of.film, lower.bottom - lower.top, (lower.bottom - upper.top) / 2
     x, low, high = map(coord, (cut.x(s), lower.bottom, upper.top))
     round_ = f"A{coord(outer)} {coord(outer)} 0 0"
     data = f"M{x} {low}{round_} {1 - turn} {x} {high}V{coord(upper.top + thick)}"
@@ -311,8 +301,8 @@ def _rod(rod: Rod, cut: StackSection) -> Iterator[str]:
     """Yield a dowel pin behind the films and its axis, stack by stack, not across the break."""
     x = cut.x(rod.middle)
     for lowest, highest in rod.stacks:
-        slabs = [slab for slab in cut.slabs if lowest <= slab.layer.index <= highest]
-        below = [slab for slab in slabs if slab.layer.index <= cut.break_above]
+        slabs = [slab for slab in cut.slabs if lowest <= slab.of.index <= highest]
+        below = [slab for slab in slabs if slab.of.index <= cut.break_above]
         for run in filter(None, (below, slabs[len(below) :])):
             top, bottom = run[-1].top, run[0].bottom
             yield from cut.boxes([rod.span], top, bottom, STEEL, draw.GREY)
@@ -321,7 +311,7 @@ def _rod(rod: Rod, cut: StackSection) -> Iterator[str]:
 
 def _breaks(cut: StackSection) -> Iterator[str]:
     if cut.hidden:
-        below = [slab for slab in cut.slabs if slab.layer.index <= cut.break_above]
+        below = [slab for slab in cut.slabs if slab.of.index <= cut.break_above]
         above, base = cut.slabs[len(below) :], below[-1].top
         x0 = cut.x(cut.low) - (0.0 if cut.cropped else 3.0)
         right = cut.x(max(end for slab in above for _, end in slab.spans)) + 3.0
@@ -354,7 +344,7 @@ def _dimensions(cut: StackSection) -> Iterator[str]:
     if cut.tab is not None:
         mouth = cut.tab[1]
         measured.append((cut.tab, "tab", base.bottom, ROW_STEP))
-        masks = [slab for slab in cut.slabs if slab.layer.role == "chamber-mask" and slab.spans]
+        masks = [slab for slab in cut.slabs if slab.of.role == "chamber-mask" and slab.spans]
         past = mouth, max((slab.spans[-1][1] for slab in masks), default=mouth)
         if past[1] - mouth > 1e-3:
             name = "tail" if any(rod.middle > mouth for rod in cut.rods) else "overhang"
@@ -369,17 +359,17 @@ def _words(name: str, span: Interval) -> str:
 
 
 def _legend(cut: StackSection, page: float) -> Iterator[str]:
-    films = dict.fromkeys(slab.layer.film for slab in cut.slabs)
+    films = dict.fromkeys(slab.of.film for slab in cut.slabs)
     signs = [
         (draw.swatch(draw.film_fill(film)), f"{film.material} film, {coord(film.thickness)}")
         for film in films
     ]
-    if not cut.joints or any(joint.interface.masks for joint in cut.joints):
+    if not cut.joints or any(joint.of.masks for joint in cut.joints):
         structural = [film.material for film in films if not film.is_mask]
         flows = structural[0] if len(structural) == 1 else "the film that melts"
         signs.append((draw.swatch(BOND), f"bond: the gap filled with {flows}"))
         signs.append((draw.swatch("#ffffff"), "unbonded: drawn as a slit beside the mask"))
-    if any(joint.spans and not joint.interface.masks for joint in cut.joints):
+    if any(joint.spans and not joint.of.masks for joint in cut.joints):
         signs.append((draw.swatch(BOND), "bond of a seam, drawn over the line between the films"))
     if cut.rods:
         signs.append((draw.swatch(STEEL), "dowel pin"))
@@ -426,10 +416,10 @@ def _labels(cut: StackSection) -> Iterator[str]:
 
 def _layer_labels(cut: StackSection) -> Iterator[SideLabel]:
     """Yield number and role of every layer shown, pointing near its end at the inlet's side."""
-    base_end = max(slab.spans[-1][1] for slab in cut.slabs if not slab.layer.is_mask)
+    base_end = max(slab.spans[-1][1] for slab in cut.slabs if not slab.of.is_mask)
     for slab in cut.slabs:
         if slab.spans:
-            layer, (start, end) = slab.layer, slab.spans[-1]
+            layer, (start, end) = slab.of, slab.spans[-1]
             words = f"{layer.index} {layer.role.replace('-', ' ')}"
             if layer.role == "chamber-mask" and end > base_end:
                 words += ", inlet strip"
@@ -439,7 +429,7 @@ def _layer_labels(cut: StackSection) -> Iterator[SideLabel]:
 
 def _feature_labels(cut: StackSection) -> Iterator[SideLabel]:
     """Yield the first of each: bond, pocket, neck ring, overhang, bore and lumen."""
-    films = [slab for slab in cut.slabs if not slab.layer.is_mask]
+    films = [slab for slab in cut.slabs if not slab.of.is_mask]
     bore = "bore ⌀" if cut.laminate.bores else "opening "
     for labels in (
         _bond_beside(cut),
@@ -454,7 +444,7 @@ def _feature_labels(cut: StackSection) -> Iterator[SideLabel]:
             break
 
 
-Feature = tuple[float, str, Joint | SectionSlab]
+Feature = tuple[float, str, Band[Interface] | Band[Layer]]
 
 
 def _bond_beside(cut: StackSection) -> Iterator[Feature]:
@@ -486,7 +476,7 @@ def _neck_ring(cut: StackSection) -> Iterator[Feature]:
 def _overhang(cut: StackSection) -> Iterator[Feature]:
     """Yield separator masks past the wall above them, away from the inlet if that shows."""
     for mask, wall in pairwise(cut.slabs):
-        if mask.layer.role == "separator-mask" and mask.spans and wall.spans:
+        if mask.of.role == "separator-mask" and mask.spans and wall.spans:
             span = mask.spans[0][0], wall.spans[0][0]
             if cut.cropped:
                 span = wall.spans[-1][1], mask.spans[-1][1]
@@ -494,7 +484,7 @@ def _overhang(cut: StackSection) -> Iterator[Feature]:
                 yield sum(span) / 2, _words("overhang", span), mask
 
 
-def _openings(name: str, at: float, slabs: Sequence[SectionSlab]) -> Iterator[Feature]:
+def _openings(name: str, at: float, slabs: Sequence[Band[Layer]]) -> Iterator[Feature]:
     for slab in slabs:
         through = opening(slab.spans, at)
         if through is not None:

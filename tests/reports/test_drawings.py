@@ -153,8 +153,8 @@ def test_seams_and_folds_are_drawn_on_the_layers_they_join() -> None:
 
 def test_the_section_cuts_where_the_formulas_say() -> None:
     section = StackSection(laminate_of("1dof-5mm"))
-    spans = {slab.layer.index: slab.spans for slab in section.slabs}
-    bonds = {joint.interface.index: joint.spans for joint in section.joints}
+    spans = {slab.of.index: slab.spans for slab in section.slabs}
+    bonds = {joint.of.index: joint.spans for joint in section.joints}
     for cut, expected in (
         (spans[1], [(-3.25, 8.25)]),
         (spans[2], [(-2.5, -0.52), (0.52, 8.75)]),
@@ -184,7 +184,7 @@ def test_labels_and_dimensions_of_the_section(
 ) -> None:
     laminate = laminate_of(*given)
     section = StackSection(laminate)
-    shown = {slab.layer.balloon for slab in section.slabs if not slab.layer.is_mask} - {None}
+    shown = {slab.of.balloon for slab in section.slabs if not slab.of.is_mask} - {None}
     assert (section.hidden, len(shown)) == (hidden, laminate.balloons - hidden)
     found = words_of(root_of(stack_svg(laminate)))
     assert {*labels} <= {*found}
