@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from sbafab.geometry.edges import Bounds, Point, box_round
+from sbafab.geometry.edges import Point, box_round
 from sbafab.geometry.region import chain_data, coord, path_data
 from sbafab.laminate.films import ink
 from sbafab.laminate.folding import lies_on
@@ -46,7 +45,7 @@ LEAD = 5.0
 def layers_svg(laminate: Laminate) -> str:
     """Every distinct pattern in plan at one scale, as a drawing for A3 (longer if need be)."""
     holding = pins_when_added(laminate)
-    cards = [_card(laminate, layers, holding) for layers in laminate.patterns.values()]
+    cards = [Card(laminate, layers, holding) for layers in laminate.patterns.values()]
     pinned = any(card.pins for card in cards)
     keys = list(_keys(laminate, pinned))
     warnings = list(filter(None, dict.fromkeys(x.film.warning for x in laminate.layers)))
@@ -147,29 +146,28 @@ def _scale_bar(scale: float, end: Point) -> Iterator[str]:
 # The drawing of one pattern: exact outline, dimensions, callouts, caption.
 
 
-@dataclass(frozen=True)
 class Card:
     """One pattern with all content of its drawing; ``bounds`` includes phantom circles.
 
-    ``pins`` are the dowel pins that hold all its layers when they are laid; ``seams`` and ``folds``
-    join any of its layers to others.
+    ``pins`` are the dowel pins that hold all its layers when they are laid (``holding``: those of
+    each layer); ``seams`` and ``folds`` join any of its layers to others.
     """
 
-    layers: tuple[Layer, ...]
-    pins: Sequence[Pin]
-    marks: Sequence[Dimension]
-    bounds: Bounds
-    seams: Sequence[Seam]
-    folds: Sequence[Fold]
-
-    @property
-    def size(self) -> Point:
-        low_x, low_y, high_x, high_y = self.bounds
-        return high_x - low_x, high_y - low_y
-
-    @cached_property
-    def words_width(self) -> float:
-        return max((draw.text_width(mark.words) for mark in self.marks), default=0.0) + LEAD
+    def __init__(
+        self, laminate: Laminate, layers: tuple[Layer, ...], holding: Mapping[int, Sequence[Pin]]
+    ) -> None:
+        self.layers = layers
+        self.marks = dimensions(laminate, layers[0])
+        around = [mark.radius for mark in self.marks if isinstance(mark, Circle) and mark.phantom]
+        boxes = [layers[0].profile.bounds, *((-r, -r, r, r) for r in around)]
+        low_x, low_y, high_x, high_y = self.bounds = box_round(boxes)
+        self.size = high_x - low_x, high_y - low_y
+        joined = {layer.index for layer in layers}
+        self.pins = [p for p in laminate.pins if all(p in holding[x.index] for x in layers)]
+        self.seams = [seam for seam in laminate.seams if joined & {seam.below, seam.above}]
+        self.folds = [fold for fold in laminate.folds if joined & {fold.lower, fold.upper}]
+        words = [draw.text_width(mark.words) for mark in self.marks]
+        self.words_width = max(words, default=0.0) + LEAD
 
     @cached_property
     def caption(self) -> tuple[str, str, str]:
@@ -193,23 +191,6 @@ class Card:
         caption = max(map(draw.text_width, self.caption)) + 9.0
         height = max(self.size[1] * scale, ROW * len(self.marks))
         return max(width, caption), CAPTION + height + UNDER + 2 * PAD
-
-
-def _card(
-    laminate: Laminate, layers: tuple[Layer, ...], holding: Mapping[int, Sequence[Pin]]
-) -> Card:
-    """Return the card of layers of one pattern; ``holding``: the pins that hold each layer."""
-    marks = dimensions(laminate, layers[0])
-    around = [mark.radius for mark in marks if isinstance(mark, Circle) and mark.phantom]
-    joined = {layer.index for layer in layers}
-    return Card(
-        layers,
-        [pin for pin in laminate.pins if all(pin in holding[x.index] for x in layers)],
-        marks,
-        box_round([layers[0].profile.bounds, *((-r, -r, r, r) for r in around)]),
-        [seam for seam in laminate.seams if joined & {seam.below, seam.above}],
-        [fold for fold in laminate.folds if joined & {fold.lower, fold.upper}],
-    )
 
 
 class CardFrame(NamedTuple):

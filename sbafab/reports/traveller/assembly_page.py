@@ -11,7 +11,7 @@ from string import ascii_uppercase
 from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
-from sbafab.assemblies.checks import SupplyRun, supply_runs
+from sbafab.assemblies.checks import supply_runs
 from sbafab.assemblies.records import AnyPart, Base, Cup
 from sbafab.assemblies.shapes import colours, own_surface
 from sbafab.cutting.sheets import SheetFile
@@ -193,30 +193,19 @@ def adhesive(placed: PlacedPart) -> str | None:
 # Joining, part by part.
 
 
-@dataclass(frozen=True)
 class PartJoint:
     """The joining step of one part: what it is fixed on, and the ``lines`` that are in it before.
 
-    ``supply`` are the runs of its tubes along the part that it is fixed on.
+    ``supply`` are the runs of its tubes along the part that it is fixed on. ``is_below``: it is
+    fixed on a lower face, upside down.
     """
 
-    placed: PlacedPart
-    carrier: PlacedPart | None
-    lines: list[str]
-    supply: Sequence[SupplyRun]
-
-    @property
-    def part(self) -> AnyPart:
-        return self.placed.part
-
-    @property
-    def glue(self) -> str | None:
-        return adhesive(self.placed)
-
-    @property
-    def is_below(self) -> bool:
-        """True if the part is fixed on a lower face, upside down."""
-        return self.part.at in ("bottom", "start")
+    def __init__(self, assembled: Assembled, placed: PlacedPart) -> None:
+        self.placed, self.part, self.glue = placed, placed.part, adhesive(placed)
+        self.carrier = assembled.on(placed)
+        self.lines = [line.name for line in _lines_through(assembled, placed)]
+        self.supply = supply_runs(placed, assembled)
+        self.is_below = placed.part.at in ("bottom", "start")
 
     @property
     def heading(self) -> float:
@@ -246,15 +235,7 @@ def _mark_angle(placed: PlacedPart) -> float:
 
 def joints(assembled: Assembled) -> list[PartJoint]:
     """Return a step for each part, in the order in which they can be joined."""
-    return [
-        PartJoint(
-            placed,
-            assembled.on(placed),
-            [line.name for line in _lines_through(assembled, placed)],
-            supply_runs(placed, assembled),
-        )
-        for placed in _in_order(assembled)
-    ]
+    return [PartJoint(assembled, placed) for placed in _in_order(assembled)]
 
 
 def _in_order(assembled: Assembled) -> Iterator[PlacedPart]:

@@ -20,32 +20,16 @@ STATION = 0.25  # spacing of the points at which two edges are compared, mm
 EQUAL = 0.02  # distances that differ by less are the same to a hand, mm
 
 
-@dataclass(frozen=True)
 class Round:
-    """Layers that are laid repeatedly in one order; ``turns`` holds every turn."""
+    """Layers that are laid repeatedly in one order; ``turns`` holds every turn, ``places`` the
+    layers of all turns at the same place in the round.
+    """
 
-    turns: tuple[tuple[Layer, ...], ...]
-
-    @property
-    def count(self) -> int:
-        return len(self.turns)
-
-    @property
-    def first(self) -> Layer:
-        return self.turns[0][0]
-
-    @property
-    def last(self) -> Layer:
-        return self.turns[-1][-1]
-
-    @property
-    def places(self) -> tuple[tuple[Layer, ...], ...]:
-        """The layers of all turns at the same place in the round."""
-        return tuple(zip(*self.turns, strict=True))
-
-    @property
-    def layers(self) -> tuple[Layer, ...]:
-        return tuple(layer for turn in self.turns for layer in turn)
+    def __init__(self, turns: Sequence[tuple[Layer, ...]]) -> None:
+        self.turns, self.count = turns, len(turns)
+        self.places = tuple(zip(*turns, strict=True))
+        self.layers = [layer for turn in turns for layer in turn]
+        self.first, self.last = self.layers[0], self.layers[-1]
 
 
 def rounds(layers: Sequence[Layer]) -> tuple[Round, ...]:
@@ -58,7 +42,7 @@ def rounds(layers: Sequence[Layer]) -> tuple[Round, ...]:
     while start < len(layers):
         period, count = _repetition(keys[start:])
         ends = range(start + period, start + period * count + 1, period)
-        gathered.append(Round(tuple(tuple(layers[end - period : end]) for end in ends)))
+        gathered.append(Round([tuple(layers[end - period : end]) for end in ends]))
         start += period * count
     return tuple(gathered)
 
