@@ -31,10 +31,9 @@ from sbafab.lab.inspection import (
     InspectionDocument,
     drawing,
     history,
-    inspect_picture,
     sizes_csv,
 )
-from sbafab.lab.scan import Reference, ScanPicture, read_cut_sheet, read_picture
+from sbafab.lab.scan import Reference, Scan, ScanPicture, read_cut_sheet, read_picture
 
 MOST_LINES = 20
 """Pieces amiss that are printed; the files have all."""
@@ -273,7 +272,7 @@ def inspect(
         raise DesignError('sbafab inspect needs scikit-image: pip install "sbafab[scan]"')
     cut, photographed = read_cut_sheet(folder, sheet), read_picture(picture)
     scale = _reference(photographed, photo, **reference)
-    inspection = inspect_picture(photographed, cut, scale, photo, paper == "dark")
+    inspection = Inspection(Scan(photographed, cut, scale, photo, paper == "dark"))
     paths = _write_inspection(inspection, out)
     if as_json:
         show.document({**InspectionDocument.of(inspection), "files": [str(path) for path in paths]})

@@ -1,7 +1,7 @@
 """Inspect a picture of a cut sheet against its cut file.
 
-``inspect_picture`` reads, registers, measures and names; the result is written as JSON, as a table
-of sizes that ``sbafab kerf`` reads, and as a picture with the deviations.
+The sheet is located, its edges are measured and its pieces named; the result is written as JSON, as
+a table of sizes that ``sbafab kerf`` reads, and as a picture with the deviations.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import base64
 import io
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,8 +20,8 @@ from sbafab.geometry.region import coord
 from sbafab.lab.coupon import COLUMNS, INSTRUMENT, Value, student_t
 from sbafab.lab.edges import EdgeFit, Scale, fitted, scale_of
 from sbafab.lab.pieces import PieceFinding, piece_findings
-from sbafab.lab.registration import SMALLEST, Content, Location, locate
-from sbafab.lab.scan import DrawnSheet, Reference, Scan, ScanPicture
+from sbafab.lab.registration import SMALLEST, Content, locate
+from sbafab.lab.scan import Scan, ScanPicture
 from sbafab.reports.drawing import TEXT, box, document, line, text
 from sbafab.spreadsheet import csv_text
 
@@ -32,25 +31,34 @@ LARGEST_KERF = 1.0  # shown in mm
 HARMLESS = ("sound", "moved", "turned")
 
 
-@dataclass(frozen=True)
 class Inspection:
     """Measurements of a cut sheet from a picture.
 
     ``kerf`` mm, twice the distance of the film's edge inside the beam's path. ``rms`` and
     ``within_95`` mm: deviations of edges from the drawn ones apart from kerf, scale and the pieces'
-    displacements. ``pixel`` and ``blur`` mm in the picture.
+    displacements. ``pixel`` and ``blur`` mm in the picture. Raises DesignError if the picture does
+    not show the sheet, or too little of it.
     """
 
-    sheet: DrawnSheet
-    picture: ScanPicture
-    location: Location
-    fit: EdgeFit
-    scale: Scale
-    kerf: Value
-    rms: float
-    within_95: float
-    pixel: float
-    pieces: tuple[PieceFinding, ...]
+    def __init__(self, scan: Scan) -> None:
+        self.sheet, self.picture = scan.sheet, scan.picture
+        self.location = locate(scan)
+        self.fit = fitted(scan, self.location)
+        known = self.fit.weights > 0
+        self.edges = int(known.sum())
+        if self.edges < FEWEST:
+            raise DesignError(
+                f"{scan.picture.path.name} shows {self.edges} places on edges of "
+                f"{scan.sheet.name}, and {FEWEST} are needed; scan at a higher resolution, or more "
+                "of the sheet"
+            )
+        self.scale = scale_of(scan, self.fit)
+        self.pixel = 1 / self.fit.warp.pixels_per_mm
+        self.kerf = _kerf(scan.picture, self.fit, self.pixel)
+        residuals = np.abs(self.fit.residuals[known])
+        self.rms = math.sqrt(float((residuals**2).mean()))
+        self.within_95 = float(np.percentile(residuals, 95))
+        self.pieces = piece_findings(scan, self.location, self.fit)
 
     @property
     def amiss(self) -> list[PieceFinding]:
@@ -61,11 +69,6 @@ class Inspection:
     def failed(self) -> bool:
         """True if a piece is missing, wrong, or too poorly visible to tell."""
         return any(piece.verdict not in HARMLESS for piece in self.pieces)
-
-    @property
-    def edges(self) -> int:
-        """Number of measured samples on edges."""
-        return int((self.fit.weights > 0).sum())
 
 
 class InspectionDocument(Document, schema="sbafab/inspection@1"):
@@ -87,44 +90,6 @@ class InspectionDocument(Document, schema="sbafab/inspection@1"):
     blur: float = attribute("fit.blur")
     failed: bool
     pieces: list[PieceFinding]
-
-
-def inspect_picture(
-    picture: ScanPicture,
-    sheet: DrawnSheet,
-    reference: Reference,
-    is_camera: bool = False,
-    is_light: bool = True,
-) -> Inspection:
-    """Return the inspection of a sheet in a picture.
-
-    ``is_camera``: taken with perspective. ``is_light``: film is lighter than its background. Raises
-    DesignError if the picture does not show the sheet, or too little of it.
-    """
-    scan = Scan(picture, sheet, reference, is_camera, is_light)
-    location = locate(scan)
-    fit = fitted(scan, location)
-    known = fit.weights > 0
-    if known.sum() < FEWEST:
-        raise DesignError(
-            f"{picture.path.name} shows {int(known.sum())} places on edges of {sheet.name}, and "
-            f"{FEWEST} are needed; scan at a higher resolution, or more of the sheet"
-        )
-    scale = scale_of(scan, fit)
-    pixel = 1 / fit.warp.pixels_per_mm
-    residuals = np.abs(fit.residuals[known])
-    return Inspection(
-        sheet=sheet,
-        picture=picture,
-        location=location,
-        fit=fit,
-        scale=scale,
-        kerf=_kerf(picture, fit, pixel),
-        rms=math.sqrt(float((residuals**2).mean())),
-        within_95=float(np.percentile(residuals, 95)),
-        pixel=pixel,
-        pieces=tuple(piece_findings(scan, location, fit)),
-    )
 
 
 def _kerf(picture: ScanPicture, fit: EdgeFit, pixel: float) -> Value:

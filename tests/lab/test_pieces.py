@@ -10,9 +10,9 @@ import pytest
 import shapely
 from shapely import affinity
 
-from sbafab.lab.inspection import Inspection, inspect_picture
+from sbafab.lab.inspection import Inspection
 from sbafab.lab.pieces import PieceFinding
-from sbafab.lab.scan import Reference, read_cut_sheet, read_picture
+from sbafab.lab.scan import Reference, Scan, read_cut_sheet, read_picture
 from tests.lab.scans import Camera, pieces_of, render, save
 from tests.lab.test_scans import inspected
 from tests.quick import few
@@ -88,7 +88,7 @@ def of_flags(tmp_path: Path, places: Any, change: Any) -> Inspection:
     picture = render(path, CAMERA, lambda drawn: [change(drawn[0]), *drawn[1:]])
     scan = save(picture, tmp_path / "scan.png", CAMERA.dpi)
     sheet = read_cut_sheet(path, None)
-    return inspect_picture(read_picture(scan), sheet, Reference((CAMERA.dpi, CAMERA.dpi)))
+    return Inspection(Scan(read_picture(scan), sheet, Reference((CAMERA.dpi, CAMERA.dpi))))
 
 
 @pytest.mark.parametrize("places", [[(0, 0), (20, 3), (40, 6)], [(0, 0), (20, 0), (0, 20)]])

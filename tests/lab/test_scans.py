@@ -11,8 +11,8 @@ import pytest
 import shapely
 
 from sbafab.errors import DesignError
-from sbafab.lab.inspection import Inspection, inspect_picture
-from sbafab.lab.scan import Reference, read_cut_sheet, read_picture
+from sbafab.lab.inspection import Inspection
+from sbafab.lab.scan import Reference, Scan, read_cut_sheet, read_picture
 from tests.lab.conftest import cut
 from tests.lab.scans import Camera, Change, render, save
 from tests.quick import few
@@ -32,8 +32,8 @@ def inspected(
     drawn = folder / "sheets" / f"{sheet}.dxf"
     path = save(render(drawn, camera, change), tmp_path / "scan.png", camera.dpi)
     dpi = None if is_photo else (camera.dpi, camera.dpi)
-    return inspect_picture(
-        read_picture(path), read_cut_sheet(folder, sheet), Reference(dpi), is_photo
+    return Inspection(
+        Scan(read_picture(path), read_cut_sheet(folder, sheet), Reference(dpi), is_photo)
     )
 
 
@@ -121,11 +121,11 @@ def test_the_pins_of_a_sheet_give_the_scale(tmp_path: Path) -> None:
 
     path = save(render(folder / "sheets" / "TPE_1.dxf", camera, shrunk), tmp_path / "p.png", None)
     sheet = read_cut_sheet(folder, "TPE_1")
-    inspection = inspect_picture(read_picture(path), sheet, Reference(pins=True), False)
+    inspection = Inspection(Scan(read_picture(path), sheet, Reference(pins=True), False))
     assert inspection.scale.reference == "3 pins"
     assert inspection.scale.x == pytest.approx(0.998, abs=2e-4)
     # Without one of them the scale is not known: no pin is there, or the picture ends before it.
     for x, y in ((75.2, 26.0), (60.0, 60.0)):
         hidden = replace(sheet, pins=(*PINS[:2], (x, y, 2.0)))
         with pytest.raises(DesignError, match=f"the pin at x {x:g}, y {y:g} mm is not seen"):
-            inspect_picture(read_picture(path), hidden, Reference(pins=True), False)
+            Inspection(Scan(read_picture(path), hidden, Reference(pins=True), False))
