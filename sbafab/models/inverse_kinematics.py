@@ -95,9 +95,7 @@ class Search:
             self._newton(self.rest, x, at)
             self._descend(x, at)
         guess = np.clip(self._guess(), 0.0, self.most)
-        raised = np.where(guess > guess.min(-1, keepdims=True), guess, 0.0)
-        for x in (guess,) if self.wall is None else (guess, raised):
-            self._newton_from(x)
+        self._newton_from(guess)
         self._descend(guess, None)
         further = further_starts(guess, self.most)
         for x in further:
@@ -111,7 +109,6 @@ class Search:
         at = self.column.start_freedoms(pressure_at(x))[:, self.column.levels]
         if self.wall is not None:
             self._newton(self.rest, x, at, SOFT)
-            self._newton(self.rest, x, self._arc_freedoms(), SOFT)
         self._newton(self.rest, x, at)
         self._settle_for_met()
 
@@ -246,33 +243,16 @@ class Search:
 
     def _guess(self) -> Array:
         """Return coordinates (n, chambers) of chambers as long as on arcs from the base to the
-        places: constant curvature (Webster and Jones 2010).
+        places: constant curvature (Webster and Jones 2010), square to the base.
         """
-        bend, length, ways = _arcs(self.places)
         column, grid = self.column, np.linspace(0.0, self.most, 33)
+        aside, up = np.hypot(*self.places[:, :2].T), self.places[:, 2]
+        bend = 2 * np.arctan2(aside, up)
+        length = np.hypot(aside, up) / np.sinc(bend / math.tau)
+        ways = self.places[:, :2] / np.maximum(aside, 1e-12)[:, None]
         kinds = np.stack([kind.rises(pressure_at(grid)) for kind in column.maps])
-        rises = length - column.pitch * len(column.levels)
-        along = rises[:, None] - bend[:, None] * (ways @ column.axes.T)
-        return np.asarray(np.interp(along, kinds[column.levels].sum(0), grid))
-
-    def _arc_freedoms(self) -> Array:
-        """Return rise and tilt of each level (n, levels, 3) on arcs to the places, all alike."""
-        bend, length, ways = _arcs(self.places)
-        levels = len(self.column.levels)
-        rise = length / levels - self.column.pitch
-        level = np.stack([rise, -bend * ways[:, 1] / levels, bend * ways[:, 0] / levels], -1)
-        return level[:, None].repeat(levels, 1)
-
-
-def _arcs(places: Array) -> tuple[Array, Array, Array]:
-    """Return bend in rad (n,), length in mm (n,) and direction (n, 2) of the arcs to places (n, 3)
-    that leave the base at a right angle.
-    """
-    aside, up = np.hypot(*places[:, :2].T), places[:, 2]
-    bend, length = 2 * np.arctan2(aside, up), np.hypot(aside, up)
-    turns = bend > 1e-9
-    length[turns] *= (bend[turns] / 2) / np.sin(bend[turns] / 2)
-    return bend, length, places[:, :2] / np.maximum(aside, 1e-12)[:, None]
+        rises = (length - column.flat_height)[:, None] - bend[:, None] * (ways @ column.axes.T)
+        return np.asarray(np.interp(rises, kinds[column.levels].sum(0), grid))
 
 
 def further_starts(guess: Array, most: float) -> list[Array]:
