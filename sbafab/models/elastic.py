@@ -436,36 +436,51 @@ def _bends(state: Inflated, stack: Stack) -> Iterator[PosedItem]:
             yield Figure(quantity, value, model, at), pose
 
 
-def pose_bent_by(
-    stack: Stack, chambers: int, angle: float, low: float = LEAST_PRESSURE, high: float = math.inf
-) -> Pose | None:
-    """Return the pose bent by an angle in degrees with some chambers pressurised and the others
-    empty; None if no pressure from ``low`` to ``high`` (kPa) gives it.
+def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
+    """Return the pose of ``poses_bent_by`` for one bend."""
+    return poses_bent_by(stack, [(chambers, angle)])[0]
+
+
+def poses_bent_by(
+    stack: Stack,
+    bends: Sequence[tuple[int, float]],
+    ranges: Mapping[int, tuple[float, float]] | None = None,
+) -> list[Pose | None]:
+    """Return the pose of each bend: some chambers pressurised, the others empty, bent by an angle
+    in degrees; None if no pressure gives it, or none in the range in kPa that ``ranges`` give by
+    the bend's number.
 
     Bisection until both ends have poses, then false position by the pressure's logarithm, with the
-    end that stays halved (Illinois).
+    end that stays halved (Illinois); all bends in step.
     """
-    high = min(high, stack.most_pressure)
-    below = above = math.nan
-    pose, before = None, 0.0
-    while high > low * (1 + NO_FURTHER):
-        share = below / (below - above)
-        middle = low * (high / low) ** (share if math.isfinite(share) else 0.5)
-        try:
-            pose = stack.pose(chamber_pressures(stack, chambers, middle), near=pose)
-        except DesignError:
-            high, above, before = middle, math.nan, 0.0
-            continue
-        missing = pose.bend - angle
-        if abs(missing) < 1e-6:
-            return pose
-        stays = 0.5 if missing * before > 0 else 1.0
-        if missing < 0:
-            low, below, above = middle, missing, stays * above
-        else:
-            high, above, below = middle, missing, stays * below
-        before = missing
-    return None
+    poses: list[Pose | None] = [None] * len(bends)
+    given = {} if ranges is None else ranges
+    all_ends = (given.get(number, (LEAST_PRESSURE, math.inf)) for number in range(len(bends)))
+    low, high = np.array(list(all_ends)).reshape(-1, 2).T
+    high = np.minimum(high, stack.most_pressure)
+    below, above, before = np.full((3, len(bends)), math.nan)
+    while (live := np.flatnonzero(high > low * (1 + NO_FURTHER))).size:
+        share = below[live] / (below[live] - above[live])
+        ratio = high[live] / low[live]
+        middle = low[live] * ratio ** np.where(np.isfinite(share), share, 0.5)
+        rows = [
+            chamber_pressures(stack, bends[k][0], p)
+            for k, p in zip(live.tolist(), middle.tolist(), strict=True)
+        ]
+        states = stack.equilibria(np.array(rows), None)
+        for number, k in enumerate(live.tolist()):
+            missing = states.bends[number] - bends[k][1]
+            if not states.is_met[number]:
+                high[k], above[k], before[k] = middle[number], math.nan, 0.0
+            elif abs(missing) < 1e-6:
+                poses[k], high[k] = states.pose(number), low[k]
+            else:
+                stays = 0.5 if missing * before[k] > 0 else 1.0
+                ends = (below, above) if missing < 0 else (above, below)
+                ends[0][k], ends[1][k] = missing, stays * ends[1][k]
+                (low if missing < 0 else high)[k] = middle[number]
+                before[k] = missing
+    return poses
 
 
 def _bent_forces(
@@ -476,16 +491,18 @@ def _bent_forces(
         return
     quantity, model = Quantity.BENT_FORCE, calibrated(FORCE, factors)
     pressure = max(request.pressures_kpa)
-    for chambers, angle in product(range(1, min(stack.chambers, 3)), ANGLES):
-        at = Conditions(kpa=pressure, chambers=chambers, angle=angle)
-        pose, guide = None, guides.get(at)
-        if guide is not None:
-            usual = guide[0].pressures[0]
-            pose = pose_bent_by(stack, chambers, angle, usual / NEARBY, usual * NEARBY)
-        pose = pose or pose_bent_by(stack, chambers, angle)
+    bends = list(product(range(1, min(stack.chambers, 3)), ANGLES))
+    conditions = [Conditions(kpa=pressure, chambers=count, angle=angle) for count, angle in bends]
+    usual = {k: guides[at][0].pressures[0] for k, at in enumerate(conditions) if at in guides}
+    near = {k: (kpa / NEARBY, kpa * NEARBY) for k, kpa in usual.items()}
+    poses = poses_bent_by(stack, bends, near)
+    for (chambers, angle), at, found in zip(bends, conditions, poses, strict=True):
+        is_far = found is None and at in guides
+        pose = pose_bent_by(stack, chambers, angle) if is_far else found
         if pose is None or pose.pressures[0] > pressure:
             yield LeftOut(quantity.named(at), "it does not bend so far", (quantity,)), None
             continue
+        guide = guides.get(at)
         try:
             start = pose if guide is None else guide[1]
             pressed = pressed_further(stack, chambers, pressure, pose, start)
