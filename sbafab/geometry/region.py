@@ -200,6 +200,14 @@ class Region:
         pieces = self.polygons(chord_error)
         return shapely.MultiPolygon([(outer, holes) for outer, *holes in pieces])
 
+    def widest_place(self) -> Point:
+        """Return the centre of a disc within the region that is within 2e-5 mm of the largest."""
+        # Imported here only.
+        import shapely
+
+        x, y = shapely.maximum_inscribed_circle(self.shapely(1e-5), 1e-5).coords[0]
+        return x, y
+
     @property
     def __geo_interface__(self) -> dict[str, object]:
         """A MultiPolygon in the terms of GeoJSON; chords stay within 1 um of the arcs."""

@@ -465,12 +465,8 @@ def inscribed_disc(region: Region) -> InscribedDisc:
     """
     if len(region.edges) > MANY_EDGES:
         # Offsets of many edges that meet near one point take minutes: a disc in 75 chords 38 s.
-        # Imported here only.
-        import shapely
-
-        polygon = region.shapely(1e-5)
-        x, y = shapely.maximum_inscribed_circle(polygon, 1e-5).coords[0]
-        return InscribedDisc(region.distance_to_edge((x, y)), (x, y))
+        centre = region.widest_place()
+        return InscribedDisc(region.distance_to_edge(centre), centre)
     circles = [None if region.holes else outer.circle for outer in region.outers]
     widest = max((c for c in circles if c), key=lambda c: c[1], default=((0.0, 0.0), 0.0))
     low, high, core = widest[1], 0.0, Region()
