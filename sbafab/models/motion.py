@@ -169,7 +169,7 @@ class Intake(NamedTuple):
             slope = np.where(still, missed * pressure_rate(tried) * ahead, 0.0).sum(1)
             steep = (wrong * rate * ahead).sum(1)
             good = found.is_met & ((slope <= -OVERSHOT * steep) | (share < LEAST_SHARE))
-            less = np.clip(steep / np.minimum(steep - slope, -1e-300), 0.1, 0.7)
+            less = np.clip(steep / np.minimum(steep - slope, -1e-100), 0.1, 0.7)
             share = np.where(good, 1.0, share * np.where(found.is_met, less, 0.5))
             x, now = np.where(good[:, None], tried, x), now.replaced(good, found.part(good))
         raise DesignError(
