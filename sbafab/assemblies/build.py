@@ -266,16 +266,16 @@ def assemble(assembly: Assembly) -> Assembled:
     design_of = {name: design for design in designs for name in design.parts}
     placed: dict[str, PlacedPart] = {}
     for name in order:
-        part, made, radius = assembly.parts[name], design_of.get(name), None
+        part, part_design, radius = assembly.parts[name], design_of.get(name), None
         if part.on is None:
-            _check_root(name, made)
+            _check_root(name, part_design)
             pose = LYING if assembly.pose == "lying" else PartPose()
         else:
-            pose, radius = _joined(name, part, made, placed[part.on])
+            pose, radius = _joined(name, part, part_design, placed[part.on])
         placed[name] = (
             PlacedPart(name, part, pose)
-            if made is None
-            else PlacedSba(name, part, pose, made, radius)
+            if part_design is None
+            else PlacedSba(name, part, pose, part_design, radius)
         )
     return Assembled(assembly, designs, tuple(placed.values()))
 
@@ -294,16 +294,16 @@ def _designs(assembly: Assembly) -> tuple[PartDesign, ...]:
     # Some file systems ignore the case of letters.
     taken = Counter(design.name.lower() for design, _ in by_hash.values())
     taken += Counter({*RESERVED, assembly.name.lower()})
-    made = []
+    part_designs = []
     for design, parts in by_hash.values():
         name = f"{design.name}-{parts[0]}" if taken[design.name.lower()] > 1 else design.name
         order = assembly.order.model_copy(update={"copies": len(parts) * assembly.order.copies})
         named = design.model_copy(update={"name": name, "order": order})
         try:
-            made.append(PartDesign(named, build(named), tuple(parts)))
+            part_designs.append(PartDesign(named, build(named), tuple(parts)))
         except (DesignError, GeometryError) as error:
             raise DesignError(f"parts.{parts[0]}: {error}") from None
-    return tuple(made)
+    return tuple(part_designs)
 
 
 def _read_part(assembly: Assembly, name: str, part: Sba) -> Design:

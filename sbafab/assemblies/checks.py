@@ -419,10 +419,10 @@ def collision(assembled: Assembled) -> Iterator[Finding]:
     worst = 0.0
     for number, a in enumerate(assembled.parts):
         for b in assembled.parts[:number]:
-            solid, other = solids[a.name], solids[b.name]
-            if {(a.name, b.name), (b.name, a.name)} & lying or box_gap(solid, other) >= 0:
+            solid, second_solid = solids[a.name], solids[b.name]
+            if {(a.name, b.name), (b.name, a.name)} & lying or box_gap(solid, second_solid) >= 0:
                 continue
-            shared = solid ^ other
+            shared = solid ^ second_solid
             volume = float(shared.volume())
             worst = max(worst, volume)
             if volume > TOUCH:

@@ -423,9 +423,9 @@ class Stages:
         head = f"{stage}: {done} of {total}" if total > 1 else stage
         if not 0 < done <= total or seconds < RATE_AFTER_SECONDS:
             return f"{head}, {elapsed}"
-        each, left = seconds / done, seconds * (total - done) / done
+        each, seconds_left = seconds / done, seconds * (total - done) / done
         rate = f", {60 / each:.3g} per minute" if each > 1 else f", {1 / each:.3g} per second"
-        time_left = "less than 1 s" if left < 1 else f"about {_clock(left)}"
+        time_left = "less than 1 s" if seconds_left < 1 else f"about {_clock(seconds_left)}"
         return f"{head}{rate if total > 1 else ''}, {elapsed}, {time_left} left"
 
 

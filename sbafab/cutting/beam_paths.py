@@ -115,16 +115,16 @@ class _Lap:
     def stretch(self, first: float, last: float) -> list[Edge]:
         """The edges from one place to another that is ahead of it, by up to two laps."""
         number, rest = self._number(first % self.length)
-        edges, left = [], last - first
-        while left > TINY:
+        edges, rest_length = [], last - first
+        while rest_length > TINY:
             edge = self._edges[number % len(self._edges)]
-            taken = min(edge.length - rest, left)
+            taken = min(edge.length - rest, rest_length)
             if taken > TINY:
                 a, b = rest / edge.length, (rest + taken) / edge.length
                 start = edge.start if a <= 0 else edge.at(a)
                 end = edge.end if b >= 1 - 1e-12 else edge.at(b)
                 edges.append(edge if taken == edge.length else edge.part(start, end))
-            left -= taken
+            rest_length -= taken
             number, rest = number + 1, 0.0
         return edges
 

@@ -333,9 +333,9 @@ class _Filler:
                     for place in _extremes(places):
                         more = tuple(sorted((*copies, (form.number, *place))))
                         if more not in steps:
-                            steps[more] = [np.copy(left) for left in maps]
-                            for there, left in zip(forms, steps[more], strict=True):
-                                strike(left, self.clear(form, there), there, place)
+                            steps[more] = [np.copy(free_map) for free_map in maps]
+                            for there, free_map in zip(forms, steps[more], strict=True):
+                                strike(free_map, self.clear(form, there), there, place)
             sheets = sorted(steps.items(), key=lambda step: -sum(map(np.count_nonzero, step[1])))
             sheets = sheets[:BEAM]
         chosen = [(self.forms[number], place) for number, *place in best]
@@ -390,16 +390,16 @@ class _Filler:
         self, sheet: int, remaining: Sequence[int], way: _Way
     ) -> tuple[list[Placement], list[Cells]]:
         """Return the lattice that a sheet starts with, and the places that it leaves free."""
-        left = _counts(self.shape_of, remaining)
+        counts = _counts(self.shape_of, remaining)
         shapes = [
             shape
             for shape, lattice in way.lattices.items()
-            if left[shape] >= (len(lattice.places) if way.whole_only else LEAST_COPIES)
+            if counts[shape] >= (len(lattice.places) if way.whole_only else LEAST_COPIES)
         ]
         if not shapes:
             return [], self.empty
-        shape = max(shapes, key=lambda shape: left[shape] * self.shapes[shape].area)
-        places = way.lattices[shape].places[: left[shape]]
+        shape = max(shapes, key=lambda shape: counts[shape] * self.shapes[shape].area)
+        places = way.lattices[shape].places[: counts[shape]]
         mine = [part for part in way.order if self.shape_of[part] == shape]
         queue = (part for part in mine for _ in range(remaining[part]))
         placements = [

@@ -226,10 +226,10 @@ class _Rows:
         """Offsets to the right, and the least heights of one copy above another there."""
         width = self.reach[0] - 1e-6
         places = np.linspace(-width, width, TABLE)
-        alike = self.above(0, 0, places)
+        same_shape = self.above(0, 0, places)
         unlike = () if self.is_symmetric else ((0, 1), (1, 0))
         heights = {both: self.above(*both, places) for both in unlike}
-        return places, {(0, 0): alike, (1, 1): alike, **heights}
+        return places, {(0, 0): same_shape, (1, 1): same_shape, **heights}
 
     # The patterns that are tried.
 

@@ -251,9 +251,9 @@ def _root(path: Path) -> ElementTree.Element:
 
 def _refuse_sheet(text: str) -> None:
     """Raise DesignError for a style sheet that sets more than paint, wherever it applies."""
-    others = [name for name in _DECLARATION.findall(text) if not _PAINT.fullmatch(name)]
-    if "@" in text or "\\" in text or "/*" in text or others:
-        what = others[0] if others else "imports, escapes or comments"
+    extra_names = [name for name in _DECLARATION.findall(text) if not _PAINT.fullmatch(name)]
+    if "@" in text or "\\" in text or "/*" in text or extra_names:
+        what = extra_names[0] if extra_names else "imports, escapes or comments"
         raise DesignError(f"has {what[:40]} in a style sheet; {PLAIN}")
 
 

@@ -120,8 +120,8 @@ class InUnit:
             return value
         number = in_first_unit(value, self.units)
         if number is None:
-            first, *others = self.units
-            more = f" (or {', '.join(others)})" if others else ""
+            first, *more_units = self.units
+            more = f" (or {', '.join(more_units)})" if more_units else ""
             raise ValueError(
                 f'must be a number, in {first}, or a text with its unit{more}, such as "'
                 f'{self.example}"'

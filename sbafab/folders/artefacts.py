@@ -171,9 +171,9 @@ def made_by(
 
 def write_artefacts(folder: DesignFolder, rows: Iterable[Artefact] | None = None) -> None:
     """Write the artefacts (by default all) that belong in the folder."""
-    wanted = [row for row in rows or artefacts() if row.belongs_in(folder)]
-    drawn = [row.path for row in wanted if row.top == "preview"]
-    for artefact in wanted:
+    rows_wanted = [row for row in rows or artefacts() if row.belongs_in(folder)]
+    drawn = [row.path for row in rows_wanted if row.top == "preview"]
+    for artefact in rows_wanted:
         contents = None if artefact.render is None else artefact.render(folder)
         if contents is not None:
             path = folder.path / artefact.path

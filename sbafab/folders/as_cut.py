@@ -306,14 +306,14 @@ def read_seams(
             message = f"seam {seam.name} ({file}): {difference}"
             problems.append(Problem(CLAIMS, message, layers))
         drawn = moved(chains, settings.seam_offsets.get(seam.tool, CENTRED))
-        what = path_difference(drawn, seam.path)
-        as_drawn = seam if what is None else replace(seam, path=drawn)
+        mismatch = path_difference(drawn, seam.path)
+        as_drawn = seam if mismatch is None else replace(seam, path=drawn)
         width = stated_width(properties)
         if width is not None and abs(width - seam.width) > TOLERANCE:
             as_drawn = replace(as_drawn, width=width)
-            what = what or f"{WIDTH} is {width:g} mm, not {seam.width:g}"
-        if what is not None:
-            message = f"seam {seam.name} is not what design.toml makes: {what}"
+            mismatch = mismatch or f"{WIDTH} is {width:g} mm, not {seam.width:g}"
+        if mismatch is not None:
+            message = f"seam {seam.name} is not what design.toml makes: {mismatch}"
             problems.append(Problem(DESIGNED, f"{message}; regenerate the folder", layers))
         seams.append(as_drawn)
     return tuple(seams), problems

@@ -107,19 +107,19 @@ class Contour:
         centre, radius = self.circle
         return ((*centre, -radius if self.is_hole else radius),)
 
-    def coincides(self, other: Contour) -> bool:
+    def coincides(self, contour: Contour) -> bool:
         """Return True if the corners and edge middles of the two lie within SAME of each other."""
-        if len(self.marks) != len(other.marks) or self.is_hole != other.is_hole:
+        if len(self.marks) != len(contour.marks) or self.is_hole != contour.is_hole:
             return False
-        if any(abs(a - b) > SAME for a, b in zip(self.bounds, other.bounds, strict=True)):
+        if any(abs(a - b) > SAME for a, b in zip(self.bounds, contour.bounds, strict=True)):
             return False
-        if self.circle is not None or other.circle is not None:
-            return (self.circle is None) == (other.circle is None)
+        if self.circle is not None or contour.circle is not None:
+            return (self.circle is None) == (contour.circle is None)
         return any(
             all(_coincide(a, b) for a, b in zip(self.edges, edges, strict=True))
-            for first, edge in enumerate(other.edges)
+            for first, edge in enumerate(contour.edges)
             if _coincide(self.edges[0], edge)
-            for edges in [other.edges[first:] + other.edges[:first]]
+            for edges in [contour.edges[first:] + contour.edges[:first]]
         )
 
     def reversed(self) -> Contour:

@@ -473,12 +473,12 @@ def shortened(path: Sequence[Edge], length: float) -> tuple[Edge, ...]:
 
 def _band(edge: Edge, half: float) -> Region:
     """Return the points within ``half`` mm of an edge along its normals."""
-    right, left = edge.offset(half), edge.offset(-half)
-    if right is not None and left is not None:
-        sides: list[Edge] = [right, Line(right.end, left.end), left.reversed()]
-        return Region((Contour((*sides, Line(left.start, right.start))),))
+    outer_side, inner = edge.offset(half), edge.offset(-half)
+    if outer_side is not None and inner is not None:
+        sides: list[Edge] = [outer_side, Line(outer_side.end, inner.end), inner.reversed()]
+        return Region((Contour((*sides, Line(inner.start, outer_side.start))),))
     # The inner side of an arc of a small radius shrinks to its centre.
-    outer = right if right is not None else left
+    outer = outer_side if outer_side is not None else inner
     assert isinstance(edge, Arc)
     assert outer is not None
     loop = Contour((outer, Line(outer.end, edge.centre), Line(edge.centre, outer.start)))

@@ -216,11 +216,11 @@ class Boundary:
         is_arc = table.turn != 0
         # The first is an arc, if either is.
         a, b = np.where(is_arc.take(b), b, a), np.where(is_arc.take(b), a, b)
-        centre, other = table.centre.take(a, axis=1), table.centre.take(b, axis=1)
+        centre, second_centre = table.centre.take(a, axis=1), table.centre.take(b, axis=1)
         both = is_arc.take(b)
-        some = is_arc.take(a) & ~(both & (length_of(centre - other) <= 1e-9))
+        some = is_arc.take(a) & ~(both & (length_of(centre - second_centre) <= 1e-9))
         p, normal, here = self.feet(centre, b)
-        target = np.where(both, other, centre + self.normal.take(b, axis=1))
+        target = np.where(both, second_centre, centre + self.normal.take(b, axis=1))
         q, inward, there = self.feet(target, a)
         first, second = [0, 0, 1, 1], [0, 1, 0, 1]
         there = here[:, first] & there[:, second] & some[:, None]
@@ -305,10 +305,10 @@ def joined(*segments: Segments) -> Segments:
     return p, q
 
 
-def _in_order(*found: Found) -> Segments:
+def _in_order(*parts: Found) -> Segments:
     """Segments of several kinds by the numbers of their pairs."""
-    pair = np.concatenate([numbers for numbers, _, _ in found])
-    p, q = joined(*((p, q) for _, p, q in found))
+    pair = np.concatenate([numbers for numbers, _, _ in parts])
+    p, q = joined(*((p, q) for _, p, q in parts))
     order = pair.argsort(kind="stable")
     return p.take(order, axis=1), q.take(order, axis=1)
 
@@ -475,8 +475,8 @@ def inscribed_disc(region: Region) -> InscribedDisc:
         high = max(high, 0.0 if circle else min(u - x, v - y) / 2)
     while high > low * (1 + DISC_SHARE):
         middle = (low + high) / 2
-        left = shrink(region, middle)
-        low, high, core = (low, middle, core) if left.is_empty else (middle, high, left)
+        shrunk = shrink(region, middle)
+        low, high, core = (low, middle, core) if shrunk.is_empty else (middle, high, shrunk)
     if core.is_empty:
         return InscribedDisc(widest[1], widest[0])
     centre = centroid(max(core.pieces, key=lambda piece: piece.area))

@@ -89,11 +89,11 @@ def key_name(text: str, taken: Iterable[str], fallback: str = "x") -> str:
     return name
 
 
-def named(what: str, places: list[str]) -> list[str]:
+def named(remark: str, places: list[str]) -> list[str]:
     """Return a remark for each of the places, or one for all if they are many."""
-    remarks = [f"{place}: {what}" for place in places[:MOST_NAMED]]
+    remarks = [f"{place}: {remark}" for place in places[:MOST_NAMED]]
     if len(places) > MOST_NAMED:
-        remarks.append(f"and {len(places) - MOST_NAMED} more places: {what}")
+        remarks.append(f"and {len(places) - MOST_NAMED} more places: {remark}")
     return remarks
 
 

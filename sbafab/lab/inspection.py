@@ -44,8 +44,8 @@ class Inspection:
         self.sheet, self.picture = scan.sheet, scan.picture
         self.location = locate(scan)
         self.fit = fitted(scan, self.location)
-        known = self.fit.weights > 0
-        self.edges = int(known.sum())
+        weighted = self.fit.weights > 0
+        self.edges = int(weighted.sum())
         if self.edges < FEWEST:
             raise DesignError(
                 f"{scan.picture.path.name} shows {self.edges} places on edges of "
@@ -55,7 +55,7 @@ class Inspection:
         self.scale = scale_of(scan, self.fit)
         self.pixel = 1 / self.fit.warp.pixels_per_mm
         self.kerf = _kerf(scan.picture, self.fit, self.pixel)
-        residuals = np.abs(self.fit.residuals[known])
+        residuals = np.abs(self.fit.residuals[weighted])
         self.rms = math.sqrt(float((residuals**2).mean()))
         self.within_95 = float(np.percentile(residuals, 95))
         self.pieces = piece_findings(scan, self.location, self.fit)

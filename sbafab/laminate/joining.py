@@ -175,8 +175,8 @@ class _Search:
         """Return why a task is not possible yet, or None if it is."""
         bond = self._bond(task)
         if bond is not None and bond.after is not None:
-            others = [self._bond(other) for other in waiting if other is not task]
-            if any(other is not None and other.name == bond.after for other in others):
+            others = [self._bond(pending) for pending in waiting if pending is not task]
+            if any(pending is not None and pending.name == bond.after for pending in others):
                 harm = (
                     f"comes after bond {bond.after} by face_bonds.{bond.name}.after, and that "
                     "cannot be made before"

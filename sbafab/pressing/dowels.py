@@ -238,10 +238,10 @@ def _choices(
     choices = []
     for depth in sorted(depth for depth in depths if depth >= seat - ROUNDING):
         lengths = {top: _shortest(sold, depth, need) for top, need in needs.items()}
-        known = {top: length for top, length in lengths.items() if length is not None}
-        if len(known) == len(needs):
-            out = max(length - depth - top for top, length in known.items())
-            choices.append(_Choice(depth, known, round(out, 6)))
+        pin_lengths = {top: length for top, length in lengths.items() if length is not None}
+        if len(pin_lengths) == len(needs):
+            out = max(length - depth - top for top, length in pin_lengths.items())
+            choices.append(_Choice(depth, pin_lengths, round(out, 6)))
     if not choices:
         least = seat + depth_tolerance(seat) + max(needs.values())
         needed = next(least + off for limit, off in LENGTH_TOLERANCES if least + off <= limit)

@@ -460,17 +460,17 @@ def _unmoved(placed: PlacedPart, stacks: Mapping[str, Stack], poses: Mapping[str
     """Return a part on flat hosts: balloons and webs of a stack in its pose; of others the part
     with its pockets filled, or the free inflated cylinder of one around a tube.
     """
-    made = placed.made
-    if made is not None and placed.name in stacks:
-        parts = inflated(made.laminate, stacks[placed.name], poses[placed.name], COARSE)
+    part_design = placed.made
+    if part_design is not None and placed.name in stacks:
+        parts = inflated(part_design.laminate, stacks[placed.name], poses[placed.name], COARSE)
         surfaces = (Surface(placed.upright(x.surface.points), x.surface.faces) for x in parts)
         return [piece for surface in surfaces for piece in surface.manifold().decompose()]
-    round_tube = {} if made is None else sizes(made.design, made.laminate)
-    if made is None or "inflated_diameter" not in round_tube:
+    round_tube = {} if part_design is None else sizes(part_design.design, part_design.laminate)
+    if part_design is None or "inflated_diameter" not in round_tube:
         return [placed_surface(placed, filled=True).manifold()]
     import manifold3d
 
-    _, low, _, high = made.laminate.layers[0].profile.turned(placed.turn).bounds
+    _, low, _, high = part_design.laminate.layers[0].profile.turned(placed.turn).bounds
     cylinder = manifold3d.Manifold.cylinder(high - low, round_tube["inflated_diameter"] / 2)
     rows = np.column_stack([np.array(placed.pose.rows), np.array(placed.pose.shift)])
     return [cylinder.translate((0.0, 0.0, low)).transform(rows)]

@@ -204,7 +204,7 @@ def _number(value: float) -> str:
 
 def _axes(plot: _Plot, place: int) -> Iterator[str]:
     """Yield grid, numbers, titles and labels; a tick's group is ``xtick<place>.<number>``."""
-    left, right, bottom = plot.left, plot.left + AXES[0], HEAD + AXES[1]
+    low_x, right, bottom = plot.left, plot.left + AXES[0], HEAD + AXES[1]
     for number, (value, text) in enumerate(plot.x.ticks, start=1):
         x, _ = plot.at(value, plot.y.low)
         grid = draw.line([(x, bottom), (x, HEAD)], colour=GRID)
@@ -212,12 +212,12 @@ def _axes(plot: _Plot, place: int) -> Iterator[str]:
         yield f'<g id="xtick{place}.{number}">{grid}{words}</g>'
     for number, (value, text) in enumerate(plot.y.ticks, start=1):
         _, y = plot.at(plot.x.low, value)
-        grid = draw.line([(left, y), (right, y)], colour=GRID)
-        words = draw.text((left - 1.5, y + 1.0), text, anchor="end")
+        grid = draw.line([(low_x, y), (right, y)], colour=GRID)
+        words = draw.text((low_x - 1.5, y + 1.0), text, anchor="end")
         yield f'<g id="ytick{place}.{number}">{grid}{words}</g>'
-    yield draw.line([(left, HEAD), (left, bottom), (right, bottom)], width=0.25)
-    panel, middle = plot.panel, (left + right) / 2
-    yield draw.text((left, HEAD - 3.0), panel.title, size=3.5)
+    yield draw.line([(low_x, HEAD), (low_x, bottom), (right, bottom)], width=0.25)
+    panel, middle = plot.panel, (low_x + right) / 2
+    yield draw.text((low_x, HEAD - 3.0), panel.title, size=3.5)
     yield draw.text((middle, bottom + 9.0), panel.x_label, anchor="middle")
     at = plot.begin + draw.TEXT + 1, HEAD + AXES[1] / 2
     yield draw.text(at, panel.y_label, anchor="middle", turned=True)

@@ -279,16 +279,16 @@ def compare(
     each = []
     for number, (design, source) in enumerate(zip((first, second), sources, strict=True)):
         progress(f"predicting {design.name}", number, 2)
-        made = make_build(design)
+        each_build = make_build(design)
         pressures = tuple(pressures_kpa or usual_pressures(design.form)[:1])
         figures = tuple(
             figure
             for figure in predict(
-                design, PredictionRequest(pressures, flow_ml_min), made.laminate
+                design, PredictionRequest(pressures, flow_ml_min), each_build.laminate
             ).figures
             if not figure.other or (figure.interval and _is_main(figure.quantity, figure.at))
         )
-        each.append(ComparedDesign(source, made, margins(made.findings), figures))
+        each.append(ComparedDesign(source, each_build, margins(each_build.findings), figures))
     a, b = each
     keys = _paired(key_values(a.design), key_values(b.design))
     rules = _paired(a.rules, b.rules)

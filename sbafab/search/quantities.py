@@ -266,9 +266,9 @@ def _kilopascals(place: str) -> float | None:
     """
     number = place.rstrip(ascii_letters)
     unit = place[len(number) :]
-    for known in KILOPASCALS:
-        if unit.lower() == known.lower() and (known != "MPa" or unit == known):
-            return in_first_unit(number + known, KILOPASCALS)
+    for each in KILOPASCALS:
+        if unit.lower() == each.lower() and (each != "MPa" or unit == each):
+            return in_first_unit(number + each, KILOPASCALS)
     return None
 
 

@@ -146,10 +146,10 @@ def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool 
         design = request.design.with_(dict(values))
         laminate = build(design)
         if with_rules or any(quantity.name == "yield" for quantity in request.quantities):
-            made = Build(design, laminate, run_deck(laminate, design))
-            rules = margins(made.findings)
-            if not made.failed:
-                refuse_undoable([made])
+            checked_build = Build(design, laminate, run_deck(laminate, design))
+            rules = margins(checked_build.findings)
+            if not checked_build.failed:
+                refuse_undoable([checked_build])
         subject = request.subject(design, laminate)
         share = rules[YIELD].measured if rules and YIELD in rules else None
         figures = {each.label: subject.value(each, share) for each in request.quantities}

@@ -140,10 +140,12 @@ class Table:
         """Return the column of the first figure of a quantity, at conditions that match ``at``, by
         the model to design with: the calibrated one, else the first; empty if no row has any.
         """
-        found = {c: f for c, f in self.figures.items() if f.quantity is quantity and f.at.meet(at)}
-        here = next((figure.at for figure in found.values()), None)
-        same = [column for column, figure in found.items() if figure.at == here]
-        calibrated = (c for c in same if found[c].model in CALIBRATED_MODELS)
+        columns = {
+            c: f for c, f in self.figures.items() if f.quantity is quantity and f.at.meet(at)
+        }
+        here = next((figure.at for figure in columns.values()), None)
+        same = [column for column, figure in columns.items() if figure.at == here]
+        calibrated = (c for c in same if columns[c].model in CALIBRATED_MODELS)
         return next(calibrated if self.is_calibrated else iter(()), next(iter(same), ""))
 
     def cells(self, names: Iterable[str]) -> Iterator[list[Any]]:

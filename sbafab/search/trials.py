@@ -61,23 +61,23 @@ def measured(
         base = checked_record(families[tables["family"]], tables, families).placed(Path(folder))
         design = base.with_(dict(values))
         row |= {"keys": key_values(design), "sha256": design_sha256(design)}
-        made = make_build(design)
-        worst = margins(made.findings)
+        made_build = make_build(design)
+        worst = margins(made_build.findings)
         row["rules"] = {
             name: [rule.verdict, rule.margin, rule.measured, rule.limit, rule.unit]
             for name, rule in worst.items()
         }
-        shares = ([each.measured, *each.interval] for each in made.findings if each.interval)
+        shares = ([each.measured, *each.interval] for each in made_build.findings if each.interval)
         row["yield"] = next(shares, [])
         # Figures have no intervals here: with the factors given, none are computed.
         request = PredictionRequest(tuple(pressures), calibration=factors_of(design))
-        figures = predict(design, request, made.laminate).figures
+        figures = predict(design, request, made_build.laminate).figures
         row["figures"] = {str(figure.key): figure.as_dict()["value"] for figure in figures}
         failed = {name: rule.message for name, rule in worst.items() if rule.verdict == "fail"}
         if failed:
             reason = " | ".join(f"{name}: {message}" for name, message in failed.items())
             return row | {"outcome": "fails", "failed": failed, "reason": reason}
-        refuse_undoable([made])
+        refuse_undoable([made_build])
         return row | {"outcome": "passes"}
     except SbafabError as error:
         return row | {"reason": _one_line(error)}
@@ -131,11 +131,20 @@ def margins(findings: Iterable[Finding]) -> dict[str, RuleMargin]:
     each: dict[str, list[RuleMargin]] = {}
     for f in findings:
         if f.verdict != "waived" or f.by_user:
-            found = f.rule, f.verdict, margin_of(f), f.measured, f.limit, f.unit, f.where, f.message
-            each.setdefault(f.rule, []).append(RuleMargin(*found))
+            values = (
+                f.rule,
+                f.verdict,
+                margin_of(f),
+                f.measured,
+                f.limit,
+                f.unit,
+                f.where,
+                f.message,
+            )
+            each.setdefault(f.rule, []).append(RuleMargin(*values))
     return {
-        name: min(found, key=lambda rule: (ORDER.index(rule.verdict), rule.share or 0.0))
-        for name, found in each.items()
+        name: min(values, key=lambda rule: (ORDER.index(rule.verdict), rule.share or 0.0))
+        for name, values in each.items()
     }
 
 

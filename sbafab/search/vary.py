@@ -106,25 +106,25 @@ def _example(option: str) -> str:
     return f"write for example {option} chamber.diameter=4:8:0.5{more}"
 
 
-def _range(key: str, parts: Sequence[str], given: str, example: str) -> Varied:
+def _range(key: str, parts: Sequence[str], words: str, example: str) -> Varied:
     try:
         # The number in mm if it has a unit.
         start, stop, *step = (Decimal(repr(millimetres(part))) for part in parts)
     except ValueError as error:
-        raise DesignError(f"{given}: START, STOP and STEP {error}") from None
+        raise DesignError(f"{words}: START, STOP and STEP {error}") from None
     if len(step) > 1:
-        raise DesignError(f"{given} is not START:STOP:STEP; {example}")
+        raise DesignError(f"{words} is not START:STOP:STEP; {example}")
     if stop < start:
-        raise DesignError(f"{given} stops below its start; write the smaller number first")
+        raise DesignError(f"{words} stops below its start; write the smaller number first")
     if not step:
         return Varied(key, (), float(start), float(stop))
     by = step[0]
     if by <= 0:
-        raise DesignError(f"{given}: STEP = {by} must be above 0")
+        raise DesignError(f"{words}: STEP = {by} must be above 0")
     count = int((stop - start) / by) + 1
     if count > MOST_VALUES:
         raise DesignError(
-            f"{given} gives {count:,} values, and at most {MOST_VALUES:,} are allowed; make STEP "
+            f"{words} gives {count:,} values, and at most {MOST_VALUES:,} are allowed; make STEP "
             "larger"
         )
     kind = int if start == int(start) and by == int(by) else float

@@ -233,10 +233,10 @@ def simulator(name: str) -> Simulator:
 
 def refuse_unused(name: str, request: SimulationRequest) -> None:
     """Raises DesignError for an unknown simulator, and for a setting that it does not use."""
-    uses = {other: simulator(other).USES for other in dict.fromkeys((name, *NAMES))}
+    uses = {each_name: simulator(each_name).USES for each_name in dict.fromkeys((name, *NAMES))}
     for setting in sorted({each for used in uses.values() for each in used}):
         if getattr(request, setting) not in (None, {}) and setting not in uses[name]:
-            users = [other for other in NAMES if setting in uses[other]]
+            users = [each_name for each_name in NAMES if setting in uses[each_name]]
             raise DesignError(f"{setting} is for {' and '.join(users)}; leave it out with {name}")
 
 

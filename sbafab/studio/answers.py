@@ -178,13 +178,13 @@ def _key(placed: PlacedPart) -> str:
     return hashlib.sha256(repr(decisive).encode()).hexdigest()[:24]
 
 
-def remembered(kept: dict[str, Kept], key: str, make: Callable[[], Kept], most: int) -> Kept:
+def remembered(cache: dict[str, Kept], key: str, make: Callable[[], Kept], most: int) -> Kept:
     """Return the value of a key, made if it is missing; the oldest of over ``most`` is dropped."""
-    if key not in kept:
-        kept[key] = make()
-        while len(kept) > most:
-            del kept[next(iter(kept))]
-    return kept[key]
+    if key not in cache:
+        cache[key] = make()
+        while len(cache) > most:
+            del cache[next(iter(cache))]
+    return cache[key]
 
 
 def packed(surface: Surface) -> dict[str, str]:

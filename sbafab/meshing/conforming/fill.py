@@ -334,14 +334,14 @@ def formed(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> list[FormedFi
 
 def _fill(stack: Layup, fill_ul: float | Fill) -> Fill:
     names = [chamber.name for chamber in stack.laminate.chambers]
-    given = fill_ul if isinstance(fill_ul, Mapping) else dict.fromkeys(names, fill_ul)
-    unknown = [name for name in given if name not in names]
+    volumes = fill_ul if isinstance(fill_ul, Mapping) else dict.fromkeys(names, fill_ul)
+    unknown = [name for name in volumes if name not in names]
     if unknown:
         raise DesignError(
             f"fill names chamber {unknown[0]}, which is not there; "
             f"the chambers are {', '.join(names)}"
         )
-    amounts = {name: float(given.get(name, 0.0)) for name in names}
+    amounts = {name: float(volumes.get(name, 0.0)) for name in names}
     if stack.sector is not None and len(set(amounts.values())) > 1:
         raise DesignError(
             "a mesh of a part by symmetry has the same fill in every chamber; ask for symmetry full"
