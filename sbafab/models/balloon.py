@@ -279,7 +279,9 @@ def initial_shape(balloon: Balloon, load: BalloonLoad) -> Array:
     rise = np.clip(rise, 0.05 * free, 0.8 * free)
     out = np.clip((flat - balloon.neck) / free, 0.0, 1.0)[:, None]
     pulled = load.tied & (load.half > rise)
-    z = np.where(pulled, load.half, rise) * np.where(pulled, 1 - out, 1 - out**2)
+    # A film without a neck would begin with a kink at the axis.
+    is_cone = pulled & (balloon.neck > 0)
+    z = np.where(pulled, load.half, rise) * np.where(is_cone, 1 - out, 1 - out**2)
     z = np.minimum(z, load.half + 1 / PLATE_STIFFNESS)
     return coordinates(np.tile(flat, (len(rise), 1)), z.T)
 
