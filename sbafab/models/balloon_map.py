@@ -263,15 +263,15 @@ def refuse_outside(pressures: Array, most_pressure: float) -> None:
 
 
 @lru_cache(maxsize=64)
-def _stiffened(made: BalloonMap, ratio: float) -> BalloonMap:
+def _stiffened(original: BalloonMap, ratio: float) -> BalloonMap:
     """Return ``made.stiffened(ratio)``, cached so that it keeps its range."""
     return BalloonMap(
-        made.balloon.stiffened(ratio),
-        ratio * made.most_pressure,
-        made.most_height,
-        ratio * made.coefficients,
-        ratio * made.scale_pressure,
-        made.base or made,
+        original.balloon.stiffened(ratio),
+        ratio * original.most_pressure,
+        original.most_height,
+        ratio * original.coefficients,
+        ratio * original.scale_pressure,
+        original.base or original,
     )
 
 
@@ -674,19 +674,21 @@ def map_range(made: BalloonMap) -> MapRange:
     return MapRange(ratio * pressures, heights, within)
 
 
-def _base(made: BalloonMap) -> tuple[BalloonMap, float]:
+def _base(stiffened_map: BalloonMap) -> tuple[BalloonMap, float]:
     """Return the map that one was stiffened from, and the ratio of their moduli."""
-    base = made.base or made
-    return base, made.scale_pressure / base.scale_pressure
+    base = stiffened_map.base or stiffened_map
+    return base, stiffened_map.scale_pressure / base.scale_pressure
 
 
-def _grid(made: BalloonMap, offset: float) -> tuple[Array, Array]:
+def _grid(checked_map: BalloonMap, offset: float) -> tuple[Array, Array]:
     """Return the pressures and the heights of the checks, ``offset`` cells further."""
     x = (np.arange(PRESSURE_CHECKS) + offset) / (PRESSURE_CHECKS - 1)
-    scale = made.scale_pressure
-    pressures = scale * np.sinh(x * math.asinh(made.most_pressure / scale))
+    scale = checked_map.scale_pressure
+    pressures = scale * np.sinh(x * math.asinh(checked_map.most_pressure / scale))
     y = (np.arange(HEIGHT_CHECKS) + offset) / (HEIGHT_CHECKS - 1)
-    return np.minimum(pressures, made.most_pressure), made.most_height * (y + y**2) / 2
+    return np.minimum(pressures, checked_map.most_pressure), checked_map.most_height * (
+        y + y**2
+    ) / 2
 
 
 def _is_near(made: BalloonMap, pressures: Array, heights: Array) -> NDArray[np.bool_]:
@@ -696,7 +698,7 @@ def _is_near(made: BalloonMap, pressures: Array, heights: Array) -> NDArray[np.b
     return (relative_errors(made, p, h) <= CELL_ERROR).reshape(grids[0].shape)
 
 
-def relative_errors(made: BalloonMap, pressure: Array, height: Array) -> Array:
+def relative_errors(checked_map: BalloonMap, pressure: Array, height: Array) -> Array:
     """Return the larger relative error of a map in force and volume, against balloons between
     plates computed at its places (n,), heights above 0. Raises DesignError if one has no
     equilibrium.
@@ -704,12 +706,12 @@ def relative_errors(made: BalloonMap, pressure: Array, height: Array) -> Array:
     Forces are compared as shares of pressure (and 0.1 kPa) times pocket, and the force; volumes as
     shares of the volume and of what a pocket holds at the least height computed.
     """
-    exact = compressed_shapes(made.balloon, pressure, height, tied=True)
-    area = math.pi * made.balloon.pocket**2
+    exact = compressed_shapes(checked_map.balloon, pressure, height, tied=True)
+    area = math.pi * checked_map.balloon.pocket**2
     push = area * (pressure + LOW_PRESSURE) + np.abs(exact.force)
     room = exact.volume + area * LEAST_HEIGHT
-    force = np.abs(made.force(pressure, height) - exact.force) / push
-    return np.maximum(force, np.abs(made.volume(pressure, height) - exact.volume) / room)
+    force = np.abs(checked_map.force(pressure, height) - exact.force) / push
+    return np.maximum(force, np.abs(checked_map.volume(pressure, height) - exact.volume) / room)
 
 
 def holds_at(made: BalloonMap, pressure: Array, height: Array) -> NDArray[np.bool_]:

@@ -153,9 +153,11 @@ class SizeRange(Section):
         """Return the relative standard deviation that is assumed for sizes off the evidence."""
         missed = [OTHER_FILM if is_other_film else 0.0]
         for name, rate in PER_DOUBLING.items():
-            of, known = getattr(self, name), getattr(evidence, name)
-            if of is not None and known is not None:
-                missed.append(rate * math.log2(max(known[0] / of[0], of[1] / known[1], 1.0)))
+            of, evidence_range = getattr(self, name), getattr(evidence, name)
+            if of is not None and evidence_range is not None:
+                missed.append(
+                    rate * math.log2(max(evidence_range[0] / of[0], of[1] / evidence_range[1], 1.0))
+                )
         return math.hypot(*missed)
 
 

@@ -401,17 +401,17 @@ class Column:
                 at = np.minimum(at, max(room, 0.0)) * (1.0, 0.0, 0.0)
             rest = np.arange(len(pressures))
         else:
-            found = self._balanced(springs, pressures, load, start)
-            rest = np.flatnonzero(~found.is_found)
+            states = self._balanced(springs, pressures, load, start)
+            rest = np.flatnonzero(~states.is_found)
             at = start[rest]
             if not rest.size:
-                return found
+                return states
         some, p = springs.at(rest), pressures[rest]
         for stiffness in SOFT_PLATES:
             softer = load._replace(stiffness=stiffness)
             at = self._balanced(some, p, softer, at, ROUGH_STEP, SOFT_STEPS).freedoms
         last = self._balanced(some, p, load, at)
-        return last if start is None else found.replaced(rest, last)
+        return last if start is None else states.replaced(rest, last)
 
     def _balanced(
         self,

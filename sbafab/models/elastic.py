@@ -158,12 +158,12 @@ def _rises(
         return [{} for _ in actuators]
     kinds = [_attempt(_drawn, of) for of in actuators]
     ratios = [of.factors.modulus_ratio for of in actuators]
-    asked: dict[Balloon, dict[float, None]] = {}
+    pressures_of: dict[Balloon, dict[float, None]] = {}
     for each, ratio in zip(kinds, ratios, strict=True):
         for kind in () if isinstance(each, DesignError) else each:
-            asked.setdefault(kind, {}).update(dict.fromkeys(p / ratio for p in pressures))
+            pressures_of.setdefault(kind, {}).update(dict.fromkeys(p / ratio for p in pressures))
     shapes: dict[tuple[Balloon, float], Shapes | DesignError] = {}
-    for kind, at in asked.items():
+    for kind, at in pressures_of.items():
         together = _attempt(free_shapes, kind, [*at])
         for row, p in enumerate(at):
             # A balloon without an equilibrium spoils no other.
@@ -231,11 +231,11 @@ def chamber_clearances(posed: Sequence[tuple[Stack, Pose]]) -> list[float]:
     radii: dict[Balloon, dict[tuple[float, float], float]] = {}
     for balloon, state in (each for levels in states for row in levels for each in row):
         radii.setdefault(balloon, {})[state] = 0.0
-    for balloon, known in radii.items():
-        pressures, heights = np.array([*known]).T
+    for balloon, radius_at in radii.items():
+        pressures, heights = np.array([*radius_at]).T
         shapes = inflate(balloon, pressures, heights, tied=True)
         widest = shapes.r[:, balloon.neck_edge : balloon.edge + 1].max(-1)
-        known.update(zip([*known], widest.tolist(), strict=True))
+        radius_at.update(zip([*radius_at], widest.tolist(), strict=True))
     rooms = []
     for (whole, _), levels in zip(posed, states, strict=True):
         wide = np.array([[radii[balloon][state] for balloon, state in row] for row in levels])
@@ -496,9 +496,9 @@ def _bent_forces(
     usual = {k: guides[at][0].pressures[0] for k, at in enumerate(conditions) if at in guides}
     near = {k: (kpa / NEARBY, kpa * NEARBY) for k, kpa in usual.items()}
     poses = poses_bent_by(stack, bends, near)
-    for (chambers, angle), at, found in zip(bends, conditions, poses, strict=True):
-        is_far = found is None and at in guides
-        pose = pose_bent_by(stack, chambers, angle) if is_far else found
+    for (chambers, angle), at, nearby in zip(bends, conditions, poses, strict=True):
+        is_far = nearby is None and at in guides
+        pose = pose_bent_by(stack, chambers, angle) if is_far else nearby
         if pose is None or pose.pressures[0] > pressure:
             yield LeftOut(quantity.named(at), "it does not bend so far", (quantity,)), None
             continue

@@ -52,9 +52,9 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Return the observation ``dt`` s later, the reward, if it arrived, and if time is over."""
-        seen, rewards, is_there, is_late, info = self._one.moved(np.asarray(action)[None])
+        observations, rewards, is_there, is_late, info = self._one.moved(np.asarray(action)[None])
         is_over = bool(is_there[0]), bool(is_late[0])
-        return seen[0], float(rewards[0]), *is_over, {"time": float(info["time"][0])}
+        return observations[0], float(rewards[0]), *is_over, {"time": float(info["time"][0])}
 
 
 class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
@@ -148,11 +148,11 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         shares = (np.clip(np.asarray(actions, dtype=float), -1.0, 1.0) + 1) / 2
         self._motion.step(self.dt, shares * self.most_pressure)
         self._left -= 1
-        seen = self._observations()
-        away = np.linalg.norm(seen[:, 6:9], axis=1)
+        observations = self._observations()
+        away = np.linalg.norm(observations[:, 6:9], axis=1)
         is_there, is_late = away <= self.near, self._left <= 0
         self._is_over = is_there | is_late
-        return seen, -away, is_there, is_late, {"time": self._motion.times.copy()}
+        return observations, -away, is_there, is_late, {"time": self._motion.times.copy()}
 
     def _begin(self, which: NDArray[np.bool_], target: Any = None) -> None:
         """Begin an episode of some of the environments."""

@@ -353,7 +353,7 @@ class Prediction:
         if len(matching) == 1:
             return matching[0]
         every = named or [figure for figure in self.figures if figure.quantity is sought]
-        reasons = [left.reason for left in self.left_out if sought in left.quantities]
+        reasons = [omitted.reason for omitted in self.left_out if sought in omitted.quantities]
         why = "; ".join(f"{figure.at.as_dict()} by {figure.model.id}" for figure in every)
         why = f"there are {why}" if why else (reasons or ["it is not predicted"])[0]
         by = f" by {model}" if model else ""
@@ -480,9 +480,9 @@ def _main_figures(figures: Sequence[Figure]) -> Iterator[tuple[str, Figure]]:
 def _of(figures: Sequence[Figure], *quantities: Quantity) -> list[Figure]:
     """Return the figures of the first of the quantities that has any."""
     for quantity in quantities:
-        found = [figure for figure in figures if figure.quantity is quantity]
-        if found:
-            return found
+        of_quantity = [figure for figure in figures if figure.quantity is quantity]
+        if of_quantity:
+            return of_quantity
     return []
 
 

@@ -60,13 +60,13 @@ def reached(
     """Return the poses whose tips stand at places (n, 3) in mm, with 0 to ``most_pressure`` in kPa;
     ``near`` is a pose to start from. Raises UnreachableError with the nearest tip found.
     """
-    found = []
+    states = []
     for begin in range(0, max(len(places), 1), TOGETHER):
         part = places[begin : begin + TOGETHER]
         search = Search(column, load, part, float(place_of(most_pressure)))
         search.run(near)
-        found.append(search.best)
-    return BatchPoses.joined(found)
+        states.append(search.best)
+    return BatchPoses.joined(states)
 
 
 class Search:
@@ -122,24 +122,24 @@ class Search:
         """
         if not rest.size:
             return
-        found, forces = self.column.states(self.load, pressure_at(x[rest]), at[rest]), None
+        states, forces = self.column.states(self.load, pressure_at(x[rest]), at[rest]), None
 
         def ahead(which: NDArray[np.int_], now: Linearised, x: Array, moves: Array) -> Array:
             return self._ahead(self.places[rest[which]], now, x, moves)
 
         for stiffness in soft:
             assert self.load is not None
-            found = replace(found, load=self.load._replace(stiffness=stiffness))
-            forces, found = together(found, ahead, self.ends, SOFT_STEPS, ROUGH, forces)
-        found = replace(found, load=self.load)
-        _, found = together(found, ahead, self.ends, STEPS, forces=forces)
+            states = replace(states, load=self.load._replace(stiffness=stiffness))
+            forces, states = together(states, ahead, self.ends, SOFT_STEPS, ROUGH, forces)
+        states = replace(states, load=self.load)
+        _, states = together(states, ahead, self.ends, STEPS, forces=forces)
         # A straight column that would buckle, unless a stable equilibrium is near.
-        unstable = np.flatnonzero(found.is_found & ~found.is_stable)
+        unstable = np.flatnonzero(states.is_found & ~states.is_stable)
         if unstable.size:
-            some = found.part(unstable)
+            some = states.part(unstable)
             again = self.column.equilibria(some.pressures, self.load, some.freedoms)
-            found = found.replaced(unstable, again)
-        self._take(rest, found)
+            states = states.replaced(unstable, again)
+        self._take(rest, states)
 
     def _ahead(self, places: Array, now: Linearised, x: Array, moves: Array) -> Array:
         """Return the steps of coordinates (n, chambers), as of ``together``."""
@@ -207,16 +207,16 @@ class Search:
 
     # The nearest states.
 
-    def _take(self, which: NDArray[np.int_], found: BatchPoses) -> None:
+    def _take(self, which: NDArray[np.int_], states: BatchPoses) -> None:
         """Keep states for some of the places if they are nearer."""
-        missing = self.places[which] - found.tips
-        away = np.where(found.is_met, np.linalg.norm(missing, axis=-1), math.inf)
+        missing = self.places[which] - states.tips
+        away = np.where(states.is_met, np.linalg.norm(missing, axis=-1), math.inf)
         is_end = away < NEAR
         if self.wall is not None:
             along = np.linalg.norm(movable(self.wall, missing), axis=-1)
             is_end = (away < MET) & (along < MET / 2)
         good = away < self.away[which]
-        self.best = self.best.replaced(which[good], found.part(good))
+        self.best = self.best.replaced(which[good], states.part(good))
         self.away[which[good]], self.is_over[which[good]] = away[good], is_end[good]
 
     def _settle_for_met(self) -> None:

@@ -251,15 +251,15 @@ def packing(
     most = int((bases != 0).sum(-1).max())
     columns = np.argsort(bases == 0, axis=-1, kind="stable")[..., :most]
     weights = np.take_along_axis(bases, columns, -1)
-    found = []
+    entries = []
     for one, other in product(range(most), repeat=2):
         a, b = columns[part, first, one], columns[part, second, other]
         weight = weights[part, first, one] * weights[part, second, other]
         good = (weight != 0) & (is_pair | (a <= b))
         twice = np.where(is_pair & (a == b), 2.0, 1.0)
         each = np.minimum(a, b), np.abs(a - b), source, weight * twice
-        found.append([values[good] for values in each])
-    row, off, sources, weight = (np.concatenate(each) for each in zip(*found, strict=True))
+        entries.append([values[good] for values in each])
+    row, off, sources, weight = (np.concatenate(each) for each in zip(*entries, strict=True))
     wide = int(off.max()) + 1
     order = np.argsort(row * wide + off, kind="stable")
     into, starts = np.unique((row * wide + off)[order], return_index=True)

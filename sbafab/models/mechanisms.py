@@ -56,8 +56,8 @@ class MeasuredPocket(NamedTuple):
     def film_stiffness(self) -> float | None:
         """Young's modulus times thickness of the weaker film in N/mm; None if one is unknown."""
         films = self.interface.below.film, self.interface.above.film
-        known = [film.elastic[0] * film.thickness for film in films if film.elastic is not None]
-        return min(known) if len(known) == len(films) else None
+        modulus = [film.elastic[0] * film.thickness for film in films if film.elastic is not None]
+        return min(modulus) if len(modulus) == len(films) else None
 
 
 def pockets_of(
@@ -66,8 +66,8 @@ def pockets_of(
     """Return the pockets at a chamber's centres; None if one has no room beside its strips."""
     strips = [inlet.width for inlet in laminate.inlets if inlet.chamber == chamber.name]
     back = max(strips, default=0.0) / 2 + SEPARATE
-    found = [_pocket(laminate, centre, back, direction) for centre in chamber.centres]
-    return [pocket for pocket in found if pocket] if all(found) else None
+    pockets = [_pocket(laminate, centre, back, direction) for centre in chamber.centres]
+    return [pocket for pocket in pockets if pocket] if all(pockets) else None
 
 
 def _pocket(

@@ -112,9 +112,9 @@ class Intake(NamedTuple):
         """Return the poses at the end. Raises DesignError for the first state that has none."""
         size = CHUNK if self.begin.load is None else LOADED_CHUNK
         parts = [slice(first, first + size) for first in range(0, len(self.begin), size)]
-        found = BatchPoses.joined([self.at(part).together() for part in parts])
-        rest = np.flatnonzero(~found.is_met)
-        return found.replaced(rest, self.at(rest).descent()) if rest.size else found
+        states = BatchPoses.joined([self.at(part).together() for part in parts])
+        rest = np.flatnonzero(~states.is_met)
+        return states.replaced(rest, self.at(rest).descent()) if rest.size else states
 
     def ahead(self, which: Any, now: Linearised, x: Array, moves: Array) -> Array:
         """Return Newton's steps of the pressures' coordinates (n, chambers) of some of the states,
@@ -138,9 +138,9 @@ class Intake(NamedTuple):
 
     def together(self) -> BatchPoses:
         """Return the states by Newton's method for freedoms and pressures together."""
-        _, found = together(self.begin, self.ahead, self.ends, MOTION_STEPS)
-        is_within = (found.pressures < self.begin.column.most_pressure).all(1)
-        return replace(found, is_found=found.is_found & found.is_stable & is_within)
+        _, states = together(self.begin, self.ahead, self.ends, MOTION_STEPS)
+        is_within = (states.pressures < self.begin.column.most_pressure).all(1)
+        return replace(states, is_found=states.is_found & states.is_stable & is_within)
 
     def descent(self) -> BatchPoses:
         """Return the states, from equilibrium to equilibrium by Newton's method with a line search.
@@ -163,15 +163,15 @@ class Intake(NamedTuple):
             moves = np.concatenate([np.zeros((*moves.shape[:2], 1)), moves], axis=-1)
             ahead = self.ahead(slice(None), at, x, moves) * ~rests.all(1)[:, None]
             tried = np.clip(x + share[:, None] * ahead, *ends)
-            found = self._equilibria(tried, now.freedoms)
-            missed, _ = self.excess(found.volumes, found.pressures)
+            candidates = self._equilibria(tried, now.freedoms)
+            missed, _ = self.excess(candidates.volumes, candidates.pressures)
             still = (tried > ends[0]) & (tried < ends[1])
             slope = np.where(still, missed * pressure_rate(tried) * ahead, 0.0).sum(1)
             steep = (wrong * rate * ahead).sum(1)
-            good = found.is_met & ((slope <= -OVERSHOT * steep) | (share < LEAST_SHARE))
+            good = candidates.is_met & ((slope <= -OVERSHOT * steep) | (share < LEAST_SHARE))
             less = np.clip(steep / np.minimum(steep - slope, -1e-100), 0.1, 0.7)
-            share = np.where(good, 1.0, share * np.where(found.is_met, less, 0.5))
-            x, now = np.where(good[:, None], tried, x), now.replaced(good, found.part(good))
+            share = np.where(good, 1.0, share * np.where(candidates.is_met, less, 0.5))
+            x, now = np.where(good[:, None], tried, x), now.replaced(good, candidates.part(good))
         raise DesignError(
             "no equilibrium of the stack found at the end of this step; try a shorter one"
         )

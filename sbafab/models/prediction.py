@@ -102,8 +102,8 @@ def predict(
     Raises DesignError if the design cannot be built, or for pressures, a flow or volumes that
     are out of range.
     """
-    asked = request or PredictionRequest()
-    uncertainty, checks_maps = None, asked.calibration is None
+    asked_request = request or PredictionRequest()
+    uncertainty, checks_maps = None, asked_request.calibration is None
     try:
         flat = laminate or build(design)
     except GeometryError as error:
@@ -111,15 +111,17 @@ def predict(
     discs = near_discs(design)
     discs = discs if discs and discs.is_round else None
     form = discs and discs.form(design, discs.equal)
-    if asked.calibration is None:
-        uncertainty = uncertainty_of(design, asked.overrides, flat, form)
-        factors = uncertainty.factors if uncertainty else factors_of(design, asked.overrides)
-        asked = replace(asked, calibration=factors)
-    subject = Actuator(design, flat, asked.factors, form)
-    _check_request(subject, asked)
-    burst_at = [(pressure, _past_burst(flat, pressure)) for pressure in asked.pressures_kpa]
+    if asked_request.calibration is None:
+        uncertainty = uncertainty_of(design, asked_request.overrides, flat, form)
+        factors = (
+            uncertainty.factors if uncertainty else factors_of(design, asked_request.overrides)
+        )
+        asked_request = replace(asked_request, calibration=factors)
+    subject = Actuator(design, flat, asked_request.factors, form)
+    _check_request(subject, asked_request)
+    burst_at = [(pressure, _past_burst(flat, pressure)) for pressure in asked_request.pressures_kpa]
     past = [LeftOut(f"all figures at {kpa:g} kPa", why) for kpa, why in burst_at if why]
-    request = replace(asked, pressures_kpa=tuple(kpa for kpa, why in burst_at if not why))
+    request = replace(asked_request, pressures_kpa=tuple(kpa for kpa, why in burst_at if not why))
     moved = uncertainty.moved if uncertainty else ()
     (state, *others), guides = _states(subject, moved, request, quick), elastic.Guides()
     items = _figures(state, request, guides, checks_maps=checks_maps)
@@ -143,7 +145,7 @@ def predict(
         uncertainty is not None,
     )
     return Prediction(
-        asked,
+        asked_request,
         tuple(replace(figure, measured=_measured(figure, subject)) for figure in figures),
         relations,
         tuple(item for item in items if isinstance(item, LeftOut)),

@@ -97,10 +97,10 @@ def with_waves(balloon: Balloon, shapes: Shapes) -> Shapes:
     rows = np.flatnonzero(shapes.pressure < _rung_pressure(balloon, RUNGS))
     if not resolves_waves(balloon) or not len(rows):
         return shapes
-    found = rippled(balloon, shapes.pressure[rows])
-    grown = _have_waves(balloon, found.edge, found.outside)
+    resolved_balloons = rippled(balloon, shapes.pressure[rows])
+    grown = _have_waves(balloon, resolved_balloons.edge, resolved_balloons.outside)
     parts = [part.copy() for part in shapes]
-    for part, resolved in zip(parts, found.shapes, strict=True):
+    for part, resolved in zip(parts, resolved_balloons.shapes, strict=True):
         part[rows[grown]] = resolved[grown]
     return Shapes(*parts)
 

@@ -102,18 +102,18 @@ def sensitivities(
     """
     factors = factors or factors_of(design)
 
-    def made(key: str = "", value: float = 0.0) -> Stack:
+    def stack_with(key: str = "", value: float = 0.0) -> Stack:
         other = design.with_({key: value}) if key else design
         return stack(other, most_pressure=most_pressure, factors=factors)
 
-    whole = made()
+    whole = stack_with()
     pose = whole.pose(pressures, **load)
     at = linearised_poses(whole.states_of(pose, whole.acting(load)))
     rows = []
     for key in keys:
         value = _value(design, key)
         if isinstance(value, int):
-            ends = [made(key, value + side) for side in (-1, 1)]
+            ends = [stack_with(key, value + side) for side in (-1, 1)]
             low, high = (each.pose(pressures, **load) for each in ends)
             flat = (ends[1].flat_height - ends[0].flat_height) / 2
             rows.append(Sensitivity(key, value, pose, _difference(low, high), flat))
@@ -121,7 +121,7 @@ def sensitivities(
             rows.append(Sensitivity(key, value, pose, _by_modulus(at, pose, value), 0.0))
         else:
             step = SHARE * value
-            around = whole, made(key, value - step), made(key, value + step)
+            around = whole, stack_with(key, value - step), stack_with(key, value + step)
             rows.append(_by_key(key, value, around, at, pose, load, step))
     return rows
 
@@ -225,14 +225,16 @@ def _by_key(
 
 
 def _held(
-    other: Stack, freedoms: Array, pose: Pose, load: dict[str, Any], forces: Array | None
+    changed_stack: Stack, freedoms: Array, pose: Pose, load: dict[str, Any], forces: Array | None
 ) -> tuple[Array, Array, Array, Array]:
     """Return of a stack with its plates held the slope (1, freedoms) of its energy against given
     contact forces, volumes (1, chambers), tip (1, 3) in mm and depths in an outer plate (1, points)
     in mm.
     """
-    springs = other.springs(np.array([pose.pressures]), sucked=True, by_level=True)
-    now = energy(springs, other.pitch, other.acting(load) or NO_LOAD, freedoms, forces)
+    springs = changed_stack.springs(np.array([pose.pressures]), sucked=True, by_level=True)
+    now = energy(
+        springs, changed_stack.pitch, changed_stack.acting(load) or NO_LOAD, freedoms, forces
+    )
     deep = np.zeros((1, 0)) if now.touch is None else now.touch.deep
     volumes = springs.order(freedoms, 1, with_rates=False)[0].sum(1)
-    return now.gradient, volumes, plate_chain(freedoms, other.pitch).tip, deep
+    return now.gradient, volumes, plate_chain(freedoms, changed_stack.pitch).tip, deep

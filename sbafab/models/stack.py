@@ -160,13 +160,13 @@ class StackBatch:
         ``near`` are N poses to start from; ``load`` are keyword arguments of ``Stack.pose`` beside
         pressures. Raises DesignError as ``Stack.pose`` does, for the first state that has no pose.
         """
-        asked = self.stack.table(pressures)
-        if near is not None and len(near.freedoms) != len(asked):
+        table = self.stack.table(pressures)
+        if near is not None and len(near.freedoms) != len(table):
             raise DesignError(
-                f"near has {len(near.freedoms)} poses for {len(asked)} states; give one a state"
+                f"near has {len(near.freedoms)} poses for {len(table)} states; give one a state"
             )
         start = None if near is None else near.freedoms
-        return self.stack.equilibria(asked, self.stack.acting(load), start).met()
+        return self.stack.equilibria(table, self.stack.acting(load), start).met()
 
     @one_blas_thread
     def reach(self, tips: ArrayLike, most_pressure: float | None = None, **load: Any) -> BatchPoses:

@@ -34,7 +34,7 @@ def descent(
     of ``Energy``.
     """
     count = len(start)
-    found, pushes = start.copy(), np.zeros(count)
+    equilibria, pushes = start.copy(), np.zeros(count)
     is_stable, is_found = np.zeros((2, count), dtype=bool)
     live, at, before = np.arange(count), start, np.full(count, FINE)
     now = energies(live, at)
@@ -55,7 +55,7 @@ def descent(
             is_firm[is_over] = is_positive_definite(matrix[is_over]).all(1)
             is_over &= is_still | is_firm
             which, ends = live[is_over], (is_last & is_firm)[is_over]
-            found[which] = at[is_over] + np.where(ends[:, None, None], move[is_over], 0.0)
+            equilibria[which] = at[is_over] + np.where(ends[:, None, None], move[is_over], 0.0)
             pushes[which], is_stable[which] = push[is_over], is_firm[is_over]
             is_found[which] = True
             goes = ~is_over
@@ -78,8 +78,8 @@ def descent(
         before = np.where(share == 1, largest, 0.0)
         at = at + share[:, None, None] * move
     else:
-        found[live] = at
-    return found, pushes, is_stable, is_found
+        equilibria[live] = at
+    return equilibria, pushes, is_stable, is_found
 
 
 def newton_step(gradient: Array, matrix: Array, is_strict: bool) -> Array:

@@ -119,14 +119,14 @@ def force_motions(arms: Array, forces: Array) -> Array:
     From the sum of x f (..., 3, 3) and of f (..., 3) over the points. The first three of the last
     axis are the sum of (motion of x) x f, the fourth is the sum of (motion of x) . f.
     """
-    found = np.empty((*forces.shape[:-1], 6, 4))
+    matrix = np.empty((*forces.shape[:-1], 6, 4))
     # (turn x x) x f is x (turn . f) less turn (x . f).
     trace = np.trace(arms, axis1=-2, axis2=-1)[..., None, None]
-    found[..., :3, :3] = arms.swapaxes(-1, -2) - trace * np.eye(3)
-    found[..., :3, 3] = arms.reshape(*forces.shape[:-1], 9) @ FLAT_CROSS.T
-    found[..., 3:, :3] = -crossing(forces)
-    found[..., 3:, 3] = forces
-    return found
+    matrix[..., :3, :3] = arms.swapaxes(-1, -2) - trace * np.eye(3)
+    matrix[..., :3, 3] = arms.reshape(*forces.shape[:-1], 9) @ FLAT_CROSS.T
+    matrix[..., 3:, :3] = -crossing(forces)
+    matrix[..., 3:, 3] = forces
+    return matrix
 
 
 # Springs of the levels: energy of balloons and of rims that meet.

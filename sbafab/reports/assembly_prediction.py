@@ -363,12 +363,12 @@ class _Scene:
         apart = {placed.name, placed.part.on, *self._moving(placed.name)}
         names = [part.name for part in self.assembled.parts]
         apart.update(name for name in names[: names.index(placed.name)] if name in self.stacks)
-        for other, theirs in self.solids.items():
+        for second, theirs in self.solids.items():
             volume = 0.0
-            if other not in apart:
+            if second not in apart:
                 volume = _shared_volume(self.solids[placed.name], theirs)
             if volume > TOUCH:
-                yield Touch(placed.name, other, volume)
+                yield Touch(placed.name, second, volume)
 
     def bends(
         self, placed: PlacedSba, pause: Callable[[], None]

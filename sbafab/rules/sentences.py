@@ -90,8 +90,8 @@ class _Teller(string.Formatter):
         if key in kwargs:
             fact = kwargs[str(key)]
         else:
-            own = f"{self.rule}.{key}"
-            fact = Clause(own if is_said(own) else f"{WORDS}.{key}")
+            value = f"{self.rule}.{key}"
+            fact = Clause(value if is_said(value) else f"{WORDS}.{key}")
         return tell(fact, kwargs) if isinstance(fact, Clause) else fact
 
     def format_field(self, value: Any, format_spec: str) -> str:
