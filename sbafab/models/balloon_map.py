@@ -264,7 +264,7 @@ def refuse_outside(pressures: Array, most_pressure: float) -> None:
 
 @lru_cache(maxsize=64)
 def _stiffened(original: BalloonMap, ratio: float) -> BalloonMap:
-    """Return ``made.stiffened(ratio)``, cached so that it keeps its range."""
+    """Return ``original.stiffened(ratio)``, cached so that it keeps its range."""
     return BalloonMap(
         original.balloon.stiffened(ratio),
         ratio * original.most_pressure,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 from sbafab.actuators import build
 from sbafab.design.records import REGISTRATIONS, Design
@@ -20,9 +20,6 @@ from sbafab.rules.deck import run_deck
 from sbafab.rules.registration_yield import SEED, Share, simulate
 from sbafab.runtime import Progress, ignore_progress
 from sbafab.search.vary import KeyDifference
-
-if TYPE_CHECKING:
-    from sbafab.search.compare import DesignComparison
 
 STEP = 0.01
 """mm: bond and overhang are advised in whole steps."""
@@ -122,7 +119,7 @@ class YieldDesign:
     ``changes`` are keys with their old and new value. ``share`` is counted on the changed design by
     another seed, or on the given one if that is enough; ``best`` and ``best_changes`` are the best
     that was reached where nothing is enough. ``fixed``: keys that were not changed although a
-    change might have helped. ``comparison`` has the figures of both designs, if one was changed.
+    change might have helped. ``comparison``, a ``DesignComparison``, has the figures of both, if one was changed.
     """
 
     target: float
@@ -133,7 +130,7 @@ class YieldDesign:
     best: Share | None = None
     best_changes: tuple[KeyDifference, ...] = ()
     fixed: tuple[str, ...] = ()
-    comparison: DesignComparison | None = field(default=None, repr=False)
+    comparison: Any = field(default=None, repr=False)
 
     @property
     def sentence(self) -> str:
