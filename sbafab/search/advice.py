@@ -119,7 +119,8 @@ class YieldDesign:
     ``changes`` are keys with their old and new value. ``share`` is counted on the changed design by
     another seed, or on the given one if that is enough; ``best`` and ``best_changes`` are the best
     that was reached where nothing is enough. ``fixed``: keys that were not changed although a
-    change might have helped. ``comparison``, a ``DesignComparison``, has the figures of both, if one was changed.
+    change might have helped. ``comparison``, a ``DesignComparison``, has the figures of both, if
+    one was changed.
     """
 
     target: float
