@@ -103,4 +103,4 @@ def test_the_grippers_right_cavity_goes_through_its_via() -> None:
     # Pouch; channel down to its corner, along and at its end; the via through a film of 0.1 mm.
     lower, upper = 16 * 14, 3.4 * (24 - 2.3) + 3.4 * 25 + 3.4 * 3.8
     expected = 0.025 * (lower + upper) + 0.1 * math.pi * 0.52**2
-    assert cavity(laminate, right, 1e-4).volume == pytest.approx(expected, rel=1e-4)
+    assert cavity(laminate, right).volume == pytest.approx(expected, rel=1e-4)
