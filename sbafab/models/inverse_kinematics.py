@@ -133,12 +133,13 @@ class Search:
             forces, states = together(states, ahead, self.ends, SOFT_STEPS, ROUGH, forces)
         states = replace(states, load=self.load)
         _, states = together(states, ahead, self.ends, STEPS, forces=forces)
-        # A straight column that would buckle, unless a stable equilibrium is near.
-        unstable = np.flatnonzero(states.is_found & ~states.is_stable)
-        if unstable.size:
-            some = states.part(unstable)
+        # A straight column would buckle, unless a stable equilibrium is near; and against a plate,
+        # which is hard, the push is that of an equilibrium alone.
+        loose = np.flatnonzero(states.is_found & (~states.is_stable | (self.wall is not None)))
+        if loose.size:
+            some = states.part(loose)
             again = self.column.equilibria(some.pressures, self.load, some.freedoms)
-            states = states.replaced(unstable, again)
+            states = states.replaced(loose, again)
         self._take(rest, states)
 
     def _ahead(self, places: Array, now: Linearised, x: Array, moves: Array) -> Array:
