@@ -76,6 +76,14 @@ def hint(name: object, names: Iterable[str], others: str = "") -> str:
     return suggestion(name, names)[2:] or others or f"there are {listed(names)}"
 
 
+def is_file(path: Path) -> bool:
+    """Return True for a file; False for a path that no system takes, such as one with a NUL."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def shown(value: object) -> str:
     """Return a value as it may appear in a message: short, on one line."""
     try:

@@ -20,6 +20,7 @@ from pydantic import Field
 from sbafab.design.files import (
     KITS,
     checked,
+    is_file,
     kit_names,
     listed,
     read_toml,
@@ -136,11 +137,7 @@ def kit_path(kit: object, folder: Path) -> Path:
     if kit in kit_names():
         return templates_folder() / KITS / f"{kit}.toml"
     path = folder / kit
-    try:
-        is_there = path.is_file()
-    except (OSError, ValueError):
-        is_there = False
-    if not is_there:
+    if not is_file(path):
         raise DesignError(
             f"kit = {shown(kit)} is neither a kit that ships ({', '.join(kit_names())}) nor a file "
             "beside the design; sbafab new kit writes one to start from"

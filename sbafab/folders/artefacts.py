@@ -171,7 +171,8 @@ def made_by(
 
 def write_artefacts(folder: DesignFolder, rows: Iterable[Artefact] | None = None) -> None:
     """Write the artefacts (by default all) that belong in the folder."""
-    rows_wanted = [row for row in rows or artefacts() if row.belongs_in(folder)]
+    every = artefacts() if rows is None else rows
+    rows_wanted = [row for row in every if row.belongs_in(folder)]
     drawn = [row.path for row in rows_wanted if row.top == "preview"]
     for artefact in rows_wanted:
         contents = None if artefact.render is None else artefact.render(folder)

@@ -14,6 +14,7 @@ from pathlib import Path, PurePath
 
 from filelock import FileLock, Timeout
 
+from sbafab.design.files import is_file
 from sbafab.errors import OutputError, SbafabError
 from sbafab.folders.order import SCHEMA, SCHEMAS
 
@@ -95,11 +96,7 @@ def _locked(target: Path) -> Iterator[None]:
 def refuse_file_as_folder(out: Path) -> None:
     """Raises OutputError if a folder to write into, or one above it, is a file."""
     for place in (out, *out.parents):
-        try:
-            is_file = place.is_file()
-        except (OSError, ValueError):
-            continue
-        if is_file:
+        if is_file(place):
             raise OutputError(f"{place} is a file, not a folder; choose a folder with -o")
 
 

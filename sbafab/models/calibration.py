@@ -21,7 +21,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from sbafab.design.files import checked, listed, read_toml, shown
+from sbafab.design.files import checked, is_file, listed, read_toml, shown
 from sbafab.design.records import Design, Discs, Form
 from sbafab.design.toml_table import Section
 from sbafab.errors import DesignError
@@ -366,11 +366,7 @@ def load_calibration(
     if name in shipped_names():
         return _shipped(name)
     path = (folder or Path()) / name
-    try:
-        is_there = path.is_file()
-    except (OSError, ValueError):
-        is_there = False
-    if not is_there:
+    if not is_file(path):
         raise DesignError(
             f'{key} = {shown(name)} is neither "none", nor one that ships '
             f"({', '.join(shipped_names())}), nor a file"
