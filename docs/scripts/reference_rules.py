@@ -8,7 +8,7 @@ from pathlib import Path
 from docs.scripts.rule_pictures import pair
 from sbafab.assemblies.checks import CHECKS
 from sbafab.catalogue import names
-from sbafab.design.sections import rule_names
+from sbafab.design.files import rule_names
 from sbafab.rules.deck import EXPLAINED
 from sbafab.rules.sentences import Explanation
 

@@ -22,11 +22,9 @@ from sbafab.actuators.shapes import (
 )
 from sbafab.actuators.stacking import CutFilm, channel_pin, layers, of_every_family
 from sbafab.design.files import hint, shown
-from sbafab.design.outline import read_drawing
 from sbafab.design.polylines import polyline
 from sbafab.design.records import Design, Drawn, Form, Free, Mechanism, Wrap, card
-from sbafab.design.sections import NAME_PATTERN
-from sbafab.design.toml_table import NamedTables, Section, writable
+from sbafab.design.toml_table import NAME_PATTERN, NamedTables, Section, writable
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError, SbafabError
 from sbafab.geometry.edges import Edge, unit
@@ -289,11 +287,6 @@ class DrawnDesign(Design):
         named = {name: shape.file for name, shape in self.shapes.by_name.items()}
         files = {name: self.folder / file for name, file in named.items() if file is not None}
         return {f"shapes.{name}.file": file for name, file in files.items()}
-
-    def outlines(self) -> Iterator[Region]:
-        named = self.shapes.by_name
-        for key, file in self.drawings.items():
-            yield read_drawing(file, named[key.split(".")[1]].layer)
 
     def drawn_shapes(self) -> Mapping[str, Region | None]:
         shapes = ShapeRegions(self.shapes.by_name, self.drawings)

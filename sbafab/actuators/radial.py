@@ -31,6 +31,7 @@ from sbafab.actuators.stacking import (
     stacked,
     tab_and_strip,
 )
+from sbafab.design.outline import read_outline
 from sbafab.design.records import Design, Drawn, Form, Free, Slots, Wrap, card
 from sbafab.design.sections import Chamber as ChamberSection
 from sbafab.design.sections import Inlet, Stack
@@ -199,9 +200,8 @@ def _slot(width: float, length: float) -> Region:
 
 
 def _pocket(design: RadialDesign) -> Region:
-    drawn = next(design.outlines(), None)
-    if drawn is not None:
-        return drawn
+    if design.drawing is not None:
+        return read_outline(design.drawing)
     width, length = design.pocket
     if min(width, length) <= 0:
         raise DesignError(

@@ -24,6 +24,7 @@ from sbafab.actuators.ears import (
     with_tails,
 )
 from sbafab.design.files import listed, shown
+from sbafab.design.outline import read_outline
 from sbafab.design.records import Design, Discs, Drawn, Free
 from sbafab.design.sections import Bore as BoreSection
 from sbafab.design.sections import Chamber as ChamberSection
@@ -314,8 +315,8 @@ def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], 
         raise DesignError(
             "chamber.outline and a list in chamber.diameter exclude each other; remove one"
         )
-    drawn = next(design.outlines(), None)
-    if drawn is not None:
+    if design.drawing is not None:
+        drawn = read_outline(design.drawing)
         check_neck(design, [drawn])
         return [drawn], (0,) * design.stack.balloons
     sizes = diameters(design, chamber)

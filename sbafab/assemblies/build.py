@@ -22,11 +22,11 @@ from sbafab.design.files import (
     listed,
     override,
     read_toml,
+    rule_names,
     shown,
 )
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, validated
-from sbafab.design.sections import rule_names
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.edges import unit
 from sbafab.laminate.laminate import Inlet, Laminate

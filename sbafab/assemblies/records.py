@@ -12,17 +12,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from sbafab import catalogue
-from sbafab.design.sections import (
-    NAME_PATTERN,
-    PART_PATTERN,
-    Laser,
-    OrderSection,
-    Press,
-    Sheets,
-    name_of,
-    rule_names,
-)
-from sbafab.design.toml_table import Section
+from sbafab.design.files import rule_names
+from sbafab.design.sections import Laser, OrderSection, Press, Sheets, name_of
+from sbafab.design.toml_table import NAME_PATTERN, PART_PATTERN, Section
 from sbafab.design.units import Length, LengthOrZero, Millimetres
 
 Seat = Literal["top", "bottom", "start", "end", "outside", "lumen", "inlet"]

@@ -12,7 +12,7 @@ import click
 from sbafab.cli import options as opt
 from sbafab.cli import show
 from sbafab.design.files import shown
-from sbafab.design.sections import NAME_PATTERN
+from sbafab.design.toml_table import NAME_PATTERN
 from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
 from sbafab.folders.swap import replace_text

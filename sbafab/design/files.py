@@ -16,20 +16,10 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from sbafab.design.films import DATE_PATTERN, FACE_PATTERN
-from sbafab.design.sections import BATCH_PATTERN, NAME_PATTERN, PART_PATTERN, rule_names
+from sbafab import catalogue, plugins
+from sbafab.design.toml_table import PATTERNS
 from sbafab.errors import DesignError
 
-PATTERNS = {
-    NAME_PATTERN: "must be 1 to 64 letters, digits, dots, dashes or underscores, beginning with a "
-    "letter or digit",
-    PART_PATTERN: "must be 1 to 32 letters, digits, dashes or underscores, beginning with a letter",
-    FACE_PATTERN: "must be 1 to 32 small letters, digits, dashes or underscores, beginning with a "
-    "letter",
-    BATCH_PATTERN: "must be 1 to 12 letters, digits or dots, beginning with a letter or digit",
-    DATE_PATTERN: "must be a date such as 2026-03-31",
-}
-"""Descriptions of texts that must match a pattern."""
 _SHEETS = (
     "belongs to registered sheets, which were removed; delete it, and register the films by "
     'registration.method = "ears" or "channel-pin"'
@@ -451,6 +441,11 @@ def with_changes(data: Mapping[str, Any], changes: Iterable[Change]) -> dict[str
 
 def _from_user(path: object) -> str:
     return str(Path(str(path)).absolute())
+
+
+def rule_names() -> tuple[str, ...]:
+    """Return the names of all rules, with rules of installed packages last."""
+    return (*catalogue.names("rules"), *(entry.name for entry in plugins.installed(plugins.RULES)))
 
 
 def add_waivers(

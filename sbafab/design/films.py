@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from sbafab.design.toml_table import NamedTables, Section
+from sbafab.design.toml_table import DATE_PATTERN, FACE_PATTERN, NamedTables, Section
 from sbafab.design.units import (
     CELSIUS,
     DENSITIES,
@@ -28,11 +28,11 @@ from sbafab.laminate.films import (
     PAPER_THICKNESS,
     PAPER_TPE,
     PTFE_WARNING,
+    BondProcess,
     Film,
     FilmKind,
     Material,
 )
-from sbafab.laminate.joints import BondProcess
 
 UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
 FILM_NAME = r"[a-z][a-z0-9]{0,15}"
@@ -118,7 +118,6 @@ class Sheet(Section):
         return self
 
 
-FACE_PATTERN = r"^[a-z][a-z0-9_-]{0,31}$"
 FaceName = Annotated[str, Field(pattern=FACE_PATTERN)]
 """A face material: small letters, digits, - and _."""
 
@@ -354,7 +353,6 @@ class LayerFilms(Section):
 
 
 Operation = Literal["cut", "engrave"]
-DATE_PATTERN = r"^\d{4}-\d{2}-\d{2}$"
 MachineName = Annotated[str, Field(min_length=1, max_length=80)]
 SAME_THICKNESS = 1e-6
 """Thicknesses that differ by less are equal, mm."""

@@ -30,7 +30,6 @@ from sbafab.design.files import (
 )
 from sbafab.design.films import FaceBondings, Films, LayerFilms, without_other_products
 from sbafab.design.sections import (
-    NAME_PATTERN,
     Acceptance,
     Laser,
     Models,
@@ -40,7 +39,7 @@ from sbafab.design.sections import (
     SeamTools,
     Sheets,
 )
-from sbafab.design.toml_table import Section, writable
+from sbafab.design.toml_table import NAME_PATTERN, Section, writable
 from sbafab.design.units import Length, is_measured
 from sbafab.errors import DesignError
 

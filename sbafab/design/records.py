@@ -37,9 +37,7 @@ from sbafab.design.films import (
     without_other_products,
 )
 from sbafab.design.kits import inlet_of_kit, load_kit, under_kit
-from sbafab.design.outline import read_outline
 from sbafab.design.sections import (
-    NAME_PATTERN,
     Acceptance,
     Bond,
     Bore,
@@ -57,7 +55,7 @@ from sbafab.design.sections import (
     Sheets,
     Stack,
 )
-from sbafab.design.toml_table import Section
+from sbafab.design.toml_table import NAME_PATTERN, Section
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError
 from sbafab.geometry.offset import Kerf
@@ -145,10 +143,6 @@ class Design(Section):
     def drawings(self) -> dict[str, Path]:
         """The files of all drawn outlines, by the keys that name them."""
         return {} if self.drawing is None else {OUTLINE: self.drawing}
-
-    def outlines(self) -> Iterator[Region]:
-        """Return the regions of all drawings. Raises DesignError if one cannot be read."""
-        return map(read_outline, self.drawings.values())
 
     @property
     def layer_films(self) -> dict[int, str]:

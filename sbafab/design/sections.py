@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
-from difflib import get_close_matches
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
@@ -17,9 +16,9 @@ from pydantic import (
     model_validator,
 )
 
-from sbafab import catalogue, plugins
+from sbafab.design.files import hint, rule_names
 from sbafab.design.films import UNCALIBRATED, KerfWidth, MachineName, Recipe, Sheet
-from sbafab.design.toml_table import Section, writable
+from sbafab.design.toml_table import BATCH_PATTERN, Section, writable
 from sbafab.design.units import CELSIUS, SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.laminate.base_plate import PlateMachine
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, film_name
@@ -30,7 +29,6 @@ MOST = 1000
 
 
 ROUNDING = 1e-9
-BATCH_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9.]{0,11}$"
 
 
 class OrderSection(Section):
@@ -144,15 +142,6 @@ FITTING = "blunt dispensing needle, 22 G (outer diameter 0.718 mm), Luer lock"
 """For the paper's tube of 0.635 mm bore, which it stretches by 13 %; 23 G (0.641 mm) by 1 %."""
 
 
-NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
-PART_PATTERN = r"^[A-Za-z][A-Za-z0-9_-]{0,31}$"
-
-
-def rule_names() -> tuple[str, ...]:
-    """Return the names of all rules, with rules of installed packages last."""
-    return (*catalogue.names("rules"), *(entry.name for entry in plugins.installed(plugins.RULES)))
-
-
 def name_of(names: Callable[[], Sequence[str]]) -> tuple[AfterValidator, Any]:
     """Return the annotation for one of some names, which installed packages may extend, in
     validation and in the schema.
@@ -161,9 +150,8 @@ def name_of(names: Callable[[], Sequence[str]]) -> tuple[AfterValidator, Any]:
     def checked(name: str) -> str:
         allowed = names()
         if name not in allowed:
-            near = get_close_matches(name, allowed, 1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(allowed)}"
-            raise ValueError(f"must be the name of a rule; {hint}")
+            near = hint(name, allowed, f"there are {', '.join(allowed)}")
+            raise ValueError(f"must be the name of a rule; {near}")
         return name
 
     def listed(schema: dict[str, Any]) -> None:

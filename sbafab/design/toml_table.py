@@ -12,6 +12,21 @@ from sbafab.documents import Described
 
 _UNWRITABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 """Control characters but tab and line end, and what XML 1.0 does not allow at all."""
+NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
+PART_PATTERN = r"^[A-Za-z][A-Za-z0-9_-]{0,31}$"
+FACE_PATTERN = r"^[a-z][a-z0-9_-]{0,31}$"
+BATCH_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9.]{0,11}$"
+DATE_PATTERN = r"^\d{4}-\d{2}-\d{2}$"
+PATTERNS = {
+    NAME_PATTERN: "must be 1 to 64 letters, digits, dots, dashes or underscores, beginning with a "
+    "letter or digit",
+    PART_PATTERN: "must be 1 to 32 letters, digits, dashes or underscores, beginning with a letter",
+    FACE_PATTERN: "must be 1 to 32 small letters, digits, dashes or underscores, beginning with a "
+    "letter",
+    BATCH_PATTERN: "must be 1 to 12 letters, digits or dots, beginning with a letter or digit",
+    DATE_PATTERN: "must be a date such as 2026-03-31",
+}
+"""Descriptions of texts that must match a pattern."""
 
 
 class Section(Described):

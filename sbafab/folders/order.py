@@ -18,7 +18,7 @@ from sbafab.cutting.cut_settings import TRUE_ARCS, Curves, CutSettings
 from sbafab.cutting.nesting import PLACES, from_dict, nest
 from sbafab.cutting.placements import Nest, NestPart, check_nest
 from sbafab.design.records import Design
-from sbafab.design.sections import NAME_PATTERN
+from sbafab.design.toml_table import NAME_PATTERN
 from sbafab.errors import DefectError, DesignError, GeometryError, OutputError
 from sbafab.folders.build import Build, make_build, stocks
 from sbafab.rules.deck import has_failed, run_deck

@@ -12,6 +12,8 @@ Material = str
 """Name of a film in files, sheets and lists: "TPE", "PTFE", or another in capitals."""
 FilmKind = Literal["structural", "mask"]
 """A structural film bonds where it touches another; nothing bonds to a mask."""
+BondProcess = Literal["press", "laser", "hot-tip", "ultrasonic", "roller"]
+"""The process that bonds two faces: the heat press, or the tool of a seam."""
 FIRST: tuple[Material, ...] = ("TPE", "PTFE")
 """The films of every design; they come first in lists."""
 PTFE_WARNING = (

@@ -15,7 +15,8 @@ from sbafab.errors import DesignError
 from sbafab.geometry.cache import stored
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
-from sbafab.laminate.joints import PRESS, BondProcess, FaceBond, Fold, Seam
+from sbafab.laminate.films import BondProcess
+from sbafab.laminate.joints import PRESS, FaceBond, Fold, Seam
 from sbafab.laminate.laminate import Interface, Laminate, Layer
 
 MOST_TRIED = 300

@@ -15,13 +15,12 @@ from typing import Literal
 from sbafab.geometry.edges import Edge, Point
 from sbafab.geometry.offset import swept
 from sbafab.geometry.region import Region, union
+from sbafab.laminate.films import BondProcess
 
 SeamTool = Literal["laser", "hot-tip", "ultrasonic", "roller"]
 """A moving tool that bonds two films along a path."""
 SeamKind = Literal["lap", "fin"]
 """A lap seam bonds films that lie flat on each other; a fin seam bonds edges that stand out."""
-BondProcess = Literal["press", "laser", "hot-tip", "ultrasonic", "roller"]
-"""The process that bonds two faces: the heat press, or the tool of a seam."""
 PRESS: BondProcess = "press"
 
 

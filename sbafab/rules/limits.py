@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from sbafab.design.records import Design, Form
-from sbafab.geometry.edges import Point
 from sbafab.laminate.laminate import Laminate
 
 TOLERANCE = 0.001
@@ -26,11 +25,6 @@ def holds(measured: float, limit: float) -> bool:
 def least_passing(limit: float) -> float:
     """Return the least value that passes a least limit."""
     return limit - TOLERANCE - 1e-9
-
-
-def at(p: Point) -> str:
-    """Return a point as messages print it."""
-    return f"x {round(p[0], 3) + 0.0:.3f}, y {round(p[1], 3) + 0.0:.3f}"
 
 
 # Limits that a design lowers below the usual ones. No waiver, but stated in every file like one.

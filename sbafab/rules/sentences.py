@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from sbafab.catalogue import catalogue
+from sbafab.geometry.edges import Point
 from sbafab.laminate.laminate import Layer
-from sbafab.rules.limits import at
 
 WORDS = "words"
 """Table of the words that several rules use."""
@@ -78,6 +78,11 @@ def tell(clause: Clause, outer: Mapping[str, Any]) -> str:
     rule, name = clause.id.split(".")
     text: str = catalogue()[rule]["says"][name]
     return _Teller(rule).vformat(text, (), {**outer, **dict(clause.facts)}) if "{" in text else text
+
+
+def at(p: Point) -> str:
+    """Return a point as messages print it."""
+    return f"x {round(p[0], 3) + 0.0:.3f}, y {round(p[1], 3) + 0.0:.3f}"
 
 
 class _Teller(string.Formatter):

@@ -17,9 +17,9 @@ from operator import le
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+from sbafab.design.files import rule_names
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
-from sbafab.design.sections import rule_names
 from sbafab.errors import OutputError
 from sbafab.markup import environment
 from sbafab.models.calibration import factors_of

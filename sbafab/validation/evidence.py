@@ -15,8 +15,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar
 from pydantic import Field, model_validator
 
 from sbafab.design.files import checked, hint, listed, read_toml, shown
-from sbafab.design.sections import NAME_PATTERN
-from sbafab.design.toml_table import Section
+from sbafab.design.toml_table import NAME_PATTERN, Section
 from sbafab.errors import DesignError
 from sbafab.spreadsheet import plain_text, table_rows
 

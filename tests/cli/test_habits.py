@@ -19,8 +19,7 @@ from sbafab.cli import app
 from sbafab.cli.check import file_states, watch_source
 from sbafab.cli.explain import design_keys
 from sbafab.cli.show import limit_text
-from sbafab.design.files import key_paths
-from sbafab.design.sections import rule_names
+from sbafab.design.files import key_paths, rule_names
 from sbafab.models.figures import FLAGS
 from sbafab.rules.deck import EXPLAINED
 from sbafab.rules.finding import Finding, Place

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.design.sections import rule_names
+from sbafab.design.files import rule_names
 from sbafab.errors import DesignError
 from sbafab.folders.as_cut import CutPart
 from sbafab.folders.differences import CLAIMS, DESIGNED, INTEGRITY

@@ -14,7 +14,7 @@ import pytest
 
 from sbafab.cli import main
 from sbafab.cutting.kerf import in_chords
-from sbafab.design.sections import rule_names
+from sbafab.design.files import rule_names
 from sbafab.errors import OutputError
 from sbafab.folders.check import check_folder
 from sbafab.rules.finding import Finding

@@ -20,7 +20,7 @@ from ezdxf.document import Drawing
 
 from sbafab.actuators import load_design
 from sbafab.cutting.cut_settings import Curves, DxfProfile
-from sbafab.design.sections import rule_names
+from sbafab.design.files import rule_names
 from sbafab.folders.check import check_folder
 from sbafab.folders.run import RunRequest, generate
 from sbafab.rules.finding import Finding

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import pytest
 
+from sbafab.design.files import rule_names
 from sbafab.design.records import Design
-from sbafab.design.sections import rule_names
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, disc, rectangle, strip
 from sbafab.laminate.laminate import Laminate

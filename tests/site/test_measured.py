@@ -21,7 +21,7 @@ from docs.scripts.nesting import most_rectangles
 from docs.scripts.rates import WORDS, statistic
 from docs.scripts.tables import SUMMARIES, Table
 from sbafab.cli import COMMANDS
-from sbafab.design.sections import rule_names
+from sbafab.design.files import rule_names
 from sbafab.rules.deck import EXPLAINED
 
 ROOT = Path(__file__).parents[2]

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from sbafab import api
-from sbafab.design.sections import rule_names
+from sbafab.design.files import rule_names
 from sbafab.errors import DesignError
 from sbafab.models import balloon_map
 from sbafab.studio import jobs
