@@ -6,7 +6,7 @@ import math
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 import tomli_w
@@ -17,6 +17,7 @@ from tests.judge import deck, reading
 from tests.judge.bonds import judge_bonds
 from tests.judge.claims import judge_claims
 from tests.judge.doctoring import (
+    Change,
     Patient,
     add_part,
     moved_hole,
@@ -68,14 +69,6 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Patient]:
     return made
 
 
-@pytest.fixture
-def patient(sound: dict[str, Patient], tmp_path: Path, request: pytest.FixtureRequest) -> Patient:
-    healthy = sound[request.param]
-    copy = tmp_path / "copy"
-    shutil.copytree(healthy.folder, copy)
-    return Patient(copy, healthy.design)
-
-
 def on_sheets(folder: Folder) -> Iterator[Disagreement]:
     return judge_sheets([folder], folder.path, folder.manifest["sheets"])
 
@@ -108,13 +101,39 @@ def test_a_beam_leaves_an_elliptic_fillet_in_a_corner() -> None:
     assert left == pytest.approx((1 - math.pi / 4) * 0.05 * 0.1, rel=0.02)
 
 
-Fault = tuple[str, Callable[[Patient], object], Callable[[Folder], Iterator[Disagreement]], str]
+class Fault(NamedTuple):
+    """What is done to a folder, and what its judge must say."""
+
+    harm: Callable[[Patient], object]
+    judge: Callable[[Folder], Iterator[Disagreement]]
+    said: str
+    patient: str = "stack"
+
+
+Harm = Callable[[Patient], object]
+
+
+def redraw(layer: int, change: Change) -> Harm:
+    return lambda patient: patient.redraw([layer], change)
+
+
+def edit(name: str, change: Callable[[Any], object]) -> Harm:
+    """A change of a JSON file, or of a DXF file's model space."""
+    return lambda patient: (patient.edit_dxf if ".dxf" in name else patient.edit)(name, change)
+
+
+def step(number: int, **keys: object) -> Harm:
+    return edit("press.json", lambda press: press["steps"][number].update(keys))
+
+
+def claim(rows: str, row: int, **areas: float) -> Harm:
+    return edit("manifest.json", lambda manifest: manifest[rows][row].update(areas))
 
 
 def _shrunk_middle(patient: Patient) -> None:
     """The middle balloon becomes a smaller one, and so do the masks on either side of it."""
-    patient.redraw([5, 7], lambda film: film & Point(0, 0).buffer(2.6))
-    patient.redraw([4, 8], lambda mask: mask & Point(0, 0).buffer(2.9))
+    patient.redraw([5, 7], lambda film: film & AXIS.buffer(2.6))
+    patient.redraw([4, 8], lambda mask: mask & AXIS.buffer(2.9))
 
 
 def _bridge(region: BaseGeometry) -> BaseGeometry:
@@ -135,10 +154,6 @@ def _first_part_off(space: Any) -> None:
         space.delete_entity(entity)
 
 
-def _one_part_more(space: Any) -> None:
-    add_part(space, Polygon([(120, 120), (126, 120), (126, 126), (120, 126)]))
-
-
 def _parts_near(space: Any) -> None:
     """The second part beside the first, nearer than 1 mm."""
     (one, _), (other, entities) = parts_of(space)[:2]
@@ -150,250 +165,131 @@ def _into_border(space: Any) -> None:
     shift(entities, 0.0, 9.99 - extent[1])
 
 
-def _line_through(layer: str) -> Callable[[Any], object]:
-    return lambda space: space.add_line((0, 0), (150, 150), dxfattribs={"layer": layer})
-
-
 def _plate_hole_off(space: Any) -> None:
     hole = next(e for e in space if e.dxftype() == "CIRCLE" and e.dxf.layer == "CUT_INNER")
     hole.translate(0.05, 0, 0)
 
 
-def _plate_hole_more(space: Any) -> None:
-    space.add_circle((1.0, 1.0), 0.75, dxfattribs={"layer": "CUT_INNER"})
-
-
-def _later_last(press: dict[str, Any]) -> None:
-    press["steps"][0]["adds"], press["steps"][0]["layers"] = [3, 2], [3, 2]
-
-
-FAULTS: dict[str, Fault] = {
-    "films that meet past a smaller balloon": (
-        "stack",
-        _shrunk_middle,
-        judge_facing,
-        "films 3 and 9",
+INNER, ENGRAVED = {"layer": "CUT_INNER"}, {"layer": "ENGRAVE"}
+AXIS = Point(0, 0)
+FIXTURE, TPE, PTFE = "sheets/fixture.dxf", "sheets/TPE_1.dxf", "sheets/PTFE_1.dxf"
+MORE = Polygon([(120, 120), (126, 120), (126, 126), (120, 126)])
+FAULTS = {
+    "films that meet past a smaller balloon": Fault(_shrunk_middle, judge_facing, "films 3 and 9"),
+    "a layer in another's place": Fault(
+        edit("manifest.json", _swapped), judge_bonds, "nothing bonds at interface 3"
     ),
-    "a layer in another's place": (
-        "stack",
-        lambda p: p.edit("manifest.json", _swapped),
-        judge_bonds,
-        "nothing bonds at interface 3",
+    "a narrowed ring": Fault(
+        redraw(6, lambda m: m.buffer(0.01)), judge_bonds, "interface 3 is 0.7397"
     ),
-    "a narrowed ring": (
-        "stack",
-        lambda p: p.redraw([6], lambda m: m.buffer(0.01)),
-        judge_bonds,
-        "interface 3 is 0.7397",
+    "a narrowed neck": Fault(
+        redraw(4, lambda m: m.buffer(0.01)), judge_bonds, "interface 2 is 0.7397"
     ),
-    "a narrowed neck": (
-        "stack",
-        lambda p: p.redraw([4], lambda m: m.buffer(0.01)),
-        judge_bonds,
-        "interface 2 is 0.7397",
+    "a missing mask": Fault(redraw(4, lambda m: m & box(2, 2, 9, 9)), judge_bonds, "no bore"),
+    "a bond where none belongs": Fault(
+        redraw(4, lambda m: m - Point(0, 2.4).buffer(0.5)), judge_bonds, "where there is no bore"
     ),
-    "a missing mask": (
-        "stack",
-        lambda p: p.redraw([4], lambda m: m & box(2, 2, 9, 9)),
-        judge_bonds,
-        "no bore",
-    ),
-    "a bond where none belongs": (
-        "stack",
-        lambda p: p.redraw([4], lambda m: m - Point(0, 2.4).buffer(0.5)),
-        judge_bonds,
-        "bond where there is no bore",
-    ),
-    "a short overhang": (
-        "stack",
-        lambda p: p.redraw([8], lambda m: m & Point(0, 0).buffer(3.74, 256)),
+    "a short overhang": Fault(
+        redraw(8, lambda m: m & AXIS.buffer(3.74, 256)),
         judge_overhangs,
         "interface 4 the mask reaches only 0.49",
     ),
-    "a bore without overhang": (
-        "pinned",
-        lambda p: p.redraw([5], lambda film: film.buffer(0.02)),
+    "a bore without overhang": Fault(
+        redraw(5, lambda film: film.buffer(0.02)),
         judge_overhangs,
         "past the edge of film 5",
+        "pinned",
     ),
-    "merged pockets": ("pinned", lambda p: p.redraw([6], _bridge), judge_voids, "pockets"),
-    "a closed bore": (
-        "stack",
-        lambda p: p.redraw([5], lambda film: without_hole(film, 0)),
+    "merged pockets": Fault(redraw(6, _bridge), judge_voids, "pockets", "pinned"),
+    "a closed bore": Fault(
+        redraw(5, lambda film: without_hole(film, 0)),
         judge_voids,
         "no inlet reaches the pocket at interface 3",
     ),
-    "a leak": (
-        "stack",
-        lambda p: p.redraw([6], lambda mask: mask | box(-5, 1.0, 0, 1.5)),
-        judge_voids,
-        "leaks to the outside",
+    "a leak": Fault(
+        redraw(6, lambda mask: mask | box(-5, 1.0, 0, 1.5)), judge_voids, "leaks to the outside"
     ),
-    "no inlet": (
-        "stack",
-        lambda p: p.redraw([2], lambda mask: mask & Point(0, 0).buffer(2.6)),
-        judge_voids,
-        "0 inlets",
+    "no inlet": Fault(redraw(2, lambda mask: mask & AXIS.buffer(2.6)), judge_voids, "0 inlets"),
+    "a narrow inlet": Fault(
+        redraw(2, lambda mask: mask - box(2.4, 0.5, 20, 2)), judge_voids, "the tube takes"
     ),
-    "a narrow inlet": (
-        "stack",
-        lambda p: p.redraw([2], lambda mask: mask - box(2.4, 0.5, 20, 2)),
-        judge_voids,
-        "the tube takes",
+    "a shifted tooling hole": Fault(
+        redraw(1, lambda film: moved_hole(film, -1, 0.05, 0)), judge_pins, "layer 1", "pinned"
     ),
-    "a shifted tooling hole": (
-        "pinned",
-        lambda p: p.redraw([1], lambda film: moved_hole(film, -1, 0.05, 0)),
-        judge_pins,
-        "layer 1",
+    "a hole of the plate off its place": Fault(
+        edit(FIXTURE, _plate_hole_off), judge_pins, "no hole for pin"
     ),
-    "a hole of the plate off its place": (
-        "stack",
-        lambda p: p.edit_dxf("sheets/fixture.dxf", _plate_hole_off),
-        judge_pins,
-        "no hole for pin",
-    ),
-    "a hole of the plate for nothing": (
-        "stack",
-        lambda p: p.edit_dxf("sheets/fixture.dxf", _plate_hole_more),
+    "a hole of the plate for nothing": Fault(
+        edit(FIXTURE, lambda space: space.add_circle((1, 1), 0.75, dxfattribs=INNER)),
         judge_pins,
         "hole for no pin",
     ),
-    "a film across a pin": (
-        "stack",
-        lambda p: p.redraw([7], lambda film: without_hole(film, 0)),
-        judge_pins,
-        "stands in layer 7",
+    "a film across a pin": Fault(
+        redraw(7, lambda film: without_hole(film, 0)), judge_pins, "stands in layer 7"
     ),
-    "pins that are out": (
-        "stack",
-        lambda p: p.edit("press.json", lambda press: press["steps"][0].update(pins=[])),
-        judge_pins,
-        "0 pins hold a piece of layer",
+    "pins that are out": Fault(step(0, pins=[]), judge_pins, "0 pins hold a piece of layer"),
+    "a missing part": Fault(edit(TPE, _first_part_off), on_sheets, "the sheets lack 1"),
+    "a part of no layer": Fault(
+        edit(TPE, lambda space: add_part(space, MORE)), on_sheets, "no piece of a layer"
     ),
-    "a missing part": (
-        "stack",
-        lambda p: p.edit_dxf("sheets/TPE_1.dxf", _first_part_off),
-        on_sheets,
-        "the sheets lack 1",
-    ),
-    "a part of no layer": (
-        "stack",
-        lambda p: p.edit_dxf("sheets/TPE_1.dxf", _one_part_more),
-        on_sheets,
-        "no piece of a layer",
-    ),
-    "parts too near": (
-        "stack",
-        lambda p: p.edit_dxf("sheets/TPE_1.dxf", _parts_near),
-        on_sheets,
-        "apart at",
-    ),
-    "a part in the border": (
-        "stack",
-        lambda p: p.edit_dxf("sheets/PTFE_1.dxf", _into_border),
-        on_sheets,
-        "in the border",
-    ),
-    "a stray line": (
-        "stack",
-        lambda p: p.edit_dxf("sheets/TPE_1.dxf", _line_through("ENGRAVE")),
+    "parts too near": Fault(edit(TPE, _parts_near), on_sheets, "apart at"),
+    "a part in the border": Fault(edit(PTFE, _into_border), on_sheets, "in the border"),
+    "a stray line": Fault(
+        edit(TPE, lambda space: space.add_line((0, 0), (150, 150), dxfattribs=ENGRAVED)),
         on_sheets,
         "crosses a part",
     ),
-    "a layer that the sheets do not cut": (
-        "pinned",
-        lambda p: p.redraw([5], lambda film: film.buffer(0.01)),
-        on_sheets,
-        "no piece of a layer",
+    "a layer that the sheets do not cut": Fault(
+        redraw(5, lambda film: film.buffer(0.01)), on_sheets, "no piece of a layer", "pinned"
     ),
-    "a wrong size": (
-        "stack",
-        lambda p: p.edit("manifest.json", lambda m: m["sizes"].update(width=13.0)),
-        judge_claims,
-        "the width",
+    "a wrong size": Fault(
+        edit("manifest.json", lambda m: m["sizes"].update(width=13.0)), judge_claims, "the width"
     ),
-    "a wrong circle on the traveller": (
-        "stack",
+    "a wrong circle on the traveller": Fault(
         lambda p: p.replace("traveller.html", "6.5 mm", "6.3 mm"),
         judge_claims,
         "said to fit a circle of 6.3",
     ),
-    "a wrong area": (
-        "stack",
-        lambda p: p.edit("manifest.json", lambda m: m["layers"][2].update(area=30.0)),
-        judge_claims,
-        "layer 3 has",
+    "a wrong area": Fault(claim("layers", 2, area=30.0), judge_claims, "layer 3 has"),
+    "a wrong bond area": Fault(
+        claim("interfaces", 1, bond_area=1.0), judge_claims, "the bond of interface 2"
     ),
-    "a wrong bond area": (
-        "stack",
-        lambda p: p.edit("manifest.json", lambda m: m["interfaces"][1].update(bond_area=1.0)),
-        judge_claims,
-        "the bond of interface 2",
+    "a changed file": Fault(
+        lambda p: p.replace("press.csv", "135", "136"), judge_claims, "press.csv is not the file"
     ),
-    "a changed file": (
-        "stack",
-        lambda p: p.replace("press.csv", "135", "136"),
-        judge_claims,
-        "press.csv is not the file",
+    "kerf that was not compensated": Fault(
+        redraw(3, lambda film: film.buffer(-0.05)), judge_claims, "layer 3 has", "pinned"
     ),
-    "kerf that was not compensated": (
-        "pinned",
-        lambda p: p.redraw([3], lambda film: film.buffer(-0.05)),
-        judge_claims,
-        "layer 3 has",
+    "a layer that is never added": Fault(step(1, adds=[]), judge_press, "layer 1 is added 0 times"),
+    "an upper layer before a lower one": Fault(
+        step(0, adds=[3, 2], layers=[3, 2]), judge_press, "lower before upper"
     ),
-    "a layer that is never added": (
-        "stack",
-        lambda p: p.edit("press.json", lambda press: press["steps"][1].update(adds=[])),
-        judge_press,
-        "layer 1 is added 0 times",
-    ),
-    "an upper layer before a lower one": (
-        "stack",
-        lambda p: p.edit("press.json", _later_last),
-        judge_press,
-        "lower before upper",
-    ),
-    "a press too hot": (
-        "stack",
-        lambda p: p.edit("press.json", lambda press: press["steps"][2].update(temperature_c=270.0)),
-        judge_press,
-        "270 C",
-    ),
-    "a missing step": (
-        "stack",
-        lambda p: p.edit("press.json", lambda press: press["steps"].pop()),
+    "a press too hot": Fault(step(2, temperature_c=270.0), judge_press, "270 C"),
+    "a missing step": Fault(
+        edit("press.json", lambda press: press["steps"].pop()),
         judge_press,
         "not a full bond of the whole",
     ),
-    "a pocket turned over": (
-        "drawn",
-        lambda p: p.redraw([6], lambda m: affinity.scale(m, 1, -1, origin=(0, 0))),
+    "a pocket turned over": Fault(
+        redraw(6, lambda m: affinity.scale(m, 1, -1, origin=(0, 0))),
         of_blob,
         "of what was drawn",
-    ),
-    "a pocket of another size": (
         "drawn",
-        lambda p: p.redraw([6], lambda m: affinity.scale(m, 1.01, 1.01, origin=(0, 0))),
+    ),
+    "a pocket of another size": Fault(
+        redraw(6, lambda m: affinity.scale(m, 1.01, 1.01, origin=(0, 0))),
         of_blob,
         "has more by",
+        "drawn",
     ),
 }
 
 
-@pytest.mark.parametrize(
-    ("patient", "harm", "judge", "said"),
-    FAULTS.values(),
-    ids=FAULTS,
-    indirect=["patient"],
-)
-def test_a_fault_is_seen_by_its_judge(
-    patient: Patient,
-    harm: Callable[[Patient], object],
-    judge: Callable[[Folder], Iterator[Disagreement]],
-    said: str,
-) -> None:
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_seen_by_its_judge(name: str, sound: dict[str, Patient], tmp_path: Path) -> None:
+    harm, judge, said, made = FAULTS[name]
+    patient = Patient(tmp_path / "copy", sound[made].design)
+    shutil.copytree(sound[made].folder, patient.folder)
     harm(patient)
     found = [disagreement.said for disagreement in judge(patient.opened())]
     assert any(said in sentence for sentence in found), found
