@@ -248,7 +248,7 @@ FAULTS = {
     "a wrong circle on the traveller": Fault(
         lambda p: p.replace("traveller.html", "6.5 mm", "6.3 mm"),
         judge_claims,
-        "said to fit a circle of 6.3",
+        "says outline_diameter [6.3]",
     ),
     "a wrong area": Fault(claim("layers", 2, area=30.0), judge_claims, "layer 3 has"),
     "a wrong bond area": Fault(
