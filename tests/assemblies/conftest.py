@@ -11,8 +11,6 @@ from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.files import assembly_of
 from sbafab.design.files import read_toml, templates_folder
 
-Change = Callable[[dict[str, Any]], None]
-
 
 @pytest.fixture
 def tables() -> Callable[[str], dict[str, Any]]:

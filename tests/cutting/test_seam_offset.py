@@ -19,7 +19,6 @@ from sbafab.errors import DesignError
 from sbafab.folders.check import read_folder
 from sbafab.importing.laminates import import_folder
 from sbafab.importing.records import write_imported
-from sbafab.rules.finding import Finding
 from tests.designs import tables
 
 X, Y = 12.0, -3.5
@@ -78,10 +77,6 @@ def test_the_file_says_its_offset_and_keeps_its_datum(folders: tuple[Path, Path]
             ((a + b) / 2).xy.isclose((0, 0)) for a, b in ((e.dxf.start, e.dxf.end) for e in cross)
         }
         assert middles == {True}
-
-
-def shown(finding: Finding) -> tuple[object, ...]:
-    return finding.rule, finding.verdict, finding.measured, finding.limit, finding.message
 
 
 def test_pages_say_that_files_are_shifted_and_prints_are_not(folders: tuple[Path, Path]) -> None:

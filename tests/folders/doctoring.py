@@ -12,8 +12,6 @@ from typing import Any
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.sequence import cutting_sequence
-from sbafab.geometry.contour import Contour
-from sbafab.geometry.edges import Arc, Line, Point
 from sbafab.geometry.region import Region
 
 
@@ -58,37 +56,3 @@ class Doctor:
                 manifest["files"][path] = hashlib.sha256(data).hexdigest()
 
         self.set_manifest(rehashed)
-
-
-def scaled(region: Region, factor: float) -> Region:
-    return _mapped(region, lambda p: (p[0] * factor, p[1] * factor), factor)
-
-
-def flipped(region: Region) -> Region:
-    """Turned over about the y axis."""
-    turned_over = _mapped(region, lambda p: (-p[0], p[1]), 1.0, mirror=True)
-    return Region(tuple(contour.reversed() for contour in turned_over.contours))
-
-
-def _mapped(
-    region: Region, move: Callable[[Point], Point], factor: float, mirror: bool = False
-) -> Region:
-    return Region(
-        tuple(
-            Contour(
-                tuple(
-                    Arc(
-                        move(edge.start),
-                        move(edge.end),
-                        move(edge.centre),
-                        edge.radius * factor,
-                        edge.ccw != mirror,
-                    )
-                    if isinstance(edge, Arc)
-                    else Line(move(edge.start), move(edge.end))
-                    for edge in contour.edges
-                )
-            )
-            for contour in region.contours
-        )
-    )

@@ -7,7 +7,6 @@ import re
 import shutil
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import pytest
 import trimesh
@@ -107,10 +106,6 @@ def test_the_written_design_builds_the_same_assembly(brace: Run) -> None:
 def test_the_same_assembly_gives_the_same_bytes(standing: Run, tmp_path: Path) -> None:
     again = generate(RunRequest(load_assembly("standing", SMALL), tmp_path))
     assert file_hashes(again.folder) == file_hashes(standing.folder)
-
-
-def words(node: Any) -> str:
-    return " ".join(node.text_content().split())
 
 
 def test_names_on_the_page_are_one_each_and_every_link_leads_somewhere(brace: Run) -> None:

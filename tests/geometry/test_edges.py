@@ -26,9 +26,6 @@ from sbafab.geometry.edges import (
     unit,
 )
 
-QUARTER = Arc((3.0, 1.0), (1.0, 3.0), (1.0, 1.0), 2.0, True)
-HALF = Arc((3.0, 1.0), (-1.0, 1.0), (1.0, 1.0), 2.0, True)
-
 places = st.tuples(st.floats(-9, 9), st.floats(-9, 9))
 bulges = st.sampled_from([0.0, 1.0, -1.0]) | st.floats(0.01, 1) | st.floats(-1, -0.01)
 

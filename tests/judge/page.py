@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 VOID = {"br", "col", "hr", "img", "input", "link", "meta", "wbr"}
 TIMES = "\N{MULTIPLICATION SIGN}"
 NUMBERS = re.compile(r"\d+(?:\.\d+)?")
-COUNT = re.compile(rf"(\d+)(?: \+ (\d+) spare)?(?: ?{TIMES} (\d+) pieces)?")
 PINS = re.compile(
     rf"(.+): ⌀([\d.]+) {TIMES} ([\d.]+) mm, ([\d.]+) mm in the plate, ([\d.]+) to ([\d.]+) mm over "
     r"it, ([\d.]+) mm or more over the stack"

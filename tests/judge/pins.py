@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import shapely
 from shapely import Point, Polygon
 
 from tests.judge.folder import Disagreement, Folder, Hole, Layer, pieces, place
@@ -160,13 +159,3 @@ def promised(folder: Folder, layer: Layer) -> int:
     if layer.role == "separator-mask":
         return 1 if folder.asked["family"] == "lobed" else 0
     return 1
-
-
-def layers_of(step: dict[str, Any]) -> list[int]:
-    return [int(index) for index in step["layers"]]
-
-
-def union_of(folder: Folder) -> shapely.geometry.base.BaseGeometry:
-    """All that is cut, laid on each other."""
-    shapes = {layer.shape: layer.profile for layer in folder.layers}
-    return shapely.union_all(list(shapes.values()))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-import shapely
 from shapely import Polygon, affinity
 
 from tests.judge.folder import Disagreement, Folder, asked_kerf, closed_by, pieces, place
@@ -64,7 +63,3 @@ def _turn(folder: Folder, home: tuple[float, float]) -> float:
     if folder.asked["family"] != "lobed":
         return 0.0
     return math.degrees(math.atan2(home[1], home[0]))
-
-
-def disc(diameter: float) -> Polygon:
-    return Polygon(shapely.Point(0, 0).buffer(diameter / 2, quad_segs=256).exterior)

@@ -34,14 +34,6 @@ class Gap(NamedTuple):
     is_pocket: bool
 
 
-class Inlet(NamedTuple):
-    """The mouth of a bottom pocket: its node and how wide it is."""
-
-    node: Node
-    width: float
-    at: str
-
-
 class Graph:
     """Nodes that air can go between."""
 

@@ -13,8 +13,6 @@ from sbafab.cutting.dxf_read import read_profile
 from sbafab.errors import DesignError
 from sbafab.lab.coupon import SIZE, coupon, read_measurements, write_coupon
 
-SVG = "{http://www.w3.org/2000/svg}"
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -69,6 +69,7 @@ def test_every_diameter_of_the_standards_is_sold(standard: Standard) -> None:
         assert is_sold(diameter, standard)
         sold = lengths_sold(diameter, standard)
         assert (sold[0], sold[-1]) == (float(shortest), float(longest))
+    assert all(chamfer(diameter) == sold for diameter, sold in CHAMFERS.items())
     absent = {0.5, 0.6, 0.8, 1.2, 3.5, 4.5} - set(ends)
     assert not any(is_sold(diameter, standard) for diameter in absent)
 

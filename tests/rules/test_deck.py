@@ -62,7 +62,6 @@ TESTED_APART = {
 """Rules that no change of one layer's profile breaks alone; nets has its own faults."""
 SILENT = {"nets"}
 """Rules that say nothing of a design without the keys that they read."""
-SEPARATOR = disc(AXIS, 3.75) - disc(AXIS, 1.25)
 # The first fault of a rule is the one that its reference page shows.
 FAULTS = {
     "narrow neck ring": Fault(

@@ -14,7 +14,6 @@ ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs" / "learn").glob("*.md"))
 NOTEBOOKS = {"python"}
 """Run by the build of the site."""
-RUN_HERE = [page for page in PAGES if page.stem not in NOTEBOOKS]
 
 
 def environment(folder: Path) -> dict[str, str]:
