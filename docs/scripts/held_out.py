@@ -1,13 +1,15 @@
-"""Coverage of the calibration's intervals over all evidence: docs/measured/held_out.json.
+"""Coverage and sharpness of the calibration's intervals: docs/measured/held_out.json.
 
-python -m docs.scripts.held_out takes about four minutes; it needs the extra "calibrate". Each curve
-is predicted by a fit without its test. What right intervals would hold is drawn from the same
-predictions, as those have points of one test depend on each other.
+python -m docs.scripts.held_out takes about fifteen minutes; it needs the extra "calibrate". Each
+curve is predicted by a fit without its test, and by one without its actuator. What right intervals
+would hold is drawn from the same predictions, as those have points of one test depend on each
+other. Variants leave out what the calibration assumes beyond one loss of pocket radius for all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,6 +17,7 @@ import numpy as np
 
 from docs.scripts.measured import Record, keep, texts, versions
 from docs.scripts.tables import Table
+from sbafab.models.calibration import BENT, FIELDS, GROUPS
 from sbafab.validation.comparison import curve_intervals, uncertainty_for
 from sbafab.validation.evidence import Evidence, MeasuredCurve, shipped_evidence
 from sbafab.validation.fit import (
@@ -47,6 +50,7 @@ POINTS = (
     "predict high",
 )
 COVERAGE = (
+    "left out",
     "interval",
     "points inside",
     "right intervals would hold",
@@ -54,7 +58,47 @@ COVERAGE = (
     "curves inside",
 )
 SOURCES = ("source", "values", "held out", "curves", "tests", "in 90 % intervals", "not predicted")
+VARIANTS = (
+    "calibration",
+    "left out",
+    "log score",
+    "in 90 % intervals",
+    "axial force, a factor",
+    "height, a factor",
+)
 ALL = "all"
+KEYS: Mapping[str, Callable[[SampledCurve], str]] = {
+    "test": lambda curve: curve.test,
+    "actuator": lambda curve: curve.actuators[0],
+}
+"""What is left out, and the key of a curve by which it is."""
+
+
+def _with_axial(curve: SampledCurve) -> SampledCurve:
+    is_bent = GROUPS[curve.group] == BENT
+    return curve._replace(group=GROUPS.index("force")) if is_bent else curve
+
+
+def _with_one_loss(curve: SampledCurve) -> SampledCurve:
+    return curve._replace(actuators=(ALL,) * len(curve.actuators))
+
+
+def _unloaded(curve: SampledCurve) -> SampledCurve:
+    column = FIELDS.index("tip_load")
+    if column not in curve.axes:
+        return curve
+    table = curve.table.take(0, curve.axes.index(column))
+    return curve._replace(axes=tuple(axis for axis in curve.axes if axis != column), table=table)
+
+
+CHANGES: Mapping[str, Sequence[Callable[[SampledCurve], SampledCurve]]] = {
+    "as it is": (),
+    "bent forces miss as axial ones do": (_with_axial,),
+    "one pocket loss for all actuators": (_with_one_loss,),
+    "nothing on the tip": (_unloaded,),
+    "all three": (_with_axial, _with_one_loss, _unloaded),
+}
+"""Calibrations that are scored: what they do to the curves."""
 
 
 class LeftOutCurve(NamedTuple):
@@ -83,16 +127,39 @@ def left_out_curves(
     """
     for source in sources:
         usable, _ = usable_curves([source])
-        if not usable:
-            continue
-        curves = sampled_curves(usable, _print_progress)
-        for test, seed, posterior in left_out_fits(curves, _print_progress, only):
-            generator = np.random.default_rng(seed)
-            for measured, curve in zip(usable, curves, strict=True):
-                if curve.test == test:
-                    drawn = posterior.predicted(curve, generator)
-                    stated = _stated(source, measured, posterior)
-                    yield LeftOutCurve(source.id, measured, curve, drawn, stated)
+        if usable:
+            curves = sampled_curves(usable, _print_progress)
+            yield from _left_out_by_test(source, usable, curves, only)
+
+
+def _left_out_by_test(
+    source: Evidence,
+    usable: Sequence[MeasuredCurve],
+    curves: Sequence[SampledCurve],
+    only: Collection[str] = (),
+) -> Iterator[LeftOutCurve]:
+    keys = [curve.test for curve in curves]
+    for test, seed, posterior in left_out_fits(curves, keys, _print_progress, only):
+        generator = np.random.default_rng(seed)
+        for measured, curve in zip(usable, curves, strict=True):
+            if curve.test == test:
+                drawn = posterior.predicted(curve, generator)
+                stated = _stated(source, measured, posterior)
+                yield LeftOutCurve(source.id, measured, curve, drawn, stated)
+
+
+def _left_out_by_actuator(
+    source: Evidence, usable: Sequence[MeasuredCurve], curves: Sequence[SampledCurve]
+) -> Iterator[LeftOutCurve]:
+    keys = [KEYS["actuator"](curve) for curve in curves]
+    for name, seed, posterior in left_out_fits(curves, keys, _print_progress):
+        generator = np.random.default_rng(seed)
+        for measured, curve, key in zip(usable, curves, keys, strict=True):
+            if key == name:
+                # By actuators, so that what stands together in a draw is one of these.
+                as_one = curve._replace(test=key)
+                drawn = posterior.predicted(curve, generator)
+                yield LeftOutCurve(source.id, measured, as_one, drawn, [None] * len(measured.y))
 
 
 def _print_progress(step: str, done: int, total: int) -> None:
@@ -104,9 +171,34 @@ def _stated(
 ) -> Sequence[tuple[float, float] | None]:
     rest, _ = usable_curves([source])
     sizes = sizes_of_groups([curve for curve in rest if curve.test != measured.test])
-    calibration = as_calibration(NAME, film_of(measured), [source], posterior, [], sizes)
+    calibration = as_calibration(NAME, film_of(measured), [source], posterior, [], sizes, {})
     intervals = curve_intervals(measured, uncertainty_for(measured, calibration))
     return intervals or [None] * len(measured.y)
+
+
+def variant_rows(curves: Sequence[SampledCurve]) -> Iterator[list[str]]:
+    """Yield a row a variant and what is left out, by VARIANTS: the sum of the log scores of all
+    curves, and the median half widths of the 90 % intervals as factors.
+    """
+    for name, changes in CHANGES.items():
+        changed = list(curves)
+        for change in changes:
+            changed = [change(curve) for curve in changed]
+        for what, key_of in KEYS.items():
+            keys = [key_of(curve) for curve in curves]
+            score, inside, wide = 0.0, 0, {"force": [], "motion": []}  # type: ignore[var-annotated]
+            for key, seed, posterior in left_out_fits(changed, keys, _print_progress):
+                generator = np.random.default_rng(seed)
+                for old, curve, its in zip(curves, changed, keys, strict=True):
+                    if its != key:
+                        continue
+                    score += posterior.log_score(curve)
+                    drawn = posterior.predicted(curve, generator)
+                    low, high = np.quantile(drawn, (0.05, 0.95), axis=0)
+                    inside += int(((low < curve.measured) & (curve.measured < high)).sum())
+                    wide.get(GROUPS[old.group], []).extend(((high - low) / 2).tolist())
+            factors = [f"{math.exp(float(np.median(each))):.2f}" for each in wide.values()]
+            yield [name, what, f"{score:.1f}", f"{inside}", *factors]
 
 
 def point_rows(curves: Sequence[LeftOutCurve]) -> Iterator[list[str]]:
@@ -127,8 +219,8 @@ def point_rows(curves: Sequence[LeftOutCurve]) -> Iterator[list[str]]:
             ]
 
 
-def coverage_rows(curves: Sequence[LeftOutCurve]) -> Iterator[list[str]]:
-    """Yield a row an interval, by COVERAGE."""
+def coverage_rows(what: str, curves: Sequence[LeftOutCurve]) -> Iterator[list[str]]:
+    """Yield a row an interval, by COVERAGE, of curves left out by their test or actuator."""
     tests = dict.fromkeys((each.source, each.curve.test) for each in curves)
     ranks = [each.ranks(each.curve.measured[None])[0] for each in curves]
     for share in SHARES:
@@ -143,6 +235,7 @@ def coverage_rows(curves: Sequence[LeftOutCurve]) -> Iterator[list[str]]:
             drawn = numbers.permutation(count)
             expected = expected + drawn if expected.size else drawn
         yield [
+            what,
             f"{100 * share:g} %",
             f"{held} of {points}",
             f"{expected.mean():.1f} +- {expected.std():.1f}",
@@ -170,11 +263,22 @@ def source_rows(sources: Sequence[Evidence], curves: Sequence[LeftOutCurve]) -> 
 def main() -> None:
     """Predict all curves and keep the record."""
     sources = shipped_evidence()
-    curves = list(left_out_curves(sources))
+    by_test: list[LeftOutCurve] = []
+    by_actuator: list[LeftOutCurve] = []
+    variants: list[list[str]] = []
+    for source in sources:
+        usable, _ = usable_curves([source])
+        if usable:
+            curves = sampled_curves(usable, _print_progress)
+            by_test += _left_out_by_test(source, usable, curves)
+            by_actuator += _left_out_by_actuator(source, usable, curves)
+            variants += variant_rows(curves)
+    coverage = [*coverage_rows("test", by_test), *coverage_rows("actuator", by_actuator)]
     tables = {
-        "sources": Table(SOURCES, list(source_rows(sources, curves))),
-        "coverage": Table(COVERAGE, list(coverage_rows(curves))),
-        "points": Table(POINTS, list(point_rows(curves))),
+        "sources": Table(SOURCES, list(source_rows(sources, by_test))),
+        "coverage": Table(COVERAGE, coverage),
+        "variants": Table(VARIANTS, variants),
+        "points": Table(POINTS, list(point_rows(by_test))),
     }
     used = versions(sbafab="sbafab", emcee="emcee", numpy="numpy")
     keep(NAME, Record(COMMAND, date.today().isoformat(), used, tables))

@@ -1,6 +1,6 @@
 """Coverage of a calibration's 90 % intervals in synthetic labs: docs/measured/synthetic_labs.json.
 
-python -m docs.scripts.synthetic_labs takes about ten minutes; it needs the extra "calibrate".
+python -m docs.scripts.synthetic_labs takes about fifteen minutes; it needs the extra "calibrate".
 """
 
 from __future__ import annotations

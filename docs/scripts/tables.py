@@ -79,7 +79,6 @@ CALIBRATED = (
     ("(largest-bend)", "largest bend"),
     ("(time-water), pressure 10 kPa", "time to fill, water"),
     ("(modulus-3dof)", "lateral modulus, 3-DoF"),
-    ("(energy-1kpa), pressure 1 kPa", "pneumatic input work at 1 kPa, d = 10"),
 )
 
 

@@ -145,7 +145,9 @@ def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) ->
     calibration, held_out = fitted.calibration, fitted.calibration.held_out
     if as_json:
         unfitted = [{"curve": curve, "reason": reason} for curve, reason in fitted.left_out]
-        left_open = [OpenEntry(curve=k, probabilities=v) for k, v in fitted.open_set_ups.items()]
+        left_open = [
+            OpenEntry(curve=k, probabilities=v) for k, v in fitted.calibration.set_ups.items()
+        ]
         more = {"file": path, "calibration": calibration.as_dict(), "not_fitted": unfitted}
         show.document(CalibrateDocument.of(fitted, left_open=left_open, **more))
         return
@@ -186,7 +188,7 @@ def _print(fitted: CalibrationFit) -> None:
     click.echo(f"What the models miss beyond that (one standard deviation): {missed}")
     names = ("", "measured", "predicted", "90 % interval", "")
     show.table("Left out", names, [*map(_held_out, fitted.points)])
-    for curve, set_ups in fitted.open_set_ups.items():
+    for curve, set_ups in fitted.calibration.set_ups.items():
         shares = ", ".join(f"{phrase} {100 * share:.0f} %" for phrase, share in set_ups.items())
         click.echo(f"Left open by {curve}: {shares}")
     for curve, reason in fitted.left_out:

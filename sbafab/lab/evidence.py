@@ -63,7 +63,8 @@ def from_lab_records(lab: Lab) -> Evidence:
 def _curves(actuators: Sequence[Built]) -> Iterator[MeasuredCurve]:
     design, build = actuators[0].design, actuators[0].build
     for name, (quantity, setup, unknown, x_name) in RECORDED.items():
-        values = tuple(a.numbers[name] for a in actuators if name in a.numbers)
+        measured = [actuator for actuator in actuators if name in actuator.numbers]
+        values = tuple(actuator.numbers[name] for actuator in measured)
         if values:
             yield MeasuredCurve(
                 id=_id(f"{design}-{name}"),
@@ -73,6 +74,7 @@ def _curves(actuators: Sequence[Built]) -> Iterator[MeasuredCurve]:
                 x_name=x_name,
                 x=(0.0,) * len(values) if x_name else (),
                 toml=build.toml if build.design else "",
+                actuators=tuple(actuator.records[0].serial for actuator in measured),
                 setup=setup,
                 error=StatedError(source="not recorded"),
                 group=_id(design),

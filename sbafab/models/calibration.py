@@ -1,7 +1,8 @@
 """A calibration: the posterior of the models' unknowns with the discrepancy that remains, as a file
 that designs and kits name; the factors of a design, and the 90 % intervals of its predictions.
 
-Unknowns have a normal posterior in their coordinates. A prediction is linear in them: its
+Unknowns have a normal posterior in their coordinates, for an actuator of which nothing was
+measured: its pocket loss differs from pressing to pressing. A prediction is linear in them: its
 logarithm, or the prediction itself where it may be 0 or below, changes by its slope times the
 change of each unknown. What the models miss beyond that is a relative discrepancy, one standard
 deviation for each group of quantities; farther from the evidence of a group, in size, film or
@@ -30,6 +31,7 @@ from sbafab.laminate.films import PAPER_BURST, PAPER_THICKNESS
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.lay_up import folded_height
 from sbafab.models.figures import EXTRAPOLATION, Factors, Figure, FigureItem, Flag
+from sbafab.models.film_elements import Array
 from sbafab.models.paper import BALLOONS, CALIBRATED_MODELS
 from sbafab.models.quantity import Quantity
 
@@ -38,12 +40,15 @@ NONE: Literal["none"] = "none"
 """The name for using no calibration: films as drawn and bought, without intervals."""
 FILE = "calibration.toml"
 """A calibration's copy in the output folder of a design."""
-FLAT = "flat height"
-"""The group of folded heights."""
-GROUPS = ("force", "motion", FLAT, "time", "work", "stiffness", "loss")
+FLAT, BENT = "flat height", "force in bending"
+"""The groups of folded heights, and of forces on a plate square to a bent tip."""
+GROUPS = ("force", BENT, "motion", FLAT, "time", "work", "stiffness", "loss")
 """Groups of quantities, each with its discrepancy."""
 SHARE = 0.9
 """Probability that an interval holds the measured value."""
+SHARED = 0.5
+"""Share of the discrepancy's variance that the points of a curve, and the values of a group that
+are measured on one actuator, have in common."""
 
 
 Ends = tuple[float, float]
@@ -91,8 +96,8 @@ def _priors() -> Iterator[Unknown]:
 
 UNKNOWNS = tuple(_priors())
 """What calibration estimates, in the order of a calibration's mean and covariance."""
-DESIGN_UNKNOWNS = 3
-"""The first of UNKNOWNS, which change an actuator; the others change its supply."""
+DESIGN_UNKNOWNS = 4
+"""The first of UNKNOWNS, which change what an actuator does; the others are terms of a figure."""
 FIELDS = [unknown.field for unknown in UNKNOWNS]
 
 
@@ -200,8 +205,11 @@ class HeldOut(Section):
 
 
 class ModelCalibration(Section):
-    """A posterior: ``mean`` and ``covariance`` (n, n) of the coordinates of ``unknowns``, and
-    ``discrepancy``, the relative standard deviation that the models miss, by group.
+    """A posterior: ``mean`` and ``covariance`` (n, n) of the coordinates of ``unknowns`` for an
+    actuator of which nothing was measured, and ``discrepancy``, the relative standard deviation
+    that the models miss, by group. ``pressing_spread`` is the standard deviation in mm of the
+    pocket loss from pressing to pressing, which the covariance contains. ``set_ups`` are the
+    probabilities of the set-ups that the source of a curve leaves open, by the curve's id.
 
     ``film`` is the product of the evidence, ``evidence`` the sources that it was fitted to,
     ``sizes`` those of its actuators by group of quantities; ``held_out`` says how many
@@ -209,7 +217,7 @@ class ModelCalibration(Section):
     distinguish.
     """
 
-    schema_name: Literal["sbafab/calibration@2"] = Field(alias="schema")
+    schema_name: Literal["sbafab/calibration@3"] = Field(alias="schema")
     name: str
     about: str
     film: str
@@ -218,9 +226,13 @@ class ModelCalibration(Section):
     mean: _Row
     covariance: Annotated[tuple[_Row, ...], Field(strict=False)]
     sentences: _Texts
+    pressing_spread: float = Field(ge=0, le=1)
     discrepancy: dict[str, Annotated[float, Field(ge=0, le=10)]]
+    set_ups: dict[str, dict[str, Annotated[float, Field(ge=0, le=1)]]]
     sizes: dict[str, SizeRange]
     held_out: HeldOut
+    offsets: _Row = (0.0,) * len(GROUPS)
+    joint: Annotated[tuple[_Row, ...] | None, Field(strict=False)] = None
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Self:
@@ -274,22 +286,74 @@ class ModelCalibration(Section):
         moved = []
         for row in range(DESIGN_UNKNOWNS):
             unknown, step = UNKNOWNS[row], math.sqrt(self.covariance[row][row])
-            # Downwards where the upper end is near: a press factor is at most 1.
+            # A smaller loss, with which an actuator reaches more; the other way where an end of the
+            # range is near: a press factor is at most 1.
+            step = -step if unknown.field == "pocket_loss" else step
             value = unknown.value(self.mean[row] + step)
-            if abs(unknown.coordinate(value) - self.mean[row]) < step / 2:
+            if abs(unknown.coordinate(value) - self.mean[row]) < abs(step) / 2:
                 value = unknown.value(self.mean[row] - step)
             start = unknown.coordinate(self.values[unknown.field])
             change = unknown.coordinate(value) - start
             moved.append((change, self._factors_at({**self.values, unknown.field: value})))
         return moved
 
-    def variance(self, slopes: Sequence[float]) -> float:
-        """Return the variance by the unknowns of a quantity with these slopes (n,) by their
-        coordinates; left-out ones at the end are 0.
+    @cached_property
+    def _joint(self) -> Array:
+        """Covariance (n + groups) of the coordinates, and of what the values of each group miss in
+        common on one actuator.
         """
-        rates = np.zeros(len(UNKNOWNS))
+        if self.joint is not None:
+            return np.array(self.joint)
+        count = len(UNKNOWNS)
+        joint = np.diag([0.0] * count + [SHARED * self.discrepancy[each] ** 2 for each in GROUPS])
+        joint[:count, :count] = self.covariance
+        return joint
+
+    def rates(self, group: str, slopes: Sequence[float], size: float = 1.0) -> Array:
+        """Return the rates (n + groups,) of a quantity of a group with these ``slopes`` by the
+        coordinates; left-out ones at the end are 0. ``size`` is the rate by what the group misses:
+        1 for a logarithm, the value for a value.
+        """
+        rates = np.zeros(len(UNKNOWNS) + len(GROUPS))
         rates[: len(slopes)] = slopes
-        return float(rates @ np.array(self.covariance) @ rates)
+        rates[len(UNKNOWNS) + GROUPS.index(group)] = size
+        return rates
+
+    def factor(self, group: str) -> float:
+        """Return the factor by which an actuator's measured values exceed the models'."""
+        return math.exp(self.offsets[GROUPS.index(group)])
+
+    def own_miss(self, group: str, farther: float = 0.0) -> float:
+        """Return the relative standard deviation that the models miss of one value of a group for
+        itself; ``farther`` is assumed off the evidence.
+        """
+        return math.hypot(math.sqrt(1 - SHARED) * self.discrepancy[group], farther)
+
+    def parts(self, rates: Array) -> Array:
+        """Return the variances (m, n + groups) of quantities of these ``rates`` (m, n + groups) by
+        each unknown, and by what the values of a group miss in common.
+        """
+        return np.asarray(rates * (rates @ self._joint))
+
+    def conditioned(self, rates: Array, missed: Array, own: Array) -> ModelCalibration:
+        """Return the calibration of an actuator by values that were measured on it: the logarithms
+        ``missed`` (m,) of measured over predicted ones, their ``rates`` (m, n + groups), and the
+        standard deviations ``own`` (m,) of each for itself, by models and measurement. The normal
+        posterior of a linear model.
+        """
+        joint = self._joint
+        gain = np.linalg.solve(rates @ joint @ rates.T + np.diag(own**2), rates @ joint).T
+        mean = np.array([*self.mean, *self.offsets]) + gain @ missed
+        joint = joint - gain @ rates @ joint
+        count = len(UNKNOWNS)
+        ends = [[u.coordinate(u.least or 1e-9), u.coordinate(u.most)] for u in UNKNOWNS]
+        built = {
+            "mean": np.clip(mean[:count], *np.transpose(ends)).tolist(),
+            "covariance": joint[:count, :count].tolist(),
+            "offsets": mean[count:].tolist(),
+            "joint": joint.tolist(),
+        }
+        return ModelCalibration.model_validate({**self.as_dict(), **built})
 
     def interval(
         self,
@@ -305,15 +369,17 @@ class ModelCalibration(Section):
         ``slopes`` are the slopes of the logarithm of the value (``is_log``) or of the value, by
         coordinate; ``farther`` is the relative standard deviation assumed off the evidence.
         """
-        missed = math.hypot(self.discrepancy[group], farther) * (1.0 if is_log else abs(value))
-        half = deviations(share) * math.sqrt(self.variance(slopes) + missed**2)
+        size = 1.0 if is_log else abs(value)
+        rates, own = self.rates(group, slopes, size), size * self.own_miss(group, farther)
+        half = deviations(share) * math.sqrt(float(rates @ self._joint @ rates) + own**2)
         if is_log:
             return value * math.exp(-half), value * math.exp(half)
         return value - half, value + half
 
     def as_dict(self) -> dict[str, Any]:
         """Return the tables of the file."""
-        return self.model_dump(mode="json", by_alias=True, exclude_none=True)
+        own = {"offsets", "joint"} if self.joint is None else set()
+        return self.model_dump(mode="json", by_alias=True, exclude_none=True, exclude=own)
 
     def for_film(self, product: str) -> ModelCalibration:
         """Return the calibration adapted to a film; for a film other than the evidence's the
@@ -396,6 +462,8 @@ def read_calibration(path: Path) -> ModelCalibration:
 TERMS = {Quantity.LOST_WORK: "loss_share", Quantity.WATER_TIME: "water_delay"}
 """Fields of the unknowns that figures have as a term."""
 CLEARANCES = (Quantity.RIM_ROOM, Quantity.CHAMBER_CLEARANCE)
+CONTRADICTION = 3.0
+"""Standard deviations between a reading and its prediction from which one of them is wrong."""
 LOG_RANGE = 3.0
 """A value that changes by more than this factor is not near enough to linear in its logarithm."""
 GROUP_BY_UNIT = {"N": "force", "mJ": "work", "s": "time", "N/mm": "stiffness"}
@@ -405,20 +473,34 @@ def discrepancy_group(figure: Figure) -> str | None:
     """Return the group of a figure's discrepancy; None if no calibrated model gives it."""
     if figure.model.id not in CALIBRATED_MODELS:
         return None
-    named = {Quantity.FOLDED_HEIGHT: FLAT, Quantity.LOST_WORK: "loss"}
+    named = {Quantity.FOLDED_HEIGHT: FLAT, Quantity.LOST_WORK: "loss", Quantity.BENT_FORCE: BENT}
     return named.get(figure.quantity) or GROUP_BY_UNIT.get(figure.unit, "motion")
+
+
+class Reading(NamedTuple):
+    """A value that was measured on one actuator: the ``text`` in which it was given, the
+    ``measured`` value and its relative standard ``error``, and its ``figures`` at the median and at
+    each of the ``moved`` factors of an ``Uncertainty``.
+    """
+
+    text: str
+    measured: float
+    error: float
+    figures: Sequence[Figure]
 
 
 @dataclass(frozen=True)
 class Uncertainty:
     """A calibration with the user's own values (``overrides``, by field of ``Factors``), which are
     exact, in place of its values; for a ``laminate`` of a ``form``, by default like its evidence.
+    Nothing stands on the tip unless the user says so, or it ``is_probed`` as in the evidence.
     """
 
     calibration: ModelCalibration
     overrides: Mapping[str, float | None] = field(default_factory=dict)
     laminate: Laminate | None = None
     form: Form | None = None
+    is_probed: bool = False
 
     def farther(self, group: str) -> float:
         """Return the relative standard deviation assumed for a group of quantities, off what the
@@ -433,6 +515,13 @@ class Uncertainty:
             return sizes.model_copy(update={"diameters": None}).farther(evidence)
         products = {layer.film.product for layer in self.laminate.tpe_layers}
         return sizes.farther(evidence, products != {self.calibration.film})
+
+    def flags(self, group: str) -> tuple[Flag, ...]:
+        """Return the flags of figures of a group; a group without evidence is an extrapolation."""
+        known = self.calibration.sizes
+        if known and group not in known:
+            return (EXTRAPOLATION,)
+        return flags_at(self.farther(group))
 
     @cached_property
     def factors(self) -> Factors:
@@ -455,18 +544,21 @@ class Uncertainty:
     def _given(self) -> dict[str, Any]:
         """The user's values by field, a modulus in place of its ratio included."""
         given = given_factors(self.overrides)
+        if not self.is_probed:
+            given = {"tip_load": 0.0, **given}
         return {"modulus_ratio": 1.0, **given} if "modulus_mpa" in given else given
 
     def _with_overrides(self, factors: Factors) -> Factors:
         label = self.calibration.name
         if "press_factor" in self._given:
             factors = replace(factors, press_film="")
-        if self._given:
-            label += " but " + ", ".join(
-                f"{name.removesuffix('_mpa').replace('_', ' ')} {value:g}"
-                for name, value in self._given.items()
-                if name != "modulus_ratio"
-            )
+        named = [
+            f"{name.removesuffix('_mpa').replace('_', ' ')} {value:g}"
+            for name, value in self._given.items()
+            if name != "modulus_ratio" and (name, value) != ("tip_load", 0.0)
+        ]
+        if named:
+            label += f" but {', '.join(named)}"
         return replace(factors, calibration=label, **self._given)
 
     def interval_of(
@@ -484,8 +576,31 @@ class Uncertainty:
         A clearance, which may be negative, is linear in the unknowns; so is a value that has almost
         vanished with other factors, such as a force near the end of the stroke.
         """
-        value = value_at(self.factors)
-        moved = [(change, value_at(of) if change else value) for change, of in self.shifted()]
+        value, slopes, is_log = self.slopes(group, value_at, term, may_be_negative)
+        low, high = self.calibration.interval(
+            group, value, slopes, is_log, share, self.farther(group)
+        )
+        if group == FLAT and self.laminate is not None:
+            # From all films flown away to the films as bought.
+            folded = folded_height(self.laminate, 1.0, self.calibration.film)
+            return value, (max(low, folded.solid), min(high, folded.nominal))
+        return value, (max(low, 0.0) if value >= 0 and not may_be_negative else low, high)
+
+    def slopes(
+        self,
+        group: str,
+        value_at: Callable[[Factors], float],
+        term: str = "",
+        may_be_negative: bool = False,
+    ) -> tuple[float, list[float], bool]:
+        """Return a value at the median, its slopes by the coordinates of the unknowns, and True if
+        these are of its logarithm; arguments as of ``interval_of``.
+        """
+        factor = self.calibration.factor(group)
+        value = factor * value_at(self.factors)
+        moved = [
+            (change, factor * value_at(of) if change else value) for change, of in self.shifted()
+        ]
         values = [value, *(each for _, each in moved)]
         least, most = min(values), max(values)
         is_log = least > 0 and most < LOG_RANGE * value < LOG_RANGE**2 * least
@@ -498,14 +613,55 @@ class Uncertainty:
         slope = 0.0 if not term or term in self._given else 1.0
         slope *= self.calibration.values[term] / value if slope and term != "loss_share" else 1.0
         slopes += [slope if name == term else 0.0 for name in FIELDS[DESIGN_UNKNOWNS:]]
-        low, high = self.calibration.interval(
-            group, value, slopes, is_log, share, self.farther(group)
-        )
-        if group == FLAT and self.laminate is not None:
-            # From all films flown away to the films as bought.
-            folded = folded_height(self.laminate, 1.0, self.calibration.film)
-            return value, (max(low, folded.solid), min(high, folded.nominal))
-        return value, (max(low, 0.0) if value >= 0 and not may_be_negative else low, high)
+        return value, slopes, is_log
+
+    def built(self, readings: Sequence[Reading]) -> Uncertainty:
+        """Return what is known of an actuator on which ``readings`` were measured.
+
+        Raises DesignError for a reading that no calibrated model gives, or that lies more than
+        CONTRADICTION standard deviations from what is predicted.
+        """
+        rows, missed, own = [], [], []
+        for reading in readings:
+            group = discrepancy_group(reading.figures[0])
+            values = [figure.value for figure in reading.figures]
+            if group is None or not all(math.isfinite(each) and each > 0 for each in values):
+                raise DesignError(
+                    f"{reading.text}: no calibrated model gives the {reading.figures[0].name}; "
+                    "give a height, stroke, bend or force that it gives"
+                )
+            by_factors = dict(zip((self.factors, *self.moved), values, strict=True))
+            term = TERMS.get(reading.figures[0].quantity, "")
+            value, slopes, _ = self.slopes(group, by_factors.__getitem__, term)
+            rows.append(self.calibration.rates(group, slopes))
+            missed.append(math.log(reading.measured / value))
+            own.append(
+                math.hypot(self.calibration.own_miss(group, self.farther(group)), reading.error)
+            )
+        rates, misses, alone = np.array(rows), np.array(missed), np.array(own)
+        self._refuse_contradictions(readings, rates, misses, alone)
+        return replace(self, calibration=self.calibration.conditioned(rates, misses, alone))
+
+    def _refuse_contradictions(
+        self, readings: Sequence[Reading], rates: Array, missed: Array, own: Array
+    ) -> None:
+        variances = self.calibration.parts(rates)
+        for reading, miss, part, alone in zip(readings, missed, variances, own, strict=True):
+            away = float(miss) / math.sqrt(float(part.sum()) + float(alone) ** 2)
+            if abs(away) > CONTRADICTION:
+                most = int(np.argmax(part))
+                against = (
+                    f"the calibration's {UNKNOWNS[most].title}"
+                    if most < len(UNKNOWNS)
+                    else "the model, beyond what it has missed so far"
+                )
+                raise DesignError(
+                    f"{reading.text} lies {abs(away):.1f} standard deviations "
+                    f"{'above' if away > 0 else 'below'} the {reading.figures[0].value:.3g} "
+                    f"{reading.figures[0].unit} that is predicted, and speaks most against "
+                    f"{against}; check the reading, its unit and its pressure, and the design's "
+                    "film"
+                )
 
     def bounded(
         self, items: Sequence[FigureItem], moved: Iterable[Sequence[FigureItem]]
@@ -532,14 +688,14 @@ class Uncertainty:
         if group == FLAT and all(each == value for each in moved):
             return figure
         values = dict(zip((self.factors, *self.moved), (value, *moved), strict=True))
-        _, interval = self.interval_of(
+        value, interval = self.interval_of(
             group,
             values.__getitem__,
             term=TERMS.get(quantity, ""),
             may_be_negative=quantity in CLEARANCES,
         )
-        flags = (*figure.flags, *flags_at(self.farther(group)))
-        return replace(figure, interval=interval, flags=flags)
+        flags = (*figure.flags, *self.flags(group))
+        return replace(figure, value=value, interval=interval, flags=flags)
 
 
 def given_factors(overrides: Mapping[str, float | None]) -> dict[str, Any]:

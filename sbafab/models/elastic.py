@@ -61,7 +61,7 @@ BUCKLES = (
 """Flag of the force of a column that would buckle (docs/measured/candidates.csv)."""
 SAMPLES, SERIES_SAMPLES = 21, 401
 ANGLES = (30.0, 60.0, 90.0)
-LEAST_PRESSURE, NO_FURTHER = 0.01, 1e-7
+LEAST_PRESSURE, NO_FURTHER = 0.01, 1e-10
 """Lowest pressure of a bend in kPa, and the relative tolerance of its pressure."""
 NEARBY = 2.0
 """Largest ratio of a bend's pressure to that of another stack which guides the search."""

@@ -269,7 +269,8 @@ class Factors:
     the loss of pocket radius in the press in mm, ``modulus_mpa``, the film's modulus if it differs
     from the design's, and ``modulus_ratio``, the ratio of the pressed film's modulus to it.
     ``water_delay`` and ``air_delay`` in s are the lag of pump and valve, ``loss_share`` the share
-    of the input work lost in inflating and deflating; 0 means unknown.
+    of the input work lost in inflating and deflating; 0 means unknown. ``tip_load`` in g is what
+    stands on the free tip.
     """
 
     press_factor: float = 1.0
@@ -280,6 +281,7 @@ class Factors:
     water_delay: float = 0.0
     air_delay: float = 0.0
     loss_share: float = 0.0
+    tip_load: float = 0.0
     press_film: str = ""
     calibration: str = ""
     """Name of the calibration that the others come from, unless it is the user's own values."""

@@ -6,6 +6,7 @@ import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import starmap
+from statistics import NormalDist
 from typing import NamedTuple
 
 from sbafab.documents import Document, Short, attribute
@@ -13,7 +14,7 @@ from sbafab.errors import DesignError
 from sbafab.models.calibration import SHARE, Ends, ModelCalibration, Uncertainty, deviations
 from sbafab.models.figures import Factors
 from sbafab.validation.evidence import Evidence, MeasuredCurve
-from sbafab.validation.fit import GROUP_OF, MIDDLES, relative_errors, term_of
+from sbafab.validation.fit import MIDDLES, relative_errors, term_of
 from sbafab.validation.model_values import ModelledActuator, ModelValue, model_values
 
 WIDTH = 100
@@ -100,27 +101,29 @@ def _compared(
 
 def uncertainty_for(curve: MeasuredCurve, calibration: ModelCalibration) -> Uncertainty:
     """Return a calibration as it holds for the actuator that was measured."""
+    is_probed = curve.setup.tip == "probed"
     if not curve.is_described:
-        return Uncertainty(calibration)
+        return Uncertainty(calibration, is_probed=is_probed)
     of = ModelledActuator(curve, Factors(**MIDDLES))
     try:
         film, form, laminate = of.design.films.tpe.product, of.design.form, of.laminate
     except DesignError:
-        return Uncertainty(calibration)
-    return Uncertainty(calibration.for_film(film), {}, laminate, form)
+        return Uncertainty(calibration, is_probed=is_probed)
+    return Uncertainty(calibration.for_film(film), {}, laminate, form, is_probed)
 
 
 def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends | None] | None:
     """Return the interval of the measured value at each point of a curve, in its unit.
 
-    The interval spans every assumption on the set-up that the source leaves open. It includes the
-    calibration's uncertainty, the models' discrepancy and the error of the measurement. Returns
-    None if the calibration does not cover the quantity. A point's interval is None if an
-    assumption reaches the point with the median factors, but not with factors one standard
-    deviation away.
+    It is that of the mixture over the set-ups that the source leaves open, each with its
+    probability by the calibration's fit (equal ones for a curve that was not fitted), and includes
+    the calibration's uncertainty, the models' discrepancy and the error of the measurement.
+    Returns None if the calibration does not cover the quantity. A point's interval is None if a
+    set-up reaches the point with the median factors, but not with factors one standard deviation
+    away; set-ups of a probability under LEAST_SHARE do not count.
     """
-    group = GROUP_OF.get(curve.quantity)
-    if group is None:
+    group = curve.discrepancy_group
+    if not group:
         return None
     series: dict[Factors, Mapping[str, tuple[ModelValue, ...]]] = {}
     for factors in (uncertainty.factors, *uncertainty.moved):
@@ -131,20 +134,53 @@ def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends
     median = series[uncertainty.factors]
     if not median:
         return None
+    shares = uncertainty.calibration.set_ups.get(curve.id, {})
+    likely = [name for name in median if shares.get(name, 1.0) >= LEAST_SHARE]
     unreached = (None,) * len(curve.y)
     intervals: list[Ends | None] = []
     for point, error in enumerate(relative_errors(curve).tolist()):
-        ends: list[Ends] = []
-        for phrase in (name for name, values in median.items() if values[point] is not None):
+        parts: list[tuple[float, float, Ends]] = []
+        for phrase in (name for name in likely if median[name][point] is not None):
             answered = {of: values.get(phrase, unreached)[point] for of, values in series.items()}
             reached = {of: value for of, value in answered.items() if value is not None}
             if len(reached) < len(answered):
-                ends = []
+                parts = []
                 break
-            wide = uncertainty.interval_of(group, reached.__getitem__, term=term_of(curve))
-            ends.append(widened(*wide, error))
-        intervals.append((min(a for a, _ in ends), max(b for _, b in ends)) if ends else None)
+            value, ends = uncertainty.interval_of(group, reached.__getitem__, term=term_of(curve))
+            parts.append((shares.get(phrase, 1.0), value, widened(value, ends, error)))
+        intervals.append(mixture_interval(parts) if parts else None)
     return intervals
+
+
+LEAST_SHARE = 0.01
+"""Probability below which an open set-up does not count."""
+
+
+def mixture_interval(parts: Sequence[tuple[float, float, Ends]]) -> Ends:
+    """Return the 90 % interval of a mixture of distributions, each given by its weight, its median
+    and its 90 % interval; they are normal in the logarithm if all ends are above 0, else in the
+    value.
+    """
+    is_log = min(low for _, _, (low, _) in parts) > 0
+    into, back = (math.log, math.exp) if is_log else (float, float)
+    total = sum(weight for weight, _, _ in parts)
+    normals = [
+        (weight / total, into(low), (into(high) - into(low)) / (2 * deviations(SHARE)))
+        for weight, _, (low, high) in parts
+    ]
+    quantiles = []
+    for share in ((1 - SHARE) / 2, (1 + SHARE) / 2):
+        low = min(into(ends[0]) for _, _, ends in parts)
+        high = max(into(ends[1]) for _, _, ends in parts)
+        for _ in range(60):
+            middle = (low + high) / 2
+            below = sum(
+                weight * NormalDist(start + deviations(SHARE) * spread, spread).cdf(middle)
+                for weight, start, spread in normals
+            )
+            low, high = (middle, high) if below < share else (low, middle)
+        quantiles.append(back((low + high) / 2))
+    return quantiles[0], quantiles[1]
 
 
 def widened(value: float, ends: Ends, error: float) -> Ends:

@@ -17,6 +17,7 @@ from pydantic import Field, model_validator
 from sbafab.design.files import checked, hint, listed, read_toml, shown
 from sbafab.design.toml_table import NAME_PATTERN, Section
 from sbafab.errors import DesignError
+from sbafab.models.calibration import BENT
 from sbafab.spreadsheet import plain_text, table_rows
 
 FOLDER = Path(__file__).parent
@@ -94,7 +95,8 @@ class Setup(Section):
     ``supply`` feeds ``fluid`` at ``flow_ml_min`` through a tube of ``tube_mm`` length and
     ``tube_bore_mm`` bore. ``chambers`` are pressurised, the others empty. The ``tip`` is free; held
     by a plate or sensor at ``height_share`` or ``stroke_mm``; bent by ``bend_deg`` and held by a
-    sensor; or pushed to a side. The curve's axis, which may be ``pressure_kpa``, is empty here.
+    sensor; or pushed to a side. A ``probed`` tip is free but for a sensor of unknown weight on it.
+    The curve's axis, which may be ``pressure_kpa``, is empty here.
     """
 
     supply: ShortText = ""
@@ -107,7 +109,7 @@ class Setup(Section):
     stroke_mm: float | None = Field(default=None, ge=0, le=1e4)
     bend_deg: float | None = Field(default=None, ge=0, le=360)
     chambers: int | None = Field(default=None, ge=0, le=100)
-    tip: Literal["free", "held", "bent", "pushed", ""] = ""
+    tip: Literal["free", "probed", "held", "bent", "pushed", ""] = ""
     note: ShortText = ""
 
 
@@ -116,11 +118,12 @@ class MeasuredCurve(Section):
 
     ``place``: figure and section of the source. The actuator is a ``design``, a template's name or
     a file, changed by ``changes`` (dotted key to value); or ``toml``, the text of a whole design;
-    all are empty if no design describes it. ``x`` is empty if ``x_name`` is; else it has one number
-    per value. ``comparable`` False: no prediction may be compared with it or fitted to it, for
-    ``reason``. Curves of a ``group`` come from one test, so a fit that leaves one out leaves all of
-    them out; "" is a test of its own. ``unknown``: sentences on facts that the source does not
-    state.
+    all are empty if no design describes it. ``actuators`` names the one that was measured, or one
+    for each value; by default all values of a design are of one. ``x`` is empty if ``x_name`` is;
+    else it has one number per value. ``comparable`` False: no prediction may be compared with it or
+    fitted to it, for ``reason``. Curves of a ``group`` come from one test, so a fit that leaves one
+    out leaves all of them out; "" is a test of its own. ``unknown``: sentences on facts that the
+    source does not state.
     """
 
     id: str = Field(pattern=NAME_PATTERN)
@@ -130,6 +133,7 @@ class MeasuredCurve(Section):
     design: ShortText = ""
     changes: dict[str, Any] = Field(default_factory=dict)
     toml: str = ""
+    actuators: Sentences = ()
     x_name: str = NO_AXIS
     x: _Values = ()
     y: _Values = Field(min_length=1)
@@ -157,6 +161,11 @@ class MeasuredCurve(Section):
         if errors and len(errors) != values:
             raise ValueError(
                 f"has {len(errors)} absolute errors for {values} y; give one for each, or relative"
+            )
+        if len(self.actuators) not in (0, 1, values):
+            raise ValueError(
+                f"has {len(self.actuators)} actuators for {values} y; give one for all, or one "
+                "for each"
             )
         if min(errors, default=0.0) < 0:
             raise ValueError(f"has an absolute error of {min(errors):g}; it must be at least 0")
@@ -198,6 +207,19 @@ class MeasuredCurve(Section):
         sizes = stated.absolute or (0.0,) * len(self.y)
         pairs = zip(sizes, self.y, strict=True)
         return tuple(KINDS[stated.kind] * math.hypot(e, stated.relative * y) for e, y in pairs)
+
+    @property
+    def actuator_of_points(self) -> tuple[str, ...]:
+        """The actuator of each value, by default one of the design."""
+        named = self.actuators or (self.design or self.toml,)
+        return named if len(named) == len(self.y) else named * len(self.y)
+
+    @property
+    def discrepancy_group(self) -> str:
+        """The group of the discrepancy of its values; "" if calibrations are not fitted to it."""
+        group = QUANTITIES[self.quantity].group
+        is_bent = self.x_name == "bend_deg" or self.setup.bend_deg is not None
+        return BENT if group == "force" and is_bent else group
 
     def points(self) -> Iterator[tuple[float | None, float, float | None]]:
         """Yield the values: the place on the axis (None without one), value, and standard error."""
@@ -308,7 +330,7 @@ def _curve(table: Mapping[str, Any], path: Path, where: str) -> MeasuredCurve:
 # CSV: one row for each value; a curve's cells are in its first row, and may be repeated below.
 
 
-OF_A_VALUE = ("x", "y", "error")
+OF_A_VALUE = ("x", "y", "error", "actuator")
 OF_CURVE = ("quantity", "design", "x_name", "place", "group", "comparable", "reason", "unknown")
 OF_ERROR = {"kind": "kind", "runs": "runs", "error_source": "source"}
 OF_SETUP = tuple(Setup.model_fields)
@@ -356,8 +378,10 @@ def _curve_of_rows(name: str, rows: Sequence[TableRow], path: Path) -> MeasuredC
     where = f"{path}, curve {shown(name)}"
     cells = _cells_of_curve(rows)
     x, y, error = (
-        [_number(row[key], key, place) for place, row in rows if key in row] for key in OF_A_VALUE
+        [_number(row[key], key, place) for place, row in rows if key in row]
+        for key in ("x", "y", "error")
     )
+    names = [row["actuator"] for _, row in rows if "actuator" in row]
     stated = {key: cells[column] for column, key in OF_ERROR.items() if column in cells}
     return _curve(
         {
@@ -365,6 +389,7 @@ def _curve_of_rows(name: str, rows: Sequence[TableRow], path: Path) -> MeasuredC
             "place": path.name,
             "group": name,
             **{key: cells[key] for key in OF_CURVE if key in cells},
+            "actuators": names[:1] if len(set(names)) == 1 else names,
             "x": x,
             "y": y,
             "error": _read(StatedError, {"source": path.name, **stated, "absolute": error}, where),

@@ -15,6 +15,7 @@ import tomli_w
 from sbafab.documents import Document
 from sbafab.errors import DesignError
 from sbafab.models.calibration import (
+    DESIGN_UNKNOWNS,
     FIELDS,
     GROUPS,
     SHARE,
@@ -26,12 +27,12 @@ from sbafab.models.calibration import (
 from sbafab.models.figures import Factors
 from sbafab.models.film_elements import Array
 from sbafab.runtime import Progress
-from sbafab.validation.evidence import QUANTITIES, Evidence, MeasuredCurve
+from sbafab.validation.evidence import Evidence, MeasuredCurve
 from sbafab.validation.model_values import ModelledActuator, model_values
 from sbafab.validation.posterior import (
     LEAST_ERROR,
+    LOSS,
     NODE_COORDINATES,
-    NODES,
     Posterior,
     SampledCurve,
     sampled,
@@ -41,6 +42,8 @@ from sbafab.validation.posterior import (
 DIGITS = 6
 TOLD_APART = 0.3
 """Correlation from which two unknowns are said not to be told apart well."""
+NO_CHANGE = 0.01
+"""Change of a logarithm from end to end of an unknown which does not count."""
 IMPOSSIBLE = 1e-3
 """Share of a curve's measured values that stands for a state which an actuator cannot reach."""
 
@@ -61,18 +64,12 @@ class HeldOutPoint(Document):
 
 class CalibrationFit(NamedTuple):
     """A calibration, its held-out points, and the curves that were not fitted, each with its
-    reason; ``open_set_ups`` are the set-ups that a curve's source leaves open: each assumed phrase
-    with its probability by the fit, from equal prior ones.
+    reason.
     """
 
     calibration: ModelCalibration
     points: Sequence[HeldOutPoint]
-    open_set_ups: Mapping[str, Mapping[str, float]]
     left_out: Sequence[tuple[str, str]]
-
-
-GROUP_OF = {name: each.group for name, each in QUANTITIES.items() if each.group}
-"""Quantities that calibration is fitted to, and the groups of their discrepancies."""
 
 
 def usable_curves(
@@ -83,7 +80,7 @@ def usable_curves(
     for source in sources:
         for curve in source.curves:
             reason = "" if curve.comparable else curve.reason
-            if not reason and curve.quantity not in GROUP_OF:
+            if not reason and not curve.discrepancy_group:
                 reason = f"the unknowns do not change the {curve.y_name}"
             if not reason and min(curve.y) <= 0:
                 reason = "its values are not all above 0"
@@ -121,17 +118,14 @@ def fit(name: str, sources: Sequence[Evidence], progress: Progress) -> Calibrati
     posterior = sampled(curves)
     points = [
         point
-        for test, seed, rest in left_out_fits(curves, progress)
+        for test, seed, rest in left_out_fits(curves, [each.test for each in curves], progress)
         for source, curve in zip(usable, curves, strict=True)
         if curve.test == test
         for point in predicted_points(source, curve, rest, seed)
     ]
-    sizes = sizes_of_groups(usable)
+    sizes, set_ups = sizes_of_groups(usable), open_set_ups(usable, curves, posterior)
     return CalibrationFit(
-        as_calibration(name, films[0], sources, posterior, points, sizes),
-        points,
-        open_set_ups(usable, curves, posterior),
-        left_out,
+        as_calibration(name, films[0], sources, posterior, points, sizes, set_ups), points, left_out
     )
 
 
@@ -154,33 +148,58 @@ def film_of(curve: MeasuredCurve) -> str:
 
 
 def sampled_curves(curves: Sequence[MeasuredCurve], progress: Progress) -> list[SampledCurve]:
-    """Return curves in the form for the posterior: the models' values at all nodes."""
-    tables: list[dict[tuple[int, ...], Array]] = [{} for _ in curves]
-    # Maps of balloons hang on the pocket loss alone.
-    for loss, ratio, press in np.ndindex(NODES[1], NODES[0], NODES[2]):
-        progress("models", loss, NODES[1])
-        place = ratio, loss, press
-        values = [
-            unknown.value(float(nodes[at]))
-            for unknown, nodes, at in zip(UNKNOWNS, NODE_COORDINATES, place, strict=False)
-        ]
-        factors = Factors(**dict(zip(FIELDS, values, strict=False)))  # type: ignore[arg-type]
-        for table, curve in zip(tables, curves, strict=True):
-            table[place] = logarithms(curve, factors)
+    """Return curves in the form for the posterior: the models' values at all nodes of the unknowns
+    that change them.
+    """
     sampled_ones = []
-    for curve, table in zip(curves, tables, strict=True):
-        joined = np.stack([table[place] for place in np.ndindex(NODES)])
+    for done, curve in enumerate(curves):
+        progress("models", done, len(curves))
+        axes = axes_of(curve)
+        nodes = [NODE_COORDINATES[axis] for axis in axes]
+        counts = [len(each) for each in nodes]
+        # Maps of balloons depend on the pocket loss alone, and are kept for some losses only.
+        order = sorted(
+            np.ndindex(*counts), key=lambda at: [at[axes.index(LOSS)]] if LOSS in axes else []
+        )
+        table: dict[tuple[int, ...], Array] = {}
+        for place in order:
+            at = {axis: float(each[k]) for axis, each, k in zip(axes, nodes, place, strict=True)}
+            table[place] = logarithms(curve, factors_at(at))
+        joined = np.stack([table[place] for place in np.ndindex(*counts)])
         sampled_ones.append(
             SampledCurve(
                 curve.test,
-                GROUPS.index(GROUP_OF[curve.quantity]),
-                joined.reshape(*NODES, *joined.shape[1:]),
+                curve.actuator_of_points,
+                GROUPS.index(curve.discrepancy_group),
+                axes,
+                joined.reshape(*counts, *joined.shape[1:]),
                 np.log(curve.y),
                 relative_errors(curve),
                 FIELDS.index(term) if (term := term_of(curve)) else -1,
             )
         )
     return sampled_ones
+
+
+def factors_at(coordinates: Mapping[int, float]) -> Factors:
+    """Return the factors with some unknowns at coordinates, by their column, the others in the
+    middle of their priors; no delay and no loss, which are terms of a figure.
+    """
+    values: dict[str, Any] = {
+        unknown.field: unknown.value(coordinates[at]) if at in coordinates else unknown.middle
+        for at, unknown in enumerate(UNKNOWNS[:DESIGN_UNKNOWNS])
+    }
+    return Factors(**values)
+
+
+def axes_of(curve: MeasuredCurve) -> tuple[int, ...]:
+    """Return the columns of the unknowns that change the models' values of a curve."""
+    axes = []
+    for axis, nodes in enumerate(NODE_COORDINATES):
+        ends = [logarithms(curve, factors_at({axis: float(nodes[end])})) for end in (0, -1)]
+        if np.abs(ends[0] - ends[1]).max() > NO_CHANGE:
+            axes.append(axis)
+    return tuple(axes)
 
 
 def logarithms(curve: MeasuredCurve, factors: Factors) -> Array:
@@ -213,20 +232,23 @@ def relative_errors(curve: MeasuredCurve) -> Array:
 
 
 def left_out_fits(
-    curves: Sequence[SampledCurve], progress: Progress, only: Collection[str] = ()
+    curves: Sequence[SampledCurve],
+    keys: Sequence[str],
+    progress: Progress,
+    only: Collection[str] = (),
 ) -> Iterator[tuple[str, int, Posterior]]:
-    """Yield fits that each leave out one test, every test in turn or each of ``only``: the test,
-    the seed of its random numbers, and the posterior.
-
-    Yields nothing if all curves are of one test.
+    """Yield fits that each leave out the curves of one key, such as their test or their actuator,
+    every key in turn or each of ``only``: the key, the seed of its random numbers, and the
+    posterior. Yields nothing if all curves have one key.
     """
-    tests = list(dict.fromkeys(curve.test for curve in curves))
-    for done, test in enumerate(tests if len(tests) > 1 else ()):
-        if only and test not in only:
+    names = list(dict.fromkeys(keys))
+    for done, name in enumerate(names if len(names) > 1 else ()):
+        if only and name not in only:
             continue
-        progress("held out", done, len(tests))
-        seed = zlib.crc32(test.encode())
-        yield test, seed, sampled([curve for curve in curves if curve.test != test], seed)
+        progress("held out", done, len(names))
+        seed = zlib.crc32(name.encode())
+        rest = [curve for curve, key in zip(curves, keys, strict=True) if key != name]
+        yield name, seed, sampled(rest, seed)
 
 
 def predicted_points(
@@ -256,7 +278,7 @@ def sizes_of_groups(curves: Sequence[MeasuredCurve]) -> dict[str, SizeRange]:
     by_group: dict[str, SizeRange] = {}
     for curve in curves:
         of = ModelledActuator(curve, Factors(**MIDDLES))
-        sizes, group = sizes_of(of.design.form, of.laminate), GROUP_OF[curve.quantity]
+        sizes, group = sizes_of(of.design.form, of.laminate), curve.discrepancy_group
         by_group[group] = by_group[group].joined(sizes) if group in by_group else sizes
     return by_group
 
@@ -268,10 +290,11 @@ def as_calibration(
     posterior: Posterior,
     points: Sequence[HeldOutPoint],
     sizes: Mapping[str, SizeRange],
+    set_ups: Mapping[str, Mapping[str, float]],
 ) -> ModelCalibration:
     """Return the calibration that a posterior stands for."""
     table = {
-        "schema": "sbafab/calibration@2",
+        "schema": "sbafab/calibration@3",
         "name": name,
         "about": "",
         "film": film,
@@ -279,6 +302,11 @@ def as_calibration(
         "unknowns": FIELDS,
         "mean": posterior.mean.round(DIGITS).tolist(),
         "covariance": posterior.covariance.round(DIGITS + 2).tolist(),
+        "pressing_spread": round(float(np.median(posterior.spread)), DIGITS),
+        "set_ups": {
+            curve: {phrase: round(share, 4) for phrase, share in shares.items()}
+            for curve, shares in set_ups.items()
+        },
         "discrepancy": {
             group: round(each, DIGITS) for group, each in posterior.discrepancy.items()
         },

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
@@ -23,22 +23,23 @@ from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.calibration import UNKNOWNS
 from sbafab.models.closed_forms import modulus, second_moments
+from sbafab.models.column import BatchPoses
 from sbafab.models.figures import Factors, Model, PredictionRequest
 from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line, usual_pressures
 from sbafab.models.prediction import plate_of, predict
 from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count
 from sbafab.models.rippled_balloon import free_shapes
-from sbafab.models.stack import MOST_PRESSURE, Pose, Stack, stack
+from sbafab.models.stack import GRAVITY, Pose, Stack, stack
 from sbafab.validation.evidence import QUANTITIES, MeasuredCurve
 
 ModelValue = float | None
 """A value of a model; None if the model has no such state."""
 Series = dict[str, tuple[ModelValue, ...]]
 """Values at a curve's points by the assumption on the set-up, as a phrase; "" if none is made."""
-SAMPLES = 16
-LEAST_FREE_KPA, FIRST_KPA, MOST_FREE_KPA = 0.002, 0.5, 20.0
-"""Pressures between which a single balloon is inflated, and the first end of its range."""
+SAMPLES = 60
+LEAST_FREE_KPA, MOST_FREE_KPA = 0.002, 20.0
+"""Pressures, of films as bought, between which a free stack is filled by volume."""
 NO_TUBE = 1e-3
 """Length in mm of a tube that takes no pressure."""
 OPEN_PRESSURES = (10.0, 30.0, 100.0)
@@ -164,7 +165,24 @@ class ModelledActuator:
 
     def free_pose(self, chambers: int, pressure: float) -> Pose:
         """Return the pose with some chambers at a pressure in kPa. Raises DesignError."""
-        return self.stack.pose(elastic.chamber_pressures(self.stack, chambers, pressure))
+        pressures = elastic.chamber_pressures(self.stack, chambers, pressure)
+        return self.stack.pose(pressures, self.tip_load)
+
+    def filling(self, chambers: int) -> BatchPoses:
+        """Return the free poses with some chambers at rising pressures, up to the first that has
+        none.
+        """
+        most = min(self.stack.most_pressure, MOST_FREE_KPA * self.factors.modulus_ratio)
+        rows = np.zeros((SAMPLES, self.stack.chambers))
+        rows[1:, :chambers] = np.geomspace(LEAST_FREE_KPA, most, SAMPLES - 1)[:, None]
+        poses = self.stack.equilibria(rows, self.stack.acting({"tip_load": self.tip_load}))
+        return poses.part(slice(int(np.logical_and.accumulate(poses.is_met).sum())))
+
+    @property
+    def tip_load(self) -> tuple[float, float, float]:
+        """Force in N on the tip by what stands on it, for a base that lies level."""
+        probe = self.factors.tip_load if self.curve.setup.tip == "probed" else 0.0
+        return (0.0, 0.0, -1e-3 * GRAVITY * probe)
 
     @property
     def chambers_that_bend(self) -> dict[str, int]:
@@ -275,21 +293,28 @@ def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> Series:
 
 
 def _bent_forces(of: ModelledActuator) -> NamedSeries:
-    curve, counts = of.curve, of.chambers_that_bend
+    """Return forces on a plate square to the bent tip, with the chambers that bend it, or all of
+    them, pressurised further.
+    """
+    curve, bending = of.curve, of.chambers_that_bend
     stated = curve.setup.bend_deg or 0.0
     angles = curve.x if curve.x_name == "bend_deg" else (stated,) * len(curve.y)
     pairs = list(zip(angles, _pressures(curve), strict=True))
 
-    def force(chambers: int, angle: float, pressure: float) -> float:
-        pose = elastic.pose_bent_by(of.stack, chambers, angle)
+    def force(bent: int, filled: int, angle: float, pressure: float) -> float:
+        pose = elastic.pose_bent_by(of.stack, bent, angle)
         if pose is None or pose.pressures[0] > pressure:
             raise DesignError("it does not bend so far")
-        return elastic.pressed_further(of.stack, chambers, pressure, pose).force
+        return elastic.pressed_further(of.stack, filled, pressure, pose).force
 
-    return of.model(), {
-        phrase: tuple(_tried(force, count, *pair) for pair in pairs)
-        for phrase, count in counts.items()
-    }
+    series: Series = {}
+    for phrase, count in bending.items():
+        further = [(count, phrase)]
+        if curve.setup.chambers is None:
+            further.append((of.stack.chambers, f"{phrase} to bend it and then all"))
+        for filled, named in further:
+            series[named] = tuple(_tried(force, count, filled, *pair) for pair in pairs)
+    return of.model(), series
 
 
 # Strokes, heights and bends.
@@ -299,7 +324,8 @@ def _strokes(of: ModelledActuator) -> NamedSeries:
     curve = of.curve
     is_stroke = curve.quantity == "stroke_mm"
     is_whole = curve.setup.chambers in (None, of.design.form.stacks)
-    if is_whole and curve.x_name != "volume_ul" and not of.shares_maps:
+    is_plain = not of.shares_maps and not any(of.tip_load)
+    if is_whole and curve.x_name != "volume_ul" and is_plain:
         # One pressure in all chambers: by the balloons themselves.
         kinds = Counter(of.balloons())
         flat = 0.0 if is_stroke else of.actuator.thickness
@@ -307,82 +333,69 @@ def _strokes(of: ModelledActuator) -> NamedSeries:
         return of.model(elastic.ELASTIC), rise
     flat = of.stack.flat_height if is_stroke else 0.0
     chambers = {"": curve.setup.chambers or of.stack.chambers}
-    return _risen(of, chambers, lambda pose: pose.height - flat)
+    return _risen(of, chambers, lambda poses: poses.heights - flat)
 
 
 def _bends(of: ModelledActuator) -> NamedSeries:
-    return _risen(of, of.chambers_that_bend, lambda pose: pose.bend)
+    return _risen(of, of.chambers_that_bend, lambda poses: poses.bends)
 
 
 def _risen(
-    of: ModelledActuator, chambers: Mapping[str, int], value: Callable[[Pose], float]
+    of: ModelledActuator, chambers: Mapping[str, int], values: Callable[[BatchPoses], Array]
 ) -> NamedSeries:
-    """Return values of the free stack's pose at the curve's pressures or volumes."""
+    """Return values of the free stack's poses at the curve's pressures or volumes."""
     series: Series = {}
     for phrase, count in chambers.items():
         if of.curve.x_name == "volume_ul":
-            poses = [_pose_with(of, count, volume) for volume in of.curve.x]
-            series[phrase] = tuple(None if pose is None else value(pose) for pose in poses)
+            series[phrase] = _by_volume(of, count, of.curve.x, values)
             continue
-        by_pressure = _by_pressure(of.curve, lambda p, n=count: value(of.free_pose(n, p)))  # type: ignore[misc]
-        for assumed, values in by_pressure.items():
-            series[", ".join(filter(None, (phrase, assumed)))] = values
+        by_pressure = _by_pressure(of.curve, lambda p, n=count: _at_pressure(of, n, p, values))  # type: ignore[misc]
+        for assumed, risen in by_pressure.items():
+            series[", ".join(filter(None, (phrase, assumed)))] = risen
     return of.model(), series
 
 
-def _pose_with(of: ModelledActuator, chambers: int, volume: float) -> Pose | None:
-    """Return the free pose with ``volume`` ul added to the pressurised chambers in total.
+def _at_pressure(
+    of: ModelledActuator, chambers: int, pressure: float, values: Callable[[BatchPoses], Array]
+) -> float:
+    rows = np.array([elastic.chamber_pressures(of.stack, chambers, pressure)])
+    load = of.stack.acting({"tip_load": of.tip_load})
+    return float(values(of.stack.equilibria(rows, load).met())[0])
 
-    None if that takes more than the stack's greatest pressure.
+
+def _by_volume(
+    of: ModelledActuator,
+    chambers: int,
+    volumes: Sequence[float],
+    values: Callable[[BatchPoses], Array],
+) -> tuple[ModelValue, ...]:
+    """Return values of the free stack with volumes in ul added to some chambers in total, by
+    poses at rising pressures. None for a volume that MOST_FREE_KPA does not reach.
     """
-
-    def volume_of(pose: Pose) -> float:
-        return float(pose.volumes[:chambers].sum())
-
-    target = volume + volume_of(of.free_pose(chambers, 0.0))
-    low, high = 0.0, min(of.stack.most_pressure, MOST_PRESSURE)
-    pose = of.free_pose(chambers, high)
-    if volume_of(pose) < target:
-        return None
-    for _ in range(40):
-        middle = (low + high) / 2
-        pose = of.free_pose(chambers, middle)
-        low, high = (middle, high) if volume_of(pose) < target else (low, middle)
-    return pose
-
-
-def _balloon_strokes(of: ModelledActuator) -> NamedSeries:
-    if len(set(of.balloons())) > 1:
-        raise DesignError("its balloons are of unlike size")
-    if of.curve.x_name == "volume_ul":
-        # A stroke by its volume is the same for every modulus.
-        drawn = of.balloons(modulus_ratio=1.0)[0]
-        return of.model(elastic.ELASTIC), {"": _strokes_by_volume(drawn, of.curve.x)}
-    balloon = of.balloons()[0]
-    series = _by_pressure(of.curve, lambda p: float(free_shapes(balloon, p).height[0]))
-    return of.model(elastic.ELASTIC), series
-
-
-def _strokes_by_volume(balloon: Balloon, volumes: tuple[float, ...]) -> tuple[ModelValue, ...]:
-    """Return the strokes in mm of a free balloon by its volume in ul, to 0.2 %.
-
-    None for a volume that MOST_FREE_KPA does not reach.
-    """
-    top = FIRST_KPA
-    while top < MOST_FREE_KPA and _filling(balloon, top)[0][-1] < max(volumes):
-        top = min(2 * top, MOST_FREE_KPA)
-    volumes_held, heights = _filling(balloon, top)
+    poses = of.filling(chambers)
+    held = poses.volumes[:, :chambers].sum(1)
+    at = values(poses)
     return tuple(
-        None if volume > volumes_held[-1] else float(np.interp(volume, volumes_held, heights))
+        None if volume > added[-1] else float(np.interp(volume, added, at))
+        for added in (np.maximum.accumulate(held - held[0]),)
         for volume in volumes
     )
 
 
-@lru_cache(maxsize=256)
-def _filling(balloon: Balloon, top: float) -> tuple[Array, Array]:
-    """Return ul in a free balloon and its height in mm as it fills to a pressure in kPa."""
-    shapes = free_shapes(balloon, np.geomspace(LEAST_FREE_KPA, top, SAMPLES))
-    return np.append(0.0, shapes.volume), np.append(0.0, shapes.height)
+def _balloon_strokes(of: ModelledActuator) -> NamedSeries:
+    balloons = of.balloons()
+    if len(set(balloons)) > 1:
+        raise DesignError("its balloons are of unlike size")
+    if of.curve.x_name == "volume_ul":
+        # Of the whole stack, since what stands on it is carried by every balloon.
+        count = len(balloons)
+        volumes = [count * volume for volume in of.curve.x]
+        strokes = _by_volume(of, of.stack.chambers, volumes, lambda poses: poses.heights)
+        flat = of.stack.flat_height
+        rises = tuple(None if height is None else (height - flat) / count for height in strokes)
+        return of.model(), {"": rises}
+    series = _by_pressure(of.curve, lambda p: float(free_shapes(balloons[0], p).height[0]))
+    return of.model(elastic.ELASTIC), series
 
 
 # Work, times, stiffness, sizes.

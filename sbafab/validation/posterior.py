@@ -1,18 +1,20 @@
 """Posterior of the unknowns and of the models' discrepancy, sampled by emcee.
 
-Logarithms of the models' values are interpolated linearly in modulus ratio (its logarithm), pocket
-loss and press factor.
-
 The logarithm of a measured value is the logarithm of the model's value, plus a discrepancy, plus
 the error of the measurement. Discrepancies are normal with one standard deviation for each group of
 quantities; half of their variance is shared by the points of a curve. If a source leaves the set-up
 open, all candidate set-ups are equally likely.
+
+Pockets differ from pressing to pressing: the pocket loss of an actuator is normal about the mean of
+a lab's pressing, with a spread of its own.
+
+Logarithms of the models' values are interpolated linearly in the coordinates of the unknowns.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -20,20 +22,21 @@ from typing import NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.calibration import GROUPS, UNKNOWNS
+from sbafab.models.calibration import FIELDS, GROUPS, SHARED, UNKNOWNS
 from sbafab.models.film_elements import Array
 
-SHARED = 0.5
-"""Share of the discrepancy's variance that the points of a curve have in common."""
 SCALE_MIDDLE, SCALE_SPREAD = 0.15, 0.7
 """Prior of a group's discrepancy: median of the standard deviation, and standard deviation of its
 logarithm. Such models are off by 10 to 20 %."""
+PRESSING_MIDDLE, PRESSING_SPREAD = 0.07, 0.7
+"""Prior of the standard deviation in mm of pocket losses by one lab's pressing: its median, and the
+standard deviation of its logarithm. Assumed: molten film creeps by some tenths of a mm."""
 LEAST_ERROR = 0.01
 """Least relative error of a measurement, for sources that state none or a scatter of repetitions
 on one actuator."""
-WALKERS, STEPS, BURN_IN, THINNING = 40, 2000, 800, 20
+WALKERS, STEPS, BURN_IN, THINNING = 64, 3000, 1000, 20
 SEED = 20220085
-
+LOSS = FIELDS.index("pocket_loss")
 
 MIDDLES, LEAST, MOST = (
     np.array([unknown.coordinate(getattr(unknown, name)) for unknown in UNKNOWNS])
@@ -41,89 +44,128 @@ MIDDLES, LEAST, MOST = (
 )
 SPREADS = np.array([unknown.spread for unknown in UNKNOWNS])
 """Means, bounds and standard deviations of the unknowns' coordinates by the priors."""
-NODES = (11, 6, 6)
-"""Nodes of a curve's table by modulus ratio, pocket loss and press factor."""
+NODES = (11, 6, 6, 6)
+"""Nodes of a curve's table by modulus ratio, pocket loss, press factor and tip load."""
 NODE_COORDINATES = [np.linspace(*ends) for ends in zip(LEAST, MOST, NODES, strict=False)]
-"""The nodes' coordinates by each design unknown, evenly spaced."""
+"""The nodes' coordinates by each of these unknowns, evenly spaced."""
 
 
-def interpolated(table: Array, coordinates: Array) -> Array:
-    """Return values linear between the nodes of a table (*NODES, ...) at coordinates (n, unknowns):
-    (n, ...).
+def interpolated(table: Array, axes: Sequence[int], coordinates: Array) -> Array:
+    """Return values linear between the nodes of a table (nodes of each of ``axes``, ...), columns
+    of UNKNOWNS, at coordinates (n, unknowns): (n, ...).
     """
     row = np.zeros((1, len(coordinates)), dtype=np.int_)
     weight = np.ones((1, len(coordinates)))
-    for axis, nodes in enumerate(NODE_COORDINATES):
+    for axis in axes:
+        nodes = NODE_COORDINATES[axis]
         place = (coordinates[:, axis] - nodes[0]) / (nodes[1] - nodes[0])
         place = np.clip(place, 0.0, len(nodes) - 1.0)
         first = np.minimum(place.astype(np.int_), len(nodes) - 2)
         share = place - first
         row = np.concatenate([row * len(nodes) + first, row * len(nodes) + first + 1])
         weight = np.concatenate([weight * (1 - share), weight * share])
-    flat = table.reshape(math.prod(NODES), -1)
-    values = (weight[..., None] * flat[row]).sum(0)
-    return np.asarray(values.reshape(len(coordinates), *table.shape[len(NODES) :]))
+    values = table.shape[len(axes) :]
+    flat = table.reshape(-1, math.prod(values))
+    return np.asarray((weight[..., None] * flat[row]).sum(0).reshape(len(coordinates), *values))
 
 
 class SampledCurve(NamedTuple):
-    """A curve for the posterior: the ``test`` that it comes from, the number of its quantity's
-    ``group`` in GROUPS, a ``table`` of logarithms of the models' values (*NODES, open set-ups,
-    points), logarithms of the ``measured`` values and their standard ``errors``, (points,), and the
-    column in UNKNOWNS of the unknown that its values have as a ``term`` (-1: none).
+    """A curve for the posterior: the ``test`` that it comes from, the name of the ``actuators`` of
+    its points, the number of its quantity's ``group`` in GROUPS, a ``table`` of logarithms of the
+    models' values (nodes of each of ``axes``, open set-ups, points) by the columns ``axes`` of
+    UNKNOWNS, logarithms of the ``measured`` values and their standard ``errors``, (points,), and
+    the column in UNKNOWNS of the unknown that its values have as a ``term`` (-1: none).
     """
 
     test: str
+    actuators: tuple[str, ...]
     group: int
+    axes: tuple[int, ...]
     table: Array
     measured: Array
     errors: Array
-    term: int
+    term: int = -1
 
-    def logarithms(self, samples: Array) -> Array:
-        """Return logarithms of the models' values (n, open set-ups, points), with the term in them,
-        such as the delay of pump or valve.
+    def logarithms(self, unknowns: Array, losses: Mapping[str, Array]) -> Array:
+        """Return logarithms of the models' values (n, open set-ups, points) at ``unknowns``
+        (n, unknowns) with the pocket losses (n,) of the actuators, with the term in them, such as
+        the delay of pump or valve.
         """
-        values = interpolated(self.table, samples)
+        values = np.empty((len(unknowns), *self.table.shape[len(self.axes) :]))
+        for actuator in dict.fromkeys(self.actuators):
+            places = unknowns.copy()
+            places[:, LOSS] = losses[actuator]
+            points = np.array([each == actuator for each in self.actuators])
+            values[..., points] = interpolated(self.table, self.axes, places)[..., points]
         if self.term < 0:
             return values
-        return np.asarray(np.log(np.exp(values) + np.exp(samples[:, self.term])[:, None, None]))
+        return np.asarray(np.log(np.exp(values) + np.exp(unknowns[:, self.term])[:, None, None]))
 
-    def densities(self, samples: Array, log_scales: Array) -> Array:
-        """Return the log density of the measured values by set-up (n, set-ups), with standard
-        deviations of the discrepancies (logarithms, n).
+    def densities(self, values: Array, log_scales: Array) -> Array:
+        """Return the log density of the measured values by set-up (n, set-ups) for logarithms of
+        the models' values (n, set-ups, points), with standard deviations of the discrepancies
+        (logarithms, n).
 
         A normal whose covariance is the discrepancy's plus the measurement's: a diagonal and one
         shared part, whose inverse and determinant have closed forms (Sherman and Morrison).
         """
-        residuals = self.measured - self.logarithms(samples)
+        residuals = self.measured - values
         squares = np.exp(2 * log_scales)[:, None]
         each = (1 - SHARED) * squares + self.errors**2
         weighted = residuals / each[:, None]
         shared = SHARED * squares
         growth = 1 + shared * (1 / each).sum(-1, keepdims=True)
         quadratic = (weighted * residuals).sum(-1) - shared / growth * weighted.sum(-1) ** 2
-        halves = (np.log(each).sum(-1) + np.log(growth[:, 0])) / 2
+        halves = (np.log(2 * np.pi * each).sum(-1) + np.log(growth[:, 0])) / 2
         return np.asarray(-0.5 * quadratic - halves[:, None])
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """Samples of the unknowns' coordinates (n, unknowns), and logarithms of the discrepancies'
-    standard deviations (n, groups).
+    """Samples: ``unknowns`` (n, unknowns), coordinates whose pocket loss is the mean of the lab's
+    pressing; the ``spread`` (n,) of losses in mm; the ``losses`` (n,) of the actuators that were
+    fitted; ``scales`` (n, groups), logarithms of the discrepancies' standard deviations; and for an
+    actuator of which nothing is known the ``departure`` (n,) of its loss in spreads.
     """
 
-    samples: Array
+    unknowns: Array
+    spread: Array
+    losses: Mapping[str, Array]
     scales: Array
+    departure: Array
+
+    @classmethod
+    def of(cls, chain: Array, actuators: Sequence[str], departure: Array) -> Posterior:
+        """Return the samples of a chain (n, unknowns + 1 + actuators + groups)."""
+        ends = np.cumsum([len(UNKNOWNS), 1, len(actuators)])
+        unknowns, spread, departures, scales = np.split(chain, ends, axis=-1)
+        spread = np.exp(spread[:, 0])
+        own = unknowns[:, LOSS, None] + spread[:, None] * departures
+        losses = dict(zip(actuators, own.T, strict=True))
+        return cls(unknowns, spread, losses, scales, departure)
+
+    @cached_property
+    def new_loss(self) -> Array:
+        """Pocket losses (n,) of an actuator of which nothing is known, mm."""
+        drawn = self.unknowns[:, LOSS] + self.spread * self.departure
+        return np.asarray(np.clip(drawn, LEAST[LOSS], MOST[LOSS]))
+
+    @cached_property
+    def coordinates(self) -> Array:
+        """Coordinates (n, unknowns) of an actuator of which nothing is known."""
+        places = self.unknowns.copy()
+        places[:, LOSS] = self.new_loss
+        return places
 
     @cached_property
     def mean(self) -> Array:
-        """Mean coordinates (unknowns,)."""
-        return np.asarray(self.samples.mean(0))
+        """Mean coordinates (unknowns,) of an actuator of which nothing is known."""
+        return np.asarray(self.coordinates.mean(0))
 
     @cached_property
     def covariance(self) -> Array:
-        """Covariance of the coordinates (unknowns, unknowns)."""
-        return np.asarray(np.cov(self.samples.T))
+        """Covariance of the coordinates (unknowns, unknowns) of such an actuator."""
+        return np.asarray(np.cov(self.coordinates.T))
 
     @cached_property
     def discrepancy(self) -> dict[str, float]:
@@ -131,20 +173,37 @@ class Posterior:
         squares = np.exp(2 * self.scales).mean(0)
         return dict(zip(GROUPS, np.sqrt(squares).tolist(), strict=True))
 
-    def predicted(self, curve: SampledCurve, generator: np.random.Generator) -> Array:
+    def logarithms(self, curve: SampledCurve, is_new: bool = False) -> Array:
+        """Return logarithms of the models' values of a curve (n, set-ups, points); its actuators
+        are taken as new ones if the fit has not seen them, or ``is_new``.
+        """
+        new = dict.fromkeys(curve.actuators, self.new_loss)
+        return curve.logarithms(self.unknowns, new if is_new else {**new, **self.losses})
+
+    def predicted(
+        self, curve: SampledCurve, generator: np.random.Generator, is_new: bool = False
+    ) -> Array:
         """Return drawn logarithms of measured values of a curve (n, points)."""
-        values = curve.logarithms(self.samples)
+        values = self.logarithms(curve, is_new)
         count, setups, points = values.shape
         chosen = values[np.arange(count), generator.integers(setups, size=count)]
         missed = discrepancies(np.exp(self.scales[:, curve.group]), points, generator)
         return np.asarray(chosen + missed + curve.errors * generator.standard_normal(missed.shape))
+
+    def log_score(self, curve: SampledCurve, is_new: bool = False) -> float:
+        """Return the logarithm of the density that a curve's measured values have by the fit: their
+        log score, in units of the logarithms of the values.
+        """
+        logs = curve.densities(self.logarithms(curve, is_new), self.scales[:, curve.group])
+        most = float(logs.max())
+        return most + math.log(float(np.exp(logs - most).mean()))
 
 
 def set_up_probabilities(curve: SampledCurve, posterior: Posterior) -> Array:
     """Return the probability of each set-up that a curve's source leaves open, by the fit to it:
     (set-ups,).
     """
-    logs = curve.densities(posterior.samples, posterior.scales[:, curve.group])
+    logs = curve.densities(posterior.logarithms(curve), posterior.scales[:, curve.group])
     weights = np.exp(logs - logs.max(-1, keepdims=True))
     return np.asarray((weights / weights.sum(-1, keepdims=True)).mean(0))
 
@@ -157,24 +216,27 @@ def discrepancies(scales: Array, points: int, generator: np.random.Generator) ->
     return np.asarray(scales[:, None] * (common + each))
 
 
-def log_prior(coordinates: Array) -> Array:
-    """Return the log prior at coordinates (n, unknowns + groups), up to a constant."""
-    places, scales = np.split(coordinates, [len(UNKNOWNS)], axis=-1)
-    total = -0.5 * (((scales - math.log(SCALE_MIDDLE)) / SCALE_SPREAD) ** 2).sum(-1)
-    # One after the other: another order of rounding leads the chains elsewhere.
-    for square in (((places - MIDDLES) / SPREADS) ** 2).T:
-        total = total - 0.5 * square
+def log_prior(chain: Array, actuators: Sequence[str]) -> Array:
+    """Return the log prior of a chain's samples (n, unknowns + 1 + actuators + groups), up to a
+    constant.
+    """
+    ends = np.cumsum([len(UNKNOWNS), 1, len(actuators)])
+    places, spread, departures, scales = np.split(chain, ends, axis=-1)
+    total = -0.5 * (((places - MIDDLES) / SPREADS) ** 2).sum(-1)
+    total -= 0.5 * (((spread - math.log(PRESSING_MIDDLE)) / PRESSING_SPREAD) ** 2).sum(-1)
+    total -= 0.5 * (departures**2).sum(-1)
+    total -= 0.5 * (((scales - math.log(SCALE_MIDDLE)) / SCALE_SPREAD) ** 2).sum(-1)
+    own = places[:, LOSS, None] + np.exp(spread) * departures
     is_inside = ((places >= LEAST) & (places <= MOST)).all(-1)
+    is_inside &= ((own >= LEAST[LOSS]) & (own <= MOST[LOSS])).all(-1)
     return np.where(is_inside, total, -np.inf)
 
 
-def log_likelihood(curves: Sequence[SampledCurve], coordinates: Array) -> Array:
-    """Return the log likelihood at coordinates (n, unknowns + groups): (n,). Open
-    set-ups are averaged.
-    """
-    total = np.zeros(len(coordinates))
+def log_likelihood(curves: Sequence[SampledCurve], samples: Posterior) -> Array:
+    """Return the log likelihood of samples (n,). Open set-ups are averaged."""
+    total = np.zeros(len(samples.unknowns))
     for curve in curves:
-        logs = curve.densities(coordinates, coordinates[:, len(UNKNOWNS) + curve.group])
+        logs = curve.densities(samples.logarithms(curve), samples.scales[:, curve.group])
         most = logs.max(-1)
         total += most + np.log(np.exp(logs - most[:, None]).mean(-1))
     return total
@@ -188,28 +250,32 @@ def sampled(curves: Sequence[SampledCurve], seed: int = SEED, steps: int = STEPS
         raise DesignError(
             'a calibration needs emcee, which is not installed; pip install "sbafab[calibrate]"'
         ) from None
+    actuators = list(dict.fromkeys(name for curve in curves for name in curve.actuators))
 
-    def log_posterior(coordinates: Array) -> Array:
-        prior = log_prior(coordinates)
-        inside = np.isfinite(prior)
-        total = np.full(len(prior), -np.inf)
+    def log_posterior(chain: Array) -> Array:
+        total = log_prior(chain, actuators)
+        inside = np.isfinite(total)
         if inside.any():
-            total[inside] = prior[inside] + log_likelihood(curves, coordinates[inside])
+            none = np.zeros(int(inside.sum()))
+            total[inside] += log_likelihood(curves, Posterior.of(chain[inside], actuators, none))
         return total
 
     generator = np.random.RandomState(seed)
-    start = _start(generator)
+    start = _start(generator, len(actuators))
     sampler = emcee.EnsembleSampler(WALKERS, start.shape[1], log_posterior, vectorize=True)
     sampler.random_state = generator.get_state()
     sampler.run_mcmc(start, steps)
     chain = sampler.get_chain(discard=min(BURN_IN, steps // 2), thin=THINNING, flat=True)
-    return Posterior(chain[:, : len(UNKNOWNS)], chain[:, len(UNKNOWNS) :])
+    return Posterior.of(chain, actuators, generator.standard_normal(len(chain)))
 
 
-def _start(generator: np.random.RandomState) -> Array:
-    """Return places within the prior to start from: (walkers, unknowns + groups)."""
+def _start(generator: np.random.RandomState, actuators: int) -> Array:
+    """Return places within the prior to start from (walkers, coordinates of a chain)."""
     drawn = MIDDLES[:, None] + 0.5 * SPREADS[:, None] * generator.randn(len(UNKNOWNS), WALKERS)
     margin = 1e-3 * (MOST - LEAST)
+    margin[LOSS] = PRESSING_MIDDLE
     places = np.clip(drawn.T, LEAST + margin, MOST - margin)
+    spread = math.log(PRESSING_MIDDLE / 2) + 0.2 * generator.randn(WALKERS, 1)
+    departures = np.clip(0.5 * generator.randn(WALKERS, actuators), -1.0, 1.0)
     scales = math.log(SCALE_MIDDLE) + 0.5 * SCALE_SPREAD * generator.randn(WALKERS, len(GROUPS))
-    return np.concatenate([places, scales], -1)
+    return np.concatenate([places, spread, departures, scales], -1)

@@ -441,7 +441,7 @@ def test_the_share_of_work_that_is_lost_is_the_calibration_s(three: Prediction) 
     # It was measured with six balloons of 10 mm: a doubling, and 2.5 times as many.
     assumed = math.hypot(0.15, 0.05 * math.log2(15 / 6))
     missed = calibration.discrepancy["loss"], assumed
-    spread = math.hypot(math.sqrt(calibration.covariance[5][5]), *missed)
+    spread = math.hypot(math.sqrt(calibration.covariance[6][6]), *missed)
     assert math.log(lost.interval[1] / lost.value) == pytest.approx(1.6448536 * spread)
     assert all(figure.quantity is not Quantity.LOST_WORK for figure in three.figures)
 

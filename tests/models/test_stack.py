@@ -47,6 +47,15 @@ def test_a_bend_that_no_pressure_gives_is_none(three: Stack) -> None:
     assert pose_bent_by(three, 1, 175.0) is None
 
 
+@pytest.mark.parametrize("angle", np.linspace(20.0, 120.0, 41).tolist())
+def test_every_bend_within_reach_is_found(angle: float) -> None:
+    """Once 60 degrees were left out: the bracket closed before the bend was met."""
+    soft = sbafab.stack("3dof-15mm", pocket_loss=0.15, modulus_mpa=20.0)
+    pose = pose_bent_by(soft, 1, angle)
+    assert pose is not None
+    assert pose.bend == pytest.approx(angle, abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("pressures", "load", "sentence"),
     [

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from sbafab.models.calibration import GROUPS, UNKNOWNS
 from sbafab.validation.posterior import (
+    LEAST,
+    LOSS,
+    MOST,
     NODE_COORDINATES,
+    PRESSING_MIDDLE,
+    PRESSING_SPREAD,
     SCALE_MIDDLE,
     SCALE_SPREAD,
     SampledCurve,
@@ -22,41 +27,54 @@ from sbafab.validation.posterior import (
 
 Array = NDArray[np.float64]
 ERROR = 0.02
-CURVES = 10
+CURVES, ACTUATORS = 10, 4
 
 
 class SyntheticLab(NamedTuple):
-    """The true coordinates of the unknowns, and the curves that were measured."""
+    """The true coordinates of the unknowns, the pocket losses of the actuators in mm, and the
+    curves that were measured.
+    """
 
     truth: Array
+    losses: dict[str, Array]
     curves: list[SampledCurve]
 
 
 def surface(rates: Array) -> Array:
     """A table whose logarithms grow by ``rates`` (3, set-ups, points) by coordinate."""
-    grid = np.stack(np.meshgrid(*NODE_COORDINATES, indexing="ij"), -1)
+    grid = np.stack(np.meshgrid(*NODE_COORDINATES[:3], indexing="ij"), -1)
     return np.asarray(np.tensordot(grid, rates, axes=([-1], [0])))
 
 
 def lab(number: int) -> SyntheticLab:
-    """The lab of a number: unknowns, discrepancies and errors as the priors have them."""
+    """The lab of a number: unknowns, pressing, discrepancies and errors as the priors have them."""
     generator = np.random.default_rng(number)
     truth = np.array([_drawn(unknown, generator) for unknown in UNKNOWNS])
+    spread = PRESSING_MIDDLE * math.exp(PRESSING_SPREAD * generator.standard_normal())
+    losses = {str(count): _loss(truth[LOSS], spread, generator) for count in range(ACTUATORS)}
     scales = SCALE_MIDDLE * np.exp(SCALE_SPREAD * generator.standard_normal(len(GROUPS)))
     curves = []
     for count in range(CURVES):
         points = int(generator.integers(1, 4))
         group = int(generator.integers(len(GROUPS)))
+        actuator = str(generator.integers(ACTUATORS))
         rates = generator.normal(0.0, [[[0.8]], [[2.0]], [[0.8]]], (3, 1, points))
         plain = SampledCurve(
-            str(count), group, surface(rates), np.zeros(points),
-            np.full(points, ERROR), -1,
+            str(count), (actuator,) * points, group, (0, 1, 2), surface(rates), np.zeros(points),
+            np.full(points, ERROR),
         )  # fmt: skip
-        values = plain.logarithms(truth[None])[0, 0]
+        values = plain.logarithms(truth[None], losses)[0, 0]
         missed = discrepancies(scales[group : group + 1], points, generator)[0]
         noise = ERROR * generator.standard_normal(points)
         curves.append(plain._replace(measured=values + missed + noise))
-    return SyntheticLab(truth, curves)
+    return SyntheticLab(truth, losses, curves)
+
+
+def _loss(mean: float, spread: float, generator: np.random.Generator) -> Array:
+    while True:
+        drawn = generator.normal(mean, spread)
+        if LEAST[LOSS] < drawn < MOST[LOSS]:
+            return np.array([drawn])
 
 
 def _drawn(unknown, generator: np.random.Generator) -> float:  # type: ignore[no-untyped-def]

@@ -21,8 +21,11 @@ def evidence_csv(curves: Sequence[MeasuredCurve]) -> str:
         cells |= {"comparable": "yes" if curve.comparable else "no"}
         cells |= {"unknown": " | ".join(curve.unknown)}
         errors = curve.error.absolute or (None,) * len(curve.y)
-        for x, y, error in zip(curve.x or errors, curve.y, errors, strict=True):
+        none = (None,) * len(curve.y)
+        names = curve.actuators if len(curve.actuators) == len(curve.y) else none
+        for x, y, error, name in zip(curve.x or errors, curve.y, errors, names, strict=True):
             values = {"curve": curve.id, "x": x if curve.x else None, "y": y, "error": error}
+            values["actuator"] = curve.actuators[0] if len(curve.actuators) == 1 else name
             rows.append([{**cells, **values}[key] for key in COLUMNS])
             cells = dict.fromkeys(COLUMNS)
     return csv_text(rows)

@@ -254,15 +254,15 @@ def test_calibrated_predictions_print_them_with_the_calibrated_values(
 ) -> None:
     _, out, _ = run_predict(["3dof-15mm", "-v", "-o", str(tmp_path)], capsys)
     text = _joined(out)
-    for angle in (60, 90):
+    for angle, chambers in ((60, "2 chambers"), (90, "one chamber")):
         # The value of the figure is that of the sentence: design and actuator are the same.
         sentence = re.search(
-            rf"bent by {angle} deg, on its 3-DoF; this model gives it ([\d.]+) with 2 chambers",
+            rf"bent by {angle} deg, on its 3-DoF; this model gives it ([\d.]+) with {chambers}",
             text,
         )
         assert sentence
         written = json.loads((tmp_path / "3dof-15mm" / "predict.json").read_text(encoding="utf-8"))
-        name = f"force at 100 kPa in 2 chambers, bent by {angle} deg"
+        name = f"force at 100 kPa in {chambers}, bent by {angle} deg"
         (figure,) = (each for each in written["figures"] if each["name"] == name)
         assert float(sentence[1]) == pytest.approx(figure["value"], rel=2e-3)
     # Near once calibrated: height and bend, whose sentences are gone.

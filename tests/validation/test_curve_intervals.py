@@ -8,7 +8,12 @@ import pytest
 
 from sbafab.models.calibration import ModelCalibration, Uncertainty, load_calibration
 from sbafab.models.figures import Factors
-from sbafab.validation.comparison import curve_intervals, uncertainty_for, widened
+from sbafab.validation.comparison import (
+    curve_intervals,
+    mixture_interval,
+    uncertainty_for,
+    widened,
+)
 from sbafab.validation.evidence import MeasuredCurve, Setup, StatedError
 from sbafab.validation.model_values import ModelValues
 
@@ -60,10 +65,12 @@ def test_a_flat_height_by_hand(paper: ModelCalibration) -> None:
 def test_what_a_source_leaves_open_widens_the_interval(
     paper: ModelCalibration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The least end of one assumption and the largest of the other; no others."""
+    """Two set-ups far from each other, alike likely: from the tenth part of the lower one's
+    distribution to nine tenths of the upper one's. With the fit's probabilities, by those.
+    """
 
     def model(_: MeasuredCurve, factors: Factors) -> ModelValues:
-        series = {"10 kPa": (factors.modulus_ratio,), "100 kPa": (40.0,), "300 kPa": (None,)}
+        series = {"10 kPa": (factors.modulus_ratio,), "100 kPa": (4000.0,), "300 kPa": (None,)}
         return ModelValues("m", series)
 
     monkeypatch.setattr("sbafab.validation.comparison.model_values", model)
@@ -73,12 +80,26 @@ def test_what_a_source_leaves_open_widens_the_interval(
     assert intervals[0] is not None
     missed = paper.discrepancy["motion"] ** 2 + 0.2**2
     least = math.sqrt(paper.covariance[0][0] + missed)
+    tenth = 1.2815516
     assert intervals[0] == pytest.approx(
         (
-            paper.values["modulus_ratio"] * math.exp(-DEVIATIONS * least),
-            40 * math.exp(DEVIATIONS * math.sqrt(missed)),
-        )
+            paper.values["modulus_ratio"] * math.exp(-tenth * least),
+            4000 * math.exp(tenth * math.sqrt(missed)),
+        ),
+        rel=1e-4,
     )
+    weighted = paper.model_copy(update={"set_ups": {of.id: {"10 kPa": 0.0, "100 kPa": 1.0}}})
+    intervals = curve_intervals(of, uncertainty_for(of, weighted))
+    assert intervals is not None
+    assert intervals[0] is not None
+    assert math.log(intervals[0][1] / intervals[0][0]) == pytest.approx(
+        2 * DEVIATIONS * math.sqrt(missed), rel=1e-4
+    )
+
+
+def test_a_mixture_of_one_is_that_one() -> None:
+    assert mixture_interval([(0.3, 2.0, (1.0, 4.0))]) == pytest.approx((1.0, 4.0))
+    assert mixture_interval([(0.3, 1.0, (-1.0, 3.0))] * 2) == pytest.approx((-1.0, 3.0))
 
 
 def test_a_time_counts_its_delay(paper: ModelCalibration) -> None:
@@ -87,7 +108,7 @@ def test_a_time_counts_its_delay(paper: ModelCalibration) -> None:
     uncertainty = Uncertainty(paper, {})
     time, ends = uncertainty.interval_of("time", lambda f: 1 + f.water_delay, term="water_delay")
     assert time == 1 + delay
-    spread = (delay / time) ** 2 * paper.covariance[3][3] + paper.discrepancy["time"] ** 2
+    spread = (delay / time) ** 2 * paper.covariance[4][4] + paper.discrepancy["time"] ** 2
     assert math.log(ends[1] / time) == pytest.approx(DEVIATIONS * math.sqrt(spread))
     exact = Uncertainty(paper, {"water_delay": delay})
     _, narrower = exact.interval_of("time", lambda f: 1 + f.water_delay, term="water_delay")

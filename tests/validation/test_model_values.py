@@ -147,7 +147,8 @@ def test_a_volume_leads_back_to_its_pose(three: Stack) -> None:
     taken_in = float((pose.volumes - empty.volumes).sum())
     stroke = curve("stroke_mm", "volume_ul", (taken_in, 1e6), design=THREE)
     first, beyond = values(stroke)[""]
-    assert first == pytest.approx(pose.height - three.flat_height, rel=1e-6)
+    # Between sixty poses.
+    assert first == pytest.approx(pose.height - three.flat_height, rel=1e-4)
     assert beyond is None
 
 

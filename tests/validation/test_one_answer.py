@@ -22,7 +22,7 @@ from sbafab.design.files import template_names
 from sbafab.design.records import Design
 from sbafab.laminate.burst import burst
 from sbafab.laminate.lay_up import pressed_layers
-from sbafab.models.calibration import factors_of
+from sbafab.models.calibration import factors_of, load_calibration
 from sbafab.models.figures import Figure, Prediction
 from sbafab.models.sizes import size_phrases, sizes
 from sbafab.search.quantities import Subject, read_quantity
@@ -231,7 +231,9 @@ def test_nothing_past_the_burst_estimate() -> None:
 
 
 def test_intervals_widen_off_the_evidence() -> None:
-    """Forces were measured of pockets of 5 mm: a doubling adds 0.15, four of them are far off."""
+    """Forces were measured of pockets of 5 mm: a doubling adds 0.15, four of them are far off. What
+    a pocket's loss adds is less of a wider pocket, what the model misses is the same.
+    """
 
     def force(diameter: float) -> Figure:
         found = sbafab.predict("1dof-5mm", pressures_kpa=[10], chamber={"diameter": diameter})
@@ -244,5 +246,8 @@ def test_intervals_widen_off_the_evidence() -> None:
         assert ("extrapolation" in figure.flags) == is_far
         low, high = figure.interval
         spreads.append(math.log(high / low) / 2 / 1.6448536)
-    assert spreads[1] == pytest.approx(math.hypot(spreads[0], 0.15), rel=0.03)
-    assert spreads[2] == pytest.approx(math.hypot(spreads[0], 0.15 * math.log2(10)), rel=0.03)
+    calibration = load_calibration("paper")
+    assert calibration is not None
+    for spread, doublings in zip(spreads[1:], (1.0, math.log2(10)), strict=True):
+        least = math.hypot(calibration.discrepancy["force"], 0.15 * doublings)
+        assert least < spread < math.hypot(spreads[0], 0.15 * doublings)

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from docs.scripts.measured import FOLDER, record
-from sbafab.models.calibration import GROUPS, UNKNOWNS
+from sbafab.models.calibration import GROUPS, SHARED, UNKNOWNS
 from sbafab.validation.fit import correlated
 from sbafab.validation.posterior import (
+    LOSS,
+    MIDDLES,
+    MOST,
     NODE_COORDINATES,
-    SHARED,
     Posterior,
     SampledCurve,
     discrepancies,
@@ -26,18 +28,53 @@ from tests.validation.synthetic import held_out_inside, lab, share_and_error, su
 
 
 def curve(rates: np.ndarray, measured: list[float], errors: list[float]) -> SampledCurve:  # type: ignore[type-arg]
-    return SampledCurve("c", 0, surface(rates), np.array(measured), np.array(errors), -1)
+    names = ("a",) * len(measured)
+    axes = (0, 1, 2)
+    return SampledCurve("c", names, 0, axes, surface(rates), np.array(measured), np.array(errors))
 
 
-def coordinates(scale: float) -> np.ndarray:  # type: ignore[type-arg]
-    middle = [unknown.coordinate(unknown.middle) for unknown in UNKNOWNS]
-    return np.array([[*middle, *[math.log(scale)] * len(GROUPS)]])
+def at(scale: float) -> Posterior:
+    """One sample in the middle of the priors, with one actuator."""
+    places, loss = MIDDLES[None], MIDDLES[LOSS : LOSS + 1]
+    scales = np.full((1, len(GROUPS)), math.log(scale))
+    return Posterior(places, np.full(1, 0.1), {"a": loss}, scales, np.zeros(1))
 
 
 def test_a_surface_is_exact_between_its_nodes_where_it_is_linear() -> None:
     rates = np.arange(6.0).reshape(3, 1, 2)
-    place = np.array([[nodes[0] * 0.3 + nodes[1] * 0.7 for nodes in NODE_COORDINATES]])
-    assert interpolated(surface(rates), place)[0, 0] == pytest.approx(place[0] @ rates[:, 0])
+    place = np.array([[nodes[0] * 0.3 + nodes[1] * 0.7 for nodes in NODE_COORDINATES[:3]]])
+    values = interpolated(surface(rates), (0, 1, 2), place)
+    assert values[0, 0] == pytest.approx(place[0] @ rates[:, 0])
+
+
+def test_points_have_the_losses_of_their_actuators() -> None:
+    """Values that grow by 2 for each mm of loss, of two actuators of 0.1 and 0.3 mm."""
+    rates = np.zeros((3, 1, 2))
+    rates[LOSS] = 2.0
+    both = curve(rates, [0.0, 0.0], [0.1, 0.1])._replace(actuators=("a", "b"))
+    losses = {"a": np.array([0.1]), "b": np.array([0.3])}
+    assert both.logarithms(MIDDLES[None], losses)[0, 0] == pytest.approx([0.2, 0.6])
+
+
+def test_a_new_actuator_has_the_spread_of_the_pressing() -> None:
+    """Mean 0.3 mm exactly and a spread of 0.05 mm: the variance of a new one's loss is its square;
+    an actuator that was fitted has its own.
+    """
+    count = 20000
+    departure = np.random.default_rng(2).standard_normal(count)
+    places = np.tile(MIDDLES, (count, 1))
+    places[:, LOSS] = 0.3
+    own = {"a": np.full(count, 0.25)}
+    scales = np.full((count, len(GROUPS)), math.log(0.1))
+    posterior = Posterior(places, np.full(count, 0.05), own, scales, departure)
+    assert posterior.mean[LOSS] == pytest.approx(0.3, abs=1e-3)
+    assert posterior.covariance[LOSS, LOSS] == pytest.approx(0.05**2, rel=0.03)
+    rates = np.zeros((3, 1, 1))
+    rates[LOSS] = 2.0
+    of = curve(rates, [0.0], [0.1])
+    assert posterior.logarithms(of) == pytest.approx(0.5)
+    assert posterior.logarithms(of, is_new=True).std() == pytest.approx(0.1, rel=0.03)
+    assert posterior.logarithms(of._replace(actuators=("b",))).std() > 0.09
 
 
 def test_the_likelihood_is_that_of_a_normal_with_shared_discrepancy() -> None:
@@ -49,17 +86,18 @@ def test_the_likelihood_is_that_of_a_normal_with_shared_discrepancy() -> None:
     det = a * d - b * b
     x, y = residuals
     square = (d * x * x - 2 * b * x * y + a * y * y) / det
-    expected = -0.5 * square - 0.5 * math.log(det)
-    value = log_likelihood([curve(rates, list(residuals), list(errors))], coordinates(scale))
-    assert value[0] == pytest.approx(expected)
+    expected = -0.5 * square - 0.5 * math.log(det) - math.log(2 * math.pi)
+    of = curve(rates, list(residuals), list(errors))
+    assert log_likelihood([of], at(scale))[0] == pytest.approx(expected)
+    assert at(scale).log_score(of) == pytest.approx(expected)
 
 
 def test_open_set_ups_are_averaged() -> None:
     """One set-up right, the other far off: the density is half of that of the right one alone."""
     one, both = np.zeros((3, 1, 1)), np.zeros((3, 2, 1))
     both[0, 1] = 50.0
-    alone = log_likelihood([curve(one, [0.1], [0.1])], coordinates(0.1))
-    averaged = log_likelihood([curve(both, [0.1], [0.1])], coordinates(0.1))
+    alone = log_likelihood([curve(one, [0.1], [0.1])], at(0.1))
+    averaged = log_likelihood([curve(both, [0.1], [0.1])], at(0.1))
     assert averaged[0] == pytest.approx(alone[0] - math.log(2))
 
 
@@ -70,10 +108,15 @@ def test_drawn_discrepancies_have_their_variance_and_share_half_of_it() -> None:
 
 
 def test_no_unknown_leaves_its_bounds() -> None:
-    place = coordinates(0.1)
-    assert np.isfinite(log_prior(place)[0])
-    place[0, 1] = -0.01
-    assert log_prior(place)[0] == -np.inf
+    def chain(loss: float, departure: float) -> np.ndarray:  # type: ignore[type-arg]
+        places = MIDDLES.copy()
+        places[LOSS] = loss
+        return np.array([[*places, math.log(0.1), departure, *[math.log(0.1)] * len(GROUPS)]])
+
+    assert np.isfinite(log_prior(chain(0.2, 1.0), ["a"])[0])
+    assert log_prior(chain(-0.01, 1.0), ["a"])[0] == -np.inf
+    # Nor does the loss of an actuator.
+    assert log_prior(chain(MOST[LOSS] - 0.05, 1.0), ["a"])[0] == -np.inf
 
 
 def test_a_fit_finds_unknowns_that_curves_tell_apart() -> None:
@@ -88,6 +131,9 @@ def test_a_fit_finds_unknowns_that_curves_tell_apart() -> None:
     posterior = sampled(curves, 3, 1000)
     spreads = np.sqrt(np.diag(posterior.covariance))[:3]
     assert (np.abs(posterior.mean[:3] - truth) < 2 * spreads).all()
+    (own,) = posterior.losses.values()
+    assert own.mean() == pytest.approx(truth[LOSS], abs=2 * own.std())
+    assert own.std() < posterior.new_loss.std()
     assert spreads[0] < 0.6 * UNKNOWNS[0].spread
 
 
@@ -99,7 +145,7 @@ def test_correlated_unknowns_are_named() -> None:
 
 def test_the_same_curves_give_the_same_samples() -> None:
     curves = lab(1).curves
-    assert (sampled(curves, 1, 60).samples == sampled(curves, 1, 60).samples).all()
+    assert (sampled(curves, 1, 60).unknowns == sampled(curves, 1, 60).unknowns).all()
 
 
 @pytest.mark.long
@@ -135,8 +181,6 @@ def test_probabilities_of_set_ups_are_their_densities() -> None:
     open_curve = curve(both, [0.0], [error])
     off = np.array([0.0, 2 * math.hypot(scale, error)])
     open_curve = open_curve._replace(table=open_curve.table + off[:, None])
-    place = coordinates(scale)
-    posterior = Posterior(place[:, : len(UNKNOWNS)], place[:, len(UNKNOWNS) :])
-    right, wrong = set_up_probabilities(open_curve, posterior)
+    right, wrong = set_up_probabilities(open_curve, at(scale))
     assert wrong / right == pytest.approx(math.exp(-2))
     assert right + wrong == pytest.approx(1)

