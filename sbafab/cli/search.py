@@ -272,7 +272,8 @@ def _more_pressure(result: FoundDesign) -> str:
         kpa = max(USEFUL_KPA, 2 * (quantity.kpa or 0.0))
         is_allowed = kpa <= MOST_PRESSURE and not is_near_burst(laminate, kpa)
         if is_allowed and not result.best.meets(row):
-            return f", ask for the force at more pressure, {replace(quantity, kpa=kpa).label}"
+            more = replace(quantity, at=quantity.at._replace(kpa=kpa))
+            return f", ask for the force at more pressure, {more.label}"
     return ""
 
 

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 from sbafab.design.outline import read_outline
 from sbafab.design.records import Design, Discs, Drawn, Form, Slots
-from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, PAPER_TPE, film_name
 from sbafab.laminate.laminate import Laminate
@@ -29,8 +28,6 @@ NOT_MEASURED = (
     f"{PAPER_TPE[0]:g} MPa, and no model predicts it for another: take the free stroke at a "
     "pressure, or simulate the design"
 )
-NO_OUTLINE = "no model knows the form of a drawn pocket outline; simulate the design instead"
-"""Message of a search, which compares designs by figures without bounds."""
 ROUNDNESS = 1.2
 """Largest ratio of the farthest to the nearest distance of a nearly round pocket's edge from its
 axis: its stroke, in proportion to the diameter, is then known to some 10 % either way.
@@ -118,15 +115,6 @@ class Actuator:
     def has_reference(self) -> bool:
         """True if the reference stroke is known: measured for round pockets, with one film."""
         return not self.radii or self.has_the_papers_film
-
-    @property
-    def known_stroke(self) -> float:
-        """The reference stroke in mm. Raises DesignError if it is not known."""
-        if not self.pockets:
-            raise DesignError(NO_OUTLINE)
-        if not self.has_reference:
-            raise DesignError(f"reference stroke: {NOT_MEASURED}")
-        return self.reference_stroke
 
     def is_like_paper(self, stacks: int, radius: float) -> bool:
         """Return True if the paper measured this number of stacks of such balloons on common

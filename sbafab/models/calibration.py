@@ -664,7 +664,10 @@ class Uncertainty:
                 )
 
     def bounded(
-        self, items: Sequence[FigureItem], moved: Iterable[Sequence[FigureItem]]
+        self,
+        items: Sequence[FigureItem],
+        moved: Iterable[Sequence[FigureItem]],
+        share: float = SHARE,
     ) -> list[FigureItem]:
         """Return the items with the intervals of figures that the calibration covers; ``moved`` are
         the same figures at each of the ``moved`` factors. A figure that one of them lacks has no
@@ -674,13 +677,13 @@ class Uncertainty:
             {item.key: item.value for item in each if isinstance(item, Figure)} for each in moved
         ]
         return [
-            self._bounded(item, [values.get(item.key, math.nan) for values in others])
+            self._bounded(item, [values.get(item.key, math.nan) for values in others], share)
             if isinstance(item, Figure)
             else item
             for item in items
         ]
 
-    def _bounded(self, figure: Figure, moved: Sequence[float]) -> Figure:
+    def _bounded(self, figure: Figure, moved: Sequence[float], share: float) -> Figure:
         """Return a figure with its interval, from its values at each of the ``moved`` factors."""
         group, value, quantity = discrepancy_group(figure), figure.value, figure.quantity
         if group is None or not all(map(math.isfinite, moved)):
@@ -691,6 +694,7 @@ class Uncertainty:
         value, interval = self.interval_of(
             group,
             values.__getitem__,
+            share,
             term=TERMS.get(quantity, ""),
             may_be_negative=quantity in CLEARANCES,
         )

@@ -8,7 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from itertools import combinations, product
 from typing import Any, NamedTuple, TypeVar
 
@@ -88,6 +88,15 @@ def calibrated(model: Model, factors: Factors) -> Model:
 # equal shapes, so that one computation of a balloon serves all moduli, all pressures and poses.
 
 
+RISES = (
+    Quantity.FREE_STROKE,
+    Quantity.FREE_HEIGHT,
+    Quantity.BALLOON_VOLUME,
+    Quantity.FREE_WORK,
+)
+BENDS = Quantity.BEND, Quantity.RIM_ROOM, Quantity.CHAMBER_CLEARANCE, Quantity.ASIDE
+
+
 class Rise(NamedTuple):
     """Rise of one free stack of balloons: ``stroke`` in mm, ``volume`` in ul, and the ``energy`` in
     its films in uJ, to 3 % the integral of p dV.
@@ -114,22 +123,23 @@ class Inflated:
 def inflated(
     actuators: Sequence[Actuator],
     stacks: Sequence[Stack | LeftOut | None],
-    pressures: Sequence[float],
+    request: PredictionRequest,
 ) -> list[Inflated]:
-    """Return actuators of one form at pressures in kPa."""
-    bent = [_bent_poses(each, pressures) for each in stacks]
+    """Return actuators of one form at the pressures of a request."""
+    bent = [_bent_poses(each, request) for each in stacks]
     posed = [
         (each, pose)
         for each, poses in zip(stacks, bent, strict=True)
         for pose in poses.values()
-        if isinstance(each, Stack) and isinstance(pose, Pose)
+        if isinstance(each, Stack) and isinstance(pose, Pose) and request.wanted is None
     ]
     rooms = iter(chamber_clearances(posed))
     states = []
-    rises = _rises(actuators, pressures)
+    usual = (Conditions(kpa=kpa) for kpa in request.pressures_kpa if actuators[0].radii)
+    rises = _rises(actuators, [at.kpa or 0.0 for at in request.places(usual, *RISES)])
     for actuator, there, rise, poses in zip(actuators, stacks, rises, bent, strict=True):
         with_rooms = {
-            at: (pose, next(rooms)) if isinstance(pose, Pose) else pose
+            at: (pose, next(rooms, math.nan)) if isinstance(pose, Pose) else pose
             for at, pose in poses.items()
         }
         states.append(Inflated(actuator, there, rise, with_rooms))
@@ -164,7 +174,7 @@ def _rises(
             pressures_of.setdefault(kind, {}).update(dict.fromkeys(p / ratio for p in pressures))
     shapes: dict[tuple[Balloon, float], Shapes | DesignError] = {}
     for kind, at in pressures_of.items():
-        together = _attempt(free_shapes, kind, [*at])
+        together = _free_shapes(kind, (*at,))
         for row, p in enumerate(at):
             # A balloon without an equilibrium spoils no other.
             shapes[kind, p] = (
@@ -178,6 +188,11 @@ def _rises(
         else {p: _attempt(_rise, each, shapes, p, ratio) for p in pressures}
         for each, ratio in zip(kinds, ratios, strict=True)
     ]
+
+
+@lru_cache(maxsize=256)
+def _free_shapes(kind: Balloon, pressures: tuple[float, ...]) -> Shapes | DesignError:
+    return _attempt(free_shapes, kind, [*pressures])
 
 
 def _rise(
@@ -205,16 +220,16 @@ def free_rise(kinds: Counter[Balloon], pressure: float) -> Rise:
 
 
 def _bent_poses(
-    whole: Stack | LeftOut | None, pressures: Sequence[float]
+    whole: Stack | LeftOut | None, request: PredictionRequest
 ) -> dict[Conditions, Pose | DesignError]:
     """Return poses with some chambers at each pressure, the others empty, or why there is none."""
     if not isinstance(whole, Stack):
         return {}
+    every = product(request.pressures_kpa, range(1, whole.chambers))
+    usual = (Conditions(kpa=kpa, chambers=count) for kpa, count in every)
     return {
-        Conditions(kpa=kpa, chambers=count): _attempt(
-            whole.pose, chamber_pressures(whole, count, kpa)
-        )
-        for kpa, count in product(pressures, range(1, whole.chambers))
+        at: _attempt(whole.pose, chamber_pressures(whole, at.chambers or 0, at.kpa or 0.0))
+        for at in request.places(usual, *BENDS)
     }
 
 
@@ -299,13 +314,13 @@ def free_strokes(state: Inflated) -> Iterator[FigureItem]:
     """Yield stroke, volume and input work of a free stack of round pockets at each pressure."""
     actuator, quantity = state.actuator, Quantity.FREE_STROKE
     if isinstance(state.rises, DesignError):
-        yield LeftOut("free stroke, elastic balloon", str(state.rises), (quantity,))
+        yield LeftOut.of("free stroke, elastic balloon", state.rises, quantity)
         return
     model = calibrated(ELASTIC, actuator.factors)
     for pressure, rise in state.rises.items():
         at = Conditions(kpa=pressure)
         if isinstance(rise, DesignError):
-            yield LeftOut(f"{quantity.named(at)}, elastic balloon", str(rise), (quantity,))
+            yield LeftOut.of(f"{quantity.named(at)}, elastic balloon", rise, quantity)
             continue
         yield Figure(quantity, rise.stroke, model, at)
         yield Figure(Quantity.FREE_HEIGHT, actuator.thickness + rise.stroke, model, at)
@@ -327,7 +342,7 @@ def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | Lef
     try:
         return stack(actuator.design, actuator.laminate, most, actuator.factors, actuator.form)
     except DesignError as error:
-        return LeftOut("elastic stack", str(error))
+        return LeftOut.of("elastic stack", error)
 
 
 def moved_stack(together: Stack, actuator: Actuator, moved: Factors) -> Stack | None:
@@ -383,22 +398,25 @@ def _forces(
 ) -> Iterator[PosedItem]:
     quantity, model = Quantity.BLOCKED_FORCE, calibrated(FORCE, actuator.factors)
     shares = paper.HEIGHTS if actuator.has_reference else paper.HEIGHTS[:1]
-    places = list(product(request.pressures_kpa, shares))
-    strokes = [actuator.stroke_at(share) for _, share in places]
+    every = product(request.pressures_kpa, shares)
+    places = request.places((Conditions(kpa=kpa, share=share) for kpa, share in every), quantity)
+    strokes = [actuator.stroke_at(at.share or 0.0) if at.rise is None else at.rise for at in places]
     strains = [0.0] * len(places)
     if checks_films and places:
         kinds = balloons_of(actuator.design, actuator.laminate, actuator.factors, actuator.form)
-        strains = held_stretch(kinds, [kpa for kpa, _ in places], strokes).tolist()
-    for (pressure, share), stroke, strain in zip(places, strokes, strains, strict=True):
-        at = Conditions(kpa=pressure, share=share)
+        strains = held_stretch(kinds, [at.kpa or 0.0 for at in places], strokes).tolist()
+    for at, stroke, strain in zip(places, strokes, strains, strict=True):
+        pressure = at.kpa or 0.0
         try:
-            refuse_stretched(strain)
             value = actuator.form.pushing * float(blocked_force(stack, pressure, stroke))
+            if value > 0 or request.wanted is None:
+                refuse_stretched(strain)
         except DesignError as error:
-            yield LeftOut(f"{quantity.named(at)}, elastic stack", str(error), (quantity,)), None
+            yield LeftOut.of(f"{quantity.named(at)}, elastic stack", error, quantity), None
             continue
         # Values at other factors need no pose: a force does not depend on whether it is stable.
-        pose = _level_pose(stack, pressure, stroke) if checks_films else None
+        is_posed = checks_films and request.wanted is None
+        pose = _level_pose(stack, pressure, stroke) if is_posed else None
         buckles = pose is not None and not pose.stable
         by = replace(model, trust=f"{BUCKLES}; {model.trust}") if buckles else model
         yield Figure(quantity, value, by, at), pose
@@ -424,7 +442,7 @@ def _bends(state: Inflated, stack: Stack) -> Iterator[PosedItem]:
     bends, contacts = (calibrated(model, state.actuator.factors) for model in (BEND, CONTACT))
     for at, bent in state.bent.items():
         if isinstance(bent, DesignError):
-            yield LeftOut(Quantity.BEND.named(at), str(bent), (Quantity.BEND,)), None
+            yield LeftOut.of(Quantity.BEND.named(at), bent, Quantity.BEND), None
             continue
         pose, room = bent
         for quantity, value, model in (
@@ -487,7 +505,7 @@ def _bent_forces(
     request: PredictionRequest, stack: Stack, guides: Guides, factors: Factors
 ) -> Iterator[PosedItem]:
     """Yield forces on a plate square to the bent tip, its chambers pressurised further."""
-    if not request.pressures_kpa:
+    if not request.pressures_kpa or request.wanted is not None:
         return
     quantity, model = Quantity.BENT_FORCE, calibrated(FORCE, factors)
     pressure = max(request.pressures_kpa)
@@ -507,7 +525,7 @@ def _bent_forces(
             start = pose if guide is None else guide[1]
             pressed = pressed_further(stack, chambers, pressure, pose, start)
         except DesignError as error:
-            yield LeftOut(quantity.named(at), str(error), (quantity,)), None
+            yield LeftOut.of(quantity.named(at), error, quantity), None
             continue
         guides.setdefault(at, (pose, pressed))
         yield Figure(quantity, pressed.force, model, at), pressed
@@ -555,23 +573,23 @@ def air_time(whole: Stack, flow_ml_min: float, until: float, line: Line) -> floa
 
 
 def _times(request: PredictionRequest, stack: Stack, factors: Factors) -> Iterator[PosedItem]:
-    model = calibrated(TIME, factors)
-    at = Conditions(kpa=paper.FULL_KPA, flow=request.flow_ml_min)
-    try:
-        time, pose = time_to_fill(stack, request.flow_ml_min, paper.FULL_KPA)
-    except DesignError as error:
-        quantity = Quantity.WATER_TIME
-        yield LeftOut(quantity.named(at), str(error), (quantity,)), None
-        return
-    yield Figure(Quantity.WATER_TIME, time + factors.water_delay, model, at), pose
-    at = Conditions(kpa=paper.FULL_KPA)
-    yield Figure(Quantity.WATER_HEIGHT, pose.height, model, at), pose
+    model, quantity = calibrated(TIME, factors), Quantity.WATER_TIME
+    for at in request.places([Conditions(kpa=paper.FULL_KPA, flow=request.flow_ml_min)], quantity):
+        try:
+            time, pose = time_to_fill(stack, request.flow_ml_min, paper.FULL_KPA)
+        except DesignError as error:
+            yield LeftOut.of(quantity.named(at), error, quantity), None
+            return
+        yield Figure(quantity, time + factors.water_delay, model, at), pose
+        yield Figure(Quantity.WATER_HEIGHT, pose.height, model, at._replace(flow=None)), pose
 
 
 def _stiffness(request: PredictionRequest, stack: Stack, factors: Factors) -> Iterator[PosedItem]:
     held, shut = (calibrated(each, factors) for each in (HELD, SHUT))
-    for pressure in request.pressures_kpa[:1]:
-        at = Conditions(kpa=pressure)
+    both = Quantity.HELD_STIFFNESS, Quantity.SHUT_STIFFNESS
+    usual = (Conditions(kpa=kpa) for kpa in request.pressures_kpa[:1])
+    for at in request.places(usual, *both):
+        pressure = at.kpa or 0.0
         try:
             start = stack.pose((pressure,) * stack.chambers)
             aside = (PROBE_FORCE, 0.0, 0.0)
@@ -581,9 +599,7 @@ def _stiffness(request: PredictionRequest, stack: Stack, factors: Factors) -> It
             stiffness, _ = shut_stiffness(stack, pressure)
             yield Figure(Quantity.SHUT_STIFFNESS, stiffness, shut, at), start
         except DesignError as error:
-            both = (Quantity.HELD_STIFFNESS, Quantity.SHUT_STIFFNESS)
-            name = f"lateral tip stiffness at {pressure:g} kPa"
-            yield LeftOut(name, str(error), both), None
+            yield LeftOut.of(f"lateral tip stiffness at {pressure:g} kPa", error, *both), None
 
 
 def shut_stiffness(stack: Stack, pressure: float) -> tuple[float, float]:

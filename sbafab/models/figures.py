@@ -248,12 +248,20 @@ QuantityEntry = Annotated[Quantity, PlainSerializer(attrgetter("key"), return_ty
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What is not given, and why; with the ``quantities`` if they are specific ones."""
+    """What is not given, and why; with the ``quantities`` if they are specific ones, and the
+    ``error`` if one was raised.
+    """
 
     name: str
     reason: str
     quantities: tuple[QuantityEntry, ...] = ()
+    error: Annotated[Any, Field(exclude=True)] = field(default=None, repr=False, compare=False)
     group: ClassVar = ""
+
+    @classmethod
+    def of(cls, name: str, error: DesignError, *quantities: Quantity) -> LeftOut:
+        """Return what an error leaves out."""
+        return cls(name, str(error), quantities, error)
 
 
 FigureItem = Figure | LeftOut
@@ -312,7 +320,8 @@ class PredictionRequest:
     volumes in ul a balloon, and factors.
 
     Without ``calibration`` the factors come from the design's calibration, replaced by the user's
-    values (``overrides``, by field of ``Factors``) where given.
+    values (``overrides``, by field of ``Factors``) where given. Intervals hold a measurement with
+    this ``probability``. If one figure is ``wanted``, others are left out that cost time.
     """
 
     pressures_kpa: tuple[float, ...] = USUAL_PRESSURES
@@ -320,6 +329,20 @@ class PredictionRequest:
     volumes_ul: tuple[float, ...] = ()
     calibration: Factors | None = None
     overrides: Mapping[str, float | None] = field(default_factory=dict)
+    wanted: tuple[Quantity, Conditions] | None = None
+    probability: float = 0.9
+
+    def wants(self, *groups: str) -> bool:
+        """Return True if figures of one of the groups are wanted."""
+        return self.wanted is None or self.wanted[0].group in groups
+
+    def places(self, usual: Iterable[Conditions], *of: Quantity) -> list[Conditions]:
+        """Return the conditions at which any ``of`` these quantities is wanted: the ``usual`` ones,
+        or that of the one figure.
+        """
+        if self.wanted is None:
+            return list(usual)
+        return [self.wanted[1]] if self.wanted[0] in of else []
 
     @property
     def factors(self) -> Factors:

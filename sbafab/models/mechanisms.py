@@ -15,7 +15,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from sbafab.design.records import Mechanism, MechanismKind
-from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, strip
@@ -345,38 +344,3 @@ LEFT_OUT: Mapping[MechanismKind, tuple[str, ...]] = {
     **dict.fromkeys(("beam", "jamming", "push"), ("stroke", "bending", "folded diameter")),
 }
 """Quantities that a mechanism has no figure for."""
-ASKED: Mapping[str, tuple[MechanismKind, Quantity, float | None]] = {
-    "contraction": ("pouch-motor", Quantity.CONTRACTION, None),
-    "pull": ("pouch-motor", Quantity.PULL, 0.1),
-    "free_bend": ("hinge", Quantity.FREE_BEND, None),
-    "moment": ("hinge", Quantity.MOMENT, 0.0),
-    "load": ("beam", Quantity.WRINKLING_LOAD, None),
-    "slip": ("jamming", Quantity.SLIP_LOAD, None),
-    "push": ("push", Quantity.FORCE_BOUND, None),
-}
-"""Quantities by their names in requirements: the mechanism, the figure in ``predict``, and its
-share.
-"""
-
-
-def mechanism_value(
-    mechanism: Mechanism | None, laminate: Laminate, name: str, kpa: float
-) -> float:
-    """Return a quantity of ``ASKED`` at a pressure, the least of several chambers: the figure in
-    ``predict``.
-
-    Raises DesignError if the mechanism is another one, or its model does not hold.
-    """
-    kind, quantity, share = ASKED[name]
-    if mechanism is None or mechanism.kind != kind:
-        has = "no mechanism" if mechanism is None else f"a mechanism of {mechanism.kind}"
-        raise DesignError(f"{name} is of a {kind}, and the design has {has}")
-    values = []
-    for item in mechanism_figures(mechanism, laminate, (kpa,)):
-        if isinstance(item, Figure):
-            values += [item.value] if item.is_of(quantity, Conditions(share=share)) else []
-        elif not item.quantities or quantity in item.quantities:
-            raise DesignError(f"{item.name}: {item.reason}")
-    if not values:
-        raise DesignError(f"no model gives {name} of this design at {kpa:g} kPa")
-    return min(values)

@@ -5,8 +5,9 @@ chambers in step, bending and workspace of parallel ones, and their order in a p
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from sbafab.models import elastic, paper
 from sbafab.models.actuator import NOT_MEASURED, Actuator, NearDiscs, near_discs, why_no_disc
 from sbafab.models.calibration import (
     PAPER_3DOF,
+    SHARE,
     burst_uncertainty,
     factors_of,
     flags_at,
@@ -61,6 +63,7 @@ from sbafab.models.mechanisms import LEFT_OUT, mechanism_figures
 from sbafab.models.paper import Measured, counterpart
 from sbafab.models.pneumatics import refuse_pressure, seconds
 from sbafab.models.quantity import (
+    ANYWHERE,
     OF_STACK,
     OVER_FLOW,
     P_V,
@@ -74,6 +77,12 @@ from sbafab.models.sizes import is_the_papers_3dof, sizes
 from sbafab.models.stack import Stack
 
 SAMPLES = 61
+BY_STACK = (
+    *(Quantity.BLOCKED_FORCE, Quantity.BENT_FORCE, *elastic.BENDS),
+    *(Quantity.WATER_TIME, Quantity.WATER_HEIGHT),
+    *(Quantity.HELD_STIFFNESS, Quantity.SHUT_STIFFNESS),
+)
+"""Quantities for which balloons' maps are computed."""
 GEOMETRY, CURVATURE = MODELS["geometry"], MODELS["constant-curvature"]
 FLAT_PLATES = MODELS["flat-plates"]
 SIZES = {
@@ -103,12 +112,13 @@ def predict(
     are out of range.
     """
     asked_request = request or PredictionRequest()
-    uncertainty, checks_maps = None, asked_request.calibration is None
+    uncertainty, wanted = None, asked_request.wanted
+    checks_maps = asked_request.calibration is None and wanted is None
     try:
         flat = laminate or build(design)
     except GeometryError as error:
         raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
-    discs = near_discs(design)
+    discs = near_discs(design) if asked_request.wanted is None else None
     discs = discs if discs and discs.is_round else None
     form = discs and discs.form(design, discs.equal)
     if asked_request.calibration is None:
@@ -119,16 +129,17 @@ def predict(
         asked_request = replace(asked_request, calibration=factors)
     subject = Actuator(design, flat, asked_request.factors, form)
     _check_request(subject, asked_request)
-    burst_at = [(pressure, _past_burst(flat, pressure)) for pressure in asked_request.pressures_kpa]
-    past = [LeftOut(f"all figures at {kpa:g} kPa", why) for kpa, why in burst_at if why]
-    request = replace(asked_request, pressures_kpa=tuple(kpa for kpa, why in burst_at if not why))
+    burst_at = {kpa: _past_burst(flat, kpa) for kpa in asked_request.pressures_kpa}
+    past = [LeftOut.of(f"all figures at {kpa:g} kPa", why) for kpa, why in burst_at.items() if why]
+    below = tuple(kpa for kpa, why in burst_at.items() if not why)
+    request = replace(asked_request, pressures_kpa=below)
     moved = uncertainty.moved if uncertainty else ()
     (state, *others), guides = _states(subject, moved, request, quick), elastic.Guides()
     items = _figures(state, request, guides, checks_maps=checks_maps)
     if uncertainty is not None:
         moved_items = (_figures(each, request, guides, checks_films=False) for each in others)
-        items = uncertainty.bounded(items, moved_items)
-    relations = () if quick else tuple(_relations(state, request))
+        items = uncertainty.bounded(items, moved_items, request.probability)
+    relations = () if quick or wanted else tuple(_relations(state, request))
     if discs is not None:
         ends = []
         for diameter in (discs.inner, discs.outer):
@@ -152,6 +163,43 @@ def predict(
     )
 
 
+def figure(
+    design: Design,
+    laminate: Laminate,
+    quantity: Quantity,
+    at: Conditions = ANYWHERE,
+    pressures_kpa: Sequence[float] = (),
+    probability: float | None = None,
+) -> Figure:
+    """Return the figure of ``predict`` of one quantity at its conditions: by the calibrated model
+    if several give it, of several chambers the least. Balloons' maps reach ``pressures_kpa``. With
+    a ``probability`` it has its interval, flags and measured counterpart.
+
+    Raises DesignError if no model gives it.
+    """
+    if at.share and quantity is Quantity.BLOCKED_FORCE:
+        figure(design, laminate, Quantity.REFERENCE_STROKE)  # what the share is of
+    for kpa in (at.kpa,) if at.kpa is not None else ():
+        refuse_beyond_burst(laminate, kpa)
+    request = PredictionRequest(
+        tuple(dict.fromkeys((*pressures_kpa, *((at.kpa,) if at.kpa is not None else ())))),
+        at.flow or PredictionRequest.flow_ml_min,
+        calibration=None if probability else factors_of(design),
+        wanted=(quantity, at),
+        probability=probability or SHARE,
+    )
+    prediction = predict(design, request, laminate, quick=quantity not in BY_STACK)
+    figures = [item for item in prediction.figures if item.is_of(quantity, at)]
+    calibrated = [item for item in figures if item.model.id in paper.CALIBRATED_MODELS]
+    if figures:
+        return min(calibrated or figures, key=lambda item: item.value)
+    of_it = sorted(prediction.left_out, key=lambda item: quantity not in item.quantities)
+    for item in of_it:
+        if not item.quantities or quantity in item.quantities:
+            raise item.error or DesignError(f"{item.name}: {item.reason}")
+    raise DesignError(f"no model gives the {quantity.named(at)} of {design.name}")
+
+
 def _check_request(actuator: Actuator, request: PredictionRequest) -> None:
     """Raise DesignError for pressures, flows or volumes out of every model's range."""
     refuse_pressure(request.pressures_kpa, actuator.form.works_under_vacuum)
@@ -171,17 +219,22 @@ def _measured(figure: Figure, actuator: Actuator) -> paper.Counterpart | None:
         is_the_papers_3dof(form, actuator.laminate),
         actuator.factors.calibration,
     )
-    row = counterpart(form, figure.quantity, figure.at, model.id, calibration, is_papers)
+    at = figure.at
+    if figure.quantity is Quantity.BLOCKED_FORCE and actuator.pockets:
+        # The nearest of the three heights at which forces were measured.
+        share = at.share if at.rise is None else at.rise / actuator.reference_stroke
+        at = at._replace(share=min(paper.HEIGHTS, key=lambda height: abs(height - (share or 0.0))))
+    row = counterpart(form, figure.quantity, at, model.id, calibration, is_papers)
     return row and replace(row, beside_factors=bool(model.factors))
 
 
-def _past_burst(laminate: Laminate, kpa: float) -> str:
-    """Return why there are no figures past the estimated burst pressure; "" below it."""
+def _past_burst(laminate: Laminate, kpa: float) -> BeyondError | None:
+    """Return why there are no figures past the estimated burst pressure; None below it."""
     try:
         refuse_beyond_burst(laminate, kpa)
     except BeyondError as error:
-        return str(error)
-    return ""
+        return error
+    return None
 
 
 def _flagged(item: FigureItem, laminate: Laminate) -> FigureItem:
@@ -192,7 +245,7 @@ def _flagged(item: FigureItem, laminate: Laminate) -> FigureItem:
         return item
     past = _past_burst(laminate, item.pressure_kpa)
     if past:
-        return LeftOut(item.name, past, (item.quantity,))
+        return LeftOut.of(item.name, past, item.quantity)
     is_near = is_near_burst(laminate, item.pressure_kpa)
     return replace(item, flags=(*item.flags, NEAR_BURST)) if is_near else item
 
@@ -208,8 +261,7 @@ def _states(
         moved_one = isinstance(first, Stack) and elastic.moved_stack(first, subject, each.factors)
         has_new = isinstance(first, Stack) and not moved_one
         stacks.append(elastic.elastic_stack(each, request) if has_new else moved_one or first)
-    pressures = request.pressures_kpa if subject.radii else ()
-    return elastic.inflated(actuators, stacks, pressures)
+    return elastic.inflated(actuators, stacks, request)
 
 
 def _figures(
@@ -229,36 +281,44 @@ def _figures(
 
 
 def _geometric_figures(state: elastic.Inflated, request: PredictionRequest) -> Iterator[FigureItem]:
-    actuator = state.actuator
+    """Yield the figures that need no stack, of the groups that are wanted."""
+    actuator, mass = state.actuator, _mass(state.actuator.laminate)
     form, laminate = actuator.form, actuator.laminate
-    yield from _sizes(actuator)
-    if actuator.pockets and form.is_parallel:
-        yield _folding(actuator)
-    mass = _mass(laminate)
-    yield mass
-    if isinstance(mass, LeftOut) and actuator.pockets:
-        yield LeftOut("power density", mass.reason, (Quantity.POWER_DENSITY,))
-    yield from _tubes(actuator)
-    if not form.works_under_vacuum:
-        yield _burst(laminate)
-    pushed = list(_flat_forces(actuator, request))
-    yield from pushed
-    if form.mechanism is not None:
-        yield from mechanism_figures(form.mechanism, laminate, request.pressures_kpa)
-        for name in LEFT_OUT[form.mechanism.kind]:
-            yield LeftOut(name, f"the model of its mechanism, {form.mechanism.kind}, gives none")
-    elif not actuator.pockets:
-        of_force = "force once the plates part" if pushed else "force"
-        for name in ("stroke", of_force, "actuation", "bending", "folded diameter"):
-            yield LeftOut(name, why_no_disc(actuator.design))
+    parts: list[tuple[str, Iterable[FigureItem]]] = [
+        ("size", _sizes(actuator)),
+        ("size", _folding(actuator) if actuator.pockets and form.is_parallel else ()),
+        ("size", _weights(actuator, mass)),
+        ("inlet", _tubes(actuator)),
+        ("strength", () if form.works_under_vacuum else _burst(laminate, request.probability)),
+        ("force", _flat_forces(actuator, request)),
+    ]
+    if actuator.pockets and form.mechanism is None:
+        parts += [
+            ("stroke", _strokes(actuator, request)),
+            ("", elastic.free_strokes(state)),
+            ("force", _forces(actuator, request)),
+            ("actuation", _power(actuator, request, mass)),
+            ("bending", _bending(actuator) if form.is_parallel else ()),
+            ("stiffness", _stiffness(actuator)),
+        ]
     else:
-        yield from _strokes(actuator, request)
-        yield from elastic.free_strokes(state)
-        yield from _forces(actuator, request)
-        yield from _power(actuator, request, mass)
-        if form.is_parallel:
-            yield from _bending(actuator)
-        yield from _stiffness(actuator)
+        parts.append(("", _without_pockets(actuator, request)))
+    for group, items in parts:
+        if not group or request.wants(group):
+            yield from items
+
+
+def _without_pockets(actuator: Actuator, request: PredictionRequest) -> Iterator[FigureItem]:
+    """Yield the figures of a mechanism, or why a drawn pocket has none."""
+    mechanism = actuator.form.mechanism
+    if mechanism is not None:
+        yield from mechanism_figures(mechanism, actuator.laminate, request.pressures_kpa)
+        for name in LEFT_OUT[mechanism.kind]:
+            yield LeftOut(name, f"the model of its mechanism, {mechanism.kind}, gives none")
+        return
+    of_force = "force once the plates part" if any(_flat_forces(actuator, request)) else "force"
+    for name in ("stroke", of_force, "actuation", "bending", "folded diameter"):
+        yield LeftOut(name, why_no_disc(actuator.design))
 
 
 # Drawn pockets: figures between those of two discs, and a bound that holds for any outline.
@@ -338,23 +398,30 @@ def _sizes(actuator: Actuator) -> Iterator[Figure]:
             yield Figure(quantity, value, model)
 
 
-def _folding(actuator: Actuator) -> FigureItem:
-    """Return the diameter of the channel that three folded lobes pass."""
+def _folding(actuator: Actuator) -> Iterator[FigureItem]:
+    """Yield the diameter of the channel that three folded lobes pass."""
     quantity, stacks = Quantity.FOLDED_DIAMETER, actuator.form.stacks
     if stacks != LOBES:
         reason = f"the model is of {LOBES} lobes folded into a triangle; this design has {stacks}"
-        return LeftOut("folded diameter", reason, (quantity,))
+        yield LeftOut("folded diameter", reason, (quantity,))
+        return
     factor = actuator.folded.factor if actuator.folded.molten else 1.0
     width = 2 * max(actuator.radii) + 2 * actuator.design.bond.width
     value = folded_diameter(width, actuator.thickness)
-    return Figure(quantity, value, MODELS["folded-lobes"].times("press_factor", factor))
+    yield Figure(quantity, value, MODELS["folded-lobes"].times("press_factor", factor))
 
 
 def _mass(laminate: Laminate) -> FigureItem:
     try:
         return Figure(Quantity.MASS, film_mass(laminate), MODELS["film-mass"])
     except DesignError as error:
-        return LeftOut("mass", str(error), (Quantity.MASS,))
+        return LeftOut.of("mass", error, Quantity.MASS)
+
+
+def _weights(actuator: Actuator, mass: FigureItem) -> Iterator[FigureItem]:
+    yield mass
+    if isinstance(mass, LeftOut) and actuator.pockets:
+        yield LeftOut("power density", mass.reason, (Quantity.POWER_DENSITY,))
 
 
 def _tubes(actuator: Actuator) -> Iterator[FigureItem]:
@@ -369,16 +436,17 @@ def _tubes(actuator: Actuator) -> Iterator[FigureItem]:
     yield Figure(Quantity.TUBE_ROOM, most - tube, model, Conditions(tube=tube))
 
 
-def _burst(laminate: Laminate) -> FigureItem:
-    """Return the burst pressure with its interval, which is ours."""
+def _burst(laminate: Laminate, probability: float) -> Iterator[FigureItem]:
+    """Yield the burst pressure with its interval, which is ours."""
     estimate = burst(laminate)
     if estimate is None:
-        return LeftOut("burst pressure", NOT_BURST, (Quantity.BURST,))
-    interval, missed = burst_uncertainty(estimate)
+        yield LeftOut("burst pressure", NOT_BURST, (Quantity.BURST,))
+        return
+    interval, missed = burst_uncertainty(estimate, probability)
     pocket = "round pocket" if estimate.is_round else "pocket, taken for a long one,"
     model = MODELS["film-stress"].filled(burst=paper.BURST, pocket=pocket)
     flags = flags_at(missed)
-    return Figure(Quantity.BURST, estimate.kpa, model, interval=interval, flags=flags)
+    yield Figure(Quantity.BURST, estimate.kpa, model, interval=interval, flags=flags)
 
 
 # Strokes, forces, work and time of chambers in step.
@@ -398,7 +466,9 @@ def _strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[FigureI
         for each in actuator.pockets:
             yield Figure(Quantity.REFERENCE_VOLUME, float(each.volume(stroke)), each.model)
     else:
-        yield LeftOut("reference stroke and height, and what is predicted at them", NOT_MEASURED)
+        name = "reference stroke and height, and what is predicted at them"
+        error = DesignError(f"reference stroke: {NOT_MEASURED}")
+        yield LeftOut(name, NOT_MEASURED, error=error)
     for each in actuator.pockets:
         yield Figure(Quantity.LARGEST_VOLUME, each.largest_volume, each.model)
         yield Figure(Quantity.LARGEST_STROKE, each.largest_stroke, each.model)
@@ -449,12 +519,15 @@ def _forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
     stroke.
     """
     shares = paper.HEIGHTS if actuator.has_reference else paper.HEIGHTS[:1]
-    for pressure in request.pressures_kpa:
-        for share in shares:
-            at = Conditions(kpa=pressure, share=share, each=_each(actuator))
-            for model, push in _pushes(actuator, request):
-                value = float(push(pressure, share * actuator.reference_stroke))
-                yield Figure(Quantity.BLOCKED_FORCE, value, model, at)
+    every = product(request.pressures_kpa, shares)
+    usual = (Conditions(kpa=kpa, share=share) for kpa, share in every)
+    for at in request.places(usual, Quantity.BLOCKED_FORCE):
+        if at.rise is not None and actuator.radii:
+            continue  # it may lie beyond the closed forms' largest stroke
+        stroke = (at.share or 0.0) * actuator.reference_stroke if at.rise is None else at.rise
+        for model, push in _pushes(actuator, request):
+            value = float(push(at.kpa or 0.0, stroke))
+            yield Figure(Quantity.BLOCKED_FORCE, value, model, at._replace(each=_each(actuator)))
 
 
 def _power(actuator: Actuator, request: PredictionRequest, mass: FigureItem) -> Iterator[Figure]:

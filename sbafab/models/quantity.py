@@ -16,7 +16,8 @@ class Conditions(NamedTuple):
     """State of the actuator for a figure; None if the figure does not depend on it.
 
     ``kpa`` gauge, a vacuum below 0; ``share`` of the reference stroke, of a pocket's length by
-    which it is shorter, or of the free bend; ``chambers`` pressurised, the others empty or flat;
+    which it is shorter, or of the free bend; ``rise`` in mm at which a force is blocked, in place
+    of a share; ``chambers`` pressurised, the others empty or flat;
     ``angle`` of a bend in degrees; ``volume`` in ul a balloon; ``flow`` in ml/min; ``tube`` its
     diameter in mm; ``hinges`` in a row. ``of`` names one chamber of several; ``each`` is "sba" for
     one actuator of several side by side, "pouch" for one pouch of several.
@@ -32,6 +33,7 @@ class Conditions(NamedTuple):
     hinges: int | None = None
     of: str = ""
     each: str = ""
+    rise: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the conditions that are given."""
@@ -173,7 +175,7 @@ def _texts(at: Conditions) -> dict[str, str]:
         "chambers": chamber_count(at.chambers or 0),
         "hinges": f", {at.hinges} hinges" if at.hinges else "",
         "percent": f"{100 * share:g}",
-        "stroke": share_of_stroke(share),
+        "stroke": share_of_stroke(share) if at.rise is None else f"at {at.rise:g} mm",
         "bent": "half bent" if share else "straight",
         "litres": f"{(at.flow or 0.0) / 1000:g}",
     }
@@ -290,7 +292,7 @@ class FigureKey(NamedTuple):
 
 _NAMES = ("of", "each")
 _CONDITIONS: dict[str, Any] = {
-    **dict.fromkeys(("kpa", "share", "angle", "volume", "flow", "tube"), float),
+    **dict.fromkeys(("kpa", "share", "rise", "angle", "volume", "flow", "tube"), float),
     **dict.fromkeys(("chambers", "hinges"), int),
     **dict.fromkeys(_NAMES, str),
 }

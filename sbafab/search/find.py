@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -36,7 +36,7 @@ from sbafab.errors import DesignError, OutputError, SbafabError, Stopped
 from sbafab.folders.swap import writing
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.balloons import balloons_of, has_balloons
-from sbafab.models.calibration import uncertainty_of
+from sbafab.models.calibration import SHARE, uncertainty_of
 from sbafab.models.figures import FLAGS, Flag, FlagList
 from sbafab.models.paper import Counterpart, CounterpartEntry
 from sbafab.rules.finding import Place
@@ -47,9 +47,7 @@ from sbafab.search.quantities import (
     Goal,
     RequestedQuantity,
     Requirement,
-    Subject,
-    group_of,
-    read_quantity,
+    refuse_bend,
     shown_interval,
     shown_value,
 )
@@ -176,11 +174,12 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
     if best.refused:
         # The most common reason, in the words of the nearest candidate that has it.
         refused = sorted(space.trials.values(), key=lambda trial: trial.rank)
-        counts = Counter(trial.refused_at for trial in refused)
-        nearest = max(refused, key=lambda trial: counts[trial.refused_at])
+        # One reason, whatever its numbers.
+        reasons = [re.sub(r"[\d.]+", "", trial.refused) for trial in refused]
+        (reason, count), *_ = Counter(reasons).most_common()
+        nearest = refused[reasons.index(reason)]
         raise DesignError(
-            f"no design could be made: {nearest.refused} ({counts[nearest.refused_at]} of the "
-            f"{len(refused)} tried)"
+            f"no design could be made: {nearest.refused} ({count} of the {len(refused)} tried)"
         )
     shown_front, count = pareto_front(space, best) if best.holds else ([], 0)
     outcome = FoundDesign(
@@ -202,16 +201,18 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
 def _add_trust(outcome: FoundDesign, laminate: Laminate) -> None:
     """Add intervals, flags and measured values of the best design to a result."""
     request = outcome.request
-    subject = request.subject(request.design.with_(dict(outcome.best.values)), laminate)
+    design = request.design.with_(dict(outcome.best.values))
     for quantity in request.quantities:
+        if quantity.figure is None:
+            continue
         label = quantity.label
-        if flags := subject.flags(quantity):
-            outcome.flags[label] = flags
-        if (counterpart := subject.counterpart(quantity)) is not None:
-            outcome.measured[label] = counterpart
-        with suppress(DesignError):
-            if (interval := subject.interval(quantity)) is not None:
-                outcome.intervals[label] = interval
+        _, figure = request.measured(quantity, design, laminate, probability=SHARE)
+        if figure and figure.flags:
+            outcome.flags[label] = figure.flags
+        if figure and figure.measured:
+            outcome.measured[label] = figure.measured
+        if figure and figure.interval:
+            outcome.intervals[label] = figure.interval
 
 
 # The free keys of a request, and what no search could answer.
@@ -260,14 +261,8 @@ def _refuse_unknown(quantity: RequestedQuantity, design: Design, free: Sequence[
         raise DesignError(f"{design.name} has no lumen; ask for one of a lobed design")
     if name in ROUND_A_TUBE and form.wrap is None:
         raise DesignError(f"{design.name} has no {name}; only radial designs do")
-    if name == "bend" and quantity.chambers >= form.stacks and COUNT not in free:
-        if not form.is_parallel:
-            raise DesignError(f"{design.name} does not bend; only chambers side by side do")
-        raise DesignError(
-            f"{quantity.label}: {design.name} has {form.stacks} chambers and one must stay empty; "
-            f"ask for at most {form.stacks - 1}, or for more chambers with --free "
-            f"{COUNT}=LOW:HIGH:STEP"
-        )
+    if name == "bend" and COUNT not in free:
+        refuse_bend(quantity, design, f"; ask for more with --free {COUNT}=LOW:HIGH:STEP")
 
 
 def _refuse_unknown_films(request: FindRequest) -> None:
@@ -279,15 +274,14 @@ def _refuse_unknown_films(request: FindRequest) -> None:
         laminate = build(design)
     except SbafabError:
         return  # the search may start from impossible sizes
-    subject = Subject(design, laminate)
     has_modulus = all(layer.film.elastic for layer in laminate.tpe_layers)
     for quantity in request.quantities:
         try:
             if quantity.name in KNOWN_BY_FILM:
-                subject.value(quantity, math.nan)
-            elif quantity.share:
-                subject.value(read_quantity("reference_stroke"))
-            if quantity.is_moved and has_balloons(design.form) and not has_modulus:
+                request.measured(quantity, design, laminate)
+            elif quantity.at.share:
+                request.measured(RequestedQuantity("reference_stroke"), design, laminate)
+            if quantity.kpa is not None and has_balloons(design.form) and not has_modulus:
                 balloons_of(design, laminate)
         except DesignError as error:
             raise DesignError(f"{quantity.label}: {error}") from None
@@ -306,7 +300,7 @@ def _refuse_unsure(request: FindRequest, sure: float) -> None:
     for quantity in (requirement.quantity for requirement in request.requirements):
         is_drawn = quantity.name in NAMES and NAMES[quantity.name].is_drawn
         is_exact = is_drawn or quantity.key is not None or quantity.name == "burst"
-        if not is_exact and group_of(quantity, design.form) is None:
+        if not is_exact and not quantity.is_calibrated(design.form):
             is_reference = quantity.name == "reference_stroke"
             instead = "ask for stroke@10kPa" if is_reference else "leave sure out"
             raise DesignError(

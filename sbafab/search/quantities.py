@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import permutations
 from string import ascii_letters
 from typing import Any, NamedTuple
 
 from sbafab.design.files import hint, shown
-from sbafab.design.records import Design, Form, Slots
+from sbafab.design.records import Design, Discs, Form, Slots
 from sbafab.design.units import (
     KILOPASCALS,
     MILLILITRES_PER_MINUTE,
@@ -27,20 +25,12 @@ from sbafab.design.units import (
     share_of,
 )
 from sbafab.errors import DesignError
-from sbafab.laminate.burst import NOT_BURST, Burst, burst, is_near_burst, refuse_beyond_burst
-from sbafab.laminate.laminate import Laminate, film_mass
-from sbafab.models import calibration, elastic
-from sbafab.models.actuator import Actuator
-from sbafab.models.balloon import Balloon
-from sbafab.models.balloons import balloons_of
-from sbafab.models.calibration import SHARE
-from sbafab.models.figures import NEAR_BURST, Factors, Flag
-from sbafab.models.mechanisms import ASKED, mechanism_value
-from sbafab.models.paper import FULL_KPA, HEIGHTS, WATER_FLOW, Counterpart, counterpart
+from sbafab.laminate.laminate import Laminate
+from sbafab.models.figures import Figure
+from sbafab.models.paper import FULL_KPA, WATER_FLOW
 from sbafab.models.pneumatics import refuse_pressure, seconds
-from sbafab.models.quantity import Conditions, ModelId, Quantity
-from sbafab.models.sizes import is_the_papers_3dof, sizes
-from sbafab.models.stack import MOST_PRESSURE, Stack, stack
+from sbafab.models.prediction import figure
+from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.search.vary import key_values
 
 
@@ -103,6 +93,40 @@ def quantity_lines() -> str:
     )
 
 
+FIGURES: dict[str, tuple[Quantity, Conditions]] = {
+    **{
+        of.key: (of, ANYWHERE)
+        for of in (
+            *(Quantity.OVERALL_DIAMETER, Quantity.OUTLINE_DIAMETER, Quantity.WIDTH),
+            *(Quantity.DEFLATED_DIAMETER, Quantity.INFLATED_DIAMETER, Quantity.REACHED_DIAMETER),
+            *(Quantity.LENGTH, Quantity.MASS, Quantity.REFERENCE_STROKE),
+            *(Quantity.CONTRACTION, Quantity.FREE_BEND),
+        )
+    },
+    "height": (Quantity.FOLDED_HEIGHT, ANYWHERE),
+    "stroke": (Quantity.FREE_STROKE, ANYWHERE),
+    "bend": (Quantity.BEND, Conditions(chambers=1)),
+    "force": (Quantity.BLOCKED_FORCE, ANYWHERE),
+    "burst": (Quantity.BURST, ANYWHERE),
+    "lateral_stiffness": (Quantity.SHUT_STIFFNESS, ANYWHERE),
+    "time": (Quantity.WATER_TIME, Conditions(kpa=FULL_KPA)),
+    "pull": (Quantity.PULL, Conditions(share=0.1)),
+    "moment": (Quantity.MOMENT, Conditions(share=0.0)),
+    "load": (Quantity.WRINKLING_LOAD, ANYWHERE),
+    "slip": (Quantity.SLIP_LOAD, ANYWHERE),
+    "push": (Quantity.FORCE_BOUND, ANYWHERE),
+}
+"""Figures of ``predict`` with the conditions that a requirement does not name."""
+OF_MECHANISMS = {
+    **dict.fromkeys(("contraction", "pull"), "pouch-motor"),
+    **dict.fromkeys(("free_bend", "moment"), "hinge"),
+    "load": "beam",
+    "slip": "jamming",
+    "push": "push",
+}
+"""Kinds of mechanisms by their quantities."""
+CALIBRATED = ("height", "stroke", "bend", "force", "lateral_stiffness", "time")
+"""Quantities that calibrated models give: of oblong pockets the height alone."""
 USUAL_KPA = 10.0
 _CHAMBERS = re.compile(r"\s*([1-9]\d?)\s*chambers?\s*", re.IGNORECASE)
 NAMES = {row.name: row for row in QUANTITIES}
@@ -131,26 +155,28 @@ HOW = (
 
 @dataclass(frozen=True)
 class RequestedQuantity:
-    """A quantity by name or dotted key; with its pressure in kPa, a force with its stroke in mm or
-    as a share of the reference stroke, a bend with the number of its pressurised chambers, a time
-    with its flow in ml/min.
+    """A quantity by name or dotted key, ``at`` the conditions that are named: the pressure, a
+    force's rise or share of the reference stroke, a bend's chambers, a time's flow.
     """
 
     name: str
-    unit: str
-    kpa: float | None = None
-    stroke: float | None = None
-    chambers: int = 1
-    flow: float | None = None
-    share: float | None = None
+    at: Conditions = ANYWHERE
+
+    @property
+    def unit(self) -> str:
+        return NAMES[self.name].unit if self.name in NAMES else ""
 
     @property
     def label(self) -> str:
-        at = f"@{self.stroke:g}mm" if self.stroke is not None else ""
-        at += f"@{100 * self.share:g}%" if self.share is not None else ""
-        at += f"@{self.chambers}chambers" if self.chambers > 1 else ""
-        at += f"@{self.kpa:g}kPa" if self.kpa is not None else ""
-        return f"{self.name}{at}{f'@{self.flow:g}ml/min' if self.flow is not None else ''}"
+        at = self.at
+        places = [
+            (at.rise is not None, f"{at.rise or 0:g}mm"),
+            (at.share is not None, f"{100 * (at.share or 0):g}%"),
+            ((at.chambers or 1) > 1, f"{at.chambers}chambers"),
+            (at.kpa is not None, f"{at.kpa or 0:g}kPa"),
+            (at.flow is not None, f"{at.flow or 0:g}ml/min"),
+        ]
+        return "@".join([self.name, *(text for is_given, text in places if is_given)])
 
     @property
     def key(self) -> str | None:
@@ -160,14 +186,22 @@ class RequestedQuantity:
         return self.name if "." in self.name else None
 
     @property
-    def is_moved(self) -> bool:
-        """True for what inflated chambers do."""
-        return self.name in AT_PRESSURE or self.name == "time"
+    def figure(self) -> tuple[Quantity, Conditions] | None:
+        """The figure of ``predict`` and its conditions; None of the drawing and its keys."""
+        if self.name not in FIGURES:
+            return None
+        of, usual = FIGURES[self.name]
+        return of, Conditions(**{**usual.as_dict(), **self.at.as_dict()})
 
     @property
-    def gauge_kpa(self) -> float | None:
+    def kpa(self) -> float | None:
         """The gauge pressure in kPa, of a time the one that it ends at; None without one."""
-        return FULL_KPA if self.name == "time" else self.kpa
+        return self.figure[1].kpa if self.figure else None
+
+    def is_calibrated(self, form: Form) -> bool:
+        """Return True if a calibrated model gives the quantity."""
+        is_oblong = isinstance(form.pockets, Slots) and self.name != "height"
+        return self.name in CALIBRATED and not is_oblong
 
 
 def read_quantity(
@@ -179,38 +213,36 @@ def read_quantity(
     name, *places = (part.strip() for part in text.split("@"))
     name = name if "." in name else name.replace("-", "_").lower()
     if name in AT_PRESSURE:
-        return _with_pressure(name, places, text, kpa)
+        return RequestedQuantity(name, _conditions(name, places, text, kpa))
     if name == "time":
-        return RequestedQuantity(name, "s", flow=_flow(places, text, flow_ml_min))
+        return RequestedQuantity(name, Conditions(flow=_flow(places, text, flow_ml_min)))
     if places:
         named = f"{', '.join(AT_PRESSURE[:-1])} and {AT_PRESSURE[-1]}"
         raise DesignError(f"{shown(text)}: only {named} take a pressure; {HOW}")
     if name not in NAMES and "." not in name:
         raise DesignError(f"{shown(text)} is not a quantity; {hint(name, [*NAMES, 'any key'])}")
-    return RequestedQuantity(name, NAMES[name].unit if name in NAMES else "")
+    return RequestedQuantity(name)
 
 
 def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:
     """The quantity to compare with a limit: of the inflated diameters, the conservative one."""
     if quantity.name not in (REACHED, WIDEST):
         return quantity
-    return replace(quantity, name=REACHED if at_least else WIDEST)
+    return RequestedQuantity(REACHED if at_least else WIDEST)
 
 
-def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -> RequestedQuantity:
+def _conditions(name: str, places: list[str], text: str, kpa: float | None) -> Conditions:
     is_vacuum = name == "slip"
     read: dict[str, Any] = {}
-    try:
-        for place in places:
+    for place in places:
+        try:
             field, value = _place(place, name)
-            if field == "kpa" and field in read:
-                raise DesignError(f"{shown(text)} names two pressures; name one")
-            read[field] = value
-    except ValueError as error:
-        if isinstance(error, DesignError):
-            raise
-        raise DesignError(f"{shown(text)}: {shown(place)} {error}") from None
-    if len({"stroke", "share"} & read.keys()) != (name == "force"):
+        except ValueError as error:
+            raise DesignError(f"{shown(text)}: {shown(place)} {error}") from None
+        if field == "kpa" and field in read:
+            raise DesignError(f"{shown(text)} names two pressures; name one")
+        read[field] = value
+    if len({"rise", "share"} & read.keys()) != (name == "force"):
         raise DesignError(
             f"{shown(text)}: a force needs one stroke, and only a force takes one; {HOW}"
         )
@@ -220,11 +252,11 @@ def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -
         refuse_pressure(read["kpa"], is_vacuum)
     except DesignError as error:
         raise DesignError(f"{shown(text)}: {error}") from None
-    return RequestedQuantity(name, NAMES[name].unit, **read)
+    return Conditions(**read)
 
 
 def _place(place: str, name: str) -> tuple[str, float]:
-    """Return what a place in a quantity is, a field of ``RequestedQuantity``, and its value.
+    """Return the condition that a place in a quantity names, and its value.
 
     Raises ValueError with the end of a sentence.
     """
@@ -237,15 +269,11 @@ def _place(place: str, name: str) -> tuple[str, float]:
     if place.replace(".", "", 1).isdecimal():
         length = f" or {place}mm" if name == "force" else ""
         raise ValueError(f"has no unit; write {place}kPa{length}")
-    if place.endswith("%"):
-        try:
-            return "share", read_share(place)
-        except ValueError as error:
-            raise ValueError(f"{error}; {HOW}") from None
     try:
-        return "stroke", millimetres(place)
-    except ValueError:
-        raise ValueError(f"is neither a pressure nor a length; {HOW}") from None
+        return ("share", read_share(place)) if place.endswith("%") else ("rise", millimetres(place))
+    except ValueError as error:
+        reason = error if place.endswith("%") else "is neither a pressure nor a length"
+        raise ValueError(f"{reason}; {HOW}") from None
 
 
 def _flow(places: list[str], text: str, flow_ml_min: float) -> float:
@@ -414,220 +442,59 @@ def _refuse_contradictions(requirements: Sequence[Requirement], texts: Sequence[
 # The values of a design.
 
 
-@dataclass(frozen=True)
-class Subject:
-    """A design with its quantities, each computed once.
+def measured(
+    quantity: RequestedQuantity,
+    design: Design,
+    laminate: Laminate,
+    good: float | None = None,
+    pressures_kpa: Sequence[float] = (),
+    probability: float | None = None,
+) -> tuple[float, Figure | None]:
+    """Return the value of a quantity of a design in its unit, and the figure of ``predict`` that it
+    is, if any; ``good`` is the share of good builds, the others as in ``figure``.
 
-    ``given``: factors in place of the calibration's, ``origin``: the subject at the calibration's
-    factors, whose stack is reused for others if possible. Its maps reach ``most_kpa``.
+    Raises DesignError if the design has no such quantity, or no model covers it.
     """
-
-    design: Design
-    laminate: Laminate
-    given: Factors | None = None
-    origin: Subject | None = None
-    most_kpa: float = MOST_PRESSURE
-
-    def value(self, quantity: RequestedQuantity, good: float | None = None) -> float:
-        """Return the value of a quantity in its unit; ``good`` is the share of good builds.
-
-        Raises DesignError if the design has no such quantity, or no model covers it.
-        """
-        name, form = quantity.name, self.design.form
-        if quantity.gauge_kpa is not None:
-            refuse_beyond_burst(self.laminate, quantity.gauge_kpa)
-        if name in ASKED:
-            return mechanism_value(form.mechanism, self.laminate, name, quantity.kpa or USUAL_KPA)
-        kpa = quantity.kpa or 0.0
-        values: Mapping[str, Callable[[], Any]] = {
-            "yield": lambda: good,
-            "mass": lambda: film_mass(self.laminate),
-            "height": lambda: self._actuator.thickness,
-            "reference_stroke": lambda: self._actuator.known_stroke,
-            "burst": lambda: self._burst.kpa,
-            "time": lambda: self._time(quantity.flow or WATER_FLOW),
-            "lumen": lambda: form.lumen,
-            "stroke": lambda: self._stroke(kpa),
-            "bend": lambda: self._bend(quantity.chambers, kpa),
-            "force": lambda: self._force(self._stroke_of(quantity), kpa),
-            "lateral_stiffness": lambda: elastic.shut_stiffness(self._stack, kpa)[0],
-        }
-        others = key_values(self.design) if "." in name else self._sizes
-        value = values[name]() if name in values else others.get(name)
+    name, form = quantity.name, design.form
+    if quantity.figure is None:
+        others = {**key_values(design), "yield": good, "lumen": form.lumen}
+        value = others.get(name)
         if isinstance(value, int | float):
-            return float(value)
-        raise DesignError(f"{self.design.name} has no {name} that is a number")
-
-    @cached_property
-    def _sizes(self) -> Mapping[str, float]:
-        return sizes(self.design, self.laminate, self.factors)
-
-    @property
-    def _burst(self) -> Burst:
-        estimate = burst(self.laminate)
-        if estimate is None:
-            raise DesignError(f"the burst pressure of {self.design.name} is not known: {NOT_BURST}")
-        return estimate
-
-    def flags(self, quantity: RequestedQuantity) -> tuple[Flag, ...]:
-        """Return the limits to trust in the quantity's figure, as in ``predict``."""
-        form, kpa = self.design.form, quantity.gauge_kpa
-        group, missed = group_of(quantity, form), 0.0
-        if quantity.name == "burst":
-            missed = calibration.burst_uncertainty(self._burst)[1]
-        elif quantity.name == "reference_stroke" and self._actuator.radii:
-            sizes = calibration.sizes_of(form, self.laminate)
-            missed = sizes.farther(calibration.PAPER_3DOF)
-        elif group is not None and self.uncertainty is not None:
-            missed = self.uncertainty.farther(group)
-        near = kpa is not None and is_near_burst(self.laminate, kpa)
-        return (*calibration.flags_at(missed), *((NEAR_BURST,) if near else ()))
-
-    def _time(self, flow_ml_min: float) -> float:
-        time, _ = elastic.time_to_fill(self._stack, flow_ml_min, FULL_KPA)
-        return time + self.factors.water_delay
-
-    def _stroke_of(self, quantity: RequestedQuantity) -> float:
-        """Return the stroke in mm at which a force is blocked; a share is relative to the reference
-        stroke, as in ``predict``. Raises DesignError for a share without a reference stroke.
-        """
-        if not quantity.share:
-            return quantity.stroke or 0.0
-        reference = self._actuator.known_stroke
-        if isinstance(self.design.form.pockets, Slots):
-            return quantity.share * reference
-        return self._actuator.stroke_at(quantity.share)
-
-    @cached_property
-    def factors(self) -> Factors:
-        """The factors of the design's calibration, or the given ones."""
-        return self.given or calibration.factors_of(self.design)
-
-    @cached_property
-    def uncertainty(self) -> calibration.Uncertainty | None:
-        """The calibration of the design; None without one."""
-        return calibration.uncertainty_of(self.design, laminate=self.laminate)
-
-    @cached_property
-    def _others(self) -> dict[Factors, Subject]:
-        """The design at other factors."""
-        return {self.factors: self}
-
-    def _at(self, factors: Factors) -> Subject:
-        subject = Subject(self.design, self.laminate, factors, self, self.most_kpa)
-        return self._others.setdefault(factors, subject)
-
-    def interval(
-        self, quantity: RequestedQuantity, share: float = SHARE
-    ) -> tuple[float, float] | None:
-        """Return the interval that holds a measurement of the quantity with a probability of
-        ``share``; None without a calibration, and if no calibrated model gives it.
-
-        Raises DesignError if other factors of the calibration lead out of the model's range.
-        """
-        if quantity.name == "burst":
-            return calibration.burst_uncertainty(self._burst, share)[0]
-        group = group_of(quantity, self.design.form)
-        is_unmolten = quantity.name == "height" and not self._actuator.folded.molten
-        if self.uncertainty is None or group is None or is_unmolten:
-            return None
-        # Below 0 a force is only a distance from one, for the search.
-        least = 0.0 if quantity.name == "force" and self.value(quantity) > 0 else -math.inf
-
-        def value_at(factors: Factors) -> float:
-            return max(self._at(factors).value(quantity), least)
-
-        delay = "water_delay" if quantity.name == "time" else ""
-        return self.uncertainty.interval_of(group, value_at, share, delay)[1]
-
-    @cached_property
-    def _actuator(self) -> Actuator:
-        return Actuator(self.design, self.laminate, self.factors)
-
-    @cached_property
-    def _stack(self) -> Stack:
-        moved = None
-        if self.origin is not None:
-            origin = self.origin
-            moved = elastic.moved_stack(origin._stack, origin._actuator, self.factors)
-        return moved or stack(self.design, self.laminate, self.most_kpa, self.factors)
-
-    def _stroke(self, kpa: float) -> float:
-        if isinstance(self.design.form.pockets, Slots):
-            return self._actuator.known_stroke
-        kinds = balloons_of(self.design, self.laminate, self.factors)
-        return sum(kinds.count(kind) * free_height(kind, kpa) for kind in dict.fromkeys(kinds))
-
-    def _bend(self, chambers: int, kpa: float) -> float:
-        if not self.design.form.is_parallel:
-            raise DesignError(f"{self.design.name} does not bend; only chambers side by side do")
-        empty = self._stack.chambers - chambers
-        if empty < 1:
-            raise DesignError(
-                f"{self.design.name} has {self._stack.chambers} chambers, and a bend is of at most "
-                f"{self._stack.chambers - 1} of them, the others empty"
-            )
-        return self._stack.pose((*(kpa,) * chambers, *(0.0,) * empty)).bend
-
-    def _force(self, stroke: float, kpa: float) -> float:
-        form = self.design.form
-        if isinstance(form.pockets, Slots):
-            first = self._actuator.pockets[0]
-            if stroke > first.largest_stroke:
-                return first.largest_stroke - stroke
-            return form.pushing * kpa * float(first.rate(stroke)) / 1000
-        kinds = balloons_of(self.design, self.laminate, self.factors)
-        push = float(elastic.blocked_force(self._stack, kpa, stroke))
-        if push <= 0:
-            maps = self._stack.maps
-            free = sum(float(maps[level].free_height(kpa)) for level in self._stack.levels)
-            # The shortfall of stroke, as the force for that much of it.
-            least = min(kind.pocket for kind in kinds)
-            return -kpa / 1000 * math.pi * least**2 * max(stroke / max(free, 1e-6) - 1, 0.0)
-        elastic.refuse_stretched(float(elastic.held_stretch(kinds, [kpa], [stroke])[0]))
-        return form.pushing * push
-
-    def counterpart(self, quantity: RequestedQuantity) -> Counterpart | None:
-        """Return the paper's measured value if the model is off by over a quarter, else None."""
-        form, name = self.design.form, quantity.name
-        if group_of(quantity, form) is None:
-            return None
-        at = Conditions(kpa=quantity.gauge_kpa, flow=quantity.flow)
-        if name == "height":
-            folded = self._actuator.folded
-            if folded.molten > 0 and folded.factor != 1:
-                return None
-        elif name == "bend":
-            at = at._replace(chambers=quantity.chambers)
-        elif name == "force":
-            # The nearest of the three heights at which forces were measured.
-            share = self._stroke_of(quantity) / self._actuator.reference_stroke
-            at = at._replace(share=min(HEIGHTS, key=lambda height: abs(height - share)))
-        (of, model), of_papers = FIGURES[name], is_the_papers_3dof(form, self.laminate)
-        return counterpart(form, of, at, model, self.factors.calibration, of_papers)
+            return float(value), None
+        raise DesignError(f"{design.name} has no {name} that is a number")
+    of, at = quantity.figure
+    kind = OF_MECHANISMS.get(name)
+    if kind and (form.mechanism is None or form.mechanism.kind != kind):
+        has = f"a mechanism of {form.mechanism.kind}" if form.mechanism else "no mechanism"
+        raise DesignError(f"{name} is of a {kind}, and the design has {has}")
+    if of is Quantity.BEND:
+        refuse_bend(quantity, design)
+    if of is Quantity.FREE_STROKE and isinstance(form.pockets, Slots):
+        of, at = Quantity.REFERENCE_STROKE, ANYWHERE
+    if of is Quantity.BLOCKED_FORCE and isinstance(form.pockets, Slots | Discs):
+        largest = figure(design, laminate, Quantity.LARGEST_STROKE).value
+        stroke = at.rise or 0.0
+        if at.share:
+            stroke = at.share * figure(design, laminate, Quantity.REFERENCE_STROKE).value
+        is_beyond = isinstance(form.pockets, Slots) and stroke > largest
+        item = None if is_beyond else figure(design, laminate, of, at, pressures_kpa, probability)
+        if item is None or item.value <= 0:
+            # For the search: the less, the farther the stroke is beyond the balloons'.
+            return -abs(at.kpa or 0.0) / 1000 * stroke / largest, None
+        return item.value, item
+    item = figure(design, laminate, of, at, pressures_kpa, probability)
+    return item.value, item
 
 
-FIGURES = {
-    "height": (Quantity.FOLDED_HEIGHT, ModelId.FILMS),
-    "stroke": (Quantity.FREE_STROKE, ModelId.ELASTIC_BALLOON),
-    "bend": (Quantity.BEND, ModelId.ELASTIC_STACK),
-    "force": (Quantity.BLOCKED_FORCE, ModelId.ELASTIC_STACK),
-    "time": (Quantity.WATER_TIME, ModelId.STACK_IN_TIME),
-    "lateral_stiffness": (Quantity.SHUT_STIFFNESS, ModelId.STACK_SHUT),
-}
-"""Figures of ``predict`` and their models, of quantities that the paper measured."""
-
-
-def group_of(quantity: RequestedQuantity, form: Form) -> str | None:
-    """Return the group of a quantity's discrepancy; None if no calibrated model gives it."""
-    if quantity.name == "height":
-        return calibration.FLAT
-    if quantity.name in ASKED or not quantity.is_moved or isinstance(form.pockets, Slots):
-        return None
-    return calibration.GROUP_BY_UNIT.get(quantity.unit, "motion")
-
-
-@lru_cache(maxsize=4096)
-def free_height(kind: Balloon, kpa: float) -> float:
-    """Free height (mm) of a balloon. Raises BeyondError if its film does not stand it."""
-    return elastic.free_rise(Counter([kind]), kpa).stroke
+def refuse_bend(quantity: RequestedQuantity, design: Design, more: str = "") -> None:
+    """Raise DesignError for a bend for which no chamber would stay empty; ``more`` ends the
+    sentence.
+    """
+    form, chambers = design.form, quantity.at.chambers or 1
+    if not form.is_parallel:
+        raise DesignError(f"{design.name} does not bend; only chambers side by side do")
+    if chambers >= form.stacks:
+        raise DesignError(
+            f"{quantity.label}: {design.name} has {form.stacks} chambers, and a bend is of at most "
+            f"{form.stacks - 1} of them, the others empty{more}"
+        )

@@ -11,7 +11,6 @@ from __future__ import annotations
 import itertools
 import math
 import random
-import traceback
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -28,7 +27,7 @@ from sbafab.design.units import millimetres
 from sbafab.errors import BeyondError, DesignError, GeometryError
 from sbafab.folders.build import Build, refuse_undoable
 from sbafab.laminate.laminate import Laminate, film_mass
-from sbafab.models.stack import MOST_PRESSURE
+from sbafab.models.figures import Figure
 from sbafab.rules.deck import run_deck
 from sbafab.runtime import Progress
 from sbafab.search.quantities import (
@@ -36,7 +35,7 @@ from sbafab.search.quantities import (
     Goal,
     RequestedQuantity,
     Requirement,
-    Subject,
+    measured,
     shown_value,
 )
 from sbafab.search.trials import RuleMargin, margins
@@ -65,10 +64,17 @@ class FindRequest:
         """The quantities to evaluate: the requirements' first, then the goal's."""
         return [*(requirement.quantity for requirement in self.requirements), self.goal.quantity]
 
-    def subject(self, design: Design, laminate: Laminate) -> Subject:
-        """Return a candidate to evaluate, up to the highest pressure of the quantities."""
-        most = max(each.gauge_kpa or 0.0 for each in self.quantities)
-        return Subject(design, laminate, most_kpa=max(MOST_PRESSURE, most))
+    def measured(
+        self,
+        quantity: RequestedQuantity,
+        design: Design,
+        laminate: Laminate,
+        good: float | None = None,
+        probability: float | None = None,
+    ) -> tuple[float, Figure | None]:
+        """Return a quantity of a candidate, with maps that reach all pressures of the request."""
+        kpa = [each.kpa for each in self.quantities if each.kpa is not None]
+        return measured(quantity, design, laminate, good, kpa, probability)
 
 
 # One candidate: its figures against the requirements, its rules by their margins.
@@ -89,8 +95,7 @@ class Trial:
     ``values`` are of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
     ``missed`` is the total share by which requirements and rules are missed; 0 if none is. A lower
     ``cost``, in the unit of the goal, is better; ``mass`` is in g. ``refused`` says why the design
-    cannot be made, ``refused_at`` is the place in the program that raised it: one per reason,
-    whatever its numbers. ``intervals``, by quantity in its unit, have ends that are compared with
+    cannot be made. ``intervals``, by quantity in its unit, have ends that are compared with
     limits, if requirements have a probability. ``words`` counts keys with words that differ from
     the starting design's.
     """
@@ -102,7 +107,6 @@ class Trial:
     cost: float = 0.0
     mass: float = 0.0
     refused: str = ""
-    refused_at: str = ""
     laminate: Laminate | None = field(default=None, repr=False, compare=False)
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     words: int = 0
@@ -150,15 +154,12 @@ def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool 
             rules = margins(checked_build.findings)
             if not checked_build.failed:
                 refuse_undoable([checked_build])
-        subject = request.subject(design, laminate)
         share = rules[YIELD].measured if rules and YIELD in rules else None
-        figures = {each.label: subject.value(each, share) for each in request.quantities}
-        intervals = _intervals(request, subject)
+        figures, intervals = _figures(request, design, laminate, share)
     except (DesignError, GeometryError) as error:
         excess = error.excess if isinstance(error, BeyondError) else IMPOSSIBLE
-        *_, (frame, line) = traceback.walk_tb(error.__traceback__)
-        reason, place = " ".join(str(error).split()), f"{frame.f_code.co_filename}:{line}"
-        return Trial(values, missed=IMPOSSIBLE + excess, refused=reason, refused_at=place)
+        reason = " ".join(str(error).split())
+        return Trial(values, missed=IMPOSSIBLE + excess, refused=reason)
     trial = Trial(values, figures, rules, laminate=laminate, intervals=intervals)
     missed = [-min(0.0, row.margin(trial.judged(row)) + CLOSE) for row in request.requirements]
     # The share by which each failing rule misses its limit.
@@ -171,13 +172,26 @@ def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool 
     return replace(trial, missed=sum(missed), cost=cost, mass=mass)
 
 
-def _intervals(request: FindRequest, subject: Subject) -> dict[str, tuple[float, float]]:
-    """Return intervals whose ends a measured value passes with a probability of ``1 - sure``."""
-    if request.sure is None:
-        return {}
-    quantities = dict.fromkeys(row.quantity for row in request.requirements)
-    each = {of.label: subject.interval(of, 2 * request.sure - 1) for of in quantities}
-    return {label: interval for label, interval in each.items() if interval is not None}
+def _figures(
+    request: FindRequest, design: Design, laminate: Laminate, good: float | None
+) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    """Return the quantities of a candidate, and the intervals whose ends a measured value passes
+    with a probability of ``1 - sure``.
+    """
+    figures: dict[str, float] = {}
+    intervals: dict[str, tuple[float, float]] = {}
+    required = {row.quantity for row in request.requirements if request.sure is not None}
+    for quantity in dict.fromkeys(request.quantities):
+        label, probability = quantity.label, None
+        if quantity in required and request.sure is not None:
+            probability = 2 * request.sure - 1
+        value, figure = request.measured(quantity, design, laminate, good, probability)
+        figures[label] = value
+        if probability and figure and figure.interval:
+            intervals[label] = figure.interval
+        elif probability and figure and quantity.is_calibrated(design.form) and label != "height":
+            raise DesignError(f"{label} is not known at other factors of the calibration")
+    return figures, intervals
 
 
 def figure_text(request: FindRequest, trial: Trial, requirement: Requirement) -> str:

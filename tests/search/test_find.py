@@ -468,7 +468,7 @@ TPU = {"product": "TPU 85A", "thickness": 0.1, "modulus": 20, "poisson": 0.45, "
 @pytest.mark.parametrize(
     ("asked", "left_out", "said"),
     [
-        ("burst", "", "burst: the burst pressure of 3dof-15mm is not known"),
+        ("burst", "", "burst: burst pressure: no burst test of this film is known"),
         ("reference_stroke", "", "reference_stroke: reference stroke: the paper measured it"),
         ("force@50%@10kPa", "", "force@50%@10kPa: reference stroke: the paper measured it"),
         ("mass", "density", "mass: "),

@@ -9,7 +9,14 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.search.quantities import RequestedQuantity, Subject, read_all, read_limit, read_quantity
+from sbafab.models.quantity import Conditions
+from sbafab.search.quantities import (
+    RequestedQuantity,
+    measured,
+    read_all,
+    read_limit,
+    read_quantity,
+)
 
 UNCALIBRATED = {"calibration": "none"}
 """Films as drawn and bought, whose figures are closed forms."""
@@ -17,25 +24,25 @@ UNCALIBRATED = {"calibration": "none"}
 
 def _value(text: str, name: str = "1dof-5mm", **tables: Any) -> float:
     design = sbafab.load(name, **tables)
-    return Subject(design, sbafab.build(design)).value(read_quantity(text), 0.875)
+    return measured(read_quantity(text), design, sbafab.build(design), 0.875)[0]
 
 
 READ = {
-    "mass": RequestedQuantity("mass", "g"),
-    "overall-diameter": RequestedQuantity("overall_diameter", "mm"),
-    "Stroke": RequestedQuantity("stroke", "mm", 10.0),
-    "stroke@0.5bar": RequestedQuantity("stroke", "mm", 50.0),
-    "stroke@50KPA": RequestedQuantity("stroke", "mm", 50.0),
-    "stroke@0.1MPa": RequestedQuantity("stroke", "mm", 100.0),
-    "bend": RequestedQuantity("bend", "deg", 10.0),
-    "bend@2chambers@5kPa": RequestedQuantity("bend", "deg", 5.0, chambers=2),
-    "force@50 kPa@0.5 in": RequestedQuantity("force", "N", 50.0, 12.7),
-    "force@50%": RequestedQuantity("force", "N", 10.0, share=0.5),
-    "force@ 12.5 % @50kPa": RequestedQuantity("force", "N", 50.0, share=0.125),
-    "lateral-stiffness@5kPa": RequestedQuantity("lateral_stiffness", "N/mm", 5.0),
-    "time": RequestedQuantity("time", "s", flow=35.0),
-    "time@0.5ml/s": RequestedQuantity("time", "s", flow=30.0),
-    "chamber.diameter": RequestedQuantity("chamber.diameter", ""),
+    "mass": RequestedQuantity("mass"),
+    "overall-diameter": RequestedQuantity("overall_diameter"),
+    "Stroke": RequestedQuantity("stroke", Conditions(kpa=10.0)),
+    "stroke@0.5bar": RequestedQuantity("stroke", Conditions(kpa=50.0)),
+    "stroke@50KPA": RequestedQuantity("stroke", Conditions(kpa=50.0)),
+    "stroke@0.1MPa": RequestedQuantity("stroke", Conditions(kpa=100.0)),
+    "bend": RequestedQuantity("bend", Conditions(kpa=10.0)),
+    "bend@2chambers@5kPa": RequestedQuantity("bend", Conditions(kpa=5.0, chambers=2)),
+    "force@50 kPa@0.5 in": RequestedQuantity("force", Conditions(kpa=50.0, rise=12.7)),
+    "force@50%": RequestedQuantity("force", Conditions(kpa=10.0, share=0.5)),
+    "force@ 12.5 % @50kPa": RequestedQuantity("force", Conditions(kpa=50.0, share=0.125)),
+    "lateral-stiffness@5kPa": RequestedQuantity("lateral_stiffness", Conditions(kpa=5.0)),
+    "time": RequestedQuantity("time", Conditions(flow=35.0)),
+    "time@0.5ml/s": RequestedQuantity("time", Conditions(flow=30.0)),
+    "chamber.diameter": RequestedQuantity("chamber.diameter"),
 }
 
 
@@ -119,8 +126,8 @@ def test_what_must_reach_counts_the_lens_and_what_must_not_touch_the_cylinder(na
     (reach, clear), _ = read_all([f"{name}=25"], [f"{name}=25"], "mass")
     chamber = {"width": 9.5, "length": 9.5}
     design = sbafab.load("radial-15mm", chamber=chamber, models=UNCALIBRATED)
-    subject = Subject(design, sbafab.build(design))
-    reached, widest = (subject.value(one.quantity) for one in (reach, clear))
+    laminate = sbafab.build(design)
+    reached, widest = (measured(one.quantity, design, laminate)[0] for one in (reach, clear))
     assert widest == pytest.approx(15.328 + 4 * 8 / math.pi)
     stroke = sbafab.predict(design).value("reference_stroke")
     assert reached == pytest.approx(15.328 + 2 * stroke)
@@ -187,7 +194,7 @@ def test_each_figure_with_its_interval_is_the_one_of_predict(template: str, kpa:
     changes, names = FIGURES[template, kpa]
     design = sbafab.load(template, changes)
     said = sbafab.predict(design, pressures_kpa=[kpa], flow_ml_min=20.0)
-    subject = Subject(design, sbafab.build(design))
+    laminate = sbafab.build(design)
     for text, name in names.items():
         figure = max(
             (one for one in said.figures if one.name == name),
@@ -195,12 +202,13 @@ def test_each_figure_with_its_interval_is_the_one_of_predict(template: str, kpa:
         )
         quantity = read_quantity(text)
         assert quantity.unit == figure.unit, text
-        assert subject.value(quantity) == pytest.approx(figure.value, rel=1e-7), text
-        # The burst's film gives an interval, no calibration does.
-        interval = subject.interval(quantity)
+        value, mine = measured(quantity, design, laminate, probability=0.9)
+        assert mine is not None
+        assert value == mine.value == pytest.approx(figure.value, rel=1e-7), text
+        assert measured(quantity, design, laminate)[0] == pytest.approx(value, rel=1e-12)
         expected = figure.interval and pytest.approx(figure.interval, rel=1e-7)
-        assert interval == expected, text
-        assert (subject.counterpart(quantity) is None) == (figure.measured is None), text
+        assert mine.interval == expected, text
+        assert (mine.measured, mine.flags) == (figure.measured, figure.flags), text
 
 
 def test_a_force_at_a_length_is_that_at_its_share_of_the_stroke() -> None:
@@ -213,7 +221,9 @@ def test_a_force_at_a_length_is_that_at_its_share_of_the_stroke() -> None:
 
 def test_without_a_calibration_nothing_has_an_interval() -> None:
     design = sbafab.load("3dof-15mm", models=UNCALIBRATED)
-    assert Subject(design, sbafab.build(design)).interval(read_quantity("height")) is None
+    _, height = measured(read_quantity("height"), design, sbafab.build(design), probability=0.9)
+    assert height is not None
+    assert height.interval is None
 
 
 def test_stroke_and_force_are_those_of_a_flat_balloon() -> None:

@@ -25,7 +25,7 @@ from sbafab.laminate.lay_up import pressed_layers
 from sbafab.models.calibration import factors_of, load_calibration
 from sbafab.models.figures import Figure, Prediction
 from sbafab.models.sizes import size_phrases, sizes
-from sbafab.search.quantities import Subject, read_quantity
+from sbafab.search.quantities import measured, read_quantity
 from sbafab.studio.jobs import elastic, motion
 from sbafab.validation.evidence import MeasuredCurve, Setup, StatedError
 from sbafab.validation.model_values import model_values
@@ -103,8 +103,7 @@ def _near(figure: Figure) -> Any:
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_find_has_the_figure_of_predict(case: Case, prediction: Prediction) -> None:
     design = sbafab.load(NAME)
-    subject = Subject(design, sbafab.build(design))
-    value = subject.value(read_quantity(case.quantity))
+    value, _ = measured(read_quantity(case.quantity), design, sbafab.build(design))
     assert value == _near(_figure(prediction, case.figure))
 
 
@@ -118,11 +117,11 @@ def test_find_has_the_figure_of_predict(case: Case, prediction: Prediction) -> N
 )
 def test_find_has_the_sizes_of_predict(name: str, quantities: set[str]) -> None:
     design = sbafab.load(name)
-    subject = Subject(design, sbafab.build(design))
+    laminate = sbafab.build(design)
     figures = {one.name: one.value for one in sbafab.predict(name).figures}
     for quantity in quantities:
         figure = "folded height" if quantity == "height" else quantity.replace("_", " ")
-        value = subject.value(read_quantity(quantity))
+        value, _ = measured(read_quantity(quantity), design, laminate)
         assert value == pytest.approx(figures[figure], rel=1e-12)
 
 
@@ -210,14 +209,14 @@ def test_one_folded_height_and_one_burst(name: str) -> None:
         for layer in laminate.layers
     )
     assert height == pytest.approx(by_hand, rel=1e-12)
-    subject = Subject(design, laminate)
-    assert subject.value(read_quantity("height")) == pytest.approx(height, rel=1e-12)
+    value, _ = measured(read_quantity("height"), design, laminate)
+    assert value == pytest.approx(height, rel=1e-12)
     assert sizes(design, laminate)["folded_height"] == pytest.approx(height, rel=1e-12)
     assert f"folded height {height:.3f} mm" in size_phrases(design, laminate)[-1]
     estimate = burst(laminate)
     if estimate is not None and not design.form.works_under_vacuum:
         assert figures["burst pressure"].value == estimate.kpa
-        assert subject.value(read_quantity("burst")) == estimate.kpa
+        assert measured(read_quantity("burst"), design, laminate)[0] == estimate.kpa
 
 
 def test_nothing_past_the_burst_estimate() -> None:
