@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, TypeVar
 
 from pydantic import AliasPath, Field
@@ -206,19 +207,20 @@ class CompareDocument(Document, schema="sbafab/compare@1"):
 
 
 def _rule_entry(row: RuleDifference) -> RuleEntry:
-    return RuleEntry.read(
-        row,
-        unit=next(margin.unit for margin in row.margins if margin is not None),
-        verdicts=[margin and margin.verdict for margin in row.margins],
-        margins=[margin and margin.margin for margin in row.margins],
-        measured=[margin and margin.measured for margin in row.margins],
-    )
+    either = row.margins[0] or row.margins[1]
+    columns = {"verdicts": "verdict", "margins": "margin", "measured": "measured"}
+    return RuleEntry.read(row, unit=either and either.unit, **_both(row.margins, columns))
 
 
 def _figure_entry(pair: FigurePair) -> FigureEntry:
-    each = [figure.as_dict() if figure is not None else None for figure in pair.figures]
-    columns = ("value", "interval", "model")
-    return FigureEntry.read(pair, **{f"{c}s": [row and row[c] for row in each] for c in columns})
+    each = [figure and SimpleNamespace(**figure.as_dict()) for figure in pair.figures]
+    columns = {"values": "value", "intervals": "interval", "models": "model"}
+    return FigureEntry.read(pair, **_both(each, columns))
+
+
+def _both(pair: Sequence[Any], columns: Mapping[str, str]) -> dict[str, list[Any]]:
+    """Return columns with an attribute of both, None of one that is not there."""
+    return {key: [each and getattr(each, name) for each in pair] for key, name in columns.items()}
 
 
 def load_compared(source: str | Path, changes: Iterable[Change] = ()) -> Design:

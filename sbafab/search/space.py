@@ -160,7 +160,9 @@ def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool 
         excess = error.excess if isinstance(error, BeyondError) else IMPOSSIBLE
         reason = " ".join(str(error).split())
         return Trial(values, missed=IMPOSSIBLE + excess, refused=reason)
-    trial = Trial(values, figures, rules, laminate=laminate, intervals=intervals)
+    keys = key_values(request.design)
+    words = sum(isinstance(value, str) and value != keys.get(key) for key, value in values.items())
+    trial = Trial(values, figures, rules, laminate=laminate, intervals=intervals, words=words)
     missed = [-min(0.0, row.margin(trial.judged(row)) + CLOSE) for row in request.requirements]
     # The share by which each failing rule misses its limit.
     failed = (rule for rule in (rules or {}).values() if rule.verdict == "fail")
@@ -326,12 +328,8 @@ class SearchSpace:
     @property
     def counts(self) -> list[int]:
         """Number of values of each key."""
-        return list((self.highs - self.lows + 1).tolist())
-
-    @property
-    def points(self) -> Iterator[GridPoint]:
-        """Every design of the space."""
-        return itertools.product(*map(range, self.lows.tolist(), (self.highs + 1).tolist()))
+        counts: list[int] = (self.highs - self.lows + 1).tolist()
+        return counts
 
     def number(self, axis: int, point: GridPoint) -> float:
         """Return the value of a key at a point; for a list its largest number."""
@@ -392,15 +390,13 @@ class SearchSpace:
         """Return the candidate at a point, also out of range; it does not count as a try."""
         if point in self.trials:
             return self.trials[point]
-        changes = zip(self.free, point, self.start, strict=True)
-        words = sum(free.choices != () and step != start for free, step, start in changes)
-        return replace(evaluated(self.request, self.values(point)), words=words)
+        return evaluated(self.request, self.values(point))
 
     def with_rules(self, trial: Trial) -> Trial:
         """Return the candidate with its rules checked, unless they are known or it was refused."""
         if trial.rules is not None or trial.refused:
             return trial
-        return replace(evaluated(self.request, trial.values, with_rules=True), words=trial.words)
+        return evaluated(self.request, trial.values, with_rules=True)
 
     def best(self) -> tuple[GridPoint, Trial]:
         """Return the best candidate, rules checked; if they make it worse, the next one is
@@ -445,8 +441,8 @@ def searched(request: FindRequest, free: tuple[Free, ...], progress: Progress) -
     """Return the space of a request after all tries that lead further."""
     space = SearchSpace(request, free, progress)
     if space.size <= request.tries:
-        for point in space.points:
-            space.trial(point, checks_rules=False)
+        for steps in np.ndindex(*space.counts):
+            space.trial(tuple((space.lows + steps).tolist()), checks_rules=False)
     else:
         _explore(space)
     _refine(space)

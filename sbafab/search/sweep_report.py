@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -240,18 +241,6 @@ Columns = Mapping[str, Sequence[Any]]
 """One value for each design by column, with ``outcome``; None if a design lacks it."""
 
 
-class Objective(NamedTuple):
-    """A column, its label, and whether more of it is better."""
-
-    column: str
-    label: str
-    more: bool
-
-    @property
-    def better(self) -> str:
-        return f"{self.label} ({'more' if self.more else 'less'} is better)"
-
-
 def _both(columns: Columns, x: str, y: str, outcome: str) -> list[tuple[float, float, int]]:
     """Return values and numbers of the designs of one outcome that have both."""
     rows = enumerate(zip(columns["outcome"], columns[x], columns[y], strict=True))
@@ -272,24 +261,27 @@ def passes_svg(columns: Columns, keys: Sequence[str]) -> str:
     return _drawn("Outcomes", panels)
 
 
-def trades_svg(
-    columns: Columns, pairs: Sequence[tuple[Objective, Objective]]
-) -> tuple[str, set[int]]:
-    """One panel per pair with the front of passing designs, and the numbers of designs on any
-    front.
+def trades_svg(columns: Columns, pairs: Sequence[tuple[str, str]]) -> tuple[str, set[int]]:
+    """One panel per pair of a cost and a gain with the front of passing designs, and the numbers of
+    designs on any front.
     """
     on_front: set[int] = set()
     panels = []
     for x, y in pairs:
-        rows = _both(columns, x.column, y.column, "passes")
-        best = sorted(rows[place] for place in front([row[:2] for row in rows], (x.more, y.more)))
+        rows = _both(columns, x, y, "passes")
+        best = sorted(rows[place] for place in front([row[:2] for row in rows], (False, True)))
         on_front.update(number for _, _, number in best)
-        curve = ChartCurve(
-            "Pareto front", [a for a, _, _ in best], [b for _, b, _ in best], False, True
-        )
-        specks = _specks(columns, x.column, y.column, ("fails", "passes"))
-        panels.append(Panel("", x.better, y.better, [curve], (), False, specks))
+        on_curve = [a for a, _, _ in best], [b for _, b, _ in best]
+        curve = ChartCurve("Pareto front", *on_curve, dotted=True)
+        labels = f"{_label(x)} (less is better)", f"{_label(y)} (more is better)"
+        specks = _specks(columns, x, y, ("fails", "passes"))
+        panels.append(Panel("", *labels, [curve], (), False, specks))
     return _drawn("Trade-offs", panels), on_front
+
+
+def _label(column: str) -> str:
+    """Return the words of a column."""
+    return "share of good builds" if column == YIELD[0] else re.sub(r"\[(.*)\]", r"in \1", column)
 
 
 def _drawn(title: str, panels: Sequence[Panel]) -> str:
@@ -381,15 +373,15 @@ def page_html(
 def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
     """Return the whole page of a sweep."""
     keys = [swept.key for swept in varied]
-    objectives = _objectives(table)
-    names = ["outcome", *keys, *(objective.column for objective in objectives)]
+    costs, gains = _objectives(table)
+    names = ["outcome", *keys, *costs, *gains]
     columns = dict(zip(names, zip(*table.cells(names), strict=True), strict=True))
     counts = table.outcomes
-    pairs = _pairs(objectives, columns)
-    note = ""
-    if not pairs:
-        none = "The passing designs do not differ in two figures, so there is no trade-off."
-        note = none if counts["passes"] else "No design passes."
+    passing = [number for number, of in enumerate(columns["outcome"]) if of == "passes"]
+    differ = [name for name in names if len({columns[name][at] for at in passing} - {None}) > 1]
+    pairs = [(cost, gain) for cost in costs for gain in gains if {cost, gain} <= {*differ}][:6]
+    none = "The passing designs do not differ in two figures, so there is no trade-off."
+    note = "" if pairs else none if counts["passes"] else "No design passes."
     sections = [PageSection("Passing designs", svg=passes_svg(columns, keys), note=note)]
     causes = sorted(table.causes.items(), key=lambda item: -len(item[1]))
     if causes:
@@ -399,7 +391,7 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
         rows = [[cause, str(len(told)), told[0]] for cause, told in causes[:MOST_REASONS]]
         sections.append(PageSection("Causes of failure", head=head, rows=rows, note=note))
     if pairs:
-        sections += _trade_offs(design, table, keys, objectives, columns, pairs)
+        sections += _trade_offs(design, table, keys, [*costs, *gains], columns, pairs)
     footer = (
         f"Design {design_sha256(design)[:12]}, {GENERATOR}. Values: sweep.csv; all of them: sbafab "
         "sweep --all-columns. Predictions are models, each with its validity: sbafab predict."
@@ -418,26 +410,23 @@ def _trade_offs(
     design: Design,
     table: Table,
     keys: Sequence[str],
-    objectives: Sequence[Objective],
+    objectives: Sequence[str],
     columns: Columns,
-    pairs: Sequence[tuple[Objective, Objective]],
+    pairs: Sequence[tuple[str, str]],
 ) -> Iterator[PageSection]:
     """Yield the pictures of trade-offs, with the paper's measured values of figures whose model is
     off by more than a quarter, and the designs on their fronts.
     """
     trades, best = trades_svg(columns, pairs)
     calibration = factors_of(design).calibration
-    measured = []
-    for objective in objectives:
-        figure = table.figures.get(objective.column)
-        beside = figure and counterpart(design.form, *figure, calibration)
-        if beside:
-            measured.append(f"{objective.label}: {beside.sentence}.")
+    figures = {name: table.figures[name] for name in objectives if name in table.figures}
+    beside = {name: counterpart(design.form, *of, calibration) for name, of in figures.items()}
+    measured = [f"{_label(name)}: {row.sentence}." for name, row in beside.items() if row]
     yield PageSection("Trade-offs", measured, trades)
     listed = sorted(best)[:MOST_ROWS]
-    names = [*keys, *(objective.column for objective in objectives)]
+    names = [*keys, *objectives]
     rows = [[str(n + 1), *(format_value(columns[name][n]) for name in names)] for n in listed]
-    head = ("no.", *keys, *(objective.label for objective in objectives))
+    head = ("no.", *keys, *map(_label, objectives))
     line = "Passing designs that no other one improves on in both values of a picture above."
     more = len(best) - len(listed)
     note = f"{more} more designs are in the tables." if more else ""
@@ -453,33 +442,17 @@ def _values_text(swept: Varied) -> str:
     return ", ".join(texts)
 
 
-def _objectives(table: Table) -> list[Objective]:
-    """Size and mass, the first predicted stroke and force, and the yield."""
+def _objectives(table: Table) -> tuple[list[str], list[str]]:
+    """Return the columns of costs, sizes and mass, and of gains: the first predicted stroke and
+    force, and the yield.
+    """
     first = table.first
     flat = Conditions(share=0.0, kpa=max(table.pressures_kpa, key=abs, default=None))
     stroke = first(Quantity.FREE_STROKE) or first(Quantity.REFERENCE_STROKE)
     force = first(Quantity.BLOCKED_FORCE, flat) or first(Quantity.FORCE_BOUND)
-    columns = [(first(quantity), False) for quantity in INTRODUCTION]
-    columns += [(stroke, True), (force, True)]
-    objectives = [
-        Objective(name, name.replace("[", "in ").replace("]", ""), more)
-        for name, more in columns
-        if name
-    ]
-    good = Objective(YIELD[0], "share of good builds", True)
-    return [*objectives, good] if YIELD[0] in table.columns else objectives
-
-
-def _pairs(objectives: Sequence[Objective], columns: Columns) -> list[tuple[Objective, Objective]]:
-    """Return (cost, gain) pairs of objectives that both differ between passing designs."""
-    passing = [number for number, of in enumerate(columns["outcome"]) if of == "passes"]
-    differ = [
-        objective
-        for objective in objectives
-        if len({columns[objective.column][number] for number in passing} - {None}) > 1
-    ]
-    costs, gains = [o for o in differ if not o.more], [o for o in differ if o.more]
-    return [(cost, gain) for cost in costs for gain in gains][:6]
+    good = YIELD[0] if YIELD[0] in table.columns else ""
+    costs, gains = map(first, INTRODUCTION), (stroke, force, good)
+    return [*filter(None, costs)], [*filter(None, gains)]
 
 
 # The Pareto front.

@@ -21,7 +21,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from itertools import islice
 from pathlib import Path
-from typing import IO, Any, Literal, NamedTuple
+from typing import IO, Any, Literal
 
 import sbafab
 from sbafab.actuators import records
@@ -34,7 +34,7 @@ from sbafab.models.figures import PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.plugins import FAMILIES, RULES, installed
 from sbafab.rules.deck import AT_MOST
-from sbafab.rules.finding import Finding, Place, Verdict
+from sbafab.rules.finding import Finding, Verdict
 from sbafab.runtime import prepare, processors
 from sbafab.search.vary import key_values
 
@@ -93,35 +93,24 @@ def _one_line(error: Exception) -> str:
 ORDER: tuple[Verdict, ...] = ("fail", "waived", "warn", "pass")
 
 
-class RuleMargin(NamedTuple):
-    """A rule's worst verdict, and the margin of the worst value to its limit: below 0 it fails.
+class RuleMargin(Finding):
+    """A rule's worst finding."""
 
-    ``margin`` is None if nothing was measured, or without a limit.
-    """
-
-    rule: str
-    verdict: Verdict
-    margin: float | None
-    measured: float | None
-    limit: float | None
-    unit: str
-    where: Place
-    message: str
+    @property
+    def margin(self) -> float | None:
+        """The margin of the value to its limit in its unit, below 0 if the rule fails; None if
+        nothing was measured, or without a limit.
+        """
+        if self.measured is None or self.limit is None:
+            return None
+        more = self.measured - self.limit
+        return round(-more if self.rule in AT_MOST else more, 6)
 
     @property
     def share(self) -> float | None:
         """The margin as a share of the limit, unless that is 0."""
-        if self.margin is None:
-            return None
-        return self.margin / self.limit if self.limit else self.margin
-
-
-def margin_of(finding: Finding) -> float | None:
-    """Margin of a finding to its limit, in its unit."""
-    if finding.measured is None or finding.limit is None:
-        return None
-    more = finding.measured - finding.limit
-    return round(-more if finding.rule in AT_MOST else more, 6)
+        margin = self.margin
+        return margin / self.limit if margin is not None and self.limit else margin
 
 
 def margins(findings: Iterable[Finding]) -> dict[str, RuleMargin]:
@@ -129,19 +118,9 @@ def margins(findings: Iterable[Finding]) -> dict[str, RuleMargin]:
     ignored.
     """
     each: dict[str, list[RuleMargin]] = {}
-    for f in findings:
-        if f.verdict != "waived" or f.by_user:
-            values = (
-                f.rule,
-                f.verdict,
-                margin_of(f),
-                f.measured,
-                f.limit,
-                f.unit,
-                f.where,
-                f.message,
-            )
-            each.setdefault(f.rule, []).append(RuleMargin(*values))
+    for finding in findings:
+        if finding.verdict != "waived" or finding.by_user:
+            each.setdefault(finding.rule, []).append(RuleMargin(**vars(finding)))
     return {
         name: min(values, key=lambda rule: (ORDER.index(rule.verdict), rule.share or 0.0))
         for name, values in each.items()

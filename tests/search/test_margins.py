@@ -9,7 +9,7 @@ import pytest
 import sbafab
 from sbafab.rules.finding import Finding, Findings, Place
 from sbafab.rules.limits import TOLERANCE
-from sbafab.search.trials import margin_of, margins
+from sbafab.search.trials import RuleMargin, margins
 
 FAULTY = (
     {"bond.width": 0.6, "mask.overhang": 0.3, "laser.least_feature": 1.2},
@@ -27,7 +27,7 @@ def test_what_fails_has_a_margin_below_zero(changes: dict[str, float]) -> None:
     findings = _findings("1dof-5mm", changes)
     assert len({finding.rule for finding in findings.failed}) >= len(changes)
     for finding in findings:
-        margin = margin_of(finding)
+        margin = RuleMargin(**vars(finding)).margin
         if finding.verdict == "fail":
             assert margin is not None
             assert margin < 0
@@ -48,6 +48,6 @@ def test_a_rules_worst_finding_is_the_one_that_counts() -> None:
 
 
 def test_a_most_counts_the_other_way() -> None:
-    most = Finding("press-fit", "pass", 152.4, 20.0, "mm", Place(), "")
-    assert margin_of(most) == pytest.approx(132.4)
-    assert margin_of(replace(most, limit=None)) is None
+    most = RuleMargin("press-fit", "pass", 152.4, 20.0, "mm", Place(), "")
+    assert most.margin == pytest.approx(132.4)
+    assert replace(most, limit=None).margin is None
