@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from sbafab import actuators
+from sbafab.api.explained import DesignKey, design_keys
 from sbafab.assemblies.records import Assembly
-from sbafab.cli.explain import DesignKey, design_keys
 
 HEAD = """# Keys of a design file
 

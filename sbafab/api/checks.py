@@ -2,20 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from sbafab.api.designs import Source, build, command, either_of, load
 from sbafab.assemblies.records import Assembly
-from sbafab.design.files import Change
+from sbafab.design.files import Change, template_names
+from sbafab.design.identity import cited
+from sbafab.design.records import Design
+from sbafab.documents import Document
+from sbafab.folders.build import refuse_undoable
+from sbafab.folders.checks_json import checks
+from sbafab.folders.order import Order, make_order
+from sbafab.laminate.joints import PortKind
 from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.netlist import SCHEMA as NETS
+from sbafab.laminate.netlist import read_netlist
+from sbafab.models.sizes import size_phrases, sizes
 from sbafab.reports.nets_svg import NetMap, net_map
-from sbafab.rules.deck import RULES, run_rule
+from sbafab.rules.deck import AT_MOST, EXPLAINED, RULES, run_rule
 from sbafab.rules.finding import Findings
 from sbafab.rules.measures import Measures
-from sbafab.rules.nets import connectivity
+from sbafab.rules.nets import connectivity, netlist_findings
 from sbafab.runtime import Progress
+from sbafab.search.advice import advise
+
+PAIR = Field(min_length=2, max_length=2)
+
+
+class NamedPort(Document):
+    """A port of a netlist, with its place if it is none of the design's."""
+
+    name: str
+    at: Annotated[Sequence[float], PAIR] = ()
+    """x, y, mm"""
+    layers: Annotated[Sequence[int], PAIR] = ()
+    """structural layers below and above, from 1"""
+    kind: PortKind = "place"
+
+
+class NetsDocument(Document, schema=NETS):
+    """A netlist."""
+
+    nets: dict[str, list[str | NamedPort]] = Field(min_length=1)
+    """name -> ports and chambers of the design, or ports with their place"""
 
 
 @command
@@ -29,9 +62,8 @@ def check(
     built. Limits are the paper's (Sec. 2) if it gives one, else ours.
     """
     # A job takes models, hence numpy; a page without numpy has the rules of a design.
-    from sbafab.folders.order import make_order
 
-    return Findings(make_order(either_of(source, changes, tables), progress=progress).findings)
+    return Findings(make_order(either_of(source, [*changes, tables]), progress=progress).findings)
 
 
 def checking(

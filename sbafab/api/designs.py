@@ -20,7 +20,14 @@ from sbafab.assemblies.shapes import bent_surface
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.design import laminate_file
-from sbafab.design.files import Change, as_in_a_file, shown, template_names, template_text
+from sbafab.design.files import (
+    Change,
+    as_in_a_file,
+    key_paths,
+    shown,
+    template_names,
+    template_text,
+)
 from sbafab.design.records import Design
 from sbafab.design.records import resolved as written_out
 from sbafab.errors import DesignError
@@ -79,22 +86,25 @@ def numbers(name: str, values: float | Sequence[float]) -> tuple[float, ...]:
         raise DesignError(f"{name} = {shown(values)} must be a number or a list of them") from None
 
 
-def design_of(source: Source, changes: Sequence[Change], tables: Mapping[str, Any]) -> Design:
-    """Return the design with its keys changed. Raises DesignError."""
+def design_of(source: Source, changes: Sequence[Change], waivers: Sequence[str] = ()) -> Design:
+    """Return the design with its keys changed, of a file also with more waivers.
+
+    Raises DesignError.
+    """
     if isinstance(source, Design):
-        return source.with_(*changes, **tables) if changes or tables else source
-    return actuators.load_design(source, [*changes, tables])
+        return source.with_(*changes) if any(changes) else source
+    return actuators.load_design(source, changes, waivers)
 
 
 def either_of(
-    source: Source | Assembly, changes: Sequence[Change], tables: Mapping[str, Any]
+    source: Source | Assembly, changes: Sequence[Change], waivers: Sequence[str] = ()
 ) -> Design | Assembly:
-    """Return the design or the assembly with its keys changed. Raises DesignError."""
+    """Return the design, as ``design_of`` does, or the assembly. Raises DesignError."""
     if isinstance(source, Assembly):
         return source
     if isinstance(source, Design):
-        return design_of(source, changes, tables)
-    return load_either(source, [*changes, tables])
+        return design_of(source, changes)
+    return load_either(source, changes, waivers)
 
 
 def templates() -> list[str]:
@@ -110,6 +120,12 @@ def template(name: str) -> str:
 def schema() -> dict[str, Any]:
     """Return the JSON schema (2020-12) of a design file: every key, its default and meaning."""
     return actuators.schema(Assembly)
+
+
+def kinds_of_keys() -> dict[str, object]:
+    """Return every dotted key of design files of all families, with its annotation."""
+    paths = map(key_paths, actuators.records().values())
+    return {key: kind for keys in paths for key, kind in keys.items()}
 
 
 NAMED = "NAME"
@@ -185,7 +201,7 @@ def load(source: Source, *changes: Change, **tables: Any) -> Design:
     ``typing.cast(LobedDesign, load("my.toml"))``, where ``LobedDesign`` is from
     ``sbafab.actuators.lobed``. Raises DesignError with field, value and the allowed values.
     """
-    return design_of(source, changes, tables)
+    return design_of(source, [*changes, tables])
 
 
 def loads(text: str, path: str | Path = "design.toml") -> Design | Assembly:

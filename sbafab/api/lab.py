@@ -11,10 +11,20 @@ from sbafab.design.files import Change
 from sbafab.errors import DesignError
 from sbafab.lab import recording
 from sbafab.lab.coupon import Calibration, calibrated, read_measurements
-from sbafab.lab.records import HistoryEntry, Record, columns, row_of
-from sbafab.lab.report import Report
+from sbafab.lab.records import (
+    HistoryEntry,
+    HistoryRow,
+    LabRow,
+    Record,
+    RecordEntry,
+    RecordsDocument,
+    RowEntry,
+    columns,
+    row_of,
+)
+from sbafab.lab.report import Report, ReportDocument, success_svg
 from sbafab.lab.report import report as report_of
-from sbafab.lab.store import Lab, store_photograph
+from sbafab.lab.store import Contents, Lab, store_photograph
 from sbafab.reports.traveller.record_sheet import RecordTable
 
 

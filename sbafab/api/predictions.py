@@ -10,19 +10,42 @@ from sbafab.api.designs import Source, assemble, command, load, numbers
 from sbafab.assemblies.build import Assembled, PlacedSba
 from sbafab.assemblies.records import Assembly
 from sbafab.design.files import Change
+from sbafab.design.records import Design, Drawn
 from sbafab.errors import DesignError
+from sbafab.folders.artefacts import PredictDocument, prediction_json
+from sbafab.folders.run import RunRequest, generate
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Surface
+from sbafab.models.actuator import model_form
+from sbafab.models.balloons import has_balloons
 from sbafab.models.calibration import factors_of
-from sbafab.models.figures import Prediction, PredictionRequest
+from sbafab.models.figures import (
+    FLAGS,
+    LEFT_OUT,
+    NEAR_BURST,
+    Figure,
+    Model,
+    Prediction,
+    PredictionRequest,
+)
 from sbafab.models.pneumatics import FLUIDS, Line, usual_pressures
 from sbafab.models.prediction import predict as predict_design
+from sbafab.models.sensitivities import SensitivityRow, sensitivity_table
+from sbafab.models.sizes import size_phrases
 from sbafab.models.stack import MOST_PRESSURE, Motion, Stack
 from sbafab.models.stack import stack as stack_of
-from sbafab.reports.assembly_prediction import AssemblyPrediction, Grip
+from sbafab.reports.assembly_prediction import SCHEMA, AssemblyPrediction, Grip
 from sbafab.reports.assembly_prediction import grip as grip_of
 from sbafab.reports.assembly_prediction import predict_assembly as predict_assembled
 from sbafab.reports.inflated import gripping
+
+
+class PrintedPrediction(PredictDocument, schema=PredictDocument.SCHEMA):
+    """The contents of ``predict.json`` and further printed figures."""
+
+    failed: tuple[str, ...] = ()
+    folder: str = ""
+    sensitivity: tuple[SensitivityRow, ...] = ()
 
 
 @command

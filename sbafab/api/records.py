@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from sbafab.assemblies.build import Assembled, PlacedPart
-from sbafab.assemblies.records import Assembly
 from sbafab.design.records import Design
 from sbafab.folders.checks_json import FindingEntry
 from sbafab.geometry.region import Region
@@ -15,7 +14,6 @@ from sbafab.rules.finding import Finding
 
 __all__ = [
     "Assembled",
-    "Assembly",
     "Design",
     "Finding",
     "FindingEntry",

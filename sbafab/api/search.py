@@ -6,20 +6,37 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from sbafab.actuators import load_design
 from sbafab.api.designs import Source, command, load, numbers
-from sbafab.design.files import Change, changed_keys
+from sbafab.design.files import Change, changed_keys, name_of, template_names
 from sbafab.design.records import Design, Free
+from sbafab.laminate.burst import is_near_burst
+from sbafab.models.figures import FLAGS
+from sbafab.models.pneumatics import MOST_PRESSURE
+from sbafab.runtime import Progress, ignore_progress
+from sbafab.search import compare as comparing
 from sbafab.search.advice import YieldDesign
-from sbafab.search.compare import DesignComparison, load_compared, write_page
+from sbafab.search.compare import DesignComparison, YieldEntry, load_compared, write_page
 from sbafab.search.compare import compare as run_compare
 from sbafab.search.compare import reach_yield as run_reach_yield
-from sbafab.search.find import FoundDesign
+from sbafab.search.find import (
+    FoundDesign,
+    find_document,
+    found_toml,
+    free_keys,
+    refuse_existing,
+    write_found,
+)
 from sbafab.search.find import find as run_find
-from sbafab.search.quantities import read_all
-from sbafab.search.space import FindRequest, free_of
-from sbafab.search.sweep import SweepRequest, SweptDesigns
+from sbafab.search.quantities import (
+    quantity_lines,
+    read_all,
+    shown_value,
+)
+from sbafab.search.space import FindRequest, figure_text, free_of, read_free
+from sbafab.search.sweep import SweepDocument, SweepRequest, SweptDesigns
 from sbafab.search.sweep import sweep as run_sweep
-from sbafab.search.vary import varied_keys
+from sbafab.search.vary import format_keys, format_value, varied_keys
 
 
 @command
@@ -110,6 +127,7 @@ def sweep(
     dask: str | None = None,
     seconds: float = SweepRequest.seconds,
     all_columns: bool = False,
+    progress: Progress | None = None,
     **tables: Any,
 ) -> SweptDesigns:
     """Checks and predicts a design with varied keys; writes one row per design.
@@ -118,8 +136,8 @@ def sweep(
     numpy.linspace(4, 8, 9), "stack.balloons": [3, 6, 9]}`` (lengths in mm), or their range as
     text, ``"4:8:0.5"``; or it holds texts such as ``"chamber.diameter=4:8:0.5"``. ``samples`` and
     the arguments after it are the fields of ``SweepRequest``, with the ``seconds`` s that a design
-    may take; ``tables`` override tables of the design. ``swept.frame()`` returns the rows. Raises
-    DesignError for an unknown key, and OutputError.
+    may take; ``progress`` is called with each design; ``tables`` override tables of the design.
+    ``swept.frame()`` returns the rows. Raises DesignError for an unknown key, and OutputError.
     """
     request = SweepRequest(
         load(source, *changes, **tables),
@@ -132,4 +150,4 @@ def sweep(
         seconds,
         all_columns,
     )
-    return run_sweep(request, Path(out))
+    return run_sweep(request, Path(out), progress or ignore_progress)

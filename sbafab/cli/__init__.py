@@ -63,8 +63,8 @@ BUILTIN = {"map": "map_", "import": "import_"}
 HOMES = {
     name: module
     for module, names in {
-        "start": "new studio",
-        "make": "import generate cut press mesh nest",
+        "start": "new import studio",
+        "make": "generate cut press mesh nest simulate",
         "inflate": "map picture",
         "search": "find sweep compare",
         "measure": "kerf inspect",

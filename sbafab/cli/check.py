@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
@@ -11,22 +11,12 @@ from typing import Any
 
 import click
 
-from sbafab.actuators import load_design
-from sbafab.assemblies.files import load
+from sbafab.api import checks as api
+from sbafab.api.designs import design_of, either_of
 from sbafab.cli import options as opt
 from sbafab.cli import show
 from sbafab.cli.exit import print_error
-from sbafab.design.files import template_names
-from sbafab.design.identity import cited
-from sbafab.design.records import Design
 from sbafab.errors import DesignError, SbafabError
-from sbafab.folders.build import Build, refuse_undoable
-from sbafab.folders.checks_json import checks
-from sbafab.folders.order import make_order
-from sbafab.laminate.netlist import read_netlist
-from sbafab.models.sizes import size_phrases, sizes
-from sbafab.rules.nets import netlist_findings
-from sbafab.search.advice import advise
 
 YIELD_RULE = "registration-yield"
 DEFAULT_KIT = "paper"
@@ -37,9 +27,11 @@ DEFAULT_KIT = "paper"
 @opt.design_argument(metavar="DESIGN|FOLDER")
 @opt.set_option
 @opt.waive_option("Accept the failure of this rule; cut files would state it. Repeatable.")
-@opt.target_yield_option(
+@opt.option(
+    "--target-yield",
     "Fail if fewer random builds are good than this share, e.g. 0.99, and advise the smallest bond "
-    "and overhang that reach it."
+    "and overhang that reach it.",
+    opt.PartialShare("SHARE"),
 )
 @opt.option(
     "--nets FILE",
@@ -54,7 +46,7 @@ def check(source: str, watch: bool, as_json: bool, **options: Any) -> None:
 
     Nothing is written. FOLDER was written by sbafab generate; the files on disk are checked.
     """
-    is_folder = source not in template_names() and Path(source).is_dir()
+    is_folder = source not in api.template_names() and Path(source).is_dir()
     if is_folder and (options["assignments"] or options["waivers"] or options["target_yield"]):
         raise DesignError(
             "--set, --waive and --target-yield go with a design; leave them out to check a folder"
@@ -88,36 +80,39 @@ def _check_design(
 
     Raises DesignError, also if press or sheets cannot make it.
     """
-    source = load(name, assignments, waivers)
+    source = either_of(name, assignments, waivers)
     for flag, value in (("--target-yield", target_yield), ("--nets", nets)):
-        if value is not None and not isinstance(source, Design):
+        if value is not None and not isinstance(source, api.Design):
             raise DesignError(
                 f"{flag} goes with a design, and this is an assembly; check its parts' designs "
                 "one by one"
             )
-    advice, has_target = None, isinstance(source, Design) and source.rules.target_yield is not None
+    advice, has_target = (
+        None,
+        isinstance(source, api.Design) and source.rules.target_yield is not None,
+    )
     with show.progress(as_json) as progress:
         if target_yield is not None:
             with_target = (*assignments, f"rules.target_yield={target_yield}")
-            advice = advise(load_design(name, with_target), target_yield, progress)
-            source = load_design(name, with_target, waivers)
-        order = make_order(source, progress=progress)
+            advice = api.advise(design_of(name, with_target), target_yield, progress)
+            source = design_of(name, with_target, waivers)
+        order = api.make_order(source, progress=progress)
     if not order.failed:
-        refuse_undoable(order.builds)
-    findings, groups = order.findings, show.groups_of(order)
+        api.refuse_undoable(order.builds)
+    findings, groups = order.findings, order.groups
     if nets is not None:
         (build,) = order.builds
-        more = netlist_findings(build.laminate, build.design, read_netlist(nets), nets.name)
+        more = api.netlist_findings(build.laminate, build.design, api.read_netlist(nets), nets.name)
         findings = (*findings, *more)
         groups = {order.name: findings}
     if as_json:
         printed: dict[str, object] = {} if advice is None else {"advice": advice}
-        printed["sizes"] = {b.design.name: sizes(b.design, b.laminate) for b in order.builds}
-        printed["notes"] = show.notes_of(order.builds)
+        printed["sizes"] = {b.design.name: api.sizes(b.design, b.laminate) for b in order.builds}
+        printed["notes"] = order.notes
         designs = [build.design for build in order.builds]
-        show.document(checks(findings, "design", order.name, designs, **printed))
+        show.document(api.checks(findings, "design", order.name, designs, **printed))
         return bool(show.failed_rules(findings))
-    _print_heads(order.builds, verbose)
+    _print_heads(order, verbose)
     show.findings(groups, verbose)
     if advice is not None:
         show.wrapped(advice.sentence)
@@ -130,14 +125,15 @@ def _check_design(
     return _print_outcome(order.name, groups, verbose, "design")
 
 
-def _print_heads(builds: Sequence[Build], verbose: bool) -> None:
+def _print_heads(order: api.Order, verbose: bool) -> None:
     """Print sizes, kits and notes."""
+    builds = order.builds
     for build in builds:
         label = "size" if len(builds) == 1 else f"{build.design.name}, size"
-        show.phrases(label, size_phrases(build.design, build.laminate))
+        show.phrases(label, api.size_phrases(build.design, build.laminate))
     designs = [build.design for build in builds]
-    kits = [cited(design) for design in designs if verbose or design.kit != DEFAULT_KIT]
-    for line in (*dict.fromkeys(kits), *(f"note: {note}" for note in show.notes_of(builds))):
+    kits = [api.cited(design) for design in designs if verbose or design.kit != DEFAULT_KIT]
+    for line in (*dict.fromkeys(kits), *(f"note: {note}" for note in order.notes)):
         show.wrapped(line)
 
 
@@ -145,14 +141,11 @@ def _check_folder(folder: Path, nets: Path | None, verbose: bool, as_json: bool)
     """Check the files of an output folder and print the outcome; return True if a rule failed."""
     import logging
 
-    # Modules that read a folder back take as long to load as those that check a design.
-    from sbafab.folders.check import check_folder
-
     # A broken file becomes a finding; the log of ezdxf would repeat it on the screen.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
-    findings = check_folder(folder, nets)
+    findings = api.check_folder(folder, nets)
     if as_json:
-        show.document(checks(findings, "as-built", str(folder), notes=()))
+        show.document(api.checks(findings, "as-built", str(folder), notes=()))
         return bool(show.failed_rules(findings))
     show.line(f"as built: {folder}")
     show.findings({str(folder): findings}, verbose)

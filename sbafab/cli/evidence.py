@@ -9,20 +9,11 @@ from typing import Any
 
 import click
 
+from sbafab.api import evidence as api
 from sbafab.cli import options as opt
 from sbafab.cli import show
-from sbafab.design.files import shown
-from sbafab.design.toml_table import NAME_PATTERN
 from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
-from sbafab.folders.swap import replace_text
-from sbafab.lab.evidence import load_source
-from sbafab.models.calibration import NONE, UNKNOWNS, load_calibration, shipped_names
-from sbafab.validation.comparison import ComparisonDocument, compare, table_lines
-from sbafab.validation.evidence import shipped_evidence
-from sbafab.validation.fit import CalibrationFit, HeldOutPoint, calibration_text, fit
-from sbafab.validation.paper_table import PAPER, TITLE, PaperTable
-from sbafab.validation.paper_table import as_json as table_json
 
 FOLDER = "reproduction"
 ALL = "all"
@@ -49,22 +40,22 @@ def reproduce(source: str | None, calibration: str | None, out: Path, as_json: b
     nothing is written. Ranges of model and 90 % interval span what the source leaves open.
     """
     if source is not None:
-        _print_comparison(source, calibration or PAPER, as_json)
+        _print_comparison(source, calibration or api.PAPER, as_json)
         return
     if calibration is not None:
         raise click.UsageError("--calibration goes with a SOURCE")
-    table, folder = PaperTable(), out / FOLDER
+    table, folder = api.PaperTable(), out / FOLDER
     table.write(folder)
     if as_json:
-        show.document(table_json(table, folder=str(folder)))
+        show.document(api.table_json(table, folder=str(folder)))
         return
     for section, rows in table.sections.items():
         click.echo(f"\n{section}")
         for row in rows:
             predicted = row.predicted_text or "-"
             click.echo(f"  {row.figure:<58}{row.measured_text:>20}{predicted:>16}  {row.model}")
-    click.echo(f"\n{TITLE}")
-    for line in table_lines(table.curves):
+    click.echo(f"\n{api.TITLE}")
+    for line in api.table_lines(table.curves):
         click.echo(f"  {line}")
     count = sum(row.predicted is not None for row in table.rows)
     show.verdict(
@@ -75,17 +66,17 @@ def reproduce(source: str | None, calibration: str | None, out: Path, as_json: b
 
 
 def _print_comparison(source: str, name: str, as_json: bool) -> None:
-    calibration = load_calibration(name, key="--calibration")
-    evidences = shipped_evidence() if source == ALL else (load_source(source),)
-    curves = [curve for evidence in evidences for curve in compare(evidence, calibration)]
+    calibration = api.load_calibration(name, key="--calibration")
+    evidences = api.shipped_evidence() if source == ALL else (api.load_source(source),)
+    curves = [curve for evidence in evidences for curve in api.compare(evidence, calibration)]
     if as_json:
         show.document(
-            ComparisonDocument.of(None, calibration=name, sources=evidences, curves=curves)
+            api.ComparisonDocument.of(None, calibration=name, sources=evidences, curves=curves)
         )
         return
     for evidence in evidences:
         click.echo(evidence.citation + (f", doi:{evidence.doi}" if evidence.doi else ""))
-        for line in table_lines([curve for curve in curves if curve.source == evidence.id]):
+        for line in api.table_lines([curve for curve in curves if curve.source == evidence.id]):
             click.echo(line)
         for sentence in evidence.missing:
             click.echo(f"Not had: {sentence}")
@@ -116,7 +107,7 @@ class CalibrateDocument(Document, schema="sbafab/calibrate@1"):
     file: Path
     calibration: dict[str, Any]
     """contents of the file"""
-    held_out: list[HeldOutPoint] = attribute("points")
+    held_out: list[api.HeldOutPoint] = attribute("points")
     left_open: list[OpenEntry]
     not_fitted: list[dict[str, str]]
 
@@ -136,12 +127,12 @@ def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) ->
     or kit uses the file that is written with models.calibration = "NAME.toml".
     """
     _check_name(name)
-    sources = [load_source(source) for source in evidence or ("paper",)]
+    sources = [api.load_source(source) for source in evidence or ("paper",)]
     with show.progress(as_json) as progress:
-        fitted = fit(name, sources, progress)
+        fitted = api.fit(name, sources, progress)
     path = out / f"{name}.toml"
     out.mkdir(parents=True, exist_ok=True)
-    replace_text(path, calibration_text(fitted.calibration))
+    api.replace_text(path, api.calibration_text(fitted.calibration))
     calibration, held_out = fitted.calibration, fitted.calibration.held_out
     if as_json:
         unfitted = [{"curve": curve, "reason": reason} for curve, reason in fitted.left_out]
@@ -161,20 +152,21 @@ def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) ->
 
 
 def _check_name(name: str) -> None:
-    if not re.fullmatch(NAME_PATTERN, name):
+    if not re.fullmatch(api.NAME_PATTERN, name):
         raise DesignError(
-            f"--name is {shown(name)}; use letters, digits, dot, dash and underscore, such as lab"
+            f"--name is {api.shown(name)}; use letters, digits, dot, dash and underscore, such "
+            "as lab"
         )
-    if name in (NONE, *shipped_names()):
+    if name in (api.NONE, *api.shipped_names()):
         raise DesignError(
-            f"--name is {shown(name)}, which stands for another one; give another name"
+            f"--name is {api.shown(name)}, which stands for another one; give another name"
         )
 
 
-def _print(fitted: CalibrationFit) -> None:
+def _print(fitted: api.CalibrationFit) -> None:
     calibration = fitted.calibration
     rows = []
-    for unknown in UNKNOWNS:
+    for unknown in api.UNKNOWNS:
         low, high = calibration.bounds(unknown.field)
         value = unknown.shown(calibration.values[unknown.field])
         prior = f"{unknown.shown(unknown.middle)}: {unknown.source}"
@@ -195,7 +187,7 @@ def _print(fitted: CalibrationFit) -> None:
         click.echo(f"Not fitted: {curve}: {reason}")
 
 
-def _held_out(point: HeldOutPoint) -> Sequence[str]:
+def _held_out(point: api.HeldOutPoint) -> Sequence[str]:
     at = "" if point.place is None else f" at {point.place:g}"
     interval = f"{point.low:.3g} to {point.high:.3g} {point.unit}".rstrip()
     outside = "" if point.inside else "outside"

@@ -5,24 +5,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import click
 from pydantic import Field
 
-from sbafab import actuators, plugins
-from sbafab.assemblies.records import Assembly
+from sbafab import plugins
+from sbafab.api.designs import schema as design_schema
+from sbafab.api.runs import RunDocument
+from sbafab.api.search import YieldEntry
 from sbafab.cli import show
 from sbafab.cli.exit import ErrorKind
-from sbafab.cli.make import RunDocument
 from sbafab.documents import Document, json_schema
 from sbafab.errors import ERROR_SCHEMA
-from sbafab.folders.artefacts import PredictDocument
-from sbafab.laminate.joints import PortKind
-from sbafab.laminate.netlist import SCHEMA as NETS
-from sbafab.models.sensitivities import SensitivityRow
-from sbafab.search.compare import YieldEntry
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -31,35 +27,6 @@ class YieldRunDocument(RunDocument, schema=RunDocument.SCHEMA):
     """A folder, and the changes of --target-yield; figures as given and as changed."""
 
     reached: YieldEntry | None = Field(None, alias="yield")
-
-
-class PrintedPrediction(PredictDocument, schema=PredictDocument.SCHEMA):
-    """The contents of ``predict.json`` and further printed figures."""
-
-    failed: tuple[str, ...] = ()
-    folder: str = ""
-    sensitivity: tuple[SensitivityRow, ...] = ()
-
-
-PAIR = Field(min_length=2, max_length=2)
-
-
-class NamedPort(Document):
-    """A port of a netlist, with its place if it is none of the design's."""
-
-    name: str
-    at: Annotated[Sequence[float], PAIR] = ()
-    """x, y, mm"""
-    layers: Annotated[Sequence[int], PAIR] = ()
-    """structural layers below and above, from 1"""
-    kind: PortKind = "place"
-
-
-class NetsDocument(Document, schema=NETS):
-    """A netlist."""
-
-    nets: dict[str, list[str | NamedPort]] = Field(min_length=1)
-    """name -> ports and chambers of the design, or ports with their place"""
 
 
 class ErrorEntry(Document):
@@ -104,7 +71,7 @@ FORMATS: Mapping[str, Format] = {
         "`laminate.json`: layers with exact edges, films, inlets",
         "sbafab/laminate@1",
     ),
-    "nets": Format("cli.formats:NetsDocument", "a netlist, for `check --nets`"),
+    "nets": Format("api.checks:NetsDocument", "a netlist, for `check --nets`"),
     "manifest": Format("folders.manifest:Manifest", "`manifest.json` of a design's folder"),
     "job": Format(
         "folders.manifest:JobManifest", "`manifest.json` of several designs cut together by `nest`"
@@ -116,7 +83,7 @@ FORMATS: Mapping[str, Format] = {
         "pressing.schedule_files:PressDocument", "`press.json`, the heat-press schedule"
     ),
     "predict": Format(
-        "cli.formats:PrintedPrediction",
+        "api.predictions:PrintedPrediction",
         "`predict.json`, and what `predict --json` prints of a design",
     ),
     "find": Format("search.find:FindDocument", "what `find --json` prints"),
@@ -125,7 +92,7 @@ FORMATS: Mapping[str, Format] = {
         "cli.formats:YieldRunDocument",
         "what `generate`, `cut`, `press` and `mesh` print with `--json`",
     ),
-    "nested": Format("cli.make:NestedDocument", "what `nest --json` prints"),
+    "nested": Format("api.runs:NestedDocument", "what `nest --json` prints"),
     "records": Format("lab.records:RecordsDocument", "what `record --json` prints of records"),
     "history": Format("lab.records:HistoryDocument", "what `record --export FILE.json` writes"),
     "report": Format("lab.report:ReportDocument", "what `record --report --json` prints"),
@@ -151,9 +118,9 @@ FORMATS: Mapping[str, Format] = {
         "lab.inspection:InspectionDocument", "what `inspect` writes, and prints with `--json`"
     ),
     "kerf": Format("cli.measure:KerfDocument", "what `kerf --json` prints"),
-    "explain": Format("cli.explain:ExplainDocument", "what `explain NAME --json` prints"),
+    "explain": Format("api.explained:ExplainDocument", "what `explain NAME --json` prints"),
     "explained": Format(
-        "cli.explain:ExplainedDocument", "what `explain --json` prints of all rules"
+        "api.explained:ExplainedDocument", "what `explain --json` prints of all rules"
     ),
     "calibrate": Format("cli.evidence:CalibrateDocument", "what `calibrate --json` prints"),
     "templates": Format(
@@ -170,7 +137,7 @@ def schema_of(name: str) -> dict[str, Any]:
     """Return the JSON schema of a format in ``FORMATS``."""
     record, identity = FORMATS[name].record, FORMATS[name].identity
     # A design file is an assembly or of any family.
-    body = actuators.schema(record) if record is Assembly else json_schema(record, identity)
+    body = design_schema() if name == "design" else json_schema(record, identity)
     head = {"$schema": DIALECT, "$id": f"urn:{identity.replace('/', ':')}"}
     return head | {key: value for key, value in body.items() if key != "$schema"}
 

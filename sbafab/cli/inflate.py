@@ -8,27 +8,10 @@ from typing import Any, get_args
 
 import click
 
-from sbafab.actuators import build, load_design
+from sbafab.api import inflated as api
 from sbafab.cli import options as opt
 from sbafab.cli import show
-from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.laminate.burst import refuse_beyond_burst
-from sbafab.models.actuator import model_form, near_discs
-from sbafab.models.balloons import has_balloons
-from sbafab.models.calibration import factors_of
-from sbafab.models.map_files import FORMATS, map_text
-from sbafab.models.pneumatics import refuse_pressure
-from sbafab.models.stack import MOST_PRESSURE, stack
-from sbafab.reports.solid_pictures import (
-    MOVING,
-    WHY,
-    Movement,
-    PictureRequest,
-    write_flat_picture,
-    write_picture,
-)
-from sbafab.simulators.mujoco.mjcf import chain_text
 
 MUJOCO = "xml"
 """Ending of a MuJoCo model."""
@@ -73,7 +56,7 @@ def map_(
     of the stack about its pose at the given pressures, FILE.urdf its kinematic chain.
     """
     form = "csv" if to is None else to.suffix.removeprefix(".")
-    formats = (*FORMATS, MUJOCO)
+    formats = (*api.FORMATS, MUJOCO)
     if form not in formats:
         raise DesignError(f"{to} must end with .{', .'.join(formats)}, which sets the format")
     if form != MUJOCO:
@@ -82,14 +65,14 @@ def map_(
         )
     if pressure <= 0:
         raise DesignError(f"--pressure is {pressure:g} kPa; give more than 0 kPa")
-    design = load_design(source, assignments, ())
-    refuse_pressure(pressure)
-    refuse_beyond_burst(build(design), pressure)
-    actuator = stack(design, most_pressure=pressure, factors=factors_of(design, factors))
+    design = api.load_design(source, assignments, ())
+    api.refuse_pressure(pressure)
+    api.refuse_beyond_burst(api.build(design), pressure)
+    actuator = api.stack(design, most_pressure=pressure, factors=api.factors_of(design, factors))
     if form == MUJOCO:
-        text = chain_text(design.name, actuator, _listed(pressures, actuator.chambers))
+        text = api.chain_text(design.name, actuator, _listed(pressures, actuator.chambers))
     else:
-        text = map_text(design.name, actuator, form, points)
+        text = api.map_text(design.name, actuator, form, points)
     if to is None:
         show.result(text.removesuffix("\n"))
         return
@@ -132,20 +115,20 @@ def _listed(pressures: str | None, chambers: int) -> tuple[float, ...]:
 @opt.option(
     "--motion",
     "Animation: from flat and back, or pressure circling through the chambers.",
-    get_args(Movement),
-    default=PictureRequest.motion,
+    get_args(api.Movement),
+    default=api.PictureRequest.motion,
 )
 @opt.option(
     "--elevation",
     "Viewing angle above the bench, degrees.",
     opt.FiniteFloat(),
-    default=PictureRequest.elevation,
+    default=api.PictureRequest.elevation,
 )
 @opt.option(
     "--azimuth",
     "Viewing angle round the vertical axis, degrees.",
     opt.FiniteFloat(),
-    default=PictureRequest.azimuth,
+    default=api.PictureRequest.azimuth,
 )
 @opt.option(
     "--width",
@@ -170,43 +153,43 @@ def picture(
     """
     if pressures and volumes:
         raise DesignError("give --pressure or --volume, not both")
-    loaded = load_design(design, assignments)
-    is_inflated = has_balloons(model_form(loaded))
+    loaded = api.load_design(design, assignments)
+    is_inflated = api.has_balloons(api.model_form(loaded))
     path = path or Path(f"{loaded.name}-{'inflated' if is_inflated else 'flat'}.png")
     _refuse_unused(path.suffix.lower())
-    pixels = width or (480 if path.suffix.lower() in MOVING else PictureRequest.width)
+    pixels = width or (480 if path.suffix.lower() in api.MOVING else api.PictureRequest.width)
     view |= {"width": pixels, "height": pixels * 4 // 5}
-    picture = PictureRequest(pressures or {"": 5.0}, volumes or None, **view)
+    picture = api.PictureRequest(pressures or {"": 5.0}, volumes or None, **view)
     if is_inflated:
         _draw_inflated(loaded, picture, path)
         return
     opt.refuse_options(
-        f"is for inflated actuators, and {WHY}: {loaded.name} is drawn flat; leave it out",
+        f"is for inflated actuators, and {api.WHY}: {loaded.name} is drawn flat; leave it out",
         *("pressures", "volumes", "elevation", "azimuth"),
     )
-    write_flat_picture(build(loaded), path, picture.width, picture.height)
-    show.verdict(f"{loaded.name} drawn flat, since {WHY}. Written to {path}", path)
+    api.write_flat_picture(api.build(loaded), path, picture.width, picture.height)
+    show.verdict(f"{loaded.name} drawn flat, since {api.WHY}. Written to {path}", path)
 
 
 def _refuse_unused(suffix: str) -> None:
     """Raise UsageError for options that a file with this suffix does not use."""
-    if suffix not in MOVING:
-        reason = f"is for an animation; give --to FILE{MOVING[0]}, or leave it out"
+    if suffix not in api.MOVING:
+        reason = f"is for an animation; give --to FILE{api.MOVING[0]}, or leave it out"
         opt.refuse_options(reason, "motion")
     if suffix == ".glb":
         reason = "is for a picture, and the view of a .glb is chosen in its viewer; leave it out"
         opt.refuse_options(reason, "elevation", "azimuth", "width")
 
 
-def _draw_inflated(design: Design, picture: PictureRequest, path: Path) -> None:
-    laminate, pressures = build(design), [*picture.pressures_kpa.values()]
-    refuse_pressure(pressures)
-    refuse_beyond_burst(laminate, max(pressures))
-    most = max(MOST_PRESSURE, *pressures)
+def _draw_inflated(design: api.Design, picture: api.PictureRequest, path: Path) -> None:
+    laminate, pressures = api.build(design), [*picture.pressures_kpa.values()]
+    api.refuse_pressure(pressures)
+    api.refuse_beyond_burst(laminate, max(pressures))
+    most = max(api.MOST_PRESSURE, *pressures)
     with show.progress(False) as progress:
-        inflated = stack(design, laminate, most, factors_of(design), model_form(design))
-        pose = write_picture(laminate, inflated, picture, path, partial(progress, "frames"))
-    discs = near_discs(design)
+        inflated = api.stack(design, laminate, most, api.factors_of(design), api.model_form(design))
+        pose = api.write_picture(laminate, inflated, picture, path, partial(progress, "frames"))
+    discs = api.near_discs(design)
     if discs is not None:
         show.wrapped(
             f"(the drawn pocket is replaced by a disc of equal area, d = {discs.equal:.4g} mm; its "

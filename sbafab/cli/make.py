@@ -1,45 +1,70 @@
-"""``sbafab generate``, ``cut``, ``press``, ``mesh``, ``nest`` and ``import``: commands that write.
+"""``sbafab generate``, ``cut``, ``press``, ``mesh``, ``nest``, ``simulate``: a folder each.
 
 Each runs a design, prints the table of its files, and exits by the verdict.
 """
 
 from __future__ import annotations
 
-import shlex
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, get_args
 
 import click
 
-from sbafab.actuators import load_design
+from sbafab import plugins
 from sbafab.api import runs
-from sbafab.assemblies.files import load
+from sbafab.api.designs import Assembly, Design, design_of, either_of
+from sbafab.api.runs import TRUE_ARCS, DxfProfile, Element, MeshSettings, Run, Symmetry
 from sbafab.cli import options as opt
 from sbafab.cli import show
-from sbafab.cli.exit import RULE_FAILED, end, print_error
-from sbafab.design.files import changed_keys
-from sbafab.design.records import Design
-from sbafab.documents import Document, attribute
+from sbafab.cli.exit import print_error
 from sbafab.errors import DesignError
-from sbafab.folders.checks_json import FindingEntry
-from sbafab.folders.order import JOB_SCHEMA
-from sbafab.folders.run import Run
-from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
-from sbafab.meshing.formats import conforming_endings
-from sbafab.pressing.cycles import batch_times, design_runs
+
+
+def _chord_error(ctx: click.Context, _: click.Parameter, value: float | None) -> float:
+    if value is not None and ctx.params["dxf_profile"] != "chords":
+        raise click.UsageError("--chord-error goes with --dxf-profile chords; add it")
+    return value or TRUE_ARCS.chord_error
+
+
+def cut_options(command: opt.Command) -> opt.Command:
+    """Add ``--dxf-profile`` and ``--chord-error``, for readers that cannot read bulges, and
+    ``--copies``, which sets a key of the design.
+    """
+    profile = opt.option(
+        "--dxf-profile",
+        "Write arcs as polyline bulges, ARC entities or chords.",
+        get_args(DxfProfile),
+        default=TRUE_ARCS.profile,
+        is_eager=True,
+    )
+    chord = opt.option(
+        "--chord-error MM",
+        "Largest distance of a chord from its arc, with --dxf-profile chords.  "
+        f"[default: {TRUE_ARCS.chord_error:g}]",
+        opt.FiniteRange(0.0001, 0.1),
+        callback=_chord_error,
+    )
+    count = opt.option(
+        "--copies K", "Cut K copies of each actuator.  [default: the design's order.copies, 1]", int
+    )
+    return profile(chord(count(command)))
 
 
 @click.command()
-@opt.run_options()
-@opt.cut_options
-@opt.target_yield_option(
+@opt.run_options(either_of)
+@cut_options
+@opt.option(
+    "--target-yield",
     "Change the design as little as this share of good random builds needs, e.g. 0.95: order of "
-    "stacking, bond and overhang, plate, ears. Keys of --set stay."
+    "stacking, bond and overhang, plate, ears. Keys of --set stay.",
+    opt.PartialShare("SHARE"),
 )
 @opt.option("--decks", "Also write the input files of the simulators.", bool)
-def generate(request: opt.Request, target_yield: float | None, **settings: Any) -> None:
+def generate(source: Design | Assembly, target_yield: float | None, **settings: Any) -> None:
     """Write everything: cut files, schedule, traveller, meshes.
 
     --decks also writes calculix/, sofa/ and mujoco/, like `sbafab simulate --export`. An assembly
@@ -47,11 +72,13 @@ def generate(request: opt.Request, target_yield: float | None, **settings: Any) 
     --target-yield prints what it changed and what that costs, and the folder's design.toml is the
     changed design; if the share is not reached, nothing is written and the exit code is 1.
     """
-    source = load(*request.source)
     if target_yield is None:
-        _run(request, runs.generate, source, **settings)
+        _run(runs.generate, source, **settings)
     elif isinstance(source, Design):
-        _generate_for_yield(source, target_yield, request, settings)
+        # Both designs are predicted, which a plain run does not do: models load slowly.
+        changed_for_yield = plugins.load("sbafab.cli.search:changed_for_yield")
+        design, more, before = changed_for_yield(source, target_yield, settings["as_json"])
+        _run(runs.generate, design, before=before, more=more, **settings)
     else:
         raise DesignError(
             "--target-yield goes with a design, and this is an assembly; generate its parts' "
@@ -60,22 +87,22 @@ def generate(request: opt.Request, target_yield: float | None, **settings: Any) 
 
 
 @click.command()
-@opt.run_options()
-@opt.cut_options
-def cut(request: opt.Request, **curves: Any) -> None:
+@opt.run_options(design_of)
+@cut_options
+def cut(design: Design, **settings: Any) -> None:
     """Write the cut files: a DXF for each layer, and film sheets."""
-    _run(request, runs.cut, load_design(*request.source), **curves)
+    _run(runs.cut, design, **settings)
 
 
 @click.command()
-@opt.run_options()
-def press(request: opt.Request) -> None:
+@opt.run_options(design_of)
+def press(design: Design, **settings: Any) -> None:
     """Write the heat-press schedule."""
-    _run(request, runs.press, load_design(*request.source))
+    _run(runs.press, design, **settings)
 
 
 @click.command()
-@opt.run_options()
+@opt.run_options(design_of)
 @opt.option("--h", "Edge length of the triangles.", opt.POSITIVE_LENGTH, default=MeshSettings.h)
 @opt.option(
     "--element",
@@ -99,10 +126,10 @@ def press(request: opt.Request) -> None:
 @opt.option(
     "--format formats...",
     "Formats of the volume, shell and cavity meshes.  [default: all]",
-    conforming_endings(),
+    runs.conforming_endings(),
 )
 def mesh(
-    request: opt.Request,
+    design: Design,
     formats: tuple[str, ...],
     flat: bool,
     fill_ul: dict[str, float],
@@ -115,64 +142,27 @@ def mesh(
     if "" in fill_ul and len(fill_ul) > 1:
         raise click.UsageError("--fill takes one volume for all, or one for each chamber")
     fill = fill_ul.get("", fill_ul) if fill_ul else None
-    more |= {"formats": formats or conforming_endings(), "wrapped": not flat, "fill_ul": fill}
-    _run(request, runs.mesh, load_design(*request.source), **more)
+    formats = formats or runs.conforming_endings()
+    _run(runs.mesh, design, formats=formats, wrapped=not flat, fill_ul=fill, **more)
 
 
 @click.command()
-@opt.run_options(is_several=True)
+@opt.run_options(design_of, is_several=True)
 @opt.option("--name", "Name of the folder OUT/<name>/.", default="job")
-@opt.cut_options
-def nest(request: opt.Request, **settings: Any) -> None:
+@cut_options
+def nest(designs: Sequence[Design], **settings: Any) -> None:
     """Cut several designs from the same film sheets.
 
     OUT/<name>/ receives a folder for each DESIGN, and sheets/ with the parts of all. Overrides
     apply to every design. Copies: --copies of every design, else each design's order.copies.
     """
-    designs = [load_design(name, request.assignments, request.waivers) for name in request.designs]
-    _run(request, runs.nest, designs, **settings)
-
-
-@click.command("import")
-@click.argument("source", type=opt.file_path())
-@opt.folder_option("Folder in which NAME.toml and a folder of its drawings are written.")
-@opt.file_option("NAME.toml")
-@opt.json_option
-def import_(source: Path, out: Path, to: Path | None, as_json: bool) -> None:
-    """Write a design of drawn layers from other files.
-
-    SOURCE is a folder of drawings with a table layers.csv, an output folder, a laminate.json, a
-    ParchMint circuit (JSON), or a laminate of foldable_robotics or popupCAD. What is not carried
-    over is named.
-    """
-    # A tenth of the time that `generate` takes to load.
-    from sbafab.importing.records import default_file, write_imported
-    from sbafab.importing.sources import import_source
-
-    name, imported = import_source(source)
-    file = opt.design_file(to, out, default_file(imported).name)
-    written = write_imported(imported, file, source.name)
-    layers, patterns = len(written.laminate.layers), len(written.laminate.patterns)
-    if as_json:
-        document = {"file": str(written.file), "format": name, "layers": layers}
-        show.document({**document, "patterns": patterns, "remarks": list(imported.remarks)})
-        return
-    for remark in imported.remarks:
-        show.note(remark)
-    show.verdict(
-        f"{written.file} written: {layers} layers in {patterns} patterns, from {name}. Next: "
-        f"sbafab generate {shlex.quote(str(written.file))}",
-        written.file,
-    )
-
-
-# Running a request.
+    _run(runs.nest, designs, **settings)
 
 
 def _run(
-    request: opt.Request,
     write: Callable[..., Run],
     source: object,
+    as_json: bool,
     before: Callable[[], None] = lambda: None,
     more: Mapping[str, object] | None = None,
     **settings: Any,
@@ -181,81 +171,17 @@ def _run(
 
     ``before`` prints what comes before the files, ``more`` has further keys of the document.
     """
-    with show.progress(request.as_json) as progress:
-        run = write(source, out=request.out, progress=progress, **settings)
+    with show.progress(as_json) as progress:
+        run = write(source, progress=progress, **settings)
     for name, reason in run.left_out:
         print_error(f"left out: {name}. {reason}")
-    if request.as_json:
-        show.document({**_document(run), **(more or {})})
+    if as_json:
+        show.document({**runs.run_document(run), **(more or {})})
     else:
         before()
         _print_run(run)
     if run.failed:
         show.end_failed()
-
-
-def _generate_for_yield(
-    design: Design, target: float, request: opt.Request, settings: dict[str, Any]
-) -> None:
-    """Write the folder of a design changed for a yield; exits with 1 if none reaches it."""
-    # Both designs are predicted, which a plain run does not do: models load slowly.
-    from sbafab.cli.search import print_changes
-    from sbafab.search.compare import reach_yield, yield_document
-
-    with show.progress(request.as_json) as progress:
-        fixed = frozenset(changed_keys(request.assignments))
-        reached = reach_yield(design, target, fixed, progress)
-    if reached.design is None:
-        end("yield", reached.sentence, RULE_FAILED, request.as_json)
-
-    def before() -> None:
-        print_changes(reached)
-        show.wrapped(reached.sentence)
-        show.line("")
-
-    more = {"yield": yield_document(reached)} if request.as_json else {}
-    _run(request, runs.generate, reached.design, before, more, **settings)
-
-
-# The documents of runs.
-
-
-class RunDocument(Document, schema="sbafab/run@1"):
-    """Output of a command that writes a folder."""
-
-    folder: Path
-    failed: bool
-    findings: list[FindingEntry]
-    notes: list[str]
-    files: list[str]
-    """contents of the folder"""
-
-
-class NestedDesign(Document):
-    """One of the designs."""
-
-    name: str = attribute("design.name")
-    failed: bool
-    findings: list[FindingEntry]
-    notes: list[str]
-
-
-class NestedDocument(Document, schema="sbafab/nested@1"):
-    """Output of ``nest --json``."""
-
-    folder: Path
-    failed: bool
-    designs: list[NestedDesign]
-    files: list[str]
-    """contents of the folder"""
-
-
-def _document(run: Run) -> dict[str, Any]:
-    files = [] if run.kept else sorted(run.manifest["files"])
-    if run.order.schema == JOB_SCHEMA:
-        designs = [NestedDesign.read(each, notes=show.notes_of([each])) for each in run.builds]
-        return NestedDocument.of(run, designs=designs, files=files)
-    return RunDocument.of(run, notes=show.notes_of(run.builds), files=files)
 
 
 # Printing: a table of facts, and the verdict.
@@ -273,11 +199,11 @@ Facts = Iterator[tuple[str, str]]
 
 def _print_run(run: Run) -> None:
     """Print the files of an order, remedies and, last, the verdict."""
-    is_job, is_design = run.order.schema == JOB_SCHEMA, len(show.groups_of(run)) == 1
+    is_job, is_design = run.order.is_job, len(run.order.groups) == 1
     if is_job or not run.kept:
         show.facts(_design_facts(run) if is_design and not is_job else _order_facts(run))
         show.line("")
-    groups = show.groups_of(run)
+    groups = run.order.groups
     if is_design:
         show.remedies(run.findings)
     else:
@@ -309,7 +235,7 @@ def _order_facts(run: Run) -> Facts:
         warned = sorted({f.rule for f in build.findings if f.verdict == "warn"})
         words += [f"; warnings: {', '.join(warned)}"] if warned else []
         yield build.design.name, "".join(words)
-    for note in show.notes_of(run.builds):
+    for note in run.order.notes:
         yield "note", note
     for film in index.get("films", ()):
         yield f"{film['material']} film", _film_text(film, index["sheets"], 1)
@@ -371,13 +297,13 @@ def _press_facts(run: Run) -> Facts:
         f"{len(schedule.steps)} steps, {_minutes(schedule.total_press_minutes)} at "
         f"{first.temperature_c:g} C, {first.force_n / 1000:.3f} kN; press.json, press.csv",
     )
-    runs = design_runs(run.design, run.laminate)
-    if runs.copies > 1:
-        times = batch_times(runs, schedule)
-        sizes = ", ".join(map(str, dict.fromkeys(runs.cycles)))
+    cycles = run.builds[0].cycles
+    if cycles.copies > 1:
+        times = runs.batch_times(cycles, schedule)
+        sizes = ", ".join(map(str, dict.fromkeys(cycles.cycles)))
         yield (
             "batch",
-            f"{runs.copies} copies in {show.several(runs.count, 'press cycle')} of {sizes}: "
+            f"{cycles.copies} copies in {show.several(cycles.count, 'press cycle')} of {sizes}: "
             f"{_minutes(times.press)} in the press, {_minutes(times.total)} in all",
         )
 
@@ -432,3 +358,100 @@ def _film_text(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], cop
         f"of cutting; {', '.join(sheet['file'] for sheet in film_sheets)}"
         f"{unlabelled if bare else ''}"
     )
+
+
+# Simulations.
+
+
+@click.command()
+@opt.run_options(design_of)
+@opt.option("--with simulator", "Simulator.", runs.NAMES, required=True)
+@opt.option(
+    "--pressure P",
+    'Gauge pressure in all chambers, kPa or with a unit ("60 mbar"); a vacuum is negative and '
+    "for calculix.  [default: calculix 6, others 5; of a design that works under a vacuum -6]",
+    opt.PRESSURE,
+)
+@opt.option(
+    "--chamber chambers NAME=P...",
+    "Pressure in one chamber; the others have --pressure if given, else none.",
+    opt.OfChamber(opt.PRESSURE),
+)
+@opt.option(
+    "--minutes",
+    "Time limit, minutes; results up to then are kept.",
+    opt.FiniteRange(0, 10_000, min_open=True),
+    default=runs.SimulationRequest.minutes,
+)
+@opt.option("--export", "Write the input files of the simulator without running it.", bool)
+@opt.option("--h MM", "calculix: mesh size.  [default: 0.35]", opt.LENGTH)
+@opt.option(
+    "--symmetry",
+    "calculix: part that is computed; only the full one wrinkles and bends freely."
+    "  [default: full]",
+    runs.CHOICES["symmetry"],
+)
+@opt.option(
+    "--procedure",
+    "calculix: static is faster but stops when films wrinkle.  [default: dynamic]",
+    runs.CHOICES["procedure"],
+)
+@opt.option("--scene", "sofa: scene that is run.  [default: shell]", runs.CHOICES["scene"])
+@opt.option(
+    "--seconds S",
+    "sofa, mujoco: simulated time, s; for mujoco at least 2.  [default: sofa 8, mujoco 5]",
+    float,
+)
+@opt.option(
+    "--volume volumes NAME=UL...",
+    "sofa, scene volume: volume added to a chamber.",
+    opt.OfChamber(opt.VOLUME),
+)
+def simulate(design: Design, as_json: bool, **settings: Any) -> None:
+    """Inflate a design in an installed simulator.
+
+    OUT/<name>/calculix/ receives stroke, air volume and wall stress over pressure as table and
+    plot, and the deformed shape as VTU and picture; OUT/<name>/sofa/ or mujoco/ the input files of
+    the run. result.json holds height, tip, tilt and volumes over time. If a run stops early, its
+    results are kept and the exit code is 1. A result that cannot be, such as air below 0, is void:
+    the reason is printed, nothing is written, and the exit code is 1.
+    """
+    with show.progress(as_json) as progress, _printed_warnings():
+        simulation = runs.simulate(design, progress=progress, **settings)
+    if simulation.folder is None:
+        if as_json:
+            show.document(runs.checks(simulation.findings, "design", design.name))
+        else:
+            show.findings({design.name: simulation.findings})
+            show.failed(design.name, simulation.findings, "It was not simulated", "design")
+        show.end_failed()
+    result = simulation.result
+    if as_json:
+        show.document({**runs.result_json(result), "folder": str(simulation.folder)})
+    else:
+        _print_result(design.name, result, simulation.folder)
+    if simulation.beside:
+        print_error(f"{simulation.beside}; the results were put into {simulation.folder}")
+    if result is not None and result.stopped is not None:
+        print_error(result.stopped)
+        show.end_failed()
+
+
+@contextmanager
+def _printed_warnings() -> Iterator[None]:
+    """Print warnings as sentences on standard error at once: a run may take hours after them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = lambda message, *_: print_error(f"warning: {message}")
+        yield
+
+
+def _print_result(name: str, result: runs.Result | None, folder: Path) -> None:
+    if result is None:
+        show.verdict(f"{name} exported. Written to {folder}", folder)
+        return
+    width = max(len(label) for label, _, _ in result.rows)
+    for label, value, unit in result.rows:
+        click.echo(f"{label:{width}} {value:10.3f} {unit}".rstrip())
+    outcome = "simulated" if result.stopped is None else "failed: the simulation stopped early"
+    show.verdict(f"{name} {outcome}. Written to {folder}", folder)

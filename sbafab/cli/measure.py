@@ -11,29 +11,11 @@ from typing import Any
 
 import click
 
+from sbafab.api import measure as api
 from sbafab.cli import options as opt
 from sbafab.cli import show
-from sbafab.design.films import FILM_NAME, is_kerf
 from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
-from sbafab.folders.swap import replace_text
-from sbafab.lab.coupon import (
-    RESOLUTIONS,
-    Calibration,
-    Estimate,
-    Measurement,
-    Value,
-    calibrated,
-    read_measurements,
-)
-from sbafab.lab.inspection import (
-    Inspection,
-    InspectionDocument,
-    drawing,
-    history,
-    sizes_csv,
-)
-from sbafab.lab.scan import Reference, Scan, ScanPicture, read_cut_sheet, read_picture
 
 MOST_LINES = 20
 """Pieces amiss that are printed; the files have all."""
@@ -42,10 +24,10 @@ MOST_LINES = 20
 class KerfEstimate(Document):
     """Fit of ``count`` sizes: kerf in mm and scale as a ratio, with 95 % half widths."""
 
-    kerf: Value
-    scale: Value | None
+    kerf: api.Value
+    scale: api.Value | None
     scaled: bool = attribute("is_scaled")
-    offsets: Mapping[str, Value]
+    offsets: Mapping[str, api.Value]
     """excess of each instrument's readings, mm; empty if the sizes do not determine it"""
     count: int
 
@@ -56,7 +38,7 @@ class KerfDocument(Document, schema="sbafab/kerf@1"):
     all: KerfEstimate = attribute("overall")
     x: KerfEstimate | None
     y: KerfEstimate | None
-    difference: Value | None
+    difference: api.Value | None
     """kerf along x less that along y, mm"""
     differs: bool
     warnings: list[str]
@@ -67,7 +49,7 @@ class KerfDocument(Document, schema="sbafab/kerf@1"):
 
 def _film(context: click.Context, option: click.Parameter, name: str) -> str:
     """Return the name of a film; raises BadParameter for one that no film can have."""
-    if not re.fullmatch(FILM_NAME, name):
+    if not re.fullmatch(api.FILM_NAME, name):
         raise click.BadParameter(
             f"{name!r} is not the name of a film; give tpe, ptfe or a table of [films]"
         )
@@ -85,12 +67,12 @@ def _film(context: click.Context, option: click.Parameter, name: str) -> str:
 @opt.option(
     "--instrument",
     "Instrument of the measurements, unless the table has a column of that name.",
-    tuple(RESOLUTIONS),
+    tuple(api.RESOLUTIONS),
 )
 @opt.option(
     "--resolution MM",
     "Resolution of the instrument.  [default: "
-    + ", ".join(f"{name} {least:.3g}" for name, least in RESOLUTIONS.items())
+    + ", ".join(f"{name} {least:.3g}" for name, least in api.RESOLUTIONS.items())
     + "]",
     opt.FiniteRange(0, 1),
 )
@@ -114,8 +96,8 @@ def kerf(
     scanner or a microscope rather than a calliper, which bends it. A constant reading error and a
     scale error are separated from the kerf.
     """
-    sizes = read_measurements(measurements, instrument or "")
-    calibration = calibrated(sizes, resolution)
+    sizes = api.read_measurements(measurements, instrument or "")
+    calibration = api.calibrated(sizes, resolution)
     pair = [estimate for estimate in (calibration.x, calibration.y) if estimate is not None]
     if split_xy and len(pair) < 2:
         raise DesignError("--split-xy needs two sizes along x and two along y; fill in more rows")
@@ -143,7 +125,7 @@ def kerf(
     show.verdict(f"# {material} kerf: {values} mm from {calibration.overall.count} sizes{count}")
 
 
-def _toml_block(film: str, widths: Sequence[Estimate], warnings: Sequence[str]) -> str:
+def _toml_block(film: str, widths: Sequence[api.Estimate], warnings: Sequence[str]) -> str:
     """Return the lines for the design file, with the warnings as comments."""
     is_usual = film in ("tpe", "ptfe")
     table, key = ("[laser]", f"kerf_{film}") if is_usual else (f"[films.{film}]", "kerf")
@@ -153,7 +135,7 @@ def _toml_block(film: str, widths: Sequence[Estimate], warnings: Sequence[str]) 
     return f"{table}\n{doubts}{key} = {value}\n"
 
 
-def _with_interval(value: Value) -> str:
+def _with_interval(value: api.Value) -> str:
     low, high = value.interval
     return (
         f"{value.value:.4f} mm, standard uncertainty {value.uncertainty:.4f}, "
@@ -162,7 +144,7 @@ def _with_interval(value: Value) -> str:
 
 
 def _remarks(
-    calibration: Calibration, widths: Sequence[Estimate], sizes: Sequence[Measurement]
+    calibration: api.Calibration, widths: Sequence[api.Estimate], sizes: Sequence[api.Measurement]
 ) -> Iterator[str]:
     """Yield sentences on x and y, on significant reading errors, and on calliper jaws, whose effect
     no fit detects.
@@ -190,7 +172,7 @@ def _remarks(
         )
 
 
-def _warnings(calibration: Calibration, widths: Sequence[Estimate]) -> Iterator[str]:
+def _warnings(calibration: api.Calibration, widths: Sequence[api.Estimate]) -> Iterator[str]:
     """Yield sentences on doubts about these widths: intervals, reading errors, scale."""
     is_pair = len(widths) == 2
     for estimate, place in zip(widths, (" along x", " along y") if is_pair else ("",), strict=True):
@@ -201,7 +183,7 @@ def _warnings(calibration: Calibration, widths: Sequence[Estimate]) -> Iterator[
                 f"interval is {low:.3f} to {high:.3f} mm from {estimate.count} sizes; measure more "
                 "sizes, or repeat each, before you cut with it"
             )
-    if not is_kerf(widths[0].kerf.value, widths[-1].kerf.value):
+    if not api.is_kerf(widths[0].kerf.value, widths[-1].kerf.value):
         yield (
             "one kerf is over ten times the other, which no design may have; measure again, or use "
             "--no-split-xy"
@@ -270,12 +252,14 @@ def inspect(
     """
     if find_spec("skimage") is None or find_spec("scipy") is None:
         raise DesignError('sbafab inspect needs scikit-image: pip install "sbafab[scan]"')
-    cut, photographed = read_cut_sheet(folder, sheet), read_picture(picture)
+    cut, photographed = api.read_cut_sheet(folder, sheet), api.read_picture(picture)
     scale = _reference(photographed, photo, **reference)
-    inspection = Inspection(Scan(photographed, cut, scale, photo, paper == "dark"))
+    inspection = api.Inspection(api.Scan(photographed, cut, scale, photo, paper == "dark"))
     paths = _write_inspection(inspection, out)
     if as_json:
-        show.document({**InspectionDocument.of(inspection), "files": [str(path) for path in paths]})
+        show.document(
+            {**api.InspectionDocument.of(inspection), "files": [str(path) for path in paths]}
+        )
     else:
         _print_inspection(inspection, paths)
     if inspection.failed:
@@ -283,8 +267,8 @@ def inspect(
 
 
 def _reference(
-    picture: ScanPicture, photo: bool, dpi: float | None, bar: float | None, pins: bool
-) -> Reference:
+    picture: api.ScanPicture, photo: bool, dpi: float | None, bar: float | None, pins: bool
+) -> api.Reference:
     if bar is not None and pins:
         raise DesignError("give --bar or --pins, not both")
     stated = None if photo else picture.dpi
@@ -294,25 +278,26 @@ def _reference(
             f"{picture.path} states no resolution; give --dpi as scanned, --bar or --pins, or "
             "--photo to take the scale from the cut edges themselves"
         )
-    return Reference(resolution, bar, pins)
+    return api.Reference(resolution, bar, pins)
 
 
-def _write_inspection(inspection: Inspection, out: Path) -> list[Path]:
+def _write_inspection(inspection: api.Inspection, out: Path) -> list[Path]:
     """Write picture, result, entry and table of sizes; return their paths."""
     out.mkdir(parents=True, exist_ok=True)
     stem = f"{inspection.sheet.name.replace('/', '_')}-{inspection.picture.path.stem}"
     texts = {
-        ".json": json.dumps(InspectionDocument.of(inspection), indent=1, ensure_ascii=False) + "\n",
-        "_history.json": json.dumps(history(inspection), indent=1, ensure_ascii=False) + "\n",
-        ".svg": drawing(inspection),
-        "_sizes.csv": sizes_csv(inspection),
+        ".json": json.dumps(api.InspectionDocument.of(inspection), indent=1, ensure_ascii=False)
+        + "\n",
+        "_history.json": json.dumps(api.history(inspection), indent=1, ensure_ascii=False) + "\n",
+        ".svg": api.drawing(inspection),
+        "_sizes.csv": api.sizes_csv(inspection),
     }
     for ending, text in texts.items():
-        replace_text(out / f"{stem}{ending}", text)
+        api.replace_text(out / f"{stem}{ending}", text)
     return [out / f"{stem}{ending}" for ending in texts]
 
 
-def _print_inspection(inspection: Inspection, paths: list[Path]) -> None:
+def _print_inspection(inspection: api.Inspection, paths: list[Path]) -> None:
     """Print kerf, scale, edges and the pieces amiss, and last the verdict."""
     kerf, scale, sheet = inspection.kerf, inspection.scale, inspection.sheet
     low, high = kerf.interval

@@ -5,16 +5,20 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 import click
 from click.shell_completion import CompletionItem
 
-from sbafab.cutting.cut_settings import TRUE_ARCS, DxfProfile
-from sbafab.design.files import key_paths, template_summaries
-from sbafab.design.units import KILOPASCALS, MILLILITRES_PER_MINUTE, in_first_unit, share_of
+from sbafab.api.files import (
+    KILOPASCALS,
+    MILLILITRES_PER_MINUTE,
+    in_first_unit,
+    refuse_file_as_folder,
+    share_of,
+    template_summaries,
+)
 
 Command = Callable[..., Any]
 Decorator = Callable[[Command], Command]
@@ -137,7 +141,7 @@ def designs(ctx: click.Context, param: click.Parameter, typed: str) -> list[Comp
 def rules(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete the names of rules and checks."""
     # Options need no rule; a shell asks for their names.
-    from sbafab.rules.deck import EXPLAINED
+    from sbafab.api.checks import EXPLAINED
 
     return completions(typed, ((name, rule.holds) for name, rule in EXPLAINED.items()))
 
@@ -145,9 +149,9 @@ def rules(ctx: click.Context, param: click.Parameter, typed: str) -> list[Comple
 def assignments(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete ``KEY=``, and after it the values of a key that has a choice."""
     # `sbafab new` has options too, and needs no family.
-    from sbafab.actuators import records
+    from sbafab.api.designs import kinds_of_keys
 
-    kinds = {key: kind for record in records().values() for key, kind in key_paths(record).items()}
+    kinds = kinds_of_keys()
     tables = {path.rpartition(".")[0] for path in kinds}
     key, equals, _ = typed.partition("=")
     if not equals:
@@ -207,7 +211,7 @@ json_option = option("--json as_json", "Print the result as JSON.", bool)
 def pressures_option(words: str, default: str) -> Decorator:
     """Return ``--pressure``, repeatable, whose help begins with ``words``."""
     words += f", kPa or with a unit. Repeatable.  [default: {default}]"
-    return option("--pressure pressures", words, PRESSURE, multiple=True)
+    return option("--pressure pressures_kpa", words, PRESSURE, multiple=True)
 
 
 def calibration_options(command: Command) -> Command:
@@ -239,11 +243,6 @@ def waive_option(words: str) -> Decorator:
     return option("--waive waivers RULE", words, multiple=True, shell_complete=rules)
 
 
-def target_yield_option(words: str) -> Decorator:
-    """Return ``--target-yield`` with the help text of a command."""
-    return option("--target-yield", words, PartialShare("SHARE"))
-
-
 WAIVE_HELP = {
     "press": "Write the schedule although this rule fails; it will state it. Repeatable.",
     "mesh": "Write the meshes although this rule fails; the manifest will state it. Repeatable.",
@@ -259,9 +258,6 @@ def _refuse_file(ctx: click.Context, _: click.Parameter, out: Path) -> Path:
     """Raises BadParameter for the name of a design file, and OutputError for a folder that is a
     file, before anything is computed.
     """
-    # Help and completion do without it.
-    from sbafab.folders.swap import refuse_file_as_folder
-
     refuse_file_as_folder(out)
     if out.suffix.lower() == ".toml":
         has_file = any("--to" in param.opts for param in ctx.command.params)
@@ -310,80 +306,33 @@ def refuse_options(why: str, *names: str) -> None:
             raise click.UsageError(f"{max(param.opts, key=len)} {why}")
 
 
-@dataclass(frozen=True)
-class Request:
-    """Arguments and options of a command that writes a folder."""
+def run_options(load: Callable[..., Any], is_several: bool = False) -> Decorator:
+    """Add DESIGN, or any number of them, and the options of a writing command.
 
-    designs: tuple[str, ...]
-    out: Path
-    assignments: tuple[str, ...]
-    waivers: tuple[str, ...]
-    as_json: bool
-
-    @property
-    def source(self) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
-        """The design, the first one of several, its changed keys and the rules waived."""
-        return self.designs[0], self.assignments, self.waivers
-
-
-def run_options(is_several: bool = False) -> Decorator:
-    """Add DESIGN, or any number of them, and the options of a writing command, passed to it as a
-    Request.
+    The command gets the design that ``load`` makes of the name, keys and waivers, or a list of
+    them, then ``out`` and ``as_json``; ``copies`` of ``cut_options`` is a key of the design.
     """
 
     def add(command: Command) -> Command:
         @functools.wraps(command)
-        def gathered(**parameters: Any) -> Any:
-            request = Request(
-                **{field.name: parameters.pop(field.name) for field in fields(Request)}
-            )
-            return command(request=request, **parameters)
+        def loaded(
+            designs: tuple[str, ...] | str,
+            assignments: tuple[str, ...],
+            waivers: tuple[str, ...],
+            **parameters: Any,
+        ) -> Any:
+            copies = parameters.pop("copies", None)
+            keys = () if copies is None else (f"order.copies={copies}",)
+            names = (designs,) if isinstance(designs, str) else designs
+            sources = [load(name, (*assignments, *keys), waivers) for name in names]
+            return command(sources if is_several else sources[0], **parameters)
 
-        argument = design_argument(
-            "designs",
-            metavar="DESIGN..." if is_several else "DESIGN",
-            nargs=-1 if is_several else 1,
-            callback=lambda _, __, value: (value,) if isinstance(value, str) else value,
-            required=True,
-        )
+        metavar, count = ("DESIGN...", -1) if is_several else ("DESIGN", 1)
+        argument = design_argument("designs", metavar=metavar, nargs=count, required=True)
         waive = waive_option(WAIVE_HELP.get(command.__name__, WAIVE_CUT))
-        decorated: Command = gathered
+        decorated: Command = loaded
         for each in (json_option, waive, set_option, out_option, argument):
             decorated = each(decorated)
         return decorated
 
     return add
-
-
-def cut_options(command: Command) -> Command:
-    """Add ``--dxf-profile`` and ``--chord-error``, for readers that cannot read bulges, and
-    ``--copies``, which sets a key of the design.
-    """
-
-    @functools.wraps(command)
-    def with_curves(
-        request: Request, chord_error: float | None, copies: int | None, **parameters: Any
-    ) -> Any:
-        if chord_error is not None and parameters["dxf_profile"] != "chords":
-            raise click.UsageError("--chord-error goes with --dxf-profile chords; add it")
-        parameters["chord_error"] = chord_error or TRUE_ARCS.chord_error
-        keys = () if copies is None else (f"order.copies={copies}",)
-        request = replace(request, assignments=(*request.assignments, *keys))
-        return command(request=request, **parameters)
-
-    profile = option(
-        "--dxf-profile",
-        "Write arcs as polyline bulges, ARC entities or chords.",
-        get_args(DxfProfile),
-        default=TRUE_ARCS.profile,
-    )
-    chord = option(
-        "--chord-error MM",
-        "Largest distance of a chord from its arc, with --dxf-profile chords.  "
-        f"[default: {TRUE_ARCS.chord_error:g}]",
-        FiniteRange(0.0001, 0.1),
-    )
-    count = option(
-        "--copies K", "Cut K copies of each actuator.  [default: the design's order.copies, 1]", int
-    )
-    return profile(chord(count(with_curves)))

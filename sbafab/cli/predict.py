@@ -5,52 +5,35 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import click
 
-from sbafab.assemblies.build import assemble
-from sbafab.assemblies.files import load
-from sbafab.assemblies.records import Assembly
+from sbafab.api import predictions as api
+from sbafab.api.designs import either_of
 from sbafab.cli import options as opt
 from sbafab.cli import show
 from sbafab.cli.exit import print_error
-from sbafab.design.records import Design, Drawn
 from sbafab.errors import OutputError
-from sbafab.folders.artefacts import prediction_json
-from sbafab.folders.run import RunRequest, generate
-from sbafab.models.actuator import model_form
-from sbafab.models.balloons import has_balloons
-from sbafab.models.figures import (
-    FLAGS,
-    LEFT_OUT,
-    NEAR_BURST,
-    Figure,
-    Model,
-    Prediction,
-    PredictionRequest,
-)
-from sbafab.models.pneumatics import usual_pressures
-from sbafab.models.prediction import predict as predicted
-from sbafab.models.sensitivities import SensitivityRow, sensitivity_table
-from sbafab.models.sizes import size_phrases
-from sbafab.reports.assembly_prediction import SCHEMA, AssemblyPrediction, predict_assembly
 
 ELASTIC_OPTIONS = ("pocket_loss", "modulus_mpa", "sensitivity")
 """Options of the model of elastic balloons alone."""
-FORMULA_OPTIONS = ("flow_ml_min", "volumes", "contact_factor")
+FORMULA_OPTIONS = ("flow_ml_min", "volumes_ul", "contact_factor")
 """Options of formulas that need round or oblong pockets."""
 
 
 @click.command()
-@opt.run_options()
+@opt.run_options(either_of)
 @opt.pressures_option(
     "Gauge pressure of force and work, negative for a vacuum",
     "10, 100; of a design that works under a vacuum -10, -100",
 )
 @opt.flow_option("Flow for the actuation time")
 @opt.option(
-    "--volume volumes...", "Volume of each balloon for the stroke, ul or with a unit.", opt.VOLUME
+    "--volume volumes_ul...",
+    "Volume of each balloon for the stroke, ul or with a unit.",
+    opt.VOLUME,
 )
 @opt.option(
     "--press-factor F",
@@ -75,14 +58,14 @@ FORMULA_OPTIONS = ("flow_ml_min", "volumes", "contact_factor")
 )
 @opt.option("-v --verbose", "All figures, with their models and validity.", bool)
 def predict(
-    request: opt.Request,
-    pressures: tuple[float, ...],
-    flow_ml_min: float,
-    volumes: tuple[float, ...],
+    design: api.Design | api.Assembly,
+    out: Path,
+    as_json: bool,
+    pressures_kpa: tuple[float, ...],
     load_g: float,
     sensitivity: bool,
     verbose: bool,
-    **factors: Any,
+    **conditions: Any,
 ) -> None:
     """Predict size, stroke, force, time and bending.
 
@@ -93,40 +76,36 @@ def predict(
     Of an assembly it prints reach, load, grip in its lumen, and collisions of inflated parts, at
     one pressure (default 10 kPa).
     """
-    design = load(*request.source)
-    if not isinstance(design, Design):
-        _refuse_for_assembly(design, pressures)
-        _predict_assembly(design, request, pressures[0] if pressures else 10.0, load_g)
+    if not isinstance(design, api.Design):
+        _refuse_for_assembly(design, pressures_kpa)
+        _predict_assembly(design, as_json, pressures_kpa[0] if pressures_kpa else 10.0, load_g)
         return
     _refuse_for_design(design)
-    conditions = PredictionRequest(
-        pressures or usual_pressures(design.form), flow_ml_min, volumes, overrides=factors
-    )
-    rows: Sequence[SensitivityRow] = ()
-    with show.progress(request.as_json) as progress:
+    rows: Sequence[api.SensitivityRow] = ()
+    with show.progress(as_json) as progress:
         progress("predicting", 0, 1)
-        prediction = predicted(design, conditions)
-        write = RunRequest(design, request.out, ("predict",), prediction=prediction)
+        prediction = api.predict(design, pressures_kpa=pressures_kpa or None, **conditions)
+        write = api.RunRequest(design, out, ("predict",), prediction=prediction)
         try:
-            run = generate(write, progress)
+            run = api.generate(write, progress)
         except OutputError:
             # The prediction exists, though it cannot be written.
-            if not request.as_json:
+            if not as_json:
                 print_prediction(prediction, verbose)
             raise
         if sensitivity:
             progress("sensitivity", 0, 1)
-            rows = sensitivity_table(design, conditions.pressures_kpa[0])
+            rows = api.sensitivity_table(design, prediction.asked.pressures_kpa[0])
     failed = show.failed_rules(run.findings)
-    if request.as_json:
+    if as_json:
         more = {"sensitivity": [asdict(row) for row in rows]} if sensitivity else {}
-        document = {**prediction_json(design, prediction), **more}
+        document = {**api.prediction_json(design, prediction), **more}
         show.document({**document, "failed": failed, "folder": str(run.folder)})
     else:
-        show.phrases("size", size_phrases(design, run.laminate, prediction.asked.factors))
+        show.phrases("size", api.size_phrases(design, run.laminate, prediction.asked.factors))
         print_prediction(prediction, verbose)
         if rows:
-            _print_sensitivity(rows, conditions.pressures_kpa[0])
+            _print_sensitivity(rows, prediction.asked.pressures_kpa[0])
         if not run.failed:
             details = "" if verbose else " Details: -v"
             show.verdict(
@@ -144,7 +123,7 @@ def predict(
         show.end_failed()
 
 
-def _print_sensitivity(rows: Sequence[SensitivityRow], pressure: float) -> None:
+def _print_sensitivity(rows: Sequence[api.SensitivityRow], pressure: float) -> None:
     """Print by how much 1 % more of each key moves stroke and bend."""
     show.line(f"\nat {pressure:g} kPa 1 % more of     moves the free stroke    the bend")
     for row in rows:
@@ -152,22 +131,22 @@ def _print_sensitivity(rows: Sequence[SensitivityRow], pressure: float) -> None:
         show.line(f"{row.key:<26} {row.stroke:>+20.2f} % {bend:>11}".rstrip())
 
 
-def _refuse_for_design(design: Design) -> None:
+def _refuse_for_design(design: api.Design) -> None:
     """Raise UsageError for an option that no model of the design uses."""
-    form = model_form(design)
+    form = api.model_form(design)
     reason = f"and {design.name} has others; leave it out"
     opt.refuse_options(
         f"is for an assembly, and {design.name} is one actuator; leave it out", "load_g"
     )
-    if not has_balloons(form):
+    if not api.has_balloons(form):
         opt.refuse_options(
             f"is for elastic balloons, round pockets on flat plates, {reason}", *ELASTIC_OPTIONS
         )
-    if isinstance(form.pockets, Drawn):
+    if isinstance(form.pockets, api.Drawn):
         opt.refuse_options(f"is for pockets that are round or oblong, {reason}", *FORMULA_OPTIONS)
 
 
-def _refuse_for_assembly(assembly: Assembly, pressures: tuple[float, ...]) -> None:
+def _refuse_for_assembly(assembly: api.Assembly, pressures: tuple[float, ...]) -> None:
     """Raise UsageError for an option that only the prediction of a single design uses."""
     reason = (
         f"is for one actuator, and {assembly.name} is an assembly; predict the part's own design"
@@ -180,12 +159,12 @@ def _refuse_for_assembly(assembly: Assembly, pressures: tuple[float, ...]) -> No
 
 
 def _predict_assembly(
-    assembly: Assembly, request: opt.Request, pressure_kpa: float, load_g: float
+    assembly: api.Assembly, as_json: bool, pressure_kpa: float, load_g: float
 ) -> None:
     """Predict an assembly and print it; exits with 1 if inflated parts collide."""
-    prediction = predict_assembly(assemble(assembly), pressure_kpa, load_g)
-    if request.as_json:
-        show.document({"schema": SCHEMA, **asdict(prediction)})
+    prediction = api.predict_assembly(assembly, pressure_kpa=pressure_kpa, load_g=load_g)
+    if as_json:
+        show.document({"schema": api.SCHEMA, **asdict(prediction)})
     else:
         print_assembly_prediction(prediction)
     if prediction.touches:
@@ -199,7 +178,7 @@ NAME_WIDTH, VALUE_WIDTH = 56, 10
 """Columns of a name, at most, and of a value."""
 
 
-def print_prediction(prediction: Prediction, verbose: bool = False) -> None:
+def print_prediction(prediction: api.Prediction, verbose: bool = False) -> None:
     """Print the main figures; ``verbose`` also all figures and the validity of their models."""
     lines = prediction.verdict
     label = max((len(line.quantity) for line in lines), default=0) + 2
@@ -207,7 +186,7 @@ def print_prediction(prediction: Prediction, verbose: bool = False) -> None:
     for number, line in enumerate(lines, start=1):
         head = "" if line.quantity == previous else f"{line.quantity}:"
         previous = line.quantity
-        is_left_out = line.quantity == LEFT_OUT
+        is_left_out = line.quantity == api.LEFT_OUT
         text = f"{line.figure}: {line.note}" if is_left_out else line.figure
         show.wrapped(text, indent=" " * label, first=head.ljust(label))
         # A note of several lines stands once, under the last of them.
@@ -217,7 +196,7 @@ def print_prediction(prediction: Prediction, verbose: bool = False) -> None:
         _print_figures(prediction)
 
 
-def _print_figures(prediction: Prediction) -> None:
+def _print_figures(prediction: api.Prediction) -> None:
     """Print all figures, alternative models last, and the validity of the models."""
     groups = {
         "Figures to design with": [f for f in prediction.figures if not f.other],
@@ -239,7 +218,9 @@ def _print_figures(prediction: Prediction) -> None:
     show.line("")
 
 
-def _figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int) -> Iterator[str]:
+def _figure_lines(
+    figures: Sequence[api.Figure], models: Sequence[api.Model], width: int
+) -> Iterator[str]:
     """Yield a heading for each model of a group, and below it a line for each figure."""
     unit = max((len(figure.unit) for figure in figures), default=0)
     spans = max((len(figure.range) + 4 for figure in figures if figure.interval), default=0)
@@ -259,7 +240,7 @@ def _figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int
                     yield from (f"    {line}" for line in textwrap.wrap(figure.aside, width - 4))
 
 
-def print_assembly_prediction(prediction: AssemblyPrediction) -> None:
+def print_assembly_prediction(prediction: api.AssemblyPrediction) -> None:
     """Print the figures of an assembly and, last, the parts that collide when inflated."""
     pressure = f"at {prediction.pressure_kpa:g} kPa"
     rows, previous = [], ""
@@ -279,7 +260,7 @@ def print_assembly_prediction(prediction: AssemblyPrediction) -> None:
     for reason in prediction.left_out:
         show.line(f"left out: {reason}")
     for part in prediction.near_burst:
-        show.line(f"{part}: {FLAGS[NEAR_BURST]}")
+        show.line(f"{part}: {api.FLAGS[api.NEAR_BURST]}")
     for sentence in prediction.met():
         show.line(sentence)
     if prediction.touches:

@@ -10,23 +10,10 @@ from typing import Any
 
 import click
 
+from sbafab.api import lab as api
 from sbafab.cli import options as opt
 from sbafab.cli import show
 from sbafab.errors import DesignError
-from sbafab.lab import recording
-from sbafab.lab.records import (
-    HistoryEntry,
-    HistoryRow,
-    LabRow,
-    Record,
-    RecordEntry,
-    RecordsDocument,
-    RowEntry,
-    columns,
-    row_of,
-)
-from sbafab.lab.report import Report, ReportDocument, report, success_svg
-from sbafab.lab.store import Contents, Lab
 
 MEASUREMENTS = (
     opt.option("--leak", "Result of the leak test.", ("pass", "fail")),
@@ -44,7 +31,7 @@ MEASUREMENTS = (
     opt.option("--note TEXT", "Free text."),
 )
 """Options of a result, each with the name of its column."""
-RESULTS = tuple(name for name in columns(Record) if name != "serial")
+RESULTS = tuple(name for name in api.columns(api.Record) if name != "serial")
 
 
 def _measurement_options(command: opt.Command) -> opt.Command:
@@ -56,14 +43,14 @@ def _measurement_options(command: opt.Command) -> opt.Command:
 
 def _row_key(
     context: click.Context, parameter: click.Parameter, value: str | None
-) -> tuple[type[Record | HistoryEntry], int] | None:
+) -> tuple[type[api.Record | api.HistoryEntry], int] | None:
     """Return the kind of a row such as 3 or e3, and its number."""
     if value is None:
         return None
     match = re.fullmatch(r"(e?)(\d{1,9})", value)
     if match is None:
         raise click.BadParameter(f"{value!r} is neither a record such as 3 nor an entry such as e3")
-    return HistoryEntry if match[1] else Record, int(match[2])
+    return api.HistoryEntry if match[1] else api.Record, int(match[2])
 
 
 @click.command()
@@ -78,7 +65,7 @@ def _row_key(
 @opt.option(
     "--entry TEXT...",
     "A line of the device's history: 'step=1 temperature_c=134 initials=AL'. Fields: "
-    f"{', '.join(columns(HistoryEntry))}.",
+    f"{', '.join(api.columns(api.HistoryEntry))}.",
 )
 @opt.option(
     "--history FILE",
@@ -127,18 +114,18 @@ def record(lab: Path, assignments: tuple[str, ...], as_json: bool, **values: Any
     sbafab record 3dof-15mm --table batch.csv
     sbafab record --report
     """  # noqa: D301 (click reads the backspace as a mark)
-    store = Lab(lab)
+    store = api.Lab(lab)
     values = {k: v for k, v in values.items() if v not in (None, "", ()) and v is not False}
     task = _task(values)
     if task == "report":
         records, _, builds = store.contents()
-        _print_report(report(records, builds), as_json)
+        _print_report(api.report_of(records, builds), as_json)
     elif task == "chart":
         records, _, builds = store.contents()
-        recording.save_text(values["chart"], success_svg(records, builds))
+        api.recording.save_text(values["chart"], api.success_svg(records, builds))
         show.verdict(str(values["chart"]))
     elif task == "export":
-        count = recording.write_history(_matches(store, values), values["export"])
+        count = api.recording.write_history(_matches(store, values), values["export"])
         show.verdict(f"{values['export']}: {show.several(count, 'device')}")
     elif task == "find":
         matches = _matches(store, values)
@@ -147,8 +134,8 @@ def record(lab: Path, assignments: tuple[str, ...], as_json: bool, **values: Any
         _print_rows([_correct(store, values)], store, as_json, "added to")
     else:
         rows = _new_rows(values)
-        built = recording.built_from(values["design"], assignments)
-        rows = recording.record(store, built, rows, "again" in values)
+        built = api.recording.built_from(values["design"], assignments)
+        rows = api.recording.record(store, built, rows, "again" in values)
         _print_rows(rows, store, as_json, "added to")
 
 
@@ -184,18 +171,18 @@ def _flag(name: str) -> str:
     return "DESIGN" if name == "design" else flags[name]
 
 
-def _new_rows(values: Mapping[str, Any]) -> Sequence[LabRow]:
+def _new_rows(values: Mapping[str, Any]) -> Sequence[api.LabRow]:
     """Return the results, or the lines of history, that the options state."""
     if "table" in values:
-        return recording.read_batch(values["table"])
+        return api.recording.read_batch(values["table"])
     if not values.keys() & {"entry", "history"}:
-        return [row_of(Record, _result(values))]
+        return [api.row_of(api.Record, _result(values))]
     serial = {"serial": values.get("serial")}
-    entries: list[HistoryEntry] = []
+    entries: list[api.HistoryEntry] = []
     for text in values.get("entry", ()):
-        entries += recording.entries_of({**serial, **_pairs(text)}, f"--entry {text!r}")
+        entries += api.recording.entries_of({**serial, **_pairs(text)}, f"--entry {text!r}")
     if "history" in values:
-        entries += recording.read_history(values["history"], serial)
+        entries += api.recording.read_history(values["history"], serial)
     return entries
 
 
@@ -216,46 +203,46 @@ def _pairs(text: str) -> dict[str, str]:
     return {name: value for name, _, value in pairs}
 
 
-def _correct(store: Lab, values: Mapping[str, Any]) -> LabRow:
+def _correct(store: api.Lab, values: Mapping[str, Any]) -> api.LabRow:
     """Store the row that corrects another."""
     kind, number = values["correct"]
-    is_entry = kind is HistoryEntry
+    is_entry = kind is api.HistoryEntry
     change = _pairs(" ".join(values.get("entry", ()))) if is_entry else _result(values)
     is_other = values.keys() & ({"serial", *RESULTS} if is_entry else {"entry"})
     if is_other or not (change or "withdraw" in values):
         wanted = "an --entry with the correct text" if is_entry else "the correct result"
         raise click.UsageError(f"give {wanted}, or --withdraw")
-    row: LabRow = store.correct(kind, number, {**change, "withdrawn": "withdraw" in values})
+    row: api.LabRow = store.correct(kind, number, {**change, "withdrawn": "withdraw" in values})
     return row
 
 
-def _matches(store: Lab, values: Mapping[str, Any]) -> Contents:
+def _matches(store: api.Lab, values: Mapping[str, Any]) -> api.Contents:
     """Return what --find and --serial find, or all. Raises DesignError for nothing."""
     records, entries, builds = store.contents()
     serial = values.get("serial", "")
     text = values.get("find", serial)
     if text:
-        records = recording.matching(text, serial, records, builds)
-        entries = recording.matching(text, serial, entries, builds)
+        records = api.recording.matching(text, serial, records, builds)
+        entries = api.recording.matching(text, serial, entries, builds)
     if not records and not entries:
         raise DesignError(
             f"no record goes with {text[:60]!r}; give a serial, a design's name, 8 digits or more "
             "of its sha256, or what the traveller's code says"
         )
-    return Contents(records, entries, builds)
+    return api.Contents(records, entries, builds)
 
 
 # Printing: rows as lines, the tables of the report.
 
 
-def _print_rows(rows: Sequence[LabRow], store: Lab, as_json: bool, action: str) -> None:
+def _print_rows(rows: Sequence[api.LabRow], store: api.Lab, as_json: bool, action: str) -> None:
     """Print a line for each row, and their count with ``action``."""
     records, entries, builds = store.contents()
     newer = {(row.NOUN, row.corrects): row.id for row in (*records, *entries)}
-    documents: dict[str, list[RowEntry]] = {"record": [], "entry": []}
+    documents: dict[str, list[api.RowEntry]] = {"record": [], "entry": []}
     for row in rows:
         build, corrected_by = builds[row.design_sha256], newer.get((row.NOUN, row.id))
-        kind = HistoryRow if isinstance(row, HistoryEntry) else RecordEntry
+        kind = api.HistoryRow if isinstance(row, api.HistoryEntry) else api.RecordEntry
         more = {"design": build.name, "corrected_by": corrected_by}
         documents[row.NOUN].append(kind.read(row, actuator_sha256=build.actuator, **more))
         if not as_json:
@@ -263,7 +250,7 @@ def _print_rows(rows: Sequence[LabRow], store: Lab, as_json: bool, action: str) 
             _print_expired(row)
     if as_json:
         lists = {"records": documents["record"], "entries": documents["entry"]}
-        show.document(RecordsDocument.of(None, **lists))
+        show.document(api.RecordsDocument.of(None, **lists))
         return
     counts = {"record": "records", "entry": "entries"}
     each = [
@@ -272,7 +259,7 @@ def _print_rows(rows: Sequence[LabRow], store: Lab, as_json: bool, action: str) 
     show.verdict(f"{' and '.join(each)} {action} {store.path}")
 
 
-def _line(row: LabRow, design: str, corrected_by: int | None) -> str:
+def _line(row: api.LabRow, design: str, corrected_by: int | None) -> str:
     parts = [f"{name} {value}" for name, value in row.cells.items() if name != "serial"]
     parts += [f"attempt {row.attempt}"] if row.attempt > 1 else []
     parts += [f"corrects {row.SIGN}{row.corrects}"] if row.corrects is not None else []
@@ -282,9 +269,9 @@ def _line(row: LabRow, design: str, corrected_by: int | None) -> str:
     return f"{head}, serial {row.serial}: {', '.join(parts)}"
 
 
-def _print_expired(row: LabRow) -> None:
+def _print_expired(row: api.LabRow) -> None:
     """Print a warning if the lot of an entry had expired."""
-    if isinstance(row, HistoryEntry) and row.is_expired and not row.withdrawn:
+    if isinstance(row, api.HistoryEntry) and row.is_expired and not row.withdrawn:
         day = row.date or row.recorded[:10]
         click.echo(
             f"warning: entry {row.number}: {row.item} lot {row.lot} expired on {row.expires}, "
@@ -296,9 +283,9 @@ FITTED = ("stroke_mm", "force_n", "height_mm")
 """Quantities that ``sbafab calibrate`` fits the models to."""
 
 
-def _print_report(report: Report, as_json: bool) -> None:
+def _print_report(report: api.Report, as_json: bool) -> None:
     """Print success, measured against predicted values, advice, and last the counts."""
-    document = ReportDocument.of(report)
+    document = api.ReportDocument.of(report)
     if as_json:
         show.document(document)
         return

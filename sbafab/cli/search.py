@@ -12,35 +12,13 @@ from typing import Any, TypeVar
 
 import click
 
-from sbafab.actuators import load_design
+from sbafab.api import search as api
+from sbafab.api.designs import Design, design_of
 from sbafab.cli import options as opt
 from sbafab.cli import show
-from sbafab.design.files import changed_keys, name_of, template_names
+from sbafab.cli.exit import RULE_FAILED, end
 from sbafab.errors import DesignError
-from sbafab.laminate.burst import is_near_burst
-from sbafab.models.figures import FLAGS
-from sbafab.models.pneumatics import MOST_PRESSURE
 from sbafab.runtime import Progress
-from sbafab.search import compare as comparing
-from sbafab.search import sweep as sweeping
-from sbafab.search.advice import YieldDesign
-from sbafab.search.find import (
-    FoundDesign,
-    find_document,
-    found_toml,
-    free_keys,
-    refuse_existing,
-    write_found,
-)
-from sbafab.search.find import find as search
-from sbafab.search.quantities import (
-    quantity_lines,
-    read_all,
-    shown_value,
-)
-from sbafab.search.space import FindRequest, figure_text, read_free
-from sbafab.search.sweep import SweepDocument, SweepRequest
-from sbafab.search.vary import format_keys, format_value, varied_keys
 
 Outcome = TypeVar("Outcome")
 FOUND = "found.toml"
@@ -58,7 +36,7 @@ which round pockets have of the paper's film alone:
 """
 
 
-@click.command(help=HELP.format(quantities=quantity_lines()))
+@click.command(help=HELP.format(quantities=api.quantity_lines()))
 @opt.design_argument(metavar="[DESIGN]", required=False)
 @opt.option(
     "--min least QUANTITY=VALUE...",
@@ -90,7 +68,7 @@ which round pockets have of the paper's film alone:
     "--tries N",
     "Largest number of designs to try, for each family.",
     click.IntRange(4, 100_000),
-    default=FindRequest.tries,
+    default=api.FindRequest.tries,
 )
 @opt.folder_option(f"Folder in which {FOUND} is written.")
 @opt.file_option(FOUND)
@@ -100,33 +78,37 @@ def find(source: str | None, **options: Any) -> None:
     names = [source] if source else _family_templates()
     requests = _each(names, partial(_request, options=options))
     target = opt.design_file(options["to"], options["out"], FOUND)
-    refuse_existing(target)
+    api.refuse_existing(target)
     if any(_counts_tabs(request) for request in requests.values()):
         show.note(TABS_HINT)
     with show.progress(options["as_json"]) as progress:
         origin, result = _best_result(requests, progress)
     if result.holds:
-        name = name_of(target.stem) or origin
-        write_found(found_toml(origin, options["assignments"], name, result, target), target)
+        name = api.name_of(target.stem) or origin
+        api.write_found(
+            api.found_toml(origin, options["assignments"], name, result, target), target
+        )
     if options["as_json"]:
-        show.document(find_document(result, origin, target))
+        show.document(api.find_document(result, origin, target))
     else:
         _print_found(result, origin, target)
     if not result.holds:
         show.end_failed()
 
 
-def _request(name: str, options: dict[str, Any]) -> FindRequest:
+def _request(name: str, options: dict[str, Any]) -> api.FindRequest:
     """Return the search from a design. Raises DesignError without a requested quantity."""
-    requirements, goal = read_all(
+    requirements, goal = api.read_all(
         options["least"], options["most"], options["best"], options["flow_ml_min"]
     )
     assigned = options["assignments"]
-    design = load_design(name, assigned)
-    free = read_free(design, options["free"], options["fixed"], tuple(changed_keys(assigned)))
+    design = api.load_design(name, assigned)
+    free = api.read_free(
+        design, options["free"], options["fixed"], tuple(api.changed_keys(assigned))
+    )
     settings = {name: options[name] for name in ("tries", "sure")}
-    request = FindRequest(design, requirements, goal, free, **settings)
-    free_keys(request)  # raises DesignError for keys that cannot vary
+    request = api.FindRequest(design, requirements, goal, free, **settings)
+    api.free_keys(request)  # raises DesignError for keys that cannot vary
     return request
 
 
@@ -144,15 +126,17 @@ def _each(names: Iterable[str], value: Callable[[str], Outcome]) -> dict[str, Ou
     return values
 
 
-def _best_result(requests: dict[str, FindRequest], progress: Progress) -> tuple[str, FoundDesign]:
+def _best_result(
+    requests: dict[str, api.FindRequest], progress: Progress
+) -> tuple[str, api.FoundDesign]:
     """Run the searches; return the best result and the design that it started from."""
     names = list(requests)
 
-    def result(name: str) -> FoundDesign:
+    def result(name: str) -> api.FoundDesign:
         def report(stage: str, done: int, total: int) -> None:
             progress(stage, names.index(name) * total + done, len(names) * total)
 
-        return search(requests[name], report)
+        return api.run_find(requests[name], report)
 
     return min(_each(names, result).items(), key=lambda item: item[1].best.rank)
 
@@ -160,9 +144,9 @@ def _best_result(requests: dict[str, FindRequest], progress: Progress) -> tuple[
 def _family_templates() -> list[str]:
     """Return the first template of each family."""
     templates: dict[type, str] = {}
-    for name in template_names():
+    for name in api.template_names():
         with suppress(DesignError):
-            templates.setdefault(type(load_design(name)), name)
+            templates.setdefault(type(api.load_design(name)), name)
     return list(templates.values())
 
 
@@ -175,17 +159,17 @@ TABS_HINT = (
 )
 
 
-def _counts_tabs(request: FindRequest) -> bool:
+def _counts_tabs(request: api.FindRequest) -> bool:
     """Return True if a search limits the diameter with tabs, and may not shorten these."""
     names = [requirement.quantity.name for requirement in request.requirements]
-    free = [free.key for free in free_keys(request)]
+    free = [free.key for free in api.free_keys(request)]
     return "overall_diameter" in names and "inlet.tab_length" not in free
 
 
-def _print_found(result: FoundDesign, origin: str, target: Path) -> None:
+def _print_found(result: api.FoundDesign, origin: str, target: Path) -> None:
     """Print the design with its figures, what binds and the front; or the nearest miss."""
     title, style = ("Best design", "bold") if result.holds else ("Nearest miss", "bold red")
-    show.line(f"{title}: {format_keys(result.best.values)}, from {origin}", style)
+    show.line(f"{title}: {api.format_keys(result.best.values)}, from {origin}", style)
     _print_quantities(result)
     for rule in result.best.broken_rules:
         show.line(f"  {rule}")
@@ -215,23 +199,23 @@ def _print_found(result: FoundDesign, origin: str, target: Path) -> None:
     )
 
 
-def _binding_limits(result: FoundDesign) -> Iterator[str]:
+def _binding_limits(result: api.FoundDesign) -> Iterator[str]:
     """Yield what single steps would break, ranges, and rules without room of a design that
     holds.
     """
     for bind in result.binds:
-        yield f"{bind.key} = {format_value(bind.value)}: {bind.breaks}"
-    for end in result.ends:
-        low, high = end.wider
+        yield f"{bind.key} = {api.format_value(bind.value)}: {bind.breaks}"
+    for stop in result.ends:
+        low, high = stop.wider
         yield (
-            f"{end.key} = {end.value:g} is at the end of its range, {end.low:g} to {end.high:g}; "
-            f"widen it with --free {end.key}={low:g}:{high:g}:{end.step:g}"
+            f"{stop.key} = {stop.value:g} is at the end of its range, {stop.low:g} to "
+            f"{stop.high:g}; widen it with --free {stop.key}={low:g}:{high:g}:{stop.step:g}"
         )
     for spare in result.without_room if result.holds else ():
         yield f"{spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, at its limit"
 
 
-def _print_quantities(result: FoundDesign) -> None:
+def _print_quantities(result: api.FoundDesign) -> None:
     """Print the required quantities and the goal of the best design, each with its flags and the
     paper's measured value.
     """
@@ -239,18 +223,18 @@ def _print_quantities(result: FoundDesign) -> None:
     is_sure = request.sure is not None
     lines: dict[str, list[str]] = {}
     for row in request.requirements:
-        value = figure_text(request, best, row) + ("" if is_sure else result.interval_text(row))
+        value = api.figure_text(request, best, row) + ("" if is_sure else result.interval_text(row))
         missed = "" if best.meets(row) else ": MISSED"
         line = f"{row.quantity.label} {value}; {row.bound}{missed}"
         lines.setdefault(row.quantity.label, []).append(line)
     label = goal.label if result.holds else goal.quantity.label
-    value = shown_value(goal.quantity, best.value(goal)) + result.interval_text(goal)
+    value = api.shown_value(goal.quantity, best.value(goal)) + result.interval_text(goal)
     lines.setdefault(goal.quantity.label, []).append(f"{label}: {value}")
     for name, told_of in lines.items():
         for line in told_of:
             show.line(f"  {line}")
         for flag in result.flags.get(name, ()):
-            show.wrapped(f"({FLAGS[flag]})", indent="    ")
+            show.wrapped(f"({api.FLAGS[flag]})", indent="    ")
         if name in result.measured:
             show.wrapped(f"({result.measured[name].sentence})", indent="    ")
     if goal.quantity.label in result.intervals or (result.intervals and not is_sure):
@@ -263,26 +247,26 @@ USEFUL_KPA = 50.0
 """Pressure that is proposed for a force, unless it was missed at half of it or more."""
 
 
-def _more_pressure(result: FoundDesign) -> str:
+def _more_pressure(result: api.FoundDesign) -> str:
     """Return the advice for a missed force: the same one at more pressure; empty for others."""
     for row in result.request.requirements:
         quantity, laminate = row.quantity, result.best.laminate
         if quantity.name != "force" or not row.at_least or laminate is None:
             continue
         kpa = max(USEFUL_KPA, 2 * (quantity.kpa or 0.0))
-        is_allowed = kpa <= MOST_PRESSURE and not is_near_burst(laminate, kpa)
+        is_allowed = kpa <= api.MOST_PRESSURE and not api.is_near_burst(laminate, kpa)
         if is_allowed and not result.best.meets(row):
             more = replace(quantity, at=quantity.at._replace(kpa=kpa))
             return f", ask for the force at more pressure, {more.label}"
     return ""
 
 
-def _print_front(result: FoundDesign) -> None:
+def _print_front(result: api.FoundDesign) -> None:
     part = f"{len(result.front)} of " if result.on_front > len(result.front) else ""
     show.line(f"Pareto front, {part}{result.on_front} of the {result.tries} designs tried", "bold")
     for trial in result.front:
         figures = ", ".join(f"{name} {value:.4g}" for name, value in trial.figures.items())
-        show.line(f"  {format_keys(trial.values)}: {figures}")
+        show.line(f"  {api.format_keys(trial.values)}: {figures}")
     for name, measured in result.measured.items():
         show.wrapped(f"({name}: {measured.sentence})", indent="    ")
 
@@ -291,9 +275,9 @@ def _print_front(result: FoundDesign) -> None:
 
 
 @click.command()
-@opt.run_options()
+@opt.run_options(design_of)
 @opt.option(
-    "--vary varied KEY=VALUES...",
+    "--vary KEY=VALUES...",
     "Vary a key: KEY=START:STOP:STEP or KEY=a,b,c. Repeatable; all combinations of the values are "
     "swept.",
     required=True,
@@ -303,7 +287,7 @@ def _print_front(result: FoundDesign) -> None:
     "Sample N designs by Latin hypercube instead of the full grid; ranges need no step.",
     click.IntRange(1),
 )
-@opt.option("--seed S", "Seed of the sampling.", int, default=SweepRequest.seed)
+@opt.option("--seed S", "Seed of the sampling.", int, default=api.SweepRequest.seed)
 @opt.pressures_option("Force and stroke at this pressure", "10, 100")
 @opt.option(
     "--workers K", "Parallel processes.  [default: one for each processor]", click.IntRange(1, 256)
@@ -315,7 +299,7 @@ def _print_front(result: FoundDesign) -> None:
     "--timeout seconds S",
     "Time limit for one design, seconds.",
     opt.FiniteRange(0, min_open=True),
-    default=SweepRequest.seconds,
+    default=api.SweepRequest.seconds,
 )
 @opt.option(
     "--all-columns",
@@ -323,7 +307,10 @@ def _print_front(result: FoundDesign) -> None:
     bool,
 )
 def sweep(
-    request: opt.Request, varied: tuple[str, ...], pressures: tuple[float, ...], **settings: Any
+    design: Design,
+    out: Path,
+    as_json: bool,
+    **settings: Any,
 ) -> None:
     """Check and predict variants of a design.
 
@@ -331,19 +318,17 @@ def sweep(
     each design, times.csv, and the page sweep.html. Run the same command again to resume a sweep
     that was stopped.
     """
-    design = load_design(*request.source)
-    sweep_request = SweepRequest(design, varied_keys(varied), pressures_kpa=pressures, **settings)
-    with show.progress(request.as_json) as progress:
-        swept = sweeping.sweep(sweep_request, request.out, progress)
-    if request.as_json:
-        show.document(SweepDocument.of(swept))
+    with show.progress(as_json) as progress:
+        swept = api.sweep(design, out=out, progress=progress, **settings)
+    if as_json:
+        show.document(api.SweepDocument.of(swept))
         return
     if swept.no_longer_asked:
         show.line(
             f"The tables leave out {swept.no_longer_asked} designs of an earlier sweep; its "
             "command restores them from the journal"
         )
-    if not sweep_request.all_columns:
+    if not settings["all_columns"]:
         show.line(
             "columns: varied, requested and binding; --all-columns writes all without computing "
             "again"
@@ -374,7 +359,7 @@ def sweep(
 def compare(
     first: str,
     second: str,
-    pressures: tuple[float, ...],
+    pressures_kpa: tuple[float, ...],
     flow_ml_min: float,
     out: Path,
     assignments: tuple[str, ...],
@@ -385,37 +370,53 @@ def compare(
     A and B are templates, design files, output folders, or rows of a sweep by number, such as
     out/1dof-5mm-sweep/sweep.csv:12. OUT/compare/compare.html has pictures of both side by side.
     """
-    a, b = (comparing.load_compared(source, assignments) for source in (first, second))
+    a, b = (api.comparing.load_compared(source, assignments) for source in (first, second))
     with show.progress(as_json) as progress:
-        comparison = comparing.compare(
-            a, b, (first, second), pressures or None, flow_ml_min, progress
+        comparison = api.comparing.compare(
+            a, b, (first, second), pressures_kpa or None, flow_ml_min, progress
         )
-        folder = comparing.write_page(comparison, out)
+        folder = api.comparing.write_page(comparison, out)
     if as_json:
         show.document({**comparison.as_dict(), "folder": str(folder)})
         return
     names = ("", *comparison.names)
-    show.table("Keys", names, comparing.key_rows(comparison.keys))
-    show.table("Rules", names, comparing.rule_rows(comparison.rules))
+    show.table("Keys", names, api.comparing.key_rows(comparison.keys))
+    show.table("Rules", names, api.comparing.rule_rows(comparison.rules))
     _print_figures(comparison, names)
     counts = len(comparison.keys), len(comparison.rules), sum(p.differs for p in comparison.figures)
     keys, rules, figures = map(show.several, counts, ("key", "rule", "figure"))
     show.verdict(
         f"{first} and {second} differ in {keys}, {rules} and {figures}. Written to {folder}: "
-        f"{comparing.PAGE}",
+        f"{api.comparing.PAGE}",
         folder,
     )
 
 
-def print_changes(reached: YieldDesign) -> None:
-    """Print the keys that were changed for a yield, and the figures before and after."""
-    if reached.comparison is not None:
-        names = ("", *comparing.DESIGNS)
-        show.table("Changed for the yield", names, comparing.key_rows(reached.changes))
-        _print_figures(reached.comparison, names)
+def changed_for_yield(
+    design: Design, target: float, as_json: bool
+) -> tuple[Design, dict[str, Any], Callable[[], None]]:
+    """Return a design changed for a yield, its entry as JSON, and what prints the changes.
+
+    Exits with 1 if none reaches it.
+    """
+    with show.progress(as_json) as progress:
+        fixed = frozenset(api.changed_keys(click.get_current_context().params["assignments"]))
+        reached = api.comparing.reach_yield(design, target, fixed, progress)
+    if reached.design is None:
+        end("yield", reached.sentence, RULE_FAILED, as_json)
+
+    def print_changes() -> None:
+        if reached.comparison is not None:
+            names = ("", *api.comparing.DESIGNS)
+            show.table("Changed for the yield", names, api.comparing.key_rows(reached.changes))
+            _print_figures(reached.comparison, names)
+        show.wrapped(reached.sentence)
+        show.line("")
+
+    return reached.design, {"yield": api.comparing.yield_document(reached)}, print_changes
 
 
-def _print_figures(comparison: comparing.DesignComparison, names: Sequence[str]) -> None:
+def _print_figures(comparison: api.comparing.DesignComparison, names: Sequence[str]) -> None:
     """Print the main figures of both designs, below the names of the columns."""
-    main = comparing.figure_rows(pair for pair in comparison.figures if pair.is_main)
+    main = api.comparing.figure_rows(pair for pair in comparison.figures if pair.is_main)
     show.table("Figures, in parentheses the 90 % interval", names, main)

@@ -18,16 +18,12 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from sbafab import catalogue
+from sbafab.api.files import Finding, counted, decisive
 from sbafab.cli.exit import RULE_FAILED, print_error
-from sbafab.rules.finding import Finding, counted, decisive
 from sbafab.runtime import Progress, ignore_progress
 
 if TYPE_CHECKING:
     from rich.table import Table
-
-    from sbafab.folders.build import Build
-    from sbafab.folders.order import Order
-    from sbafab.folders.run import Run
 
 NO_BREAK = "\u00a0"
 """No-break space: `wrapped` keeps the words on both sides on one line."""
@@ -152,22 +148,6 @@ def several(number: int, noun: str, plural: str = "") -> str:
     return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
 
 
-def notes_of(builds: Iterable[Build]) -> list[str]:
-    """Return the notes of designs without repeats, each after the names of its designs.
-
-    A note of all of them stands without names.
-    """
-    designs_of_note: dict[str, list[str]] = {}
-    designs = [(each.design.name, dict.fromkeys(each.laminate.notes)) for each in builds]
-    for name, notes in designs:
-        for note in notes:
-            designs_of_note.setdefault(note, []).append(name)
-    return [
-        note if len(of) == len(designs) else f"{', '.join(of)}: {note}"
-        for note, of in designs_of_note.items()
-    ]
-
-
 # Findings, one line per rule; remedies; the verdict in the last line.
 
 
@@ -175,12 +155,6 @@ Groups = Mapping[str, Sequence[Finding]]
 """Findings of each design by its name, and those between the parts of an assembly."""
 SHARE_OF = {"pin-fit": "stretch", "registration-yield": "hold"}
 """Words after the per cent sign, by rule: a film stretches over its pin, builds hold."""
-
-
-def groups_of(order: Order | Run) -> Groups:
-    """Return a group of findings for each design, and one for the checks between parts."""
-    groups: dict[str, Sequence[Finding]] = {b.design.name: b.findings for b in order.builds}
-    return groups if order.between is None else {**groups, "between the parts": order.between}
 
 
 def findings(groups: Groups, verbose: bool = False) -> None:
@@ -287,7 +261,7 @@ def limit_text(finding: Finding) -> str:
     if finding.limit is None:
         return "no target" if finding.rule in SHARE_OF else ""
     # What prints no findings loads neither rules nor numpy.
-    from sbafab.rules.deck import AT_MOST
+    from sbafab.api.checks import AT_MOST
 
     sense = "<=" if finding.rule in AT_MOST else ">="
     return f"{sense} {short_figure(finding.limit, _unit(finding))}"

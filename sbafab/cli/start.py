@@ -1,4 +1,4 @@
-"""``sbafab new`` and ``studio``: a file to start from, and a page to edit it."""
+"""``sbafab new``, ``import`` and ``studio``: a file to start from, and a page to edit it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import click
 from click.shell_completion import CompletionItem
 
 from sbafab import plugins
+from sbafab.api.files import template_summaries, write_kit, write_new
 from sbafab.cli import options as opt
 from sbafab.cli import show
-from sbafab.design.files import template_summaries, write_new
-from sbafab.design.kits import write_kit
 from sbafab.documents import Document
 from sbafab.version import GENERATOR
 
@@ -72,7 +71,7 @@ def new(template: str | None, file: Path | None, as_json: bool) -> None:
 
 def _coupon(folder: Path) -> None:
     # Its drawing takes numpy, which no other file to start from does.
-    from sbafab.lab.coupon import write_coupon
+    from sbafab.api.measure import write_coupon
 
     drawing, picture, table = write_coupon(folder, GENERATOR)
     click.echo(f"Cut {drawing} (picture: {picture}) from each film with a kerf offset of 0.")
@@ -80,6 +79,34 @@ def _coupon(folder: Path) -> None:
     click.echo(
         f"{folder} written. Measure the pieces, fill in {table}, then: sbafab kerf {path} "
         "--material tpe"
+    )
+
+
+@click.command("import")
+@click.argument("source", type=opt.file_path())
+@opt.folder_option("Folder in which NAME.toml and a folder of its drawings are written.")
+@opt.file_option("NAME.toml")
+@opt.json_option
+def import_(source: Path, out: Path, to: Path | None, as_json: bool) -> None:
+    """Write a design of drawn layers from other files.
+
+    SOURCE is a folder of drawings with a table layers.csv, an output folder, a laminate.json, a
+    ParchMint circuit (JSON), or a laminate of foldable_robotics or popupCAD. What is not carried
+    over is named.
+    """
+    import_to = plugins.load("sbafab.importing.sources:import_to")
+    name, remarks, written = import_to(source, to and opt.design_file(to, out, ""), out)
+    layers, patterns = len(written.laminate.layers), len(written.laminate.patterns)
+    if as_json:
+        document = {"file": str(written.file), "format": name, "layers": layers}
+        show.document({**document, "patterns": patterns, "remarks": list(remarks)})
+        return
+    for remark in remarks:
+        show.note(remark)
+    show.verdict(
+        f"{written.file} written: {layers} layers in {patterns} patterns, from {name}. Next: "
+        f"sbafab generate {shlex.quote(str(written.file))}",
+        written.file,
     )
 
 

@@ -18,7 +18,7 @@ from pydantic.fields import FieldInfo
 
 from sbafab import catalogue, plugins
 from sbafab.design.toml_table import PATTERNS
-from sbafab.errors import DesignError
+from sbafab.errors import DesignError, OutputError
 
 _SHEETS = (
     "belongs to registered sheets, which were removed; delete it, and register the films by "
@@ -72,6 +72,13 @@ def is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):
         return False
+
+
+def refuse_file_as_folder(out: Path) -> None:
+    """Raises OutputError if a folder to write into, or one above it, is a file."""
+    for place in (out, *out.parents):
+        if is_file(place):
+            raise OutputError(f"{place} is a file, not a folder; choose a folder with -o")
 
 
 def shown(value: object) -> str:

@@ -73,6 +73,29 @@ class Order:
         return (*named, *(self.between or ()))
 
     @property
+    def groups(self) -> dict[str, Sequence[Finding]]:
+        """The findings of each design by its name, and those between the parts."""
+        each: dict[str, Sequence[Finding]] = {b.design.name: b.findings for b in self.builds}
+        return each if self.between is None else {**each, "between the parts": self.between}
+
+    @property
+    def notes(self) -> list[str]:
+        """The notes of all designs once each, after the names of theirs if not of all."""
+        designs: dict[str, list[str]] = {}
+        for build in self.builds:
+            for note in dict.fromkeys(build.laminate.notes):
+                designs.setdefault(note, []).append(build.design.name)
+        return [
+            note if len(names) == len(self.builds) else f"{', '.join(names)}: {note}"
+            for note, names in designs.items()
+        ]
+
+    @property
+    def is_job(self) -> bool:
+        """True for several designs that are cut together."""
+        return self.schema == JOB_SCHEMA
+
+    @property
     def failed(self) -> bool:
         """True if a rule or a check between parts failed that is not waived."""
         return has_failed(self.findings)

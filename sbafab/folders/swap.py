@@ -14,7 +14,7 @@ from pathlib import Path, PurePath
 
 from filelock import FileLock, Timeout
 
-from sbafab.design.files import is_file
+from sbafab.design.files import refuse_file_as_folder
 from sbafab.errors import OutputError, SbafabError
 from sbafab.folders.order import SCHEMA, SCHEMAS
 
@@ -91,13 +91,6 @@ def _locked(target: Path) -> Iterator[None]:
         yield
     finally:
         lock.release()
-
-
-def refuse_file_as_folder(out: Path) -> None:
-    """Raises OutputError if a folder to write into, or one above it, is a file."""
-    for place in (out, *out.parents):
-        if is_file(place):
-            raise OutputError(f"{place} is a file, not a folder; choose a folder with -o")
 
 
 def _unwritten(target: Path, reason: str) -> OutputError:

@@ -222,11 +222,6 @@ def write_imported(imported: Imported, file: Path, source: str) -> Written:
     return Written(file, *_built(file))
 
 
-def default_file(imported: Imported) -> Path:
-    """Return the default path of an imported design file in this folder."""
-    return Path(f"{imported.tables['name']}.toml")
-
-
 def _built(file: Path) -> tuple[Design, Laminate]:
     try:
         design = load_design(file)

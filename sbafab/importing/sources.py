@@ -14,7 +14,14 @@ from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
 from sbafab.importing.layer_table import MOST_OF_POLYGONS, import_table, refuse_polygons
 from sbafab.importing.parchmint import import_parchmint
 from sbafab.importing.popupcad import SUFFIX, refuse_alone
-from sbafab.importing.records import LAYERS, Imported, json_of, read_text
+from sbafab.importing.records import (
+    LAYERS,
+    Imported,
+    Written,
+    json_of,
+    read_text,
+    write_imported,
+)
 
 
 class SourceFormat(NamedTuple):
@@ -39,6 +46,19 @@ def import_source(source: Path) -> tuple[str, Imported]:
         f"{source} is a {what} of no format that is imported: "
         + "; ".join(f.name for f in _formats())
     )
+
+
+def import_to(
+    source: Path, file: Path | None, folder: Path = Path()
+) -> tuple[str, tuple[str, ...], Written]:
+    """Write a source as a design into ``file``, by default into ``folder`` under its own name.
+
+    Return the format, remarks on what is not carried over, and the design. Raises DesignError and
+    OutputError.
+    """
+    name, imported = import_source(source)
+    file = file or folder / f"{imported.tables['name']}.toml"
+    return name, imported.remarks, write_imported(imported, file, source.name)
 
 
 def _is_file(*suffixes: str, mark: str = "") -> Callable[[Path], bool]:

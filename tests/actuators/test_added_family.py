@@ -17,7 +17,7 @@ import pytest
 
 import sbafab
 from sbafab.actuators import FAMILIES, one_dof
-from sbafab.cli.explain import design_keys
+from sbafab.api.explained import design_keys
 from sbafab.studio import forms
 
 TWIN = (

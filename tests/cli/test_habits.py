@@ -13,11 +13,11 @@ from click.shell_completion import ShellComplete
 
 import sbafab
 from sbafab.actuators import records
+from sbafab.api.explained import design_keys
 from sbafab.assemblies.checks import CHECKS
 from sbafab.assemblies.records import Assembly
 from sbafab.cli import app
 from sbafab.cli.check import file_states, watch_source
-from sbafab.cli.explain import design_keys
 from sbafab.cli.show import limit_text
 from sbafab.design.files import key_paths, rule_names
 from sbafab.models.figures import FLAGS

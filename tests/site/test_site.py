@@ -13,8 +13,8 @@ import sbafab
 from docs.scripts import reference_cli, reference_keys
 from docs.scripts.offline import complaints
 from docs.scripts.rule_pictures import OTHERS, pair
+from sbafab.api.explained import design_keys
 from sbafab.cli import COMMANDS
-from sbafab.cli.explain import design_keys
 from tests.rules.test_deck import TESTED_APART
 
 ROOT = Path(__file__).parents[2]
