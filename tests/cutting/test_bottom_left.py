@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -12,8 +15,19 @@ from shapely import unary_union
 from shapely.geometry import Point as ShapelyPoint
 from shapely.geometry import Polygon, box
 
-from sbafab.cutting.nesting import nest
-from sbafab.cutting.placements import Nest, NestPart, Stock, check_nest
+from sbafab.actuators import build, load_design
+from sbafab.cutting.nesting import as_dict, from_dict, nest
+from sbafab.cutting.placements import (
+    Nest,
+    NestPart,
+    Placement,
+    Stock,
+    check_nest,
+    check_placed,
+    least_distance,
+    parts_of,
+)
+from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 
 
@@ -109,3 +123,230 @@ def test_shapely_agrees_that_random_parts_are_apart(
         )
         assert least >= spacing - 5e-4
         assert box(4, 4, 41, 46).buffer(1e-5).contains(unary_union(shapes))
+
+
+# Faulty nests are refused with the place; distances agree with closed forms and shapely.
+
+
+SQUARE = rectangle((0.0, 0.0), (10.0, 10.0))
+STOCK = Stock(width=60, length=60, border=5, pins=((50.0, 50.0, 4.0),), most=2)
+
+
+def nest_of(*shifts: tuple[float, float, int], count: int | None = None) -> Nest:
+    placements = len(shifts) if count is None else count
+    return Nest(
+        material="TPE",
+        stock=STOCK,
+        parts=(NestPart("demo", "P01", 1, "TPE", SQUARE, placements),),
+        placements=tuple(Placement(0, sheet, 0, (x, y)) for x, y, sheet in shifts),
+    )
+
+
+@pytest.mark.parametrize(
+    ("faulty", "message"),
+    [
+        (nest_of((5, 5, 0), (15.9, 5, 0)), r"are 0\.9000 mm apart at x 15\.\d+, y \d+\.\d+"),
+        (nest_of((5, 5, 0), (12, 8, 0)), r"overlap at x"),
+        (nest_of((5, 5, 0), (5, 5, 0)), r"overlap at x"),
+        (nest_of((4.9, 5, 0)), r"0\.1000 mm into the border"),
+        (nest_of((5, 45.01, 0)), r"0\.0100 mm into the border"),
+        (nest_of((45, 30, 0), (45, 45, 0)), r"pin at x 50, y 50 overlap"),
+        (nest_of((37.5, 45, 0)), r"pin at x 50, y 50 are 0\.5000 mm apart"),
+        (nest_of((5, 5, 0), count=2), r"not nested 2 times"),
+        (nest_of((5, 5, 1)), r"too many parts or sheets"),
+        (nest_of((5, 5, 0), (5, 5, 1), (5, 5, 2)), r"too many parts or sheets"),
+    ],
+)
+def test_a_faulty_nest_is_refused(faulty: Nest, message: str) -> None:
+    with pytest.raises(OutputError, match=message):
+        check_nest(faulty)
+
+
+def test_slack_allows_for_the_rounding_of_a_file() -> None:
+    regions = [("a", SQUARE.moved(5, 5)), ("b", SQUARE.moved(15.9995, 5))]
+    check_placed(regions, STOCK, slack=1e-3)
+    with pytest.raises(OutputError, match="a and b"):
+        check_placed(regions, STOCK)
+
+
+def test_nothing_may_lie_in_a_hole_which_is_cut_first() -> None:
+    frame = rectangle((34.0, 34.0), (55.0, 55.0)) - rectangle((36.0, 36.0), (53.0, 53.0))
+    with pytest.raises(OutputError, match="frame and inside overlap"):
+        check_placed([("frame", frame), ("inside", disc((40.0, 40.0), 2.5))], STOCK)
+    with pytest.raises(OutputError, match="pin"):
+        check_placed([("frame", frame)], STOCK)
+
+
+spots = st.tuples(st.floats(-4, 4), st.floats(-4, 4))
+
+
+widths = st.floats(0.5, 3)
+shapes = st.one_of(
+    st.builds(disc, spots, widths),
+    st.builds(lambda p, w, h: stadium(p, w, w + h), spots, widths, st.floats(0, 3)),
+    st.builds(lambda p, w: polygon([p, (p[0] + w, p[1]), (p[0], p[1] + 2 * w)]), spots, widths),
+)
+
+
+@settings(max_examples=80)
+@given(shapes, shapes, spots)
+def test_shapely_finds_the_same_distance(a: Region, b: Region, shift: tuple[float, float]) -> None:
+    b = b.moved(*shift)
+    judge = Polygon(a.polygons(1e-5)[0][0]).distance(Polygon(b.polygons(1e-5)[0][0]))
+    assert least_distance(a, b, 30.0).value == pytest.approx(judge, abs=3e-5)
+
+
+# Saved placements come back for the same parts, and for nothing else.
+
+
+PARTS = (
+    NestPart("demo", "P01", 1, "TPE", rectangle((0.1, 0.2), (9.3, 7.7)), 7),
+    NestPart("demo", "P02", 1, "PTFE", disc((0.0, 0.0), 3.3), 5),
+    NestPart("demo", "P03", 1, "TPE", disc((1.0, 0.0), 4.1), 3),
+)
+STOCKS = {
+    "TPE": Stock(width=40, length=40, border=5),
+    "PTFE": Stock(width=50, length=40, border=5, spacing=0.7),
+}
+
+
+@pytest.fixture
+def saved() -> Any:
+    return json.loads(json.dumps(as_dict(nest(PARTS, STOCKS))))
+
+
+def test_the_same_nests_come_back(saved: Any) -> None:
+    assert from_dict(saved, PARTS, STOCKS) == nest(PARTS, STOCKS)
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        PARTS[:2],
+        (replace(PARTS[0], count=8), *PARTS[1:]),
+        (replace(PARTS[0], region=rectangle((0.1, 0.2), (9.3, 7.70001))), *PARTS[1:]),
+        (replace(PARTS[0], design="other"), *PARTS[1:]),
+    ],
+)
+def test_other_parts_are_nested_anew(saved: Any, parts: tuple[NestPart, ...]) -> None:
+    assert from_dict(saved, parts, STOCKS) is None
+
+
+@pytest.mark.parametrize("data", [None, [], "x", 3, {}, {"key": 1}])
+def test_what_is_no_saved_nest_is_ignored(data: object) -> None:
+    assert from_dict(data, PARTS, STOCKS) is None
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        [0, 0, 0, 1.0],
+        [9, 0, 0, 1.0, 2.0],
+        [0, -1, 0, 1.0, 2.0],
+        [0, 0, 5, 1.0, 2.0],
+        [0, 0, 0, float("nan"), 2.0],
+        [0, 0, 0, "1", 2.0],
+        [1, 0, 0, 1.0, 2.0],
+        None,
+    ],
+)
+def test_a_spoilt_row_is_ignored(saved: Any, row: object) -> None:
+    saved["nests"]["TPE"][0] = row
+    assert from_dict(saved, PARTS, STOCKS) is None
+
+
+def test_another_stock_and_a_missing_row_or_material_are_nested_anew(saved: Any) -> None:
+    stocks = {**STOCKS, "PTFE": STOCKS["PTFE"].model_copy(update={"spacing": 0.8})}
+    assert from_dict(saved, PARTS, stocks) is None
+    del saved["nests"]["TPE"][0]
+    assert from_dict(saved, PARTS, STOCKS) is None
+    del saved["nests"]["TPE"]
+    assert from_dict(saved, PARTS, STOCKS) is None
+
+
+# What cannot be nested is refused in one sentence that names the field.
+
+
+PLATE = NestPart("demo", "P02", 1, "TPE", rectangle((0.0, 0.0), (92.0, 40.0)), 1)
+COINS, MANY = (
+    NestPart("demo", "P03", 1, "PTFE", disc((0.0, 0.0), 5.0), n) for n in (30, 1_000_000)
+)
+
+
+def test_a_part_that_fits_in_another_turn_only_is_no_error() -> None:
+    (result,) = nest([PLATE], {"TPE": Stock(width=62, length=120)})
+    assert result.sheets == 1
+
+
+@pytest.mark.parametrize(
+    ("part", "stock", "says"),
+    [
+        (
+            PLATE,
+            Stock(width=72.4, length=72.4),
+            r"P02 of demo \(92.0 x 40.0 mm\) .* usable 52.4 x 52.4 mm of sheets.tpe",
+        ),
+        (
+            PLATE,
+            Stock(width=80, length=60, border=30.0),
+            "sheets.tpe.border of 30 mm .* below 30 mm",
+        ),
+        (
+            PLATE,
+            Stock(spacing=40.0, pins=((76.2, 76.2, 3.0),)),
+            "no place 40 mm clear of the 1 sheets.tpe.pins",
+        ),
+        # Nine coins a sheet of 32 usable mm: 30 take four sheets.
+        (
+            COINS,
+            Stock(width=52, length=52, most=3),
+            "30 parts of PTFE need 4 sheets of 52 x 52 mm, sheets.ptfe.most allows 3",
+        ),
+        (MANY, Stock(), "need at least 4481 sheets"),
+    ],
+)
+def test_what_does_not_fit_is_refused(part: NestPart, stock: Stock, says: str) -> None:
+    with pytest.raises(DesignError, match=says):
+        nest([part], {"TPE": stock, "PTFE": stock})
+
+
+# The parts of a laminate: every piece, counted over layers and copies.
+
+
+@pytest.mark.parametrize(("copies", "template"), [(1, "3dof-15mm"), (4, "radial-15mm")])
+def test_the_parts_hold_all_film_of_the_laminate(copies: int, template: str) -> None:
+    laminate = build(load_design(template))
+    paths = {pattern: layers[0].profile for pattern, layers in laminate.patterns.items()}
+    parts = parts_of(laminate, paths, copies)
+    for material in ("TPE", "PTFE"):
+        layers = [layer for layer in laminate.layers if layer.film.material == material]
+        chosen = [part for part in parts if part.material == material]
+        area = copies * sum(layer.profile.area for layer in layers)
+        assert sum(part.count * part.region.area for part in chosen) == pytest.approx(area)
+        pieces = copies * sum(len(layer.profile.pieces) for layer in layers)
+        assert sum(part.count for part in chosen) == pieces
+    assert {part.design for part in parts} == {laminate.name}
+
+
+@pytest.mark.parametrize(
+    ("copies", "wall", "base"),
+    # Two films a balloon of six, less base, cap and the wall with the tab: 9 walls. A twentieth of
+    # 9 is 0.45, of 54 is 2.7, of 180 is 9; of 1, 6 and 20 bases it is 0.05, 0.3 and 1.
+    [(1, 1, 1), (6, 3, 1), (20, 9, 1)],
+)
+def test_every_pattern_has_a_twentieth_of_its_number_as_spares(
+    copies: int, wall: int, base: int
+) -> None:
+    design = load_design("1dof-5mm", [f"order.copies={copies}"])
+    laminate = build(design)
+    paths = {pattern: layers[0].profile for pattern, layers in laminate.patterns.items()}
+    plain = parts_of(laminate, paths, copies)
+    spared = parts_of(laminate, paths, copies, design.order.spare_parts)
+    more = {}
+    for few, many in zip(plain, spared, strict=True):
+        layers = laminate.patterns[few.pattern]
+        pieces = few.count / (copies * len(layers))
+        more[layers[0].role, len(layers)] = (many.count - few.count) / pieces
+    assert min(more.values()) >= 1
+    assert more["wall", 9] == wall
+    assert more["base", 1] == base

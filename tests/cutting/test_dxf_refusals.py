@@ -5,17 +5,23 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 
 import ezdxf
 import pytest
+from ezdxf.document import Drawing
+from ezdxf.entities.dxfgfx import DXFGraphic
 from ezdxf.layouts import Modelspace
 
+from sbafab.cutting.chaining import JOINED, check_clear, closed_loops
 from sbafab.cutting.dxf_read import _as_written, read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
-from sbafab.geometry.region import Region
+from sbafab.geometry.edges import Line, Point
+from sbafab.geometry.region import Region, disc
+from tests.quick import few
 
 OUTER = {"layer": "CUT_OUTER"}
 SQUARE = [(20.0, 0.0), (24.0, 0.0), (24.0, 4.0), (20.0, 4.0)]
@@ -205,3 +211,120 @@ def test_a_file_that_is_not_byte_for_byte_ours_is_read_by_ezdxf(plate_text: str)
         lambda text: re.sub(r"(?<=HANDSEED\n  5\n)\w+", "FFF", text),
     ):
         assert _as_written(doctored(plate_text)) is None
+
+
+# How other programs may say that a line is drawn as its layer's; what they may not say.
+
+
+Edit = Callable[[Drawing, DXFGraphic], object]
+
+
+def saved(edit: Edit, version: str = "R2010") -> str:
+    """A disc's cut file, changed and saved by ezdxf as another program might."""
+    text = dxf_text(disc((3.0, 2.0), 4.0).contours, {"DESIGN": "disc"})
+    document = ezdxf.read(StringIO(text))
+    document.dxfversion = version
+    edit(document, next(iter(document.modelspace().query("CIRCLE"))))
+    stream = StringIO()
+    document.write(stream)
+    return stream.getvalue()
+
+
+def coloured(entity: DXFGraphic, rgb: tuple[int, int, int]) -> None:
+    entity.rgb = rgb
+
+
+@pytest.mark.parametrize("version", few(["R2000", "R2004", "R2018"], 1))
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda d, e: None,
+        lambda d, e: e.dxf.set("color", 1),
+        lambda d, e: e.dxf.set("linetype", "BYLAYER"),
+        lambda d, e: e.dxf.set("linetype", "CONTINUOUS"),
+        lambda d, e: e.dxf.set("lineweight", 25),
+        lambda d, e: d.layers.get("CUT_OUTER").dxf.set("lineweight", 50),
+        lambda d, e: d.layers.get("ENGRAVE").off(),
+        lambda d, e: d.layers.get("REFERENCE").dxf.set("plot", 1),
+    ],
+)
+def test_what_cuts_the_same_is_read(edit: Edit, version: str) -> None:
+    assert len(read_profile(saved(edit, version)).region.outers) == 1
+
+
+def test_a_true_colour_may_be_the_layers() -> None:
+    assert read_profile(saved(lambda d, e: coloured(e, (255, 0, 0)))).region.outers
+
+
+def test_an_entity_marked_as_one_of_paper_space_is_refused() -> None:
+    text = saved(lambda d, e: None).replace(
+        "CUT_OUTER\n100\nAcDbC", "CUT_OUTER\n 67\n1\n100\nAcDbC"
+    )
+    with pytest.raises(OutputError, match="CIRCLE is in paper space"):
+        read_profile(text)
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (lambda d, e: d.layers.get("REFERENCE").off(), "REFERENCE is off"),
+        (lambda d, e: d.layers.remove("CUT_OUTER"), "not in the layer table"),
+        (lambda d, e: e.dxf.set("thickness", 2.0), "2 mm high"),
+        (lambda d, e: setattr(e, "transparency", 0.5), "is transparent"),
+    ],
+)
+def test_what_may_be_skipped_is_refused(edit: Edit, said: str) -> None:
+    """The catalogue of faults has the other ways."""
+    with pytest.raises(OutputError, match=said):
+        read_profile(saved(edit))
+
+
+# Loose edges become contours, also where edges are shorter than ends may lie apart.
+
+
+# A square of 1 mm whose last corner is cut off by three edges of half a micrometre each.
+TINY = 0.0005
+CORNERS = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.001, 1.0), (0.0007, 0.9996), (0.0003, 0.9993)]
+
+
+def square(apart: float = 0.0) -> list[Line]:
+    """Edges of the square, each end ``apart`` mm from where the next one starts."""
+    closed: list[Point] = [*CORNERS, (0.0, 0.9992), CORNERS[0]]
+    return [Line((a[0], a[1] + apart), b) for a, b in pairwise(closed)]
+
+
+def test_tiny_edges_whose_ends_meet_stay() -> None:
+    edges = square()
+    assert min(edge.length for edge in edges) < TINY < JOINED
+    (contour,) = closed_loops(edges[::-1])
+    assert len(contour.edges) == len(edges)
+
+
+@pytest.mark.parametrize("apart", [0.0002, 0.0009])
+def test_tiny_edges_whose_ends_lie_apart_become_a_corner(apart: float) -> None:
+    (contour,) = closed_loops(square(apart))
+    assert 4 <= len(contour.edges) < len(square())
+    assert abs(contour.area) == pytest.approx(1.0, abs=4 * JOINED)
+
+
+def test_a_tiny_line_by_itself_is_refused() -> None:
+    with pytest.raises(OutputError, match=r"contour open at x 3\.000, y 3\.000; close it\."):
+        closed_loops([*square(), Line((3.0, 3.0), (3.0, 3.0 + TINY))])
+
+
+def test_an_edge_drawn_twice_is_refused() -> None:
+    edges = square()
+    with pytest.raises(OutputError, match="3 edges end at x"):
+        closed_loops([*edges, edges[0].reversed()])
+
+
+@pytest.mark.parametrize("centre", [1.5, 0.5])
+def test_circles_that_just_touch_are_refused(centre: float) -> None:
+    """Discs of 1 and 0.5 mm, the small one outside (1 + 0.5) or inside (1 - 0.5)."""
+    way = 1 if centre > 1 else -1
+    for overlap in (0.0, 1e-5):
+        small = disc((centre - way * overlap, 0.0), 0.5)
+        with pytest.raises(OutputError, match=r"contours touch or cross at x 1\.000"):
+            check_clear([*disc((0, 0), 1.0).contours, *small.contours])
+    small = disc((centre + way * 1e-4, 0.0), 0.5)
+    check_clear([*disc((0, 0), 1.0).contours, *small.contours])

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import re
 
+import ezdxf
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from sbafab.cutting.cut_settings import DxfProfile
+from sbafab.cutting.cut_settings import COLOURS, DxfProfile
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import dxf_text, number
+from sbafab.cutting.dxf_write import SKELETON, dxf_text, number, skeleton_text
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.contour import in_reading_order
@@ -87,3 +88,22 @@ def test_extents_bound_the_drawing(plate: Region, plate_text: str) -> None:
 )
 def test_numbers_have_no_exponent_and_no_negative_zero(value: float, text: str) -> None:
     assert number(value) == text
+
+
+# The packaged empty document is what ezdxf writes.
+
+
+@pytest.mark.skipif(ezdxf.version < (1, 4), reason="older ezdxf writes more tags")
+def test_packaged_document_is_the_one_ezdxf_writes() -> None:
+    assert SKELETON.read_text(encoding="utf-8") == skeleton_text()
+
+
+def test_it_is_an_empty_document_in_millimetres_with_the_cut_layers() -> None:
+    document = ezdxf.readfile(SKELETON)
+    assert document.dxfversion == "AC1024"
+    assert (document.header["$INSUNITS"], document.header["$MEASUREMENT"]) == (4, 1)
+    assert len(document.modelspace()) == 0
+    colours = {layer.dxf.name: layer.dxf.color for layer in document.layers}
+    assert colours.items() >= COLOURS.items()
+    assert document.layers.get("REFERENCE").dxf.plot == 0
+    assert document.layers.get("CUT_OUTER").dxf.plot == 1

@@ -21,7 +21,7 @@ from sbafab.geometry.contour import (
     nanometres,
 )
 from sbafab.geometry.edges import Arc, Line, Point
-from sbafab.geometry.offset import fillet
+from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.region import (
     Region,
     centroid,
@@ -35,6 +35,8 @@ from sbafab.geometry.region import (
     strip,
     union,
 )
+from tests.cutting.shapes import coarse, shapes
+from tests.hunt.oracle import flat
 
 RING = disc((0, 0), 3) - disc((0.5, 0), 1)
 STAR = polygon([(0, 0), (2, 2), (4, 0), (3, 2), (4, 4), (2, 2.5), (0, 4), (1, 2)])
@@ -89,10 +91,10 @@ def started_elsewhere(region: Region, by: int) -> Region:
 
 
 def test_the_key_forgets_starts_and_order_and_tells_shapes_apart() -> None:
-    shapes = [disc((1, 2), 3), disc((1, 2), 3.00001), disc((1.00001, 2), 3), RING]
-    shapes += [rectangle((0, 0), (3, 4)), rectangle((0, 0), (4, 3)), stadium((0, 0), 2, 7)]
-    assert len({shape.key for shape in shapes}) == len(set(shapes)) == len(shapes)
-    for shape, by in itertools.product(shapes, (1, 2, 3)):
+    listed = [disc((1, 2), 3), disc((1, 2), 3.00001), disc((1.00001, 2), 3), RING]
+    listed += [rectangle((0, 0), (3, 4)), rectangle((0, 0), (4, 3)), stadium((0, 0), 2, 7)]
+    assert len({shape.key for shape in listed}) == len(set(listed)) == len(listed)
+    for shape, by in itertools.product(listed, (1, 2, 3)):
         assert started_elsewhere(shape, by).key == shape.key
         assert started_elsewhere(shape, by).moved(1e-6, 0) == shape
     discs = [disc((2 * math.cos(a), 2 * math.sin(a)), 1.5) for a in (0, 2, 4)]
@@ -242,3 +244,57 @@ def test_flattened_arcs_stay_within_the_sagitta(sagitta: float) -> None:
             middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
             assert math.dist(a, centre) == pytest.approx(radius)
             assert radius - math.dist(middle, centre) <= sagitta * (1 + 1e-9)
+
+
+# What the hunt does not ask: pieces, fillets and the order of a union, on grids of shapes.
+#
+# Edges of drawn shapes often coincide, only touch, or lie a hair apart; shapely is the judge.
+
+
+FINE = 2e-5
+"""mm a chord may leave its arc."""
+QUADRANT = 128
+"""Chords a quadrant in shapely's buffers."""
+
+
+@given(st.lists(shapes(), min_size=2, max_size=4), st.randoms(use_true_random=False))
+def test_the_order_of_a_union_does_not_matter(parts: list[Region], random: object) -> None:
+    mixed = list(parts)
+    random.shuffle(mixed)  # type: ignore[attr-defined]
+    assert union(mixed).area == pytest.approx(union(parts).area, abs=1e-4)
+
+
+@given(
+    st.lists(st.tuples(coarse, coarse), min_size=2, max_size=6, unique=True),
+    st.sampled_from([0.2, 0.3, 0.45, 0.6, 0.8]),
+    shapes(),
+)
+def test_the_number_of_pieces(
+    spots: list[tuple[float, float]], radius: float, tool: Region
+) -> None:
+    """Of dots that neither coincide nor touch: shapely counts them dependably."""
+    dots, wider = union([disc((2 * x, y), radius) for x, y in spots]), grow(tool, 0.01)
+    theirs, other = flat(dots, FINE), flat(tool, FINE).buffer(0.01)
+    for ours, expected in (
+        (dots, theirs),
+        (dots - wider, theirs.difference(other)),
+        (dots | wider, theirs.union(other)),
+    ):
+        # Slivers this small are made or lost by flattening.
+        count = sum(part.area > 1e-3 for part in shapely.get_parts(expected))
+        assert sum(piece.area > 1e-3 for piece in ours.pieces) == count
+
+
+@given(
+    st.lists(shapes(), min_size=1, max_size=4), shapes(), st.sampled_from([0.11, 0.25, 0.37, 0.5])
+)
+def test_fillets(parts: list[Region], tool: Region, radius: float) -> None:
+    """Where a gap is just twice the radius wide, a hair more or less decides: both are right."""
+    region = union(parts) - tool
+    shape, ends = flat(region, FINE), []
+    for reach in (radius * (1 - 2e-4), radius, radius * (1 + 2e-4)):
+        grown = shape.buffer(reach, quad_segs=QUADRANT)
+        ends.append(grown.buffer(-reach, quad_segs=QUADRANT).area)
+    # Shapely first drops detail of up to a hundredth of the radius.
+    error = 1e-4 + (FINE + 2e-4) * sum(contour.length for contour in region.contours)
+    assert min(ends) - error <= fillet(region, radius).area <= max(ends) + error

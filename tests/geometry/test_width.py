@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import math
 import random
+import textwrap
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import shapely
 
+from sbafab.actuators import build, load_design
 from sbafab.geometry.contour import Contour
-from sbafab.geometry.edges import Point
+from sbafab.geometry.edges import Point, unit
+from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.overlap_pairs import overlap_pairs
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union
 from sbafab.geometry.width import Width, inscribed_disc, least_gap, least_width
+from sbafab.rules import bond_width
+from sbafab.rules.film_limits import SHARP
+from sbafab.rules.measures import Measures
 
 AXIS = (0.0, 0.0)
 EXACT = 1e-9
@@ -217,3 +225,152 @@ def test_the_least_width_of_a_finely_drawn_ring_is_found_among_far_and_near_edge
     assert width.value == pytest.approx(flat, abs=EXACT)
     assert gap is not None
     assert gap.value == pytest.approx(10.0 * flat, abs=EXACT)
+
+
+# A slot is as narrow as its flanks are where its bottom begins: round, flat or a point.
+
+
+PLATE = rectangle((-3.0, -4.0), (5.0, 4.0))
+
+
+def wedge(radius: float, taper: float) -> Region:
+    """A slot that opens to the right by ``taper`` degrees from the tangents of a round bottom."""
+    away: list[Point] = []
+    for side in (-1.0, 1.0):
+        x, y = unit(90.0 + taper / 2)
+        flank = unit(taper / 2)
+        foot = (radius * x, side * radius * y)
+        away += [foot, (foot[0] + 9.0 * flank[0], foot[1] + side * 9.0 * flank[1])]
+    lower, far_below, upper, far_above = away
+    return polygon([lower, far_below, far_above, upper]) | disc((0.0, 0.0), radius)
+
+
+def trough(bottom: float, taper: float) -> Region:
+    """A slot that opens to the right by ``taper`` degrees from a flat bottom at x = 0."""
+    half = bottom / 2 + 9.0 * math.tan(math.radians(taper / 2))
+    foot = [(0.0, bottom / 2), (0.0, -bottom / 2)] if bottom else [(0.0, 0.0)]
+    return polygon([*foot, (9.0, -half), (9.0, half)])
+
+
+@pytest.mark.parametrize("turn", [0.0, 37.0])
+@pytest.mark.parametrize("taper", [4.0, 14.0, 16.0, 22.0, 29.5, 30.5, 45.0, 90.0])
+def test_a_point_is_narrower_than_any_flat_bottom_between_the_same_flanks(
+    taper: float, turn: float
+) -> None:
+    pointed, flat = (
+        least_gap((PLATE - trough(bottom, taper)).turned(turn), SHARP) for bottom in (0.0, 0.139)
+    )
+    if taper > SHARP:
+        assert (pointed, flat) == (None, None)
+    else:
+        assert pointed is not None
+        assert flat is not None
+        assert pointed.value == 0.0
+        assert flat.value == pytest.approx(0.139, abs=1e-6)
+
+
+@pytest.mark.parametrize("taper", [2.0, 10.0, 24.5])
+def test_a_round_bottom_is_as_wide_as_between_its_tangent_points(taper: float) -> None:
+    gap = least_gap(PLATE - wedge(0.3, taper), SHARP)
+    assert gap is not None
+    assert gap.value == pytest.approx(0.6 * math.cos(math.radians(taper / 2)), abs=1e-6)
+
+
+@pytest.mark.parametrize("radius", [0.1, 0.2, 0.4])
+@pytest.mark.parametrize("taper", [0.0, 8.0, 24.0])
+def test_a_filleted_flat_bottom_is_as_wide_as_where_its_fillets_begin(
+    radius: float, taper: float
+) -> None:
+    lean = math.radians(taper / 2)
+    along_flank = radius * math.tan((math.pi / 2 - lean) / 2)
+    gap = least_gap(fillet(PLATE - trough(1.0, taper), radius), SHARP)
+    assert gap is not None
+    assert gap.value == pytest.approx(1.0 + 2 * along_flank * math.sin(lean), abs=1e-6)
+
+
+def test_a_drop_is_as_wide_as_its_round_end() -> None:
+    lean = math.radians(10.0)
+    tangent = (math.sin(lean), math.cos(lean))
+    tip = (1.0 / math.sin(lean), 0.0)
+    drop = disc((0.0, 0.0), 1.0) | polygon([(tangent[0], -tangent[1]), tip, tangent])
+    width = least_width(drop, 15.0)
+    assert width is not None
+    assert width.value == pytest.approx(2.0, abs=1e-6)
+
+
+def test_a_blunter_or_filleted_corner_is_no_slot() -> None:
+    assert least_gap(PLATE - wedge(0.3, 35.0), SHARP) is None
+    for angle in (60.0, 90.0, 120.0):
+        x, y = unit(angle)
+        notched = disc((0.0, 0.0), 4.0) - polygon([(0.0, 0.0), (9.0, 0.0), (9.0 * x, 9.0 * y)])
+        assert least_gap(fillet(notched, 0.05), SHARP) is None
+
+
+# A line that runs into the arc of a round corner does not face it, whatever its radius.
+
+
+@pytest.mark.parametrize("radius", [0.5, 1.0, 2.0, 4.0])
+def test_the_width_of_a_rounded_rectangle_is_its_shorter_side(radius: float) -> None:
+    width = least_width(grow(rectangle((-8.0, -3.0), (8.0, 3.0)), radius))
+    assert width is not None
+    assert width.value == pytest.approx(6.0 + 2 * radius)
+
+
+# A web between two corners of which no edge faces the other was taken for 0.750 mm wide.
+#
+# Strips of film cross the hollow between two drawn pockets and enclose a gap there; between the gap
+# and the outside the web is narrowest along a strip's side.
+
+
+POCKET = """\
+M7.4385,-0.5690 L7.1693,0.5514 L6.4333,1.4903 L5.4036,2.1357 L4.2995,2.4855 L3.3106,2.6463
+L2.5349,2.7889 L1.9536,3.0784 L1.4512,3.6046 L0.8727,4.3405 L0.0950,5.1447 L-0.9149,5.8070
+L-2.0789,6.1209 L-3.2302,5.9565 L-4.1733,5.3053 L-4.7559,4.2815 L-4.9272,3.0795
+L-4.7578,1.9034 L-4.4150,0.8963 L-4.1010,0.0956 L-3.9778,-0.5690 L-4.1065,-1.2344
+L-4.4243,-2.0372 L-4.7684,-3.0468 L-4.9365,-4.2242 L-4.7620,-5.4255 L-4.1755,-6.4462
+L-3.2293,-7.0927 L-2.0767,-7.2520 L-0.9133,-6.9342 L0.0950,-6.2706 L0.8710,-5.4678
+L1.4490,-4.7357 L1.9527,-4.2146 L2.5371,-3.9299 L3.3167,-3.7903 L4.3088,-3.6302
+L5.4143,-3.2790 L6.4427,-2.6313 L7.1748,-1.6902 Z
+"""
+DESIGN = """
+    name = "web"
+    family = "lobed"
+    [stack]
+    balloons = 2
+    [bore]
+    diameter = 1.04
+    [fillet]
+    radius = 1
+    [inlet]
+    tab_length = 10.214
+    width = 3.572
+    [lumen]
+    diameter = 4.194
+    [chamber]
+    outline = "pocket.svg"
+    count = 3
+    axis_radius = 9.384
+"""
+STRIPS = union(
+    strip((0.0, 0.0), (9.5703 * x, 9.5703 * y), 1.0) for x, y in map(unit, (60, 180, 300))
+)
+
+
+def test_the_web_is_as_wide_as_shapely_finds_it(tmp_path: Path) -> None:
+    view = 'viewBox="-50 -50 100 100" width="100mm" height="100mm"'
+    svg = f'<svg xmlns="http://www.w3.org/2000/svg" {view}><path d="{POCKET}"/></svg>'
+    (tmp_path / "pocket.svg").write_text(svg)
+    (tmp_path / "web.toml").write_text(textwrap.dedent(DESIGN))
+    design = load_design(str(tmp_path / "web.toml"))
+    laminate = build(design)
+    layers = [
+        layer if layer.is_mask else replace(layer, profile=layer.profile | STRIPS)
+        for layer in laminate.layers
+    ]
+    laminate = replace(laminate, layers=tuple(layers))
+    (bond,) = laminate.interfaces[0].bond.shapely().geoms
+    web = min(bond.exterior.distance(hole) for hole in bond.interiors)
+    (finding,) = bond_width.check(Measures(laminate, design))
+    assert finding.verdict == "fail"
+    assert finding.measured == pytest.approx(web, abs=2e-3)
+    assert web < 0.6

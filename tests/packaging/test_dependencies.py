@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import tomllib
+from collections import defaultdict
 from pathlib import Path
 
 from sbafab.cli import EXTRAS
@@ -73,3 +74,47 @@ def test_the_extra_all_and_help_have_every_extra() -> None:
     (said,) = EXTRA["all"]
     assert said == f"sbafab[{','.join(sorted(EXTRA.keys() - APART))}]"
     assert set(EXTRAS) == EXTRA.keys() - APART
+
+
+# A public class or type has its name to itself, wherever in the package it stands.
+
+
+PACKAGE = Path(__file__).parents[2] / "sbafab"
+WORDS_OF_FILES = {"Bore", "Chamber", "Inlet", "Line", "Stack", "Tube"}
+"""Tables of a design or assembly file, which are called as the things that they ask for."""
+
+
+def test_no_two_modules_use_one_name_for_two_things() -> None:
+    places: dict[str, list[str]] = defaultdict(list)
+    for source in sources(PACKAGE):
+        for name in source.public_types:
+            places[name].append(source.path.relative_to(PACKAGE).as_posix())
+    twice = {name: where for name, where in places.items() if len(where) > 1}
+    assert {name: twice[name] for name in twice.keys() - WORDS_OF_FILES} == {}
+    assert twice.keys() >= WORDS_OF_FILES
+
+
+# Records do not change after they are made, but for a few that hold a state.
+
+
+STATES = {
+    "geometry/edges.py": {"Arc", "Line"},
+    "models/motion.py": {"Motion", "BatchMotion"},
+    "folders/artefacts.py": {"DesignFolder"},
+    "rules/voids.py": {"VoidGraph"},
+    "studio/answers.py": {"AnswerShapes"},
+    "studio/app.py": {"Studio"},
+    "studio/workers.py": {"WaitingJob"},
+}
+"""Dataclasses that gather or step, by module. Edges keep their lengths and boxes; as frozen records
+they would take a fifteenth more of the time of a check.
+"""
+
+
+def test_records_are_frozen() -> None:
+    changeable = {
+        source.path.relative_to(PACKAGE).as_posix(): source.unfrozen
+        for source in sources(PACKAGE)
+        if source.unfrozen
+    }
+    assert changeable == STATES

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import checking, plates_sbafab
+from benchmarks.scaling import rules_and_cut_files
+from benchmarks.task import plates
 from tests import __main__ as command
 from tests.quick import few
 
@@ -84,3 +87,17 @@ def test_a_few_cases_stay_in_the_suite_and_the_rest_is_long(
     cases = few(range(size), count)
     assert [getattr(case, "values", (case,)) for case in cases] == [(n,) for n in range(size)]
     assert {n for n, case in enumerate(cases) if not is_long(case)} == stay
+
+
+# The benchmarks' tasks are done as they say; how fast is for them to tell.
+
+
+def test_plates_are_right_and_have_true_arcs(tmp_path: Path) -> None:
+    plates_sbafab.main(tmp_path)
+    assert len(list(tmp_path.iterdir())) == len(plates())
+    assert checking.complaint(tmp_path) is None
+    assert checking.has_true_arcs(tmp_path)
+
+
+def test_rules_and_cut_files_are_timed() -> None:
+    assert rules_and_cut_files(1, 0) > 0

@@ -6,25 +6,34 @@ import itertools
 import math
 import re
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 import shapely
 
+from sbafab.assemblies.build import Assembled, assemble
+from sbafab.assemblies.files import assembly_of
+from sbafab.design.files import read_toml, templates_folder
+from sbafab.design.sections import Acceptance
+from sbafab.laminate.burst import burst
 from sbafab.laminate.lay_up import press_steps
 from sbafab.reports.drawing import text_width
 from sbafab.reports.prints import seams_pdf
+from sbafab.reports.traveller.assembly_page import PartJoint, joints
 from sbafab.reports.traveller.lay_up import beds
 from sbafab.reports.traveller.lay_up import pitch as pitch_of
 from sbafab.reports.traveller.page import (
     PressPage,
+    acceptance,
     joint_pages,
+    proof,
     step_pages,
     straight_run,
 )
 from sbafab.reports.traveller.pictures import plan
-from tests.reports.pages import DOUBLE, EARS, bench, built, page, words_of, work_of
+from tests.reports.pages import DOUBLE, EARS, TPU, bench, built, page, words_of, work_of
 
 TPE, PTFE, BOND, OVERHANG = 0.038, 0.025, 0.75, 0.5
 
@@ -241,3 +250,134 @@ def test_the_places_of_a_full_plate_are_said_as_a_grid() -> None:
     for n, place in enumerate(work.cycles.places):
         assert place == pytest.approx(((n % columns) * right, (n // columns) * back), abs=2e-2)
     assert "place 2 by" not in words
+
+
+# The traveller's steps of joining: an order that can be done, parts placed as they are drawn.
+
+
+def together(template: str, **parts: dict[str, Any]) -> Assembled:
+    data = read_toml(templates_folder() / f"{template}.toml")
+    for name, keys in parts.items():
+        data["parts"].setdefault(name, {}).update(keys)
+    return assemble(assembly_of(data, templates_folder() / "some.toml"))
+
+
+def joint(assembled: Assembled, name: str) -> PartJoint:
+    [found] = [one for one in joints(assembled) if one.placed.name == name]
+    return found
+
+
+def test_a_line_is_threaded_while_both_ends_can_be_reached() -> None:
+    brace = together("brace")
+    names = [one.placed.name for one in joints(brace)]
+    assert names == ["tube", "grip", "vacuum", "arm", "cup"]
+    assert joint(brace, "arm").lines == ["vacuum"]
+    # The root is there before what it carries.
+    line = {"kind": "line", "on": "arm", "at": "lumen", "length": 30, "along": -5}
+    names = [one.placed.name for one in joints(together("aperture", feed=line))]
+    assert names.index("arm") == 0 < names.index("feed")
+
+
+@pytest.mark.parametrize("end", ["end", "start"])
+@pytest.mark.parametrize("turn", [0, 60, 180, 250])
+def test_the_tab_points_where_it_is_said_to(end: str, turn: float) -> None:
+    assembled = together("standing", head={"at": end, "turn": turn})
+    head = assembled["head"]
+    assert head.made is not None
+    (mouth_x, mouth_y) = head.made.laminate.inlets[0].mouth
+    # The tube lies; in its own frame the marked line is at x, and its end is looked at from above.
+    tube = assembled["tube"]
+    at = head.at((mouth_x, mouth_y, 0.0))
+    x_axis, y_axis = (
+        [b - a for a, b in zip(tube.at((0, 0, 0)), tube.at(unit), strict=True)]
+        for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    )
+    x, y = (sum(a * b for a, b in zip(at, axis, strict=True)) for axis in (x_axis, y_axis))
+    drawn = math.degrees(math.atan2(y, x)) * (1 if end == "end" else -1) % 360
+    told = joint(assembled, "head").heading
+    assert math.cos(math.radians(told - drawn)) == pytest.approx(1)
+
+
+@pytest.mark.parametrize(("at", "up"), [("top", 5), ("bottom", -5)])
+def test_a_place_on_a_plate_is_said_as_it_is_seen(at: str, up: float) -> None:
+    plate = {"kind": "base", "width": 60, "length": 30, "thickness": 2, "material": "acrylic"}
+    two = {"kind": "sba", "design": "1dof-5mm", "on": "plate", "at": at, "offset": [-15, 5]}
+    tables = {"name": "own", "family": "assembly", "parts": {"plate": plate, "two": two}}
+    own = assemble(assembly_of(tables, templates_folder() / "some.toml"))
+    assert joint(own, "two").aside == (-15, up)
+
+
+def test_supply_tubes_run_where_no_balloon_opens() -> None:
+    """Three SBAs at 0, 120 and 240 degrees round the tube; the gaps are half way between."""
+    runs = joint(together("brace"), "arm").supply
+    assert [run.angle % 360 for run in runs] == pytest.approx([60, 180, 300])
+    assert [run.over for run in runs] == [()] * 3
+    crossing = joint(together("brace", arm={"turn": 0}), "arm").supply
+    assert {name for run in crossing for name in run.over} == {"grip"}
+    assert joint(together("aperture"), "arm").supply == ()
+
+
+def test_stacked_actuators_go_by_each_others_tabs() -> None:
+    second = {"kind": "sba", "design": "1dof-5mm", "on": "arm", "at": "top", "turn": 90}
+    assert joint(together("aperture", second=second), "second").heading == 90
+    tube = {"kind": "tube", "on": "arm", "at": "top", "turn": 30}
+    assert joint(together("aperture", tube=tube), "tube").heading == 30
+
+
+def test_a_wrap_is_glued_with_what_its_design_names() -> None:
+    bare = together("brace")
+    part = bare["grip"].part.model_copy(update={"glue": None})
+    parts = tuple(replace(p, part=part) if p.name == "grip" else p for p in bare.parts)
+    assert joint(replace(bare, parts=parts), "grip").glue == "3M 1587"
+
+
+# What an actuator must stand: the proof pressure, and the fitting that it is tested with.
+
+
+@pytest.mark.parametrize(
+    ("template", "changes", "expected", "proved"),
+    [
+        # 367 kPa with pockets of 5 mm in 0.038 (paper, Sec. 4): p r / 2 t is what the film bears.
+        ("1dof-5mm", (), 367.0, 150.0),
+        ("3dof-15mm", (), 367.0, 150.0),
+        ("1dof-10mm", (), 367.0 / 2, 110.0),
+        ("1dof-10mm", ("films.tpe.thickness=0.057",), 367.0 / 2 * 1.5, 150.0),
+        # A pocket 10 wide is a cylinder of radius 10 / pi, whose film bears p r / t.
+        ("radial-15mm", (), 367.0 * 2.5 / (2 * 10 / math.pi), 85.0),
+        ("1dof-5mm", ("acceptance.proof_pressure_kpa=120",), 367.0, 120.0),
+        ("1dof-5mm", ("films.tpe.product=TPU", "films.tpe.thickness=0.038"), None, None),
+        ("1dof-5mm", (*TPU, "acceptance.proof_pressure_kpa=60"), None, 60.0),
+    ],
+)
+def test_proof_pressure_stays_well_below_the_burst(
+    template: str, changes: tuple[str, ...], expected: float | None, proved: float | None
+) -> None:
+    work = work_of(template, *changes)
+    estimate = burst(work.laminate)
+    assert (estimate is None) == (expected is None)
+    if estimate is not None:
+        assert estimate.kpa == pytest.approx(expected, rel=1e-6)
+    found = proof(work)
+    assert found.kilopascals == proved
+    if expected is not None and found.kilopascals is not None:
+        assert found.kilopascals <= 0.6 * expected
+    assert (found.paper_kpa, found.paper_error) == (367, 18)
+
+
+def test_the_needle_holds_in_the_tubes_bore() -> None:
+    """0.02825 in of 22 gauge over the tube's 0.025 in: 13 % wider."""
+    assert "22 G (outer diameter 0.718 mm)" in Acceptance().fitting
+    assert (
+        acceptance(work_of("3dof-15mm"))["bore"] == 0.635 == pytest.approx(0.718 / 1.13, abs=1e-3)
+    )
+
+
+def test_chambers_of_one_net_are_filled_by_its_first_tube() -> None:
+    """What comes out of the other is no leak between chambers."""
+    diode, gripper = (acceptance(work_of(name)) for name in ("diode", "gripper"))
+    assert diode["shared"] == {"through": ["in", "out"]}
+    assert diode["filled"] == []
+    # The channel lies between base and wall, the pocket between wall and cap.
+    assert diode["tab_films"] == {(1, 3): ["in"], (3, 5): ["out"]}
+    assert gripper["shared"] == {}
+    assert len(gripper["filled"]) > 1

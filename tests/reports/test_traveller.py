@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections import Counter
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +21,19 @@ from lxml import html as lxml_html
 from sbafab.cutting.cut_settings import COLOURS, CUT_SEQUENCE, REFERENCE
 from sbafab.design.records import keys_of
 from sbafab.design.sections import Acceptance
+from sbafab.folders.build import make_build
 from sbafab.geometry.region import Region
 from sbafab.lab.recording import entries_of
 from sbafab.reports.traveller import formatting
 from sbafab.reports.traveller.bench import cutting, held_films
+from sbafab.reports.traveller.findings import findings_html, other_hands
 from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS
 from sbafab.reports.traveller.work import HANDLING_MINUTES, cut_list, release_films, times
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding, Place
 from tests.quick import few
-from tests.reports.pages import EARS, TPU, bench, page, words_of, work_of
+from tests.reports.pages import EARS, TPU, bench, built, page, words_of, work_of
 
 DESIGNS = [
     ("3dof-15mm",),
@@ -263,3 +266,29 @@ def test_keys_of_a_design_file_are_not_for_the_bench(design: tuple[str, ...]) ->
             code.drop_tree()
         words = words_of(tree)
         assert [key for key in sorted(keys) if re.search(rf"(?<![\w.]){key}\b", words)] == []
+
+
+# findings.html: what the rules found, and how the hand tells, for whoever designs.
+
+
+def test_a_rougher_hand_has_fewer_good_builds() -> None:
+    design, laminate = built("1dof-5mm", "stack.balloons=2")
+    hands = other_hands(laminate, design)
+    assert [hand.placement for hand in hands] == [0.04, 0.12, 0.16, 0.2]
+    assert all(one.share > other.share for one, other in pairwise(hands))
+    # What warns stands before what holds; no pin is offered that could not be had out again.
+    text = findings_html(design.name, "0" * 64, [make_build(design)])
+    assert text.index("<td>warn</td>") < text.index("Remedies") < text.index("<td>pass</td>")
+    assert "lumen" not in text[text.index("Remedies") : text.index("Passes")]
+
+
+def test_with_ears_no_hand_decides() -> None:
+    design, laminate = built("1dof-5mm", "stack.balloons=2", EARS)
+    assert other_hands(laminate, design) == ()
+
+
+def test_words_from_outside_stay_words_among_findings() -> None:
+    hostile = "<script>alert(1)</script>"
+    found = Finding("bond-width", "warn", 1.0, None, "mm", Place(), hostile)
+    text = findings_html(hostile, "0" * 64, [], [found])
+    assert text.count("alert(1)") == text.count("&gt;alert(1)")
