@@ -10,7 +10,7 @@ import math
 import random
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 import shapely
@@ -66,14 +66,9 @@ def operation(number: int, kind: str, name: str = "''", **fields: object) -> str
 
 
 def drawn(number: int, sketch_id: int, layers: tuple[int, ...] = IDS, name: str = "''") -> str:
-    return operation(
-        number,
-        "SimpleSketchOp",
-        name,
-        layer_links=[*layers],
-        operation_links="{}",
-        sketch_links=f"{{sketch: [{sketch_id}]}}",
-    )
+    sketch_links = f"{{sketch: [{sketch_id}]}}"
+    fields = {"layer_links": [*layers], "operation_links": "{}", "sketch_links": sketch_links}
+    return operation(number, "SimpleSketchOp", name, **fields)
 
 
 def combined(number: int, function: str, unary: list[int], binary: list[int]) -> str:
@@ -124,14 +119,8 @@ PLATE = shape("GenericTwoPointRect", (-21.0, -16.0), (21.0, 16.0))
 CIRCLE = shape("GenericCircle", (3.0, 1.0), (7.0, 4.0))
 LINE = shape("GenericLine", (-30.0, 2.0), (30.0, 5.0))
 BENT = shape("GenericPolyline", (-10.0, -10.0), (0.0, -4.0), (10.0, -10.0))
-HOLED = shape(
-    "GenericPoly",
-    (-8.0, -8.0),
-    (12.0, -8.0),
-    (12.0, 8.0),
-    (-8.0, 8.0),
-    holes=[[(0.0, 0.0), (4.0, 0.0), (4.0, 4.0)]],
-)
+CORNERS = ((-8.0, -8.0), (12.0, -8.0), (12.0, 8.0), (-8.0, 8.0))
+HOLED = shape("GenericPoly", *CORNERS, holes=[[(0.0, 0.0), (4.0, 0.0), (4.0, 4.0)]])
 GUIDE = shape("GenericLine", (0.0, 0.0), (9.0, 9.0), construction=True)
 SKETCHES = {
     1: sketch("plate", PLATE, GUIDE),
@@ -173,74 +162,55 @@ ON_BOTH = shapely.union_all(
     [laid(FRAME, math.pi / 2, 1.5, 1, 1), laid(FRAME, SLOPE, REACH / 2, -30, 2)]
 )
 STRETCHED = {"transformtype_x": "custom", "transformtype_y": "custom"}
-CASES: dict[str, tuple[list[str], tuple[shapely.Geometry, ...]]] = {
-    "difference of several": (
+
+
+class Case(NamedTuple):
+    """Operations, and what shapely makes of each layer by the last of them."""
+
+    operations: list[str]
+    judge: tuple[shapely.Geometry, ...]
+
+
+FROZEN = (
+    f"{OBJECT}filetypes.genericlaminate.GenericLaminate "
+    f"{{geoms: {{? {OBJECT}filetypes.material2.Material2 {{id: 12}} : [{HOLED}]}}}}"
+)
+LAYERS = {"unary_layer_links": [11], "pair_layer_links": [12], "output_layer_links": [12, 13]}
+CASES = {
+    "difference of several": Case(
         [drawn(1, 1), drawn(2, 2), drawn(3, 4, (11,)), combined(4, "difference", [1], [2, 3])],
         (RECTANGLE - (ROUND | FRAME), RECTANGLE - ROUND, RECTANGLE - ROUND),
     ),
-    "symmetric difference": (
+    "symmetric difference": Case(
         [drawn(1, 2), drawn(2, 4, (11, 12)), combined(3, "symmetric_difference", [1], [2])],
         (ROUND ^ FRAME, ROUND ^ FRAME, ROUND),
     ),
-    "lines widened": (
-        [drawn(1, 3), widened(2, 1, 0.75)],
-        (wide(RULED, 0.75),) * 3,
-    ),
-    "lines outside an area, widened": (
+    "lines widened": Case([drawn(1, 3), widened(2, 1, 0.75)], (wide(RULED, 0.75),) * 3),
+    "lines outside an area, widened": Case(
         [drawn(1, 3), drawn(2, 4), combined(3, "difference", [1], [2]), widened(4, 3, 1.0)],
         (wide(RULED - FRAME, 1.0),) * 3,
     ),
-    "cleaned": (
+    "cleaned": Case(
         [drawn(1, 4), widened(2, 1, 1.0, "Cleanup2")],
         (wide(wide(wide(FRAME, -1.0), 2.0), -1.0),) * 3,
     ),
-    "flipped and moved up": (
-        turned(flip=True, rotate=False),
-        (NOTHING, FRAME, NOTHING),
-    ),
-    "turned round": (
-        turned(flip=False, rotate=True),
-        (FRAME, ROUND, NOTHING),
-    ),
-    "layers of one": (
+    "flipped and moved up": Case(turned(flip=True, rotate=False), (NOTHING, FRAME, NOTHING)),
+    "turned round": Case(turned(flip=False, rotate=True), (FRAME, ROUND, NOTHING)),
+    "layers of one": Case(
         [
-            drawn(1, 1, (11,)),
-            drawn(2, 4, (12,)),
-            combined(3, "union", [1, 2], []),
+            *(drawn(1, 1, (11,)), drawn(2, 4, (12,)), combined(3, "union", [1, 2], [])),
             operation(
-                4,
-                "LayerOp2",
-                function="difference",
-                unary_layer_links=[11],
-                pair_layer_links=[12],
-                output_layer_links=[12, 13],
-                operation_links=links(parent=[3]),
+                4, "LayerOp2", function="difference", **LAYERS, operation_links=links(parent=[3])
             ),
         ],
         (NOTHING, RECTANGLE - FRAME, RECTANGLE - FRAME),
     ),
-    "laid on two lines": (
-        [drawn(1, 4, (11,)), laid_by(2, 1)],
-        (ON_BOTH, NOTHING, NOTHING),
-    ),
-    "mirrored and stretched": (
-        [
-            drawn(1, 4, (11,)),
-            laid_by(2, 1, 7, shift=1, **STRETCHED, scalex=2.0, scaley=-0.5),
-        ],
+    "laid on two lines": Case([drawn(1, 4, (11,)), laid_by(2, 1)], (ON_BOTH, NOTHING, NOTHING)),
+    "mirrored and stretched": Case(
+        [drawn(1, 4, (11,)), laid_by(2, 1, 7, shift=1, **STRETCHED, scalex=2.0, scaley=-0.5)],
         (NOTHING, affinity.affine_transform(FRAME, [2, 0, 0, -0.5, 0, 0]), NOTHING),
     ),
-    "frozen": (
-        [
-            operation(
-                1,
-                "Freeze",
-                generic=f"{OBJECT}filetypes.genericlaminate.GenericLaminate "
-                f"{{geoms: {{? {OBJECT}filetypes.material2.Material2 {{id: 12}} : [{HOLED}]}}}}",
-            )
-        ],
-        (NOTHING, FRAME, NOTHING),
-    ),
+    "frozen": Case([operation(1, "Freeze", generic=FROZEN)], (NOTHING, FRAME, NOTHING)),
 }
 
 
@@ -310,13 +280,9 @@ def test_a_design_within_is_laid_by_its_line(tmp_path: Path) -> None:
 ROWS = "file,role,layer\nhinge.cad,base,film/1\nhinge.cad,chamber-mask,4/2\nhinge.cad,cap,film/3\n"
 CHAMBERS = "name,x,y,mouth_x,mouth_y,angle,width\npouch,0,0,0,24,90,2\n"
 TAB = shape("GenericTwoPointRect", (-2.0, 10.0), (2.0, 24.0))
+BOTH = (drawn(2, 8, (12,)), drawn(3, 9, (12,)), combined(4, "union", [2, 3], []))
 POUCH = design(
-    [
-        drawn(1, 1, name="film"),
-        drawn(2, 8, (12,)),
-        drawn(3, 9, (12,)),
-        combined(4, "union", [2, 3], []),
-    ],
+    [drawn(1, 1, name="film"), *BOTH],
     {
         1: sketch("plate", PLATE, TAB),
         8: sketch("pocket", shape("GenericTwoPointRect", (-20.0, -15.0), (20.0, 15.0))),
@@ -358,43 +324,31 @@ def test_a_design_alone_says_what_is_missing_and_what_is_not_read(
     assert "operations that are not read: 3 (JointOperation3)" in said
 
 
-UNREAD: dict[str, tuple[list[str], str]] = {
-    "a class": (
-        [drawn(1, 1), operation(2, "Simplify2", operation_links=links(parent=[1]))],
-        "hinge.cad, operation 2 (Simplify2): operations of class Simplify2 are not read",
-    ),
-    "what rests on it": (
-        [
-            operation(1, "HoleOperation", "holes", operation_links="{}"),
-            combined(2, "union", [1], []),
-        ],
-        "hinge.cad, operation 1 (holes): operations of class HoleOperation are not read",
-    ),
-    "a later one": (
-        [combined(1, "union", [2], []), drawn(2, 1)],
-        "takes operation 2, which is not",
-    ),
-    "a sketch": ([drawn(1, 77)], "operation 1 (SimpleSketchOp) takes a sketch that is not there"),
-    "no list": (
-        [drawn(1, 1).replace("sketch: [1]", "sketch: 1")],
-        "operation 1 (SimpleSketchOp) is damaged; save the design again",
-    ),
-    "a crossing": ([drawn(1, 32)], "sketch bow, shape 1 is a polygon with Self-intersection[2 2]"),
-    "a touch": (
-        [drawn(1, 35)],
-        "operation 1 (SimpleSketchOp), layer 1 has contours that touch at x 4.0000, y 4.0000",
-    ),
-    "crossed lines": (
-        [drawn(1, 3), drawn(2, 6), combined(3, "difference", [1], [2])],
-        "operation 3 (LaminateOperation2) takes the difference of lines that meet",
-    ),
-    "an ellipse": (
-        [
-            drawn(1, 2),
-            laid_by(2, 1, transformtype_y="custom", scaley=0.5),
-        ],
-        "scales arcs by 1.5 along its line and 0.5 across it, and ellipses are not read",
-    ),
+SIMPLIFIED = operation(2, "Simplify2", operation_links=links(parent=[1]))
+HOLED_BY = operation(1, "HoleOperation", "holes", operation_links="{}")
+UNREAD: dict[str, list[str]] = {
+    "hinge.cad, operation 2 (Simplify2): operations of class Simplify2 are not read": [
+        *(drawn(1, 1), SIMPLIFIED)
+    ],
+    # What rests on it is named by what it rests on.
+    "hinge.cad, operation 1 (holes): operations of class HoleOperation are not read": [
+        *(HOLED_BY, combined(2, "union", [1], []))
+    ],
+    "takes operation 2, which is not": [combined(1, "union", [2], []), drawn(2, 1)],
+    "operation 1 (SimpleSketchOp) takes a sketch that is not there": [drawn(1, 77)],
+    "operation 1 (SimpleSketchOp) is damaged; save the design again": [
+        drawn(1, 1).replace("sketch: [1]", "sketch: 1")
+    ],
+    "sketch bow, shape 1 is a polygon with Self-intersection[2 2]": [drawn(1, 32)],
+    "operation 1 (SimpleSketchOp), layer 1 has contours that touch at x 4.0000, y 4.0000": [
+        drawn(1, 35)
+    ],
+    "operation 3 (LaminateOperation2) takes the difference of lines that meet": [
+        *(drawn(1, 3), drawn(2, 6), combined(3, "difference", [1], [2]))
+    ],
+    "scales arcs by 1.5 along its line and 0.5 across it, and ellipses are not read": [
+        *(drawn(1, 2), laid_by(2, 1, transformtype_y="custom", scaley=0.5))
+    ],
 }
 ODD = {
     32: sketch("bow", shape("GenericPoly", (0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0))),
@@ -406,11 +360,11 @@ ODD = {
 }
 
 
-@pytest.mark.parametrize("name", UNREAD)
+@pytest.mark.parametrize("sentence", UNREAD)
 def test_what_is_not_read_is_named_at_its_place(
-    name: str, importing: Importing, tmp_path: Path
+    sentence: str, importing: Importing, tmp_path: Path
 ) -> None:
-    operations, sentence = UNREAD[name]
+    operations = UNREAD[sentence]
     rows = ROWS.replace("film/", f"{len(operations)}/").replace("4/2", "1/2")
     source = pouch(tmp_path, design(operations, SKETCHES | ODD), rows)
     assert sentence in importing(source).output
