@@ -14,7 +14,7 @@ from sbafab.catalogue import catalogue
 from sbafab.models.quantity import ModelId, Quantity
 from sbafab.rules import sentences
 from tests.cli.conftest import Run
-from tests.studio.worked import answers, job
+from tests.studio.asking import answers, job
 
 IDS = {"rule", "verdict", "quantity", "model_id", "unit", "key", "kind", "status", "family", "role"}
 """Keys whose texts are ids; all other texts may be sentences."""

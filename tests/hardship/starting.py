@@ -9,6 +9,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 ANSWERING = """
 import signal
@@ -39,3 +40,12 @@ def ignored_signals() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def assert_refused(ended: Any, *says: str) -> None:
+    """A run ended with one sentence, which says all this, and exit code 2."""
+    assert ended.code == 2, ended.err
+    assert ended.err.startswith("sbafab: ")
+    assert ended.err.count("\n") == 1, ended.err
+    for text in says:
+        assert text in ended.err, ended.err

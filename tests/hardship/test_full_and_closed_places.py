@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.hardship.starting import WITHOUT_PRIVILEGES
+from tests.hardship.starting import WITHOUT_PRIVILEGES, assert_refused
 from tests.quick import few
 
 if TYPE_CHECKING:
-    from conftest import Ended, Output, Runs
+    from conftest import Output, Runs
 
 # From the moment the file is opened that the test names, no file may grow past 500 bytes.
 FULL = """
@@ -25,14 +25,6 @@ def hook(event, values):
         resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))
 sys.addaudithook(hook)
 """
-
-
-def assert_refused(ended: Ended, *says: str) -> None:
-    assert ended.code == 2, ended.err
-    assert ended.err.startswith("sbafab: ")
-    assert ended.err.count("\n") == 1, ended.err
-    for text in says:
-        assert text in ended.err, ended.err
 
 
 @pytest.mark.parametrize(

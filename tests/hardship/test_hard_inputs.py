@@ -13,25 +13,17 @@ from sbafab.actuators import load_design
 from sbafab.errors import GeometryError, SbafabError
 from sbafab.folders import build as builds
 from sbafab.geometry.edges import Line
-from tests.hardship.starting import WITHOUT_PRIVILEGES
+from tests.hardship.starting import WITHOUT_PRIVILEGES, assert_refused
 from tests.hunt.oracle import laid_over
 
 pytestmark = pytest.mark.long
 
 if TYPE_CHECKING:
-    from conftest import Ended, Output, Runs
+    from conftest import Output, Runs
 
 SMALL = "import resource; resource.setrlimit(resource.RLIMIT_CPU, (8, 8))\n"
 """A run that works on what it should refuse is killed."""
 TOML = 'family = "1dof"\n[stack]\nballoons = 2\n'
-
-
-def assert_refused(ended: Ended, *says: str) -> None:
-    assert ended.code == 2, ended.err
-    assert ended.err.startswith("sbafab: ")
-    assert ended.err.count("\n") == 1, ended.err
-    for text in says:
-        assert text in ended.err, ended.err
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.hardship.starting import assert_refused
+
 pytestmark = pytest.mark.long
 
 if TYPE_CHECKING:
@@ -100,8 +102,5 @@ def test_a_bomb_is_refused(name: str, runs: Runs, output: Output) -> None:
         output.folder,
         BOUNDED.format(most=MOST_MEMORY),
     )
-    assert ended.code == 2, ended.err
-    assert ended.err.startswith("sbafab: outline ")
-    assert ended.err.count("\n") == 1
-    assert says in ended.err
+    assert_refused(ended, "sbafab: outline ", says)
     assert output.held() == "0.8"

@@ -10,19 +10,29 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 
-from tests.judge.deck import judged
+from shapely import Polygon
+
+from tests.judge.bonds import judge_bonds
+from tests.judge.claims import judge_claims
 from tests.judge.drafts import Draft, beside, draft
-from tests.judge.folder import Disagreement, open_folder
+from tests.judge.facing import judge_facing
+from tests.judge.folder import Disagreement, Folder, open_folder
+from tests.judge.overhangs import judge_overhangs
+from tests.judge.pins import judge_pins
+from tests.judge.pockets import judge_pockets
+from tests.judge.pressing import judge_press
 from tests.judge.reading import UnreadableError
 from tests.judge.sheets import judge_sheets
+from tests.judge.traveller import judge_traveller
 from tests.judge.using import Ended, sbafab
+from tests.judge.voids import judge_voids
 
 MOST_SECONDS = {False: 90, True: 400}
 """Processor time of one case, and of one drawn in chords: the whole deck measures those again."""
@@ -72,10 +82,7 @@ def run_case(seed: int, number: int, ways: Ways = Ways()) -> Case:
         home = Path(scratch)
         try:
             with _no_longer_than(most):
-                if len(made) == 1:
-                    _one(case, made[0], home, ways)
-                else:
-                    _together(case, made, home, ways)
+                _make_and_judge(case, made, home, ways)
         except TooSlowError as error:
             case.disagreements.append(Disagreement("time", f"over {most} s in {error}"))
         except Exception as error:  # a crash of the program, or of a judge, is a finding too
@@ -112,42 +119,32 @@ def _no_longer_than(seconds: int) -> Iterator[None]:
         signal.signal(signal.SIGPROF, before)
 
 
-def _one(case: Case, made: Draft, home: Path, ways: Ways) -> None:
-    design = made.write(home)
-    commands = ["cut", "press"] if ways.lean else ["generate"]
-    case.typed = " ".join(["sbafab", commands[0], design.name, *made.options])
-    folder = home / "out" / made.name
-    for command in commands:
-        options = made.options if command != "press" else []
-        if _refused(case, sbafab(command, design, "-o", home / "out", *options), folder):
-            return
-    case.disagreements += _judged(folder, design, made)
-    if ways.check:
-        _check(case, folder)
-
-
-def _together(case: Case, made: list[Draft], home: Path, ways: Ways) -> None:
-    """Designs on common sheets: each one judged by itself, the sheets against all of them."""
+def _make_and_judge(case: Case, made: list[Draft], home: Path, ways: Ways) -> None:
+    """Each design judged by itself, and common sheets against all of them."""
     designs = [one.write(home) for one in made]
-    names = [design.name for design in designs]
-    case.typed = " ".join(["sbafab", "nest", *names, *made[0].options])
-    ended = sbafab("nest", *designs, "-o", home / "out", *made[0].options)
-    if _refused(case, ended, home / "out"):
-        return
-    job = home / "out" / "job"
-    for one, design in zip(made, designs, strict=True):
-        case.disagreements += _judged(job / one.name, design, one)
+    is_alone = len(made) == 1
+    commands = ["nest"] if not is_alone else ["cut", "press"] if ways.lean else ["generate"]
+    words = [*(design.name for design in designs), *made[0].options]
+    case.typed = " ".join(["sbafab", commands[0], *words])
+    top = home / "out" / (made[0].name if is_alone else "job")
+    for command in commands:
+        options = made[0].options if command != "press" else []
+        ended = sbafab(command, *designs, "-o", home / "out", *options)
+        if _refused(case, ended, top if is_alone else home / "out"):
+            return
+    folders = [top] if is_alone else [top / one.name for one in made]
     try:
-        folders = [
-            open_folder(job / one.name, design, one.chord_error)
-            for one, design in zip(made, designs, strict=True)
-        ]
-        sheets = json.loads((job / "manifest.json").read_text(encoding="utf-8"))["sheets"]
-        case.disagreements += judge_sheets(folders, job, sheets)
+        opened = []
+        for folder, design, one in zip(folders, designs, made, strict=True):
+            opened.append(open_folder(folder, design, one.chord_error))
+            case.disagreements += judged(opened[-1], one.pockets)
+        if not is_alone:
+            sheets = json.loads((top / "manifest.json").read_text(encoding="utf-8"))["sheets"]
+            case.disagreements += judge_sheets(opened, top, sheets)
     except UnreadableError as error:
         case.disagreements.append(Disagreement("reading", str(error)))
     if ways.check:
-        _check(case, job)
+        _check(case, top)
 
 
 def _refused(case: Case, ended: Ended, folder: Path) -> bool:
@@ -166,14 +163,6 @@ def _check(case: Case, folder: Path) -> None:
     if checked.code:
         why = _reason(checked)
         case.disagreements.append(Disagreement("check", f"exit {checked.code}: {why}"))
-
-
-def _judged(folder: Path, design: Path, made: Draft) -> list[Disagreement]:
-    try:
-        opened = open_folder(folder, design, made.chord_error)
-        return judged(opened, made.pockets)
-    except UnreadableError as error:
-        return [Disagreement("reading", str(error))]
 
 
 def _reason(ended: Ended, folder: Path | None = None) -> str:
@@ -209,25 +198,15 @@ def table(cases: list[Case]) -> str:
     """Designs by what became of them, and every disagreement with its design."""
     judged_cases = [case for case in cases if case.is_judged]
     wrong = [case for case in cases if case.disagreements]
+    judges = (judge for c in wrong for judge in {d.judge for d in c.disagreements})
     lines = [
         f"designs        {len(cases)}",
         f"refused        {len(cases) - len(judged_cases)}",
-        *(
-            f"  {count:4d}  {reason}"
-            for reason, count in Counter(c.refused for c in cases if c.refused).most_common()
-        ),
+        *_counted(case.refused for case in cases if case.refused),
         f"judged         {len(judged_cases)}",
-        *(
-            f"  {count:4d}  {family}"
-            for family, count in Counter(c.family for c in judged_cases).most_common()
-        ),
+        *_counted(case.family for case in judged_cases),
         f"disagreements  {len(wrong)}",
-        *(
-            f"  {count:4d}  {judge}"
-            for judge, count in Counter(
-                judge for c in wrong for judge in {d.judge for d in c.disagreements}
-            ).most_common()
-        ),
+        *_counted(judges),
     ]
     for case in wrong:
         lines.append(f"{case.name} ({case.family}): {case.typed}")
@@ -240,3 +219,41 @@ def table(cases: list[Case]) -> str:
             lines[-1] += more
     lines.append(f"processor time {sum(case.seconds for case in cases):.0f} s")
     return "\n".join(lines)
+
+
+def _counted(names: Iterable[str]) -> list[str]:
+    return [f"  {count:4d}  {name}" for name, count in Counter(names).most_common()]
+
+
+# All judges in turn.
+
+
+Judge = Callable[[Folder], Iterator[Disagreement]]
+JUDGES: tuple[Judge, ...] = (
+    judge_facing,
+    judge_bonds,
+    judge_overhangs,
+    judge_voids,
+    judge_pins,
+    judge_press,
+    judge_claims,
+    judge_traveller,
+)
+
+
+def judged(folder: Folder, drawn: Sequence[Polygon] | None = None) -> list[Disagreement]:
+    """What all judges say of one design's folder, its sheets included if it has its own."""
+    found = [said for judge in JUDGES for said in _heard(lambda judge=judge: judge(folder))]
+    if folder.manifest.get("sheets"):
+        found += _heard(lambda: judge_sheets([folder], folder.path, folder.manifest["sheets"]))
+    if drawn is not None:
+        found += _heard(lambda: judge_pockets(folder, drawn))
+    return found
+
+
+def _heard(judge: Callable[[], Iterator[Disagreement]]) -> list[Disagreement]:
+    """What a judge says; a file that no cutter could follow does not silence the others."""
+    try:
+        return list(judge())
+    except UnreadableError as error:
+        return [Disagreement("reading", str(error))]

@@ -227,25 +227,3 @@ def corner_piece(rng: Random, least: float, most: float) -> Drawing:
 
 
 KINDS = (blob, blob, slot, star, spline, bulges, ellipse, corner_piece)
-
-
-def svg_drawing(path: str) -> Drawing:
-    """A path of absolute M, C, S, Z as a drawing of a pocket."""
-    marks = path.replace(",", " ").replace("Z", "").split()
-    numbers: list[float] = []
-    letters: list[str] = []
-    for mark in marks:
-        letters += mark[0] if mark[0].isalpha() else ""
-        numbers.append(float(mark.lstrip("MCS")))
-    at = (numbers.pop(0), numbers.pop(0))
-    corners: list[Point] = []
-    before = at
-    for letter in letters[1:]:
-        one = (numbers.pop(0), numbers.pop(0)) if letter == "C" else None
-        one = one or (2 * at[0] - before[0], 2 * at[1] - before[1])
-        two = (numbers.pop(0), numbers.pop(0))
-        end = (numbers.pop(0), numbers.pop(0))
-        corners += [_cubic(at, one, two, end, k / CHORDS) for k in range(CHORDS)]
-        at, before = end, two
-    text = f'<svg xmlns="http://www.w3.org/2000/svg"><path d="{path}"/></svg>'
-    return Drawing("pocket.svg", text, Polygon([(x, -y) for x, y in corners]))

@@ -6,6 +6,7 @@ import math
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from random import Random
 from typing import Any, NamedTuple
 
 import pytest
@@ -13,8 +14,9 @@ import tomli_w
 from shapely import Point, Polygon, affinity, box
 from shapely.geometry.base import BaseGeometry
 
-from tests.judge import deck, reading
+from tests.judge import reading
 from tests.judge.bonds import judge_bonds
+from tests.judge.campaign import judged
 from tests.judge.claims import judge_claims
 from tests.judge.doctoring import (
     Change,
@@ -25,7 +27,7 @@ from tests.judge.doctoring import (
     shift,
     without_hole,
 )
-from tests.judge.drawings import svg_drawing
+from tests.judge.drawings import blob
 from tests.judge.facing import judge_facing
 from tests.judge.folder import Disagreement, Folder, closed_by
 from tests.judge.overhangs import judge_overhangs
@@ -38,7 +40,7 @@ from tests.judge.voids import judge_voids
 from tests.quick import few
 
 RULES = {"yield_builds": 100, "worst_bond_width": 0, "worst_mask_overhang": 0}
-BLOB = svg_drawing("M3,0 C3,2 1,2.6 -0.5,2.4 S-3.4,1 -2.6,-1 S3,-2.4 3,0 Z")
+BLOB = blob(Random(2), 2.2, 3.0)
 DESIGNS: dict[str, dict[str, Any]] = {
     # Layers: 1 base, 2 pocket, 3 wall, 4 separator, 5 wall, 6 pocket, 7 wall ... 11 cap.
     "stack": {"family": "1dof", "stack": {"balloons": 3}},
@@ -81,7 +83,7 @@ def of_blob(folder: Folder) -> Iterator[Disagreement]:
 def test_sound_folders_are_left_alone(sound: dict[str, Patient], name: str) -> None:
     drawn = [BLOB.pocket] * 2 if name == "drawn" else None
     folder = sound[name].opened()
-    said = deck.judged(folder, drawn)
+    said = judged(folder, drawn)
     # The traveller's circle of a stack of equal balloons is theirs.
     assert said == []
 

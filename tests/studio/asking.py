@@ -5,10 +5,15 @@ from __future__ import annotations
 import asyncio
 import base64
 import zlib
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
 from typing import Any
 
 import httpx
 from starlette.types import ASGIApp
+
+from sbafab.studio.jobs import JOBS
 
 
 class Client:
@@ -37,3 +42,38 @@ def packed(text: str) -> str:
     squeezer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
     raw = squeezer.compress(text.encode("utf-8")) + squeezer.flush()
     return base64.urlsafe_b64encode(raw).decode("ascii").rstrip("=")
+
+
+# Jobs of the studio run here and now, without a process of their own.
+
+
+def job(folder: Path, text: str) -> dict[str, Any]:
+    """The job of showing a design whose file would lie in the folder."""
+    return {
+        "do": "live",
+        "text": text,
+        "edits": [],
+        "has": [],
+        "folder": str(folder),
+        "path": "design.toml",
+    }
+
+
+def answers(asked: dict[str, Any], beat: Callable[[], None] = lambda: None) -> list[dict[str, Any]]:
+    """Everything that the job answers."""
+    return list(JOBS[asked["do"]](asked, beat))
+
+
+class EnoughError(Exception):
+    """Nobody waits for the work any more."""
+
+
+def given_up_at(beat: int) -> Callable[[], None]:
+    """What a job calls as it goes on; that beat, counted from 1, raises EnoughError."""
+    beats = count(1)
+
+    def called() -> None:
+        if next(beats) == beat:
+            raise EnoughError
+
+    return called

@@ -18,8 +18,7 @@ from sbafab.models import balloon_map
 from sbafab.studio import jobs
 from sbafab.studio.app import design_in
 from sbafab.studio.jobs import JOBS, SupersededError, edited, refusal
-from tests.studio.asking import packed
-from tests.studio.worked import answers, job
+from tests.studio.asking import answers, job, packed
 
 SMALL = api.template("1dof-5mm").replace("balloons = 6", "balloons = 2") + (
     "[rules]\nyield_builds = 100\n"

@@ -17,7 +17,7 @@ from sbafab.assemblies.shapes import placed_surface
 from sbafab.errors import DesignError
 from sbafab.studio.forms import assembly
 from sbafab.studio.jobs import JOBS, edited, refusal
-from tests.studio.worked import EnoughError, answers, given_up_at, job
+from tests.studio.asking import EnoughError, answers, given_up_at, job
 
 BASE = """
 name = "stand"

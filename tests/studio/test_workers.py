@@ -14,7 +14,7 @@ import pytest
 from sbafab import api
 from sbafab.studio.jobs import edited
 from sbafab.studio.workers import MOST_WAITING, BusyError, WaitingJob, WorkerPool
-from tests.studio.worked import job
+from tests.studio.asking import job
 
 LONG = [("stack.balloons", "2"), ("rules.yield_builds", "1000000")]
 SHORT = [("stack.balloons", "3"), ("rules.yield_builds", "100")]

@@ -34,7 +34,7 @@ from sbafab.models.quantity import Conditions, FigureKey, Quantity
 from sbafab.studio.answers import stack_model
 from sbafab.studio.jobs import elastic
 from tests.shared import shared
-from tests.studio.worked import job
+from tests.studio.asking import job
 from tests.validation.commands import run_predict
 from tests.validation.test_validation_table import rows
 

@@ -29,7 +29,7 @@ from sbafab.search.quantities import measured, read_quantity
 from sbafab.studio.jobs import elastic, motion
 from sbafab.validation.evidence import MeasuredCurve, Setup, StatedError
 from sbafab.validation.model_values import model_values
-from tests.studio.worked import job
+from tests.studio.asking import job
 from tests.validation.commands import run_predict
 
 NAME = "3dof-15mm"
