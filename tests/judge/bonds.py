@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from tests.judge.folder import Disagreement, Folder, Interface, asked_kerf, pieces, place
+from tests.judge.folder import Folder, Interface, asked_kerf, pieces, place
 
 THINNEST = 0.004
 """mm: narrower bonds are what flattened arcs make of edges that coincide."""
@@ -36,7 +36,7 @@ def bond_of(interface: Interface) -> BaseGeometry:
     return shapely.MultiPolygon(list(pieces(bond, THINNEST)))
 
 
-def judge_bonds(folder: Folder) -> Iterator[Disagreement]:
+def judge_bonds(folder: Folder) -> Iterator[str]:
     """Every bond is as wide as the design's limit, and between balloons lies round a pin's hole."""
     seen = set()
     kerfs = [asked_kerf(folder.asked, film) or (0.0, 0.0) for film in ("tpe", "ptfe")]
@@ -48,18 +48,17 @@ def judge_bonds(folder: Folder) -> Iterator[Disagreement]:
         bond = bond_of(interface)
         where = f"interface {interface.number}"
         for width, x, y in narrow_places(bond, limit):
-            yield Disagreement(
-                "bonds",
+            yield (
                 f"the bond of {where} is {width:.4f} wide at x {x:.3f}, y {y:.3f}, where "
-                f"{folder.bond_limit:g} are asked for",
+                f"{folder.bond_limit:g} are asked for"
             )
         if not interface.is_chamber and interface.below.role != "sheet":
             yield from _stray(folder, bond, where)
         if bond.is_empty:
-            yield Disagreement("bonds", f"nothing bonds at {where}")
+            yield f"nothing bonds at {where}"
 
 
-def _stray(folder: Folder, bond: BaseGeometry, where: str) -> Iterator[Disagreement]:
+def _stray(folder: Folder, bond: BaseGeometry, where: str) -> Iterator[str]:
     """Bonds between two balloons that are no ring round a bore, and no ear: neighbours that weld.
 
     An ear is as wide as its pin and two bonds, and ends as far from the pin.
@@ -73,10 +72,7 @@ def _stray(folder: Folder, bond: BaseGeometry, where: str) -> Iterator[Disagreem
         ]
     )
     for part in pieces(bond.difference(meant), THINNEST):
-        yield Disagreement(
-            "bonds",
-            f"{part.area:.4f} mm2 of {where} bond where there is no bore, at {place(part)}",
-        )
+        yield f"{part.area:.4f} mm2 of {where} bond where there is no bore, at {place(part)}"
 
 
 def narrow_places(region: BaseGeometry, limit: float) -> Iterator[tuple[float, float, float]]:

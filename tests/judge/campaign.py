@@ -140,7 +140,7 @@ def _make_and_judge(case: Case, made: list[Draft], home: Path, ways: Ways) -> No
             case.disagreements += judged(opened[-1], one.pockets)
         if not is_alone:
             sheets = json.loads((top / "manifest.json").read_text(encoding="utf-8"))["sheets"]
-            case.disagreements += judge_sheets(opened, top, sheets)
+            case.disagreements += _heard("sheets", judge_sheets, opened, top, sheets)
     except UnreadableError as error:
         case.disagreements.append(Disagreement("reading", str(error)))
     if ways.check:
@@ -228,32 +228,31 @@ def _counted(names: Iterable[str]) -> list[str]:
 # All judges in turn.
 
 
-Judge = Callable[[Folder], Iterator[Disagreement]]
-JUDGES: tuple[Judge, ...] = (
-    judge_facing,
-    judge_bonds,
-    judge_overhangs,
-    judge_voids,
-    judge_pins,
-    judge_press,
-    judge_claims,
-    judge_traveller,
-)
+JUDGES: dict[str, Callable[[Folder], Iterator[str]]] = {
+    "facing": judge_facing,
+    "bonds": judge_bonds,
+    "overhangs": judge_overhangs,
+    "voids": judge_voids,
+    "pins": judge_pins,
+    "press": judge_press,
+    "claims": judge_claims,
+    "traveller": judge_traveller,
+}
 
 
 def judged(folder: Folder, drawn: Sequence[Polygon] | None = None) -> list[Disagreement]:
     """What all judges say of one design's folder, its sheets included if it has its own."""
-    found = [said for judge in JUDGES for said in _heard(lambda judge=judge: judge(folder))]
-    if folder.manifest.get("sheets"):
-        found += _heard(lambda: judge_sheets([folder], folder.path, folder.manifest["sheets"]))
+    found = [said for name, judge in JUDGES.items() for said in _heard(name, judge, folder)]
+    if sheets := folder.manifest.get("sheets"):
+        found += _heard("sheets", judge_sheets, [folder], folder.path, sheets)
     if drawn is not None:
-        found += _heard(lambda: judge_pockets(folder, drawn))
+        found += _heard("pockets", judge_pockets, folder, drawn)
     return found
 
 
-def _heard(judge: Callable[[], Iterator[Disagreement]]) -> list[Disagreement]:
+def _heard(name: str, judge: Callable[..., Iterator[str]], *asked: object) -> list[Disagreement]:
     """What a judge says; a file that no cutter could follow does not silence the others."""
     try:
-        return list(judge())
+        return [Disagreement(name, said) for said in judge(*asked)]
     except UnreadableError as error:
         return [Disagreement("reading", str(error))]

@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from tests.judge.bonds import bond_of
-from tests.judge.folder import Disagreement, Folder, asked_kerf, pieces
+from tests.judge.folder import Folder, asked_kerf, pieces
 
 SHARE = 1e-4
 SIZE = 0.002
@@ -28,7 +28,7 @@ SAID = {
 }
 
 
-def judge_claims(folder: Folder) -> Iterator[Disagreement]:
+def judge_claims(folder: Folder) -> Iterator[str]:
     """Areas, pieces and sizes are those of the files, and the files those of the hashes."""
     yield from _files(folder)
     yield from _layers(folder)
@@ -37,7 +37,7 @@ def judge_claims(folder: Folder) -> Iterator[Disagreement]:
     yield from _lowered(folder)
 
 
-def _lowered(folder: Folder) -> Iterator[Disagreement]:
+def _lowered(folder: Folder) -> Iterator[str]:
     """Limits below the paper's are named in every cut file."""
     names = {
         name.replace("_", " ")
@@ -49,16 +49,16 @@ def _lowered(folder: Folder) -> Iterator[Disagreement]:
         stated = LIMITS.search(text)
         said = stated.group(1).replace("_", " ").replace("-", " ") if stated else "nothing"
         if any(name not in said for name in names):
-            yield Disagreement("claims", f"{file} says {said} of limits that are lowered")
+            yield f"{file} says {said} of limits that are lowered"
 
 
-def _files(folder: Folder) -> Iterator[Disagreement]:
+def _files(folder: Folder) -> Iterator[str]:
     for name, stated in folder.manifest["files"].items():
         path = folder.path / name
         if not path.is_file():
-            yield Disagreement("claims", f"{name} is listed and missing")
+            yield f"{name} is listed and missing"
         elif hashlib.sha256(path.read_bytes()).hexdigest() != stated:
-            yield Disagreement("claims", f"{name} is not the file that is listed")
+            yield f"{name} is not the file that is listed"
 
 
 def _slack(folder: Folder, region: BaseGeometry) -> float:
@@ -68,33 +68,27 @@ def _slack(folder: Folder, region: BaseGeometry) -> float:
     return SHARE * region.area + region.length * (folder.chord_error + 5e-4) + corners
 
 
-def _layers(folder: Folder) -> Iterator[Disagreement]:
+def _layers(folder: Folder) -> Iterator[str]:
     for layer, entry in zip(folder.layers, folder.manifest["layers"], strict=True):
         area = layer.profile.area
         if abs(area - entry["area"]) > _slack(folder, layer.profile):
-            yield Disagreement(
-                "claims", f"layer {layer.index} has {area:.4f} mm2, stated {entry['area']:.4f}"
-            )
+            yield f"layer {layer.index} has {area:.4f} mm2, stated {entry['area']:.4f}"
         count = len(list(pieces(layer.profile)))
         if count != entry["pieces"]:
-            yield Disagreement(
-                "claims", f"layer {layer.index} has {count} pieces, stated {entry['pieces']}"
-            )
+            yield f"layer {layer.index} has {count} pieces, stated {entry['pieces']}"
     for film in folder.manifest["films"]:
         own = [layer for layer in folder.layers if layer.material == film["material"]]
         area = sum(layer.profile.area for layer in own)
         slack = sum(_slack(folder, layer.profile) for layer in own)
         copies = folder.copies
         if min(abs(area - film["area"]), abs(copies * area - film["area"])) > slack * copies:
-            yield Disagreement(
-                "claims", f"{film['material']} has {area:.4f} mm2, stated {film['area']:.4f}"
-            )
+            yield f"{film['material']} has {area:.4f} mm2, stated {film['area']:.4f}"
 
 
-def _interfaces(folder: Folder) -> Iterator[Disagreement]:
+def _interfaces(folder: Folder) -> Iterator[str]:
     stated = folder.manifest["interfaces"]
     if len(stated) != len(folder.interfaces):
-        yield Disagreement("claims", f"{len(stated)} interfaces stated of {len(folder.interfaces)}")
+        yield f"{len(stated)} interfaces stated of {len(folder.interfaces)}"
         return
     for interface, entry in zip(folder.interfaces, stated, strict=True):
         contact = interface.below.profile.intersection(interface.above.profile)
@@ -102,14 +96,13 @@ def _interfaces(folder: Folder) -> Iterator[Disagreement]:
         for name, region in (("contact", contact), ("bond", bond)):
             slack = _slack(folder, contact) + _slack(folder, bond)
             if abs(region.area - entry[f"{name}_area"]) > slack:
-                yield Disagreement(
-                    "claims",
+                yield (
                     f"the {name} of interface {interface.number} has {region.area:.4f} mm2, "
-                    f"stated {entry[f'{name}_area']:.4f}",
+                    f"stated {entry[f'{name}_area']:.4f}"
                 )
 
 
-def _sizes(folder: Folder) -> Iterator[Disagreement]:
+def _sizes(folder: Folder) -> Iterator[str]:
     whole = shapely.union_all([layer.profile for layer in folder.layers])
     low_x, low_y, high_x, high_y = whole.bounds
     far = shapely.get_coordinates(whole)
@@ -123,7 +116,7 @@ def _sizes(folder: Folder) -> Iterator[Disagreement]:
     stated = folder.manifest["sizes"]
     for name, value in measured.items():
         if abs(stated.get(name, value) - value) > slack * (1 + (name == "overall_diameter")):
-            yield Disagreement("claims", f"the {name} is {value:.3f}, stated {stated[name]:.3f}")
+            yield f"the {name} is {value:.3f}, stated {stated[name]:.3f}"
     page = folder.path / "traveller.html"
     if page.is_file():
         text = re.sub(r"<[^>]*>", " ", html.unescape(page.read_text(encoding="utf-8")))
@@ -132,4 +125,4 @@ def _sizes(folder: Folder) -> Iterator[Disagreement]:
             if (name == "outline_diameter" and name in stated and not told) or any(
                 abs(value - stated.get(name, -1.0)) > ROUNDED for value in told
             ):
-                yield Disagreement("claims", f"the traveller says {name} {told}, not {stated}")
+                yield f"the traveller says {name} {told}, not {stated}"

@@ -8,24 +8,23 @@ import shapely
 from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
-from tests.judge.folder import Disagreement, Folder, Layer, pieces, place
+from tests.judge.folder import Folder, Layer, pieces, place
 from tests.judge.pins import play
 
 THINNEST = 0.004
 """mm: narrower overlaps are what flattened arcs make of edges that coincide."""
 
 
-def judge_facing(folder: Folder) -> Iterator[Disagreement]:
+def judge_facing(folder: Folder) -> Iterator[str]:
     """No two films but consecutive ones see each other, other than down a pinned bore."""
     bores = shapely.union_all(
         [Point(hole.x, hole.y).buffer(hole.radius + play(folder) + 0.003) for hole in folder.holes]
     )
     for below, above, seen in _sights(folder):
         for part in pieces(seen.difference(bores), THINNEST):
-            yield Disagreement(
-                "facing",
+            yield (
                 f"films {below} and {above} face each other over {part.area:.4f} mm2 with "
-                f"nothing between, at {place(part)}",
+                f"nothing between, at {place(part)}"
             )
 
 

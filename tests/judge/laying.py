@@ -13,7 +13,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from tests.judge.folder import Disagreement, Folder, Layer, pieces
+from tests.judge.folder import Folder, Layer, pieces
 from tests.judge.page import NUMBERS, PinHole, listed, pin_holes, rows, standing, words
 
 HOLE = 0.012
@@ -40,7 +40,7 @@ STACK = re.compile(r"Lay the (?:stack|\d+ stacks) from step \d+ \(layers? ([^)]*
 BESIDE = re.compile(rf"{ALONG} \(layer (\d+)\)")
 
 
-def judge_laying(folder: Folder, page: Any, of: dict[int, str]) -> Iterator[Disagreement]:
+def judge_laying(folder: Folder, page: Any, of: dict[int, str]) -> Iterator[str]:
     """The table of the whole stack, and every press step; ``of`` is the pattern of each layer."""
     yield from _stacked(folder, page, of, _held(folder, page))
     yield from _laid(folder, page, of)
@@ -85,7 +85,7 @@ def _has_hole(rings: Iterable[tuple[float, float, float]], pin: PinHole) -> bool
 
 def _stacked(
     folder: Folder, page: Any, of: dict[int, str], held: dict[int, set[str]]
-) -> Iterator[Disagreement]:
+) -> Iterator[str]:
     """The table of the whole stack, its turns written out: every layer once, from the lowest."""
     groups: list[tuple[int, list[dict[str, str]]]] = []
     before = None
@@ -101,13 +101,13 @@ def _stacked(
     for turns, group in groups:
         columns = [listed(row["Layers"]) for row in group]
         if any(len(column) != turns for column in columns):
-            yield Disagreement("traveller", f"{turns} turns, and layers {columns}")
+            yield f"{turns} turns, and layers {columns}"
             continue
         order += [column[turn] for turn in range(turns) for column in columns]
         for row, column in zip(group, columns, strict=True):
             yield from _row(folder, row, column, of, held)
     if order != [layer.index for layer in folder.layers]:
-        yield Disagreement("traveller", f"the whole stack is said to be {order}")
+        yield f"the whole stack is said to be {order}"
 
 
 def _row(
@@ -116,7 +116,7 @@ def _row(
     column: tuple[int, ...],
     of: dict[int, str],
     held: dict[int, set[str]],
-) -> Iterator[Disagreement]:
+) -> Iterator[str]:
     by_index = {layer.index: layer for layer in folder.layers}
     said = row["Pins that hold it"]
     names = set() if said.startswith("none") else set(re.split(r", | and ", said))
@@ -129,16 +129,15 @@ def _row(
             len(list(pieces(layer.path))) != int(row["Pieces"]),
         ]
         if any(wrong):
-            yield Disagreement("traveller", f"layer {index} is listed as {row}")
+            yield f"layer {index} is listed as {row}"
         if names != held.get(index):
-            yield Disagreement(
-                "traveller",
+            yield (
                 f"layer {index} is said to be held by {said}, and has holes for "
-                f"{sorted(held.get(index, ()))}",
+                f"{sorted(held.get(index, ()))}"
             )
 
 
-def _laid(folder: Folder, page: Any, of: dict[int, str]) -> Iterator[Disagreement]:
+def _laid(folder: Folder, page: Any, of: dict[int, str]) -> Iterator[str]:
     """Every layer is laid once, in the step of press.json, as what it is, along what is said."""
     seen: list[int] = []
     for number, step in enumerate(page.xpath("//article[@class='step']"), start=1):
@@ -158,14 +157,12 @@ def _laid(folder: Folder, page: Any, of: dict[int, str]) -> Iterator[Disagreemen
         if folder.press is not None:
             wanted = folder.press["steps"][number - 1]["adds"]
             if sorted(adds) != wanted:
-                yield Disagreement("traveller", f"step {number} lays {adds}, not {wanted}")
+                yield f"step {number} lays {adds}, not {wanted}"
     if sorted(seen) != [layer.index for layer in folder.layers]:
-        yield Disagreement("traveller", f"its steps lay the layers {seen}")
+        yield f"its steps lay the layers {seen}"
 
 
-def _named(
-    folder: Folder, said: str, indices: list[int], of: dict[int, str]
-) -> Iterator[Disagreement]:
+def _named(folder: Folder, said: str, indices: list[int], of: dict[int, str]) -> Iterator[str]:
     """What a line lays: as many names as layers, or as many as a turn has."""
     by_index = {layer.index: layer for layer in folder.layers}
     named = LAID.findall(re.split(r" (?:No|One) pin holds", said)[0])
@@ -174,12 +171,12 @@ def _named(
     for place, index in enumerate(indices):
         layer = by_index[index]
         if named[place % len(named)] != (layer.material, role(layer), of[index]):
-            yield Disagreement("traveller", f"layer {index} is laid as {named[place % len(named)]}")
+            yield f"layer {index} is laid as {named[place % len(named)]}"
 
 
 def _by_hand(
     folder: Folder, said: str, lying: list[int], indices: list[int], of: dict[int, str]
-) -> Iterator[Disagreement]:
+) -> Iterator[str]:
     """Edges that are laid along others lie so in the files, wherever this line lays them."""
     for pattern, those, far, way, whole in BY_HAND.findall(said):
         named = listed(those) if those else indices
@@ -189,25 +186,22 @@ def _by_hand(
                 yield from _beside(folder, (index, max(below)), far, way, whole)
 
 
-def _along(folder: Folder, said: str, indices: list[int]) -> Iterator[Disagreement]:
+def _along(folder: Folder, said: str, indices: list[int]) -> Iterator[str]:
     """The same where the line names the layers: its own, if it is the lowest of a stack."""
     for own, along, whole in NUMBERED.findall(said):
         for far, way, other in BESIDE.findall(along):
             yield from _beside(folder, (int(own or indices[0]), int(other)), far, way, whole)
 
 
-def _beside(
-    folder: Folder, pair: tuple[int, int], far: str, way: str, whole: str
-) -> Iterator[Disagreement]:
+def _beside(folder: Folder, pair: tuple[int, int], far: str, way: str, whole: str) -> Iterator[str]:
     own, other = ({layer.index: layer.profile for layer in folder.layers}[i] for i in pair)
     wanted = float(far or 0) * (-1 if way == "inside" else 1)
     gaps = _outside(own, other)
     off = np.abs(gaps - wanted) > EDGE + folder.chord_error
     if np.mean(off) > (TABS if "tabs" in whole else 0.0):
-        yield Disagreement(
-            "traveller",
+        yield (
             f"layer {pair[0]} is to lie {far} {way} layer {pair[1]} {whole}, and lies "
-            f"{gaps.min():.2f} to {gaps.max():.2f} mm outside",
+            f"{gaps.min():.2f} to {gaps.max():.2f} mm outside"
         )
 
 
@@ -220,7 +214,7 @@ def _outside(profile: BaseGeometry, other: BaseGeometry) -> np.ndarray[Any, np.d
     return np.where(shapely.contains(whole, points), -gaps, gaps)
 
 
-def _set(folder: Folder, page: Any) -> Iterator[Disagreement]:
+def _set(folder: Folder, page: Any) -> Iterator[str]:
     """Dials, heights of pins and of the stack."""
     bill = {row["Item"]: row["What"] for row in rows(page, "Item", "What", "Quantity")}
     plate = float(NUMBERS.findall(bill["Base plate"])[0])
@@ -228,7 +222,7 @@ def _set(folder: Folder, page: Any) -> Iterator[Disagreement]:
     steps = (folder.press or {"steps": []})["steps"]
     shown = page.xpath("//article[@class='step']")
     if folder.press is not None and len(shown) != len(steps):
-        yield Disagreement("traveller", f"it has {len(shown)} steps, and press.json {len(steps)}")
+        yield f"it has {len(shown)} steps, and press.json {len(steps)}"
         return
     for number, (step, asked) in enumerate(zip(shown, steps, strict=True), start=1):
         said = words(step)
@@ -239,21 +233,19 @@ def _set(folder: Folder, page: Any) -> Iterator[Disagreement]:
             f"{asked['minutes']:g} min",
         ):
             if wanted not in dials:
-                yield Disagreement("traveller", f"step {number} shows {dials}, not {wanted}")
+                yield f"step {number} shows {dials}, not {wanted}"
         height = sum(thick[index] for index in asked["layers"])
         flat = re.search(r"the stack lies flat \(about ([\d.]+) mm\)", said)
         if flat and abs(float(flat.group(1)) - height) > 0.0006:
-            yield Disagreement(
-                "traveller", f"step {number} is {height:.3f} mm high, not {flat.group(1)}"
-            )
+            yield f"step {number} is {height:.3f} mm high, not {flat.group(1)}"
         for pin in standing(step):
             over = (pin.low + pin.high) / 2
             if abs(pin.inside + over - pin.length) > 2 * SHOWN or pin.inside > plate - FLOOR:
-                yield Disagreement("traveller", f"step {number} divides its length wrongly: {pin}")
+                yield f"step {number} divides its length wrongly: {pin}"
             if (pin.high - pin.low) / 2 < LENGTH + DEPTH - SHOWN:
-                yield Disagreement("traveller", f"step {number} wants truer pins: {pin}")
+                yield f"step {number} wants truer pins: {pin}"
             paper = "Tape a fresh print" in said
             below = float(folder.wish("press", "release_thickness", 0.05))
             below += float(folder.wish("press", "underlay_thickness", 0.1)) if paper else 0.0
             if pin.clear <= 0 or abs(pin.low - pin.clear - height - below) > 2 * SHOWN + 1e-9:
-                yield Disagreement("traveller", f"step {number} is {height:.3f} mm high: {pin}")
+                yield f"step {number} is {height:.3f} mm high: {pin}"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from tests.judge.folder import Disagreement, Folder, Hole, Interface, Layer, pieces
+from tests.judge.folder import Folder, Hole, Interface, Layer, pieces
 
 STEP = 0.1
 INSIDE = 0.001
@@ -28,7 +28,7 @@ LOOKS = 8
 Array = NDArray[np.float64]
 
 
-def judge_overhangs(folder: Folder) -> Iterator[Disagreement]:
+def judge_overhangs(folder: Folder) -> Iterator[str]:
     """Each mask reaches the design's overhang past film edges, but flush at pinned bores."""
     seen = set()
     for interface in folder.interfaces:
@@ -42,11 +42,10 @@ def judge_overhangs(folder: Folder) -> Iterator[Disagreement]:
             worst = _least(folder, film, other, mask)
             if worst is not None:
                 reach, x, y = worst
-                yield Disagreement(
-                    "overhangs",
+                yield (
                     f"at {_named(interface)} the mask reaches only {reach:.4f} past the edge of "
                     f"film {film.index} at x {x:.3f}, y {y:.3f}, where "
-                    f"{folder.overhang_limit:g} are asked for",
+                    f"{folder.overhang_limit:g} are asked for"
                 )
 
 

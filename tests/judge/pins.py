@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from shapely import Point, Polygon
 
-from tests.judge.folder import Disagreement, Folder, Hole, Layer, pieces, place
+from tests.judge.folder import Folder, Hole, Layer, pieces, place
 
 FITS = 0.004
 """mm in radius or place by which a layer's hole may differ from its pin and still hold it."""
@@ -21,7 +21,7 @@ class Pin(NamedTuple):
     hole: Hole
 
 
-def judge_pins(folder: Folder) -> Iterator[Disagreement]:
+def judge_pins(folder: Folder) -> Iterator[str]:
     """Each pin finds its hole in the plate and in films, and each film the pins it needs."""
     if folder.press is None:
         return
@@ -35,27 +35,23 @@ def judge_pins(folder: Folder) -> Iterator[Disagreement]:
         for name in step["pins"]:
             pin = pins.get(name)
             if pin is None:
-                yield Disagreement("pins", f"step {step['step']} names pin {name}, of no hole")
+                yield f"step {step['step']} names pin {name}, of no hole"
                 continue
             for index in step["layers"]:
                 key = (name, by_index[index].shape)
                 known.setdefault(key, _meets(folder, pin, by_index[index]))
                 if known[key] == "film":
-                    yield Disagreement(
-                        "pins", f"in step {step['step']} pin {name} stands in layer {index}"
-                    )
+                    yield f"in step {step['step']} pin {name} stands in layer {index}"
                 if known[key] == "held" and index in step["adds"]:
                     held[name] += 1
                     holding[index].append(pin)
     for name, count in held.items():
         if not count:
-            yield Disagreement(
-                "pins", f"the plate has a hole for pin {name}, which holds no layer in any step"
-            )
+            yield f"the plate has a hole for pin {name}, which holds no layer in any step"
     yield from _unheld(folder, holding)
 
 
-def _pins(folder: Folder) -> tuple[dict[str, Pin], list[Disagreement]]:
+def _pins(folder: Folder) -> tuple[dict[str, Pin], list[str]]:
     """The pins by name, each in its hole of the plate, and holes or pins that have no partner."""
     said = []
     pins = {}
@@ -71,21 +67,16 @@ def _pins(folder: Folder) -> tuple[dict[str, Pin], list[Disagreement]]:
             None,
         )
         if hole is None:
-            said.append(Disagreement("pins", f"the plate has no hole for pin {entry['name']}"))
+            said.append(f"the plate has no hole for pin {entry['name']}")
             continue
         left.remove(hole)
         pins[entry["name"]] = Pin(entry["name"], hole)
     said += _at_other_places(folder, pins.values(), left)
-    said += [
-        Disagreement("pins", f"the plate has a hole for no pin at x {h.x:.3f}, y {h.y:.3f}")
-        for h in left
-    ]
+    said += [f"the plate has a hole for no pin at x {h.x:.3f}, y {h.y:.3f}" for h in left]
     return pins, said
 
 
-def _at_other_places(
-    folder: Folder, pins: Iterable[Pin], left: list[Hole]
-) -> Iterator[Disagreement]:
+def _at_other_places(folder: Folder, pins: Iterable[Pin], left: list[Hole]) -> Iterator[str]:
     """Takes the same holes at the further places of a press cycle from those that are left."""
     batch = folder.manifest.get("batch")
     if batch is None:
@@ -94,13 +85,13 @@ def _at_other_places(
         len(batch["places"]) != batch["at_once"]
         or sum(batch["cycles"]) != folder.manifest["copies"]
     ):
-        yield Disagreement("pins", f"places and cycles do not make all copies: {batch}")
+        yield f"places and cycles do not make all copies: {batch}"
     for spot in batch["places"][1:]:
         for pin in pins:
             at = pin.hole.x + spot["x"], pin.hole.y + spot["y"]
             found = next((hole for hole in left if math.dist(at, hole[:2]) < FITS), None)
             if found is None or abs(found.radius - pin.hole.radius) > FITS:
-                yield Disagreement("pins", f"place {spot} has no hole for pin {pin.name}")
+                yield f"place {spot} has no hole for pin {pin.name}"
             else:
                 left.remove(found)
 
@@ -128,7 +119,7 @@ def play(folder: Folder) -> float:
     return float(folder.wish("bore", "clearance", 0.04)) / 2
 
 
-def _unheld(folder: Folder, holding: dict[int, list[Pin]]) -> Iterator[Disagreement]:
+def _unheld(folder: Folder, holding: dict[int, list[Pin]]) -> Iterator[str]:
     """Pieces of layers that lie on fewer pins than their registration method promises."""
     known = set()
     for layer in folder.layers:
@@ -140,10 +131,9 @@ def _unheld(folder: Folder, holding: dict[int, list[Pin]]) -> Iterator[Disagreem
             filled = Polygon(part.exterior)
             on = sum(filled.contains(Point(*pin.hole[:2])) for pin in holding[layer.index])
             if on < wanted:
-                yield Disagreement(
-                    "pins",
+                yield (
                     f"{on} pins hold a piece of layer {layer.index} ({layer.role}), at "
-                    f"{place(part)}, where {wanted} should",
+                    f"{place(part)}, where {wanted} should"
                 )
 
 

@@ -7,13 +7,13 @@ from collections.abc import Iterator, Sequence
 
 from shapely import Polygon, affinity
 
-from tests.judge.folder import Disagreement, Folder, asked_kerf, closed_by, pieces, place
+from tests.judge.folder import Folder, asked_kerf, closed_by, pieces, place
 
 OFF = 0.003
 """mm: the program's arcs stay within half a micrometre of a drawn curve."""
 
 
-def judge_pockets(folder: Folder, drawn: Sequence[Polygon]) -> Iterator[Disagreement]:
+def judge_pockets(folder: Folder, drawn: Sequence[Polygon]) -> Iterator[str]:
     """``drawn`` holds the pocket of every balloon, round (0, 0), bottom to top."""
     masks = [layer for layer in folder.layers if layer.role == "chamber-mask"]
     off = OFF + folder.chord_error + folder.slack
@@ -31,13 +31,12 @@ def judge_pockets(folder: Folder, drawn: Sequence[Polygon]) -> Iterator[Disagree
             more = filled.difference(cut) if mask is not masks[0] else Polygon()
             for what, region in (("lacks", missing), ("has more by", more)):
                 if not region.is_empty:
-                    yield Disagreement(
-                        "pockets",
+                    yield (
                         f"mask {mask.index} {what} {region.area:.4f} mm2 of what was drawn, at "
-                        f"{place(region)}",
+                        f"{place(region)}"
                     )
     if len(masks) != len(drawn):
-        yield Disagreement("pockets", f"{len(masks)} chamber masks for {len(drawn)} balloons")
+        yield f"{len(masks)} chamber masks for {len(drawn)} balloons"
 
 
 def _axis(folder: Folder, part: Polygon) -> tuple[float, float] | None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shapely import Point, Polygon, STRtree, affinity
 from shapely.geometry.base import BaseGeometry
 
-from tests.judge.folder import Disagreement, Folder, pieces
+from tests.judge.folder import Folder, pieces
 from tests.judge.reading import Drawing, read
 
 SAME = 0.002
@@ -38,7 +38,7 @@ class Part:
 
 def judge_sheets(
     folders: Sequence[Folder], home: Path, entries: Sequence[dict[str, Any]]
-) -> Iterator[Disagreement]:
+) -> Iterator[str]:
     """The sheets of one or several designs; ``entries`` name their files and materials."""
     parts = _parts(folders)
     asked = folders[0].asked
@@ -52,18 +52,15 @@ def judge_sheets(
         for piece in pieces(drawing.region):
             if not _taken(piece, [p for p in parts if p.material == material], turns):
                 at = piece.representative_point()
-                yield Disagreement(
-                    "sheets",
+                yield (
                     f"{name} has a part at x {at.x:.2f}, y {at.y:.2f} that is no piece of a "
-                    "layer, or one too many",
+                    "layer, or one too many"
                 )
         yield from _layout(drawing, stock, entry, name, NEAR + 2 * chords)
         yield from _strays(drawing, stock, entry, name)
     for part in parts:
         if part.lacking:
-            yield Disagreement(
-                "sheets", f"the sheets lack {part.lacking} of a piece of {part.name}"
-            )
+            yield f"the sheets lack {part.lacking} of a piece of {part.name}"
 
 
 def _uneven(asked: dict[str, Any], material: str) -> bool:
@@ -130,7 +127,7 @@ def _same(piece: Polygon, part: Part) -> bool:
 
 def _layout(
     drawing: Drawing, stock: dict[str, Any], entry: dict[str, Any], name: str, slack: float
-) -> Iterator[Disagreement]:
+) -> Iterator[str]:
     """Gaps, borders and pins."""
     outlines = [Polygon(c.points) for c in drawing.on("CUT_OUTER")]
     spacing, border = float(stock["spacing"]), float(stock["border"])
@@ -140,50 +137,49 @@ def _layout(
     for i, j in zip(one, other, strict=True):
         if i < j:
             at = outlines[i].representative_point()
-            yield Disagreement(
-                "sheets",
+            yield (
                 f"two parts of {name} lie {outlines[i].distance(outlines[j]):.4f} apart at "
-                f"x {at.x:.2f}, y {at.y:.2f}, where {spacing:g} are asked for",
+                f"x {at.x:.2f}, y {at.y:.2f}, where {spacing:g} are asked for"
             )
     inside = shapely.box(border, border, width - border, length - border).buffer(slack)
     for outline in outlines:
         if not inside.covers(outline):
-            yield Disagreement("sheets", f"a part of {name} lies in the border of {border:g}")
+            yield f"a part of {name} lies in the border of {border:g}"
             break
     for x, y, diameter in stock["pins"]:
         pin = Point(x, y).buffer(diameter / 2, quad_segs=32)
         for number in tree.query(pin, predicate="dwithin", distance=spacing - slack):
             away = outlines[number].distance(pin)
-            yield Disagreement("sheets", f"a part of {name} is {away:.4f} from the pin at {x}, {y}")
+            yield f"a part of {name} is {away:.4f} from the pin at {x}, {y}"
 
 
 def _strays(
     drawing: Drawing, stock: dict[str, Any], entry: dict[str, Any], name: str
-) -> Iterator[Disagreement]:
+) -> Iterator[str]:
     """The sheet's own size, and lines that have no business where parts lie."""
     width, length = float(entry["width"]), float(entry["length"])
     if width != float(stock["width"]) or (
         length > float(stock["length"]) if stock["roll"] else length != float(stock["length"])
     ):
-        yield Disagreement("sheets", f"{name} is {width:g} x {length:g}, which is no such sheet")
+        yield f"{name} is {width:g} x {length:g}, which is no such sheet"
     frees = drawing.on("CUT_SHEET")
     if bool(frees) != bool(stock["roll"]):
-        yield Disagreement("sheets", f"{name} has {len(frees)} cuts on CUT_SHEET")
+        yield f"{name} has {len(frees)} cuts on CUT_SHEET"
     if any(
         abs(y - length) > NEAR or not -NEAR <= x <= width + NEAR
         for free in frees
         for x, y in free.points
     ):
-        yield Disagreement("sheets", f"{name} is not freed along its end, y {length:g}")
+        yield f"{name} is not freed along its end, y {length:g}"
     outlines: BaseGeometry = shapely.MultiPolygon(
         [Polygon(c.points) for c in drawing.on("CUT_OUTER")]
     ).buffer(-NEAR)  # without a border the cut that frees a roll's sheet runs along a part
     shapely.prepare(outlines)
     for contour in drawing.contours:
         if contour.layer not in KNOWN_LAYERS:
-            yield Disagreement("sheets", f"{name} draws on layer {contour.layer}")
+            yield f"{name} draws on layer {contour.layer}"
         elif contour.layer not in PARTS and outlines.intersects(contour.line):
-            yield Disagreement("sheets", f"a line on {contour.layer} of {name} crosses a part")
+            yield f"a line on {contour.layer} of {name} crosses a part"
     low_x, low_y, high_x, high_y = shapely.total_bounds([c.line for c in drawing.contours])
     if min(low_x, low_y) < -NEAR or high_x > width + NEAR or high_y > length + NEAR:
-        yield Disagreement("sheets", f"{name} draws outside its sheet")
+        yield f"{name} draws outside its sheet"

@@ -29,7 +29,7 @@ from tests.judge.doctoring import (
 )
 from tests.judge.drawings import blob
 from tests.judge.facing import judge_facing
-from tests.judge.folder import Disagreement, Folder, closed_by
+from tests.judge.folder import Folder, closed_by
 from tests.judge.overhangs import judge_overhangs
 from tests.judge.pins import judge_pins
 from tests.judge.pockets import judge_pockets
@@ -71,11 +71,11 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Patient]:
     return made
 
 
-def on_sheets(folder: Folder) -> Iterator[Disagreement]:
+def on_sheets(folder: Folder) -> Iterator[str]:
     return judge_sheets([folder], folder.path, folder.manifest["sheets"])
 
 
-def of_blob(folder: Folder) -> Iterator[Disagreement]:
+def of_blob(folder: Folder) -> Iterator[str]:
     return judge_pockets(folder, [BLOB.pocket] * 2)
 
 
@@ -107,7 +107,7 @@ class Fault(NamedTuple):
     """What is done to a folder, and what its judge must say."""
 
     harm: Callable[[Patient], object]
-    judge: Callable[[Folder], Iterator[Disagreement]]
+    judge: Callable[[Folder], Iterator[str]]
     said: str
     patient: str = "stack"
 
@@ -293,5 +293,5 @@ def test_a_fault_is_seen_by_its_judge(name: str, sound: dict[str, Patient], tmp_
     patient = Patient(tmp_path / "copy", sound[made].design)
     shutil.copytree(sound[made].folder, patient.folder)
     harm(patient)
-    found = [disagreement.said for disagreement in judge(patient.opened())]
+    found = list(judge(patient.opened()))
     assert any(said in sentence for sentence in found), found

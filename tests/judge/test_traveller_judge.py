@@ -46,7 +46,7 @@ def patient(made: Patient) -> Iterator[Patient]:
 
 
 def said(patient: Patient) -> list[str]:
-    return [found.said for found in judge_traveller(patient.opened())]
+    return list(judge_traveller(patient.opened()))
 
 
 def test_a_sound_page_is_left_alone(made: Patient) -> None:

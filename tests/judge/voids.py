@@ -17,7 +17,7 @@ from shapely import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from tests.judge.bonds import bond_of
-from tests.judge.folder import Disagreement, Folder, Interface, pieces, place
+from tests.judge.folder import Folder, Interface, pieces, place
 
 THINNEST = 0.004
 PLUG = 0.05
@@ -53,13 +53,13 @@ class Graph:
         return found
 
 
-def judge_voids(folder: Folder) -> Iterator[Disagreement]:
+def judge_voids(folder: Folder) -> Iterator[str]:
     """From every inlet its own chamber's pockets are reached, and nothing else."""
     low_x, low_y, high_x, high_y = shapely.union_all([f.profile for f in folder.films]).bounds
     plane = box(low_x - 5, low_y - 5, high_x + 5, high_y + 5)
     bottom = next((i for i in folder.interfaces if i.is_chamber), None)
     if bottom is None:
-        yield Disagreement("voids", "no interface has a chamber mask")
+        yield "no interface has a chamber mask"
         return
     mouths, plugs = _mouths(bottom)
     graph = Graph()
@@ -121,7 +121,7 @@ def _said(
     gaps: dict[int, list[Gap]],
     mouths: list[tuple[BaseGeometry, float]],
     bottom: Interface,
-) -> Iterator[Disagreement]:
+) -> Iterator[str]:
     pockets = {gap.node: gap for found in gaps.values() for gap in found if gap.is_pocket}
     chambers = _chambers(folder)
     wanted = {
@@ -142,47 +142,42 @@ def _said(
                 for node in reached & set(pockets):
                     fed[node].append(at)
     if count != (1 if chambers.manifold else chambers.count):
-        yield Disagreement("voids", f"{count} inlets lead into the bottom pockets")
+        yield f"{count} inlets lead into the bottom pockets"
     yield from _pockets(graph, pockets, fed)
     for number in wanted:
         found = sum(node[1] == number for node in pockets)
         meant = 1 if chambers.manifold and number == bottom.number else chambers.count
         if found != meant:
-            yield Disagreement(
-                "voids", f"{found} pockets at interface {number}, where {meant} were asked for"
-            )
+            yield f"{found} pockets at interface {number}, where {meant} were asked for"
 
 
 def _from_inlet(
     reached: set[Node], at: str, pockets: dict[Node, Gap], wanted: dict[int, int]
-) -> Iterator[Disagreement]:
+) -> Iterator[str]:
     """What an inlet reaches: as many pockets as wanted at every interface, and no way out."""
     if OUTSIDE in reached:
-        yield Disagreement("voids", f"the chamber of the inlet at {at} leaks to the outside")
+        yield f"the chamber of the inlet at {at} leaks to the outside"
         return
     for number, meant in wanted.items():
         own = sum(node[1] == number for node in reached & set(pockets))
         if own != meant:
-            yield Disagreement(
-                "voids",
+            yield (
                 f"from the inlet at {at} {own} pockets are reached at interface {number}, where "
-                f"{meant} belong to its chamber",
+                f"{meant} belong to its chamber"
             )
 
 
-def _pockets(
-    graph: Graph, pockets: dict[Node, Gap], fed: dict[Node, list[str]]
-) -> Iterator[Disagreement]:
+def _pockets(graph: Graph, pockets: dict[Node, Gap], fed: dict[Node, list[str]]) -> Iterator[str]:
     for node, gap in pockets.items():
         if len(fed[node]) == 1:
             continue
         at = f"the pocket at interface {node[1]}, {place(gap.region)}"
         if fed[node]:
-            yield Disagreement("voids", f"inlets {' and '.join(fed[node])} both reach {at}")
+            yield f"inlets {' and '.join(fed[node])} both reach {at}"
         elif OUTSIDE in graph.reached(node):
-            yield Disagreement("voids", f"{at}, is open")
+            yield f"{at}, is open"
         else:
-            yield Disagreement("voids", f"no inlet reaches {at}")
+            yield f"no inlet reaches {at}"
 
 
 class Chambers(NamedTuple):
@@ -200,10 +195,8 @@ def _chambers(folder: Folder) -> Chambers:
     return Chambers(count, family == "radial" and bool(folder.wish("inlet", "manifold", False)))
 
 
-def _tube(folder: Folder, width: float, at: str) -> Iterator[Disagreement]:
+def _tube(folder: Folder, width: float, at: str) -> Iterator[str]:
     """The inlet opens to half the tube's perimeter."""
     needed = math.pi * float(folder.wish("inlet", "tube_outer_diameter", 1.016)) / 2
     if width < needed - 2 * folder.slack:
-        yield Disagreement(
-            "voids", f"the inlet at {at} is {width:.4f} wide, and the tube takes {needed:.4f}"
-        )
+        yield f"the inlet at {at} is {width:.4f} wide, and the tube takes {needed:.4f}"

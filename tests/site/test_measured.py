@@ -23,6 +23,7 @@ from docs.scripts.tables import SUMMARIES, Table
 from sbafab.cli import COMMANDS
 from sbafab.design.files import rule_names
 from sbafab.rules.deck import EXPLAINED
+from tests.judge.campaign import JUDGES
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -135,7 +136,7 @@ def test_what_the_judges_saw_adds_up() -> None:
 def test_every_judge_has_its_line() -> None:
     lines = set(re.findall(r"^\| `([a-z]+)` \| ", TEXTS[DOCS / "testing.md"], re.MULTILINE))
     source = "".join(path.read_text() for path in (ROOT / "tests" / "judge").glob("*.py"))
-    named = set(re.findall(r"Disagreement\(\s*\"([a-z]+)\"", source))
+    named = {*JUDGES, *re.findall(r"(?:Disagreement|_heard)\(\s*\"([a-z]+)\"", source)}
     # A crash, an exit, what cannot be read and what takes too long are told in a sentence.
     assert lines == named - {"crash", "exit", "reading", "time"}
 
