@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sbafab.design.files import shown
+from sbafab.design.files import read_toml, shown
 from sbafab.design.toml_table import NAME_PATTERN
 from sbafab.folders.swap import replace_text
 from sbafab.lab.evidence import load_source

@@ -127,10 +127,11 @@ def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) ->
     or kit uses the file that is written with models.calibration = "NAME.toml".
     """
     _check_name(name)
+    path = out / f"{name}.toml"
+    _refuse_another_file(path)
     sources = [api.load_source(source) for source in evidence or ("paper",)]
     with show.progress(as_json) as progress:
         fitted = api.fit(name, sources, progress)
-    path = out / f"{name}.toml"
     out.mkdir(parents=True, exist_ok=True)
     api.replace_text(path, api.calibration_text(fitted.calibration))
     calibration, held_out = fitted.calibration, fitted.calibration.held_out
@@ -160,6 +161,18 @@ def _check_name(name: str) -> None:
     if name in (api.NONE, *api.shipped_names()):
         raise DesignError(
             f"--name is {api.shown(name)}, which stands for another one; give another name"
+        )
+
+
+def _refuse_another_file(path: Path) -> None:
+    """Raise DesignError if a file that is no calibration, such as a kit, has this path."""
+    try:
+        schema = str(api.read_toml(path).get("schema"))
+    except DesignError:
+        schema = ""
+    if path.exists() and not schema.startswith("sbafab/calibration@"):
+        raise DesignError(
+            f"{path} exists, is not a calibration, and is not overwritten; give another --name"
         )
 
 

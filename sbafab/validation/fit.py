@@ -35,6 +35,7 @@ from sbafab.validation.posterior import (
     NODE_COORDINATES,
     Posterior,
     SampledCurve,
+    installed_emcee,
     sampled,
     set_up_probabilities,
 )
@@ -104,6 +105,7 @@ def fit(name: str, sources: Sequence[Evidence], progress: Progress) -> Calibrati
 
     Raises DesignError if no curve of theirs can be fitted, or without emcee.
     """
+    installed_emcee()
     usable, left_out = usable_curves(sources)
     if not usable:
         reasons = "; ".join(f"{curve}: {reason}" for curve, reason in left_out)

@@ -17,7 +17,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -242,14 +242,20 @@ def log_likelihood(curves: Sequence[SampledCurve], samples: Posterior) -> Array:
     return total
 
 
-def sampled(curves: Sequence[SampledCurve], seed: int = SEED, steps: int = STEPS) -> Posterior:
-    """Return the posterior of curves. Raises DesignError without emcee."""
+def installed_emcee() -> Any:
+    """Return the module emcee. Raises DesignError without it."""
     try:
         import emcee  # Optional: only calibration needs a sampler.
     except ImportError:
         raise DesignError(
             'a calibration needs emcee, which is not installed; pip install "sbafab[calibrate]"'
         ) from None
+    return emcee
+
+
+def sampled(curves: Sequence[SampledCurve], seed: int = SEED, steps: int = STEPS) -> Posterior:
+    """Return the posterior of curves. Raises DesignError without emcee."""
+    emcee = installed_emcee()
     actuators = list(dict.fromkeys(name for curve in curves for name in curve.actuators))
 
     def log_posterior(chain: Array) -> Array:

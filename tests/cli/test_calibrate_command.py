@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import shutil
+import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 
-from sbafab.models.calibration import read_calibration
+from sbafab.models.calibration import FOLDER, read_calibration
+from sbafab.validation import fit
 from tests.cli.conftest import Run
 
 LAB = """curve,quantity,design,x_name,x,y,error,pressure_kpa,tip,fluid,error_source
@@ -38,3 +41,24 @@ def test_a_labs_curves_become_a_calibration_that_a_folder_holds(run: Run) -> Non
     assert tables["models"] == {"calibration": "calibration.toml"}
     assert (folder / "calibration.toml").read_bytes() == Path("lab.toml").read_bytes()
     assert run("check", str(folder))[0] == 0
+
+
+def test_a_kit_is_not_overwritten(run: Run) -> None:
+    assert run("new kit lab.toml")[0] == 0
+    kit = Path("lab.toml").read_bytes()
+    code, _, err = run("calibrate --name lab")
+    assert code == 2
+    assert (
+        "lab.toml exists, is not a calibration, and is not overwritten; give another --name" in err
+    )
+    assert Path("lab.toml").read_bytes() == kit
+
+
+def test_a_calibration_may_be_overwritten_and_a_sampler_is_missed_before_anything_is_computed(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copy(FOLDER / "paper.toml", "lab.toml")
+    monkeypatch.setitem(sys.modules, "emcee", None)
+    monkeypatch.delattr(fit, "usable_curves")
+    code, _, err = run("calibrate --name lab")
+    assert (code, "needs emcee, which is not installed" in err) == (2, True)
