@@ -15,16 +15,17 @@ from sbafab.design.identity import cited
 from sbafab.design.records import Design
 from sbafab.documents import Document
 from sbafab.folders.build import refuse_undoable
-from sbafab.folders.checks_json import checks
+from sbafab.folders.checks_json import FindingEntry, checks
 from sbafab.folders.order import Order, make_order
+from sbafab.geometry.region import Region
 from sbafab.laminate.joints import PortKind
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.netlist import SCHEMA as NETS
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.sizes import size_phrases, sizes
 from sbafab.reports.nets_svg import NetMap, net_map
-from sbafab.rules.deck import AT_MOST, EXPLAINED, RULES, run_rule
-from sbafab.rules.finding import Findings
+from sbafab.rules.deck import RULES, run_rule
+from sbafab.rules.finding import Finding, Findings
 from sbafab.rules.measures import Measures
 from sbafab.rules.nets import connectivity, netlist_findings
 from sbafab.runtime import Progress

@@ -32,7 +32,7 @@ from sbafab.models.pneumatics import FLUIDS, Line, usual_pressures
 from sbafab.models.prediction import predict as predict_design
 from sbafab.models.sensitivities import SensitivityRow, sensitivity_table
 from sbafab.models.sizes import size_phrases
-from sbafab.models.stack import MOST_PRESSURE, Motion, Stack
+from sbafab.models.stack import MOST_PRESSURE, Motion, Pose, Stack
 from sbafab.models.stack import stack as stack_of
 from sbafab.reports.assembly_prediction import SCHEMA, AssemblyPrediction, Grip
 from sbafab.reports.assembly_prediction import grip as grip_of

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 import click
 from click.shell_completion import CompletionItem
 
+from sbafab import plugins
 from sbafab.api.files import (
     KILOPASCALS,
+    MEGAPASCALS,
     MILLILITRES_PER_MINUTE,
+    MILLIMETRES,
     in_first_unit,
     refuse_file_as_folder,
     share_of,
@@ -41,7 +44,12 @@ class MeasuredQuantity(_Type):
     """A number with or without a unit; ``units`` gives the size of each in the first unit."""
 
     def __init__(
-        self, metavar: str, noun: str, units: dict[str, float], example: str, positive: bool = False
+        self,
+        metavar: str,
+        noun: str,
+        units: Mapping[str, float],
+        example: str,
+        positive: bool = False,
     ) -> None:
         super().__init__(metavar)
         self.noun, self.units, self.example, self.positive = noun, units, example, positive
@@ -60,13 +68,11 @@ class MeasuredQuantity(_Type):
         return number
 
 
-MILLIMETRES = {"mm": 1.0, "um": 0.001, "cm": 10.0, "in": 25.4}
 MICROLITRES = {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}
-MEGAPASCALS = {"MPa": 1.0, "kPa": 0.001, "GPa": 1000.0}
 LENGTH = MeasuredQuantity("MM", "length", MILLIMETRES, '0.35 or "350 um"')
 POSITIVE_LENGTH = MeasuredQuantity("MM", "length", MILLIMETRES, '0.35 or "350 um"', positive=True)
 PRESSURE = MeasuredQuantity("P", "pressure", KILOPASCALS, '6, "6 kPa" or "60 mbar"')
-MODULUS = MeasuredQuantity("E", "modulus", MEGAPASCALS, '10 or "10 MPa"')
+MODULUS = MeasuredQuantity("E", "modulus", MEGAPASCALS.units, '10 or "10 MPa"')
 VOLUME = MeasuredQuantity("V", "volume", MICROLITRES, '5, 5ul or "0.005 ml"')
 FLOW = MeasuredQuantity("Q", "flow", MILLILITRES_PER_MINUTE, '35, "35 ml/min" or "0.6 ml/s"')
 
@@ -140,18 +146,15 @@ def designs(ctx: click.Context, param: click.Parameter, typed: str) -> list[Comp
 
 def rules(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete the names of rules and checks."""
-    # Options need no rule; a shell asks for their names.
-    from sbafab.api.checks import EXPLAINED
-
-    return completions(typed, ((name, rule.holds) for name, rule in EXPLAINED.items()))
+    # By name: options need no rule; a shell asks for their names.
+    explained = plugins.load("sbafab.rules.deck:EXPLAINED")
+    return completions(typed, ((name, rule.holds) for name, rule in explained.items()))
 
 
 def assignments(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete ``KEY=``, and after it the values of a key that has a choice."""
-    # `sbafab new` has options too, and needs no family.
-    from sbafab.api.designs import kinds_of_keys
-
-    kinds = kinds_of_keys()
+    # By name: `sbafab new` has options too, and needs no family.
+    kinds = plugins.load("sbafab.api.designs:kinds_of_keys")()
     tables = {path.rpartition(".")[0] for path in kinds}
     key, equals, _ = typed.partition("=")
     if not equals:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from sbafab import catalogue
+from sbafab import catalogue, plugins
 from sbafab.api.files import Finding, counted, decisive
 from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.runtime import Progress, ignore_progress
@@ -260,10 +260,8 @@ def limit_text(finding: Finding) -> str:
     """Return a limit behind ">=" if it is a lower one, behind "<=" if it is an upper one."""
     if finding.limit is None:
         return "no target" if finding.rule in SHARE_OF else ""
-    # What prints no findings loads neither rules nor numpy.
-    from sbafab.api.checks import AT_MOST
-
-    sense = "<=" if finding.rule in AT_MOST else ">="
+    # By name: what prints no findings loads neither rules nor numpy.
+    sense = "<=" if finding.rule in plugins.load("sbafab.rules.deck:AT_MOST") else ">="
     return f"{sense} {short_figure(finding.limit, _unit(finding))}"
 
 

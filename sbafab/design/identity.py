@@ -7,9 +7,9 @@ import json
 from collections.abc import Iterable
 from typing import Any
 
-from sbafab.design.files import FITS, checked, override
+from sbafab.design.files import FITS, override
 from sbafab.design.films import UNCALIBRATED
-from sbafab.design.kits import SCHEMA, Kit, KitFile, load_kit
+from sbafab.design.kits import Kit, load_kit
 from sbafab.design.records import Design, dotted, with_unused, without_none
 from sbafab.design.sections import Models
 from sbafab.laminate.films import Film
@@ -97,8 +97,7 @@ def departures(design: Design) -> list[str]:
     """Return the dotted keys that a design sets differently from its kit."""
     kit = kit_of(design)
     tubes, adhesives = kit.record.tubes, kit.record.adhesives
-    record = checked(KitFile, {"schema": SCHEMA, "name": "x", "version": "x", **kit.tables}, {})
-    values, usual = with_unused(design), without_none(record.model_dump(mode="json"))
+    values, usual = with_unused(design), without_none(kit.record.model_dump(mode="json"))
     keys = [key for key, _ in dotted(kit.tables) if _at(values, key) != _at(usual, key)]
     tube = tubes.get(design.inlet.tube)
     if tubes and tube is None:

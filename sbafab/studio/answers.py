@@ -12,26 +12,18 @@ import json
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from sbafab import api
-from sbafab.api.records import (
-    Assembled,
-    Design,
-    Finding,
-    FindingEntry,
-    Laminate,
-    Motion,
-    NetMap,
-    PlacedPart,
-    Pose,
-    Region,
-    Stack,
-    Surface,
-)
+from sbafab.api.checks import FindingEntry
 from sbafab.errors import DesignError
+
+if TYPE_CHECKING:
+    from sbafab.api.checks import Finding, NetMap, Region
+    from sbafab.api.designs import Assembled, Design, Laminate, PlacedPart, Surface
+    from sbafab.api.predictions import Motion, Pose, Stack
 
 Kept = TypeVar("Kept")
 CancelCheck = Callable[[], None]

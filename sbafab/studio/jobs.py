@@ -19,7 +19,7 @@ import tomlkit.items
 from tomlkit.exceptions import TOMLKitError
 
 from sbafab import api
-from sbafab.api.records import Assembled, Design, Laminate
+from sbafab.api.designs import Assembled, Design, Laminate
 from sbafab.errors import DesignError, SbafabError
 from sbafab.studio import design_files
 from sbafab.studio.answers import (
