@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, reduce
 from pathlib import Path
@@ -22,6 +22,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from sbafab.actuators.stacking import used_films
 from sbafab.design.files import checked, is_file, listed, read_toml, shown
 from sbafab.design.records import Design, Discs, Form
 from sbafab.design.toml_table import Section
@@ -381,12 +382,12 @@ class ModelCalibration(Section):
         own = {"offsets", "joint"} if self.joint is None else set()
         return self.model_dump(mode="json", by_alias=True, exclude_none=True, exclude=own)
 
-    def for_film(self, product: str) -> ModelCalibration:
-        """Return the calibration adapted to a film; for a film other than the evidence's the
-        modulus ratio is 1, with the prior's uncertainty, and the share of work lost is the
-        prior's.
+    def for_films(self, products: Collection[str]) -> ModelCalibration:
+        """Return the calibration adapted to films that bond, by their products; if the evidence's
+        is not among them, the modulus ratio is 1, with the prior's uncertainty, and the share of
+        work lost is the prior's.
         """
-        if product == self.film:
+        if self.film in products:
             return self
         mean, covariance = np.array(self.mean), np.array(self.covariance)
         for name, middle in (("modulus_ratio", 1.0), ("loss_share", None)):
@@ -686,10 +687,13 @@ class Uncertainty:
     def _bounded(self, figure: Figure, moved: Sequence[float], share: float) -> Figure:
         """Return a figure with its interval, from its values at each of the ``moved`` factors."""
         group, value, quantity = discrepancy_group(figure), figure.value, figure.quantity
-        if group is None or not all(map(math.isfinite, moved)):
+        if group is None:
             return figure
+        flags = (*figure.flags, *self.flags(group))
+        if not all(map(math.isfinite, moved)):
+            return replace(figure, flags=flags)
         if group == FLAT and all(each == value for each in moved):
-            return figure
+            return self._of_unknown_flow(figure)
         values = dict(zip((self.factors, *self.moved), (value, *moved), strict=True))
         value, interval = self.interval_of(
             group,
@@ -698,8 +702,21 @@ class Uncertainty:
             term=TERMS.get(quantity, ""),
             may_be_negative=quantity in CLEARANCES,
         )
-        flags = (*figure.flags, *self.flags(group))
         return replace(figure, value=value, interval=interval, flags=flags)
+
+    def _of_unknown_flow(self, figure: Figure) -> Figure:
+        """Return the folded height of films that the calibration says nothing of: as bought at
+        most, and as far flown in the press as the prior allows, or as solid films are.
+        """
+        if self.laminate is None:
+            return figure
+        prior = UNKNOWNS[FIELDS.index("press_factor")]
+        lowest = prior.value(prior.coordinate(prior.middle) - deviations(SHARE) * prior.spread)
+        low = folded_height(self.laminate, lowest, "").height
+        if low == figure.value:
+            return figure
+        flags = (*figure.flags, EXTRAPOLATION)
+        return replace(figure, interval=(low, figure.value), flags=flags)
 
 
 def given_factors(overrides: Mapping[str, float | None]) -> dict[str, Any]:
@@ -712,7 +729,15 @@ def calibration_of(design: Design) -> ModelCalibration | None:
     unknown.
     """
     calibration = load_calibration(design.models.calibration, design.folder)
-    return calibration and calibration.for_film(design.films.tpe.product)
+    return calibration and calibration.for_films(bonding_products(design))
+
+
+def bonding_products(design: Design) -> list[str]:
+    """Return the products of the films of a design that bond. Raises DesignError for a layer whose
+    film is not among its films.
+    """
+    films = used_films(design).values()
+    return list(dict.fromkeys(film.product for film in films if film.kind == "structural"))
 
 
 def uncertainty_of(

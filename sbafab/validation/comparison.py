@@ -11,7 +11,14 @@ from typing import NamedTuple
 
 from sbafab.documents import Document, Short, attribute
 from sbafab.errors import DesignError
-from sbafab.models.calibration import SHARE, Ends, ModelCalibration, Uncertainty, deviations
+from sbafab.models.calibration import (
+    SHARE,
+    Ends,
+    ModelCalibration,
+    Uncertainty,
+    bonding_products,
+    deviations,
+)
 from sbafab.models.figures import Factors
 from sbafab.validation.evidence import Evidence, MeasuredCurve
 from sbafab.validation.fit import MIDDLES, relative_errors, term_of
@@ -106,10 +113,10 @@ def uncertainty_for(curve: MeasuredCurve, calibration: ModelCalibration) -> Unce
         return Uncertainty(calibration, is_probed=is_probed)
     of = ModelledActuator(curve, Factors(**MIDDLES))
     try:
-        film, form, laminate = of.design.films.tpe.product, of.design.form, of.laminate
+        films, form, laminate = bonding_products(of.design), of.design.form, of.laminate
     except DesignError:
         return Uncertainty(calibration, is_probed=is_probed)
-    return Uncertainty(calibration.for_film(film), {}, laminate, form, is_probed)
+    return Uncertainty(calibration.for_films(films), {}, laminate, form, is_probed)
 
 
 def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends | None] | None:

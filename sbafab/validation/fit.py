@@ -22,6 +22,7 @@ from sbafab.models.calibration import (
     UNKNOWNS,
     ModelCalibration,
     SizeRange,
+    bonding_products,
     sizes_of,
 )
 from sbafab.models.figures import Factors
@@ -145,8 +146,8 @@ def open_set_ups(
 
 
 def film_of(curve: MeasuredCurve) -> str:
-    """Return the product of the film of the actuator that was measured."""
-    return ModelledActuator(curve, Factors(**MIDDLES)).design.films.tpe.product
+    """Return the products of the films of the actuator that was measured."""
+    return " and ".join(bonding_products(ModelledActuator(curve, Factors(**MIDDLES)).design))
 
 
 def sampled_curves(curves: Sequence[MeasuredCurve], progress: Progress) -> list[SampledCurve]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from sbafab.actuators import build, load_design
@@ -10,6 +12,7 @@ from sbafab.errors import DesignError
 from sbafab.laminate.laminate import film_mass
 from sbafab.models.figures import Prediction, PredictionRequest
 from sbafab.models.prediction import predict
+from sbafab.models.quantity import Quantity
 from sbafab.models.stack import stack
 from sbafab.simulators.calculix.deck import deck_settings
 from sbafab.simulators.shell_model import coarse_shell, round_stack
@@ -114,3 +117,46 @@ def test_simulators_need_modulus_and_poisson() -> None:
         deck_settings(flat)
     with pytest.raises(DesignError, match=r"add films.tpe.modulus, in MPa, and poisson"):
         stack(load_design("1dof-5mm", TPU))
+
+
+def _named(name: str, *tables: str) -> tuple[str, ...]:
+    """Changes that cut all films that bond from ``films.NAME`` with these numbers."""
+    roles = (f"layup.{role}={name}" for role in ("base", "wall", "cap"))
+    return (f"films.{name}.kind=structural", *(f"films.{name}.{each}" for each in tables), *roles)
+
+
+def test_a_film_is_that_of_the_layers_wherever_the_design_names_it() -> None:
+    """The calibration asks which film is cut, not what ``films.tpe`` says."""
+    numbers = ("product=TPU 85A", "thickness=0.05", "modulus=20", "poisson=0.45")
+    as_tpe = predict(_design(*KNOWN), quick=True)
+    as_own = predict(_design(*_named("own", *numbers)), quick=True)
+    stroke = as_tpe.figure("free_stroke", kpa=10)
+    assert as_own.figure("free_stroke", kpa=10).value == pytest.approx(stroke.value)
+    assert as_own.figure("free_stroke", kpa=10).interval == pytest.approx(stroke.interval)
+    assert as_own.asked.factors.modulus_ratio == 1.0
+    papers = ("product=Stretchlon 200", "thickness=0.038", "modulus=10", "poisson=0.2")
+    renamed = predict(_design(*_named("st", *papers), *TPU), quick=True)
+    plain = predict(_design(), quick=True).value("free_stroke", kpa=10)
+    assert renamed.value("free_stroke", kpa=10) == pytest.approx(plain)
+
+
+def test_a_folded_height_whose_flow_is_unknown_is_no_certain_figure() -> None:
+    """Films that melt in the press keep from all of their thickness down to what the prior leaves:
+    its median of 0.32, less 1.64 standard deviations of 0.7 of the logarithm.
+    """
+    design = _design(*KNOWN, "films.tpe.melting_point=120")
+    folded = predict(design, quick=True).figure("folded_height")
+    masks, films = 7 * 0.025, 8 * 0.05
+    assert folded.value == pytest.approx(masks + films)
+    assert folded.interval == pytest.approx(
+        (masks + films * 0.32 * math.exp(-1.6448536 * 0.7), masks + films)
+    )
+    assert "extrapolation" in folded.flags
+
+
+def test_a_figure_that_has_no_interval_is_flagged_too() -> None:
+    """An actuator of a stiffer film may not bend so far, so that there is no interval."""
+    found = predict(load_design("3dof-15mm", (*KNOWN, "films.tpe.thickness=0.1")))
+    bent = [figure for figure in found.figures if figure.quantity is Quantity.BENT_FORCE]
+    assert bent
+    assert all("extrapolation" in figure.flags for figure in bent)

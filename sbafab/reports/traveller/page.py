@@ -36,6 +36,7 @@ from sbafab.laminate.lay_up import (
     press_steps,
     stack_count,
 )
+from sbafab.models.calibration import factors_of
 from sbafab.models.paper import BURST, FORCE_KPA
 from sbafab.models.sizes import sizes
 from sbafab.pressing.cycles import (
@@ -128,6 +129,7 @@ def context(work: Work) -> dict[str, Any]:
         "shapes": definitions(chain(pattern_regions(laminate), part_regions(work.sheets))),
         "balloons": balloons(laminate),
         "sizes": sizes(design, laminate),
+        "flow": factors_of(design).folded(laminate).remark,
         "kit": cited(design),
         "departures": len(departures(design)),
         "code": code_svg(text),
