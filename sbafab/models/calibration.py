@@ -22,7 +22,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from sbafab.actuators.stacking import used_films
+from sbafab.actuators import build
 from sbafab.design.files import checked, is_file, listed, read_toml, shown
 from sbafab.design.records import Design, Discs, Form
 from sbafab.design.toml_table import Section
@@ -724,20 +724,17 @@ def given_factors(overrides: Mapping[str, float | None]) -> dict[str, Any]:
     return {name: value for name, value in overrides.items() if value is not None}
 
 
-def calibration_of(design: Design) -> ModelCalibration | None:
-    """Return the calibration of a design, adapted to its film. Raises DesignError if it is
-    unknown.
+def calibration_of(design: Design, laminate: Laminate | None = None) -> ModelCalibration | None:
+    """Return the calibration of a design, adapted to the films of its laminate that bond. Raises
+    DesignError if it is unknown.
     """
     calibration = load_calibration(design.models.calibration, design.folder)
-    return calibration and calibration.for_films(bonding_products(design))
+    return calibration and calibration.for_films(bonding_products(laminate or build(design)))
 
 
-def bonding_products(design: Design) -> list[str]:
-    """Return the products of the films of a design that bond. Raises DesignError for a layer whose
-    film is not among its films.
-    """
-    films = used_films(design).values()
-    return list(dict.fromkeys(film.product for film in films if film.kind == "structural"))
+def bonding_products(laminate: Laminate) -> list[str]:
+    """Return the products of the films that bond."""
+    return list(dict.fromkeys(layer.film.product for layer in laminate.tpe_layers))
 
 
 def uncertainty_of(
@@ -749,7 +746,7 @@ def uncertainty_of(
     """Return the calibration of a design with the user's own values; None without one. Intervals
     apply to its ``laminate``; ``form`` replaces the design's.
     """
-    calibration = calibration_of(design)
+    calibration = calibration_of(design, laminate)
     if calibration is None:
         return None
     return Uncertainty(calibration, overrides or {}, laminate, form or design.form)

@@ -113,7 +113,7 @@ def uncertainty_for(curve: MeasuredCurve, calibration: ModelCalibration) -> Unce
         return Uncertainty(calibration, is_probed=is_probed)
     of = ModelledActuator(curve, Factors(**MIDDLES))
     try:
-        films, form, laminate = bonding_products(of.design), of.design.form, of.laminate
+        films, form, laminate = bonding_products(of.laminate), of.design.form, of.laminate
     except DesignError:
         return Uncertainty(calibration, is_probed=is_probed)
     return Uncertainty(calibration.for_films(films), {}, laminate, form, is_probed)

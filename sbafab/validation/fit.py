@@ -147,7 +147,7 @@ def open_set_ups(
 
 def film_of(curve: MeasuredCurve) -> str:
     """Return the products of the films of the actuator that was measured."""
-    return " and ".join(bonding_products(ModelledActuator(curve, Factors(**MIDDLES)).design))
+    return " and ".join(bonding_products(ModelledActuator(curve, Factors(**MIDDLES)).laminate))
 
 
 def sampled_curves(curves: Sequence[MeasuredCurve], progress: Progress) -> list[SampledCurve]:
