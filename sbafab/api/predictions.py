@@ -14,6 +14,8 @@ from sbafab.design.records import Design, Drawn
 from sbafab.errors import DesignError
 from sbafab.folders.artefacts import PredictDocument, prediction_json
 from sbafab.folders.run import RunRequest, generate
+from sbafab.lab.report import items
+from sbafab.lab.store import Lab
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Surface
 from sbafab.models.actuator import model_form
@@ -38,6 +40,7 @@ from sbafab.reports.assembly_prediction import SCHEMA, AssemblyPrediction, Grip
 from sbafab.reports.assembly_prediction import grip as grip_of
 from sbafab.reports.assembly_prediction import predict_assembly as predict_assembled
 from sbafab.reports.inflated import gripping
+from sbafab.search.quantities import read_measured
 
 
 class PrintedPrediction(PredictDocument, schema=PredictDocument.SCHEMA):
@@ -59,6 +62,10 @@ def predict(
     contact_factor: float | None = None,
     pocket_loss: float | None = None,
     modulus_mpa: float | None = None,
+    tip_load: float | None = None,
+    measured: Sequence[str] = (),
+    serial: str = "",
+    lab: str | Path = "lab.sqlite",
     quick: bool = False,
     laminate: Laminate | None = None,
     **tables: Any,
@@ -70,7 +77,10 @@ def predict(
     with ``volumes_ul`` in each balloon. ``quick`` leaves out the curves and the figures of the
     elastic stack, which take seconds; ``laminate`` is the design's, if already built.
     The user's own ``press_factor`` and ``contact_factor`` (ratios), ``pocket_loss`` in mm and
-    ``modulus_mpa`` replace the calibration's. ``tables`` override tables of the design, such as
+    ``modulus_mpa`` replace the calibration's; ``tip_load`` g stand on the free tip. Values that
+    were ``measured`` on an actuator, such as "stroke@10kPa=16.6mm", narrow the prediction to that
+    one, and so do the force and height that the records of a ``lab`` hold of a ``serial``.
+    ``tables`` override tables of the design, such as
     ``models={"calibration": "none"}``. Figures of calibrated models have a 90 % ``interval``.
     Raises DesignError if a request is outside every model's range. Models: the paper's Eqs. 1-4
     (Sec. 3), and elastic balloons of axisymmetric film in equilibrium.
@@ -86,9 +96,36 @@ def predict(
             "contact_factor": contact_factor,
             "pocket_loss": pocket_loss,
             "modulus_mpa": modulus_mpa,
+            "tip_load": tip_load,
         },
+        measured=tuple(
+            map(read_measured, [*measured, *(_recorded(serial, lab) if serial else ())])
+        ),
     )
     return predict_design(design, request, laminate, quick)
+
+
+def _recorded(serial: str, lab: str | Path) -> list[str]:
+    """Return what the lab's records hold of an actuator, as ``measured`` of ``predict``: its
+    blocked force, flat at 100 kPa, and its folded height. A stroke has no pressure there.
+
+    Raises DesignError if they hold neither.
+    """
+    texts = {"force_n": "force@0mm@100kPa={:g}N", "height_mm": "height={:g}mm"}
+    records, _, builds = Lab(Path(lab)).contents()
+    of_serial = [each for each in items(records, builds) if each.records[0].serial == serial]
+    found = [
+        text.format(each.numbers[name])
+        for each in of_serial
+        for name, text in texts.items()
+        if name in each.numbers
+    ]
+    if not found:
+        raise DesignError(
+            f"{lab} has no force and no height of {serial}; record one, such as sbafab record "
+            f"DESIGN --serial {serial} --force 4.8"
+        )
+    return found
 
 
 @command

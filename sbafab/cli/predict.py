@@ -17,7 +17,7 @@ from sbafab.cli import show
 from sbafab.cli.exit import print_error
 from sbafab.errors import OutputError
 
-ELASTIC_OPTIONS = ("pocket_loss", "modulus_mpa", "sensitivity")
+ELASTIC_OPTIONS = ("pocket_loss", "modulus_mpa", "tip_load", "measured", "serial", "sensitivity")
 """Options of the model of elastic balloons alone."""
 FORMULA_OPTIONS = ("flow_ml_min", "volumes_ul", "contact_factor")
 """Options of formulas that need round or oblong pockets."""
@@ -47,6 +47,25 @@ FORMULA_OPTIONS = ("flow_ml_min", "volumes_ul", "contact_factor")
     opt.FiniteFloat(),
 )
 @opt.calibration_options
+@opt.option(
+    "--tip-load tip_load G",
+    "Weight on the free tip, g; for elastic models.  [default: nothing]",
+    opt.FiniteRange(min=0, max=1000),
+)
+@opt.option(
+    "--measured Q=V...",
+    "What was measured on this actuator, such as stroke@10kPa=16.6mm or force@0mm@100kPa=4.8N: "
+    "narrows the intervals to those of this one.",
+)
+@opt.option(
+    "--serial NAME", "Actuator whose recorded force and height count as measured.", default=""
+)
+@opt.option(
+    "--lab FILE",
+    "File of the lab's records, for --serial.",
+    click.Path(path_type=Path),
+    default=Path("lab.sqlite"),
+)
 @opt.option(
     "--load load_g G",
     "Assemblies: mass at the tips, g; the default is the paper's marble.",

@@ -551,6 +551,8 @@ class Uncertainty:
 
     def _with_overrides(self, factors: Factors) -> Factors:
         label = self.calibration.name
+        if self.calibration.joint is not None:
+            label += " with values of this actuator"
         if "press_factor" in self._given:
             factors = replace(factors, press_film="")
         named = [

@@ -37,7 +37,7 @@ from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
 from sbafab.models.quantity import Conditions, Quantity, chamber_count
 from sbafab.models.rippled_balloon import compressed_shapes, free_shapes
-from sbafab.models.stack import MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
+from sbafab.models.stack import GRAVITY, MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
 
 Value = TypeVar("Value")
 ELASTIC, TIME, SHUT = (MODELS[of] for of in ("elastic-balloon", "stack-in-time", "stack-shut"))
@@ -126,7 +126,8 @@ def inflated(
     request: PredictionRequest,
 ) -> list[Inflated]:
     """Return actuators of one form at the pressures of a request."""
-    bent = [_bent_poses(each, request) for each in stacks]
+    pairs = list(zip(actuators, stacks, strict=True))
+    bent = [_bent_poses(*pair, request) for pair in pairs]
     posed = [
         (each, pose)
         for each, poses in zip(stacks, bent, strict=True)
@@ -136,7 +137,12 @@ def inflated(
     rooms = iter(chamber_clearances(posed))
     states = []
     usual = (Conditions(kpa=kpa) for kpa in request.pressures_kpa if actuators[0].radii)
-    rises = _rises(actuators, [at.kpa or 0.0 for at in request.places(usual, *RISES)])
+    pressures = [at.kpa or 0.0 for at in request.places(usual, *RISES)]
+    rises: list[dict[float, Rise | DesignError] | DesignError]
+    if any(of.factors.tip_load for of in actuators):
+        rises = [{p: _attempt(_loaded_rise, *pair, p) for p in pressures} for pair in pairs]
+    else:
+        rises = _rises(actuators, pressures)
     for actuator, there, rise, poses in zip(actuators, stacks, rises, bent, strict=True):
         with_rooms = {
             at: (pose, next(rooms, math.nan)) if isinstance(pose, Pose) else pose
@@ -211,6 +217,19 @@ def _rise(
     return Rise(*total.tolist())
 
 
+def tip_force(factors: Factors) -> tuple[float, float, float]:
+    """Return the force in N of what stands on the tip, for a base that lies level."""
+    return (0.0, 0.0, -1e-3 * GRAVITY * factors.tip_load)
+
+
+def _loaded_rise(of: Actuator, whole: Stack | LeftOut | None, pressure: float) -> Rise:
+    if not isinstance(whole, Stack):
+        raise DesignError("with a weight on the tip it is that of the elastic stack")
+    pose = whole.pose((pressure,) * whole.chambers, tip_force(of.factors))
+    rise = pose.height - whole.flat_height
+    return Rise(rise, float(pose.volumes[0]), pose.energy / whole.chambers)
+
+
 def free_rise(kinds: Counter[Balloon], pressure: float) -> Rise:
     """Return the rise of the counted balloons of each kind at a pressure in kPa. Raises BeyondError
     if a film would be stretched too far.
@@ -220,7 +239,7 @@ def free_rise(kinds: Counter[Balloon], pressure: float) -> Rise:
 
 
 def _bent_poses(
-    whole: Stack | LeftOut | None, request: PredictionRequest
+    of: Actuator, whole: Stack | LeftOut | None, request: PredictionRequest
 ) -> dict[Conditions, Pose | DesignError]:
     """Return poses with some chambers at each pressure, the others empty, or why there is none."""
     if not isinstance(whole, Stack):
@@ -228,7 +247,11 @@ def _bent_poses(
     every = product(request.pressures_kpa, range(1, whole.chambers))
     usual = (Conditions(kpa=kpa, chambers=count) for kpa, count in every)
     return {
-        at: _attempt(whole.pose, chamber_pressures(whole, at.chambers or 0, at.kpa or 0.0))
+        at: _attempt(
+            whole.pose,
+            chamber_pressures(whole, at.chambers or 0, at.kpa or 0.0),
+            tip_force(of.factors),
+        )
         for at in request.places(usual, *BENDS)
     }
 

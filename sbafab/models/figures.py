@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field, PlainSerializer, WithJsonSchema
 
@@ -300,6 +300,8 @@ class Factors:
             value, name = getattr(self, field_name), field_name.replace("_", " ")
             if not 0 < value <= most:
                 raise DesignError(f"{name} = {value:g} must be above 0 and at most {most:g}")
+        if not 0 <= self.tip_load <= 1000:
+            raise DesignError(f"tip load = {self.tip_load:g} g must be from 0 to 1000 g")
         if not 0 <= self.pocket_loss <= 100:
             raise DesignError(f"pocket loss = {self.pocket_loss:g} mm must be from 0 to 100 mm")
         if self.modulus_mpa is not None and not 0.1 <= self.modulus_mpa <= 1e4:
@@ -314,6 +316,17 @@ USUAL_PRESSURES = (10.0, 100.0)
 """Default pressures of predictions, kPa."""
 
 
+class MeasuredValue(NamedTuple):
+    """A value that was measured on one actuator, in the unit of its quantity, and the ``text`` in
+    which it was given.
+    """
+
+    text: str
+    quantity: Quantity
+    at: Conditions
+    value: float
+
+
 @dataclass(frozen=True)
 class PredictionRequest:
     """Conditions of a prediction: gauge pressures in kPa, flow in ml/min into each chamber or all,
@@ -321,7 +334,8 @@ class PredictionRequest:
 
     Without ``calibration`` the factors come from the design's calibration, replaced by the user's
     values (``overrides``, by field of ``Factors``) where given. Intervals hold a measurement with
-    this ``probability``. If one figure is ``wanted``, others are left out that cost time.
+    this ``probability`` (a share). If one figure is ``wanted``, others are left out that cost time.
+    What was ``measured`` on an actuator narrows the prediction to that one.
     """
 
     pressures_kpa: tuple[float, ...] = USUAL_PRESSURES
@@ -331,6 +345,7 @@ class PredictionRequest:
     overrides: Mapping[str, float | None] = field(default_factory=dict)
     wanted: tuple[Quantity, Conditions] | None = None
     probability: float = 0.9
+    measured: tuple[MeasuredValue, ...] = ()
 
     def wants(self, *groups: str) -> bool:
         """Return True if figures of one of the groups are wanted."""
@@ -350,6 +365,11 @@ class PredictionRequest:
         return self.calibration or Factors()
 
     @property
+    def measured_texts(self) -> list[str]:
+        """The measured values as they were given."""
+        return [one.text for one in self.measured]
+
+    @property
     def given_overrides(self) -> dict[str, float]:
         """The overrides that have a value."""
         return {name: value for name, value in self.overrides.items() if value is not None}
@@ -357,12 +377,15 @@ class PredictionRequest:
 
 @dataclass(frozen=True, repr=False)
 class Prediction:
-    """The prediction of one design."""
+    """The prediction of one design; if it is that of an actuator on which values were measured,
+    ``before`` has the figures without these.
+    """
 
     asked: PredictionRequest
     figures: tuple[Figure, ...]
     relations: tuple[Relation, ...]
     left_out: tuple[LeftOut, ...]
+    before: tuple[Figure, ...] = ()
 
     def figure(self, quantity: Quantity | str, model: str = "", **at: Any) -> Figure:
         """Return the figure of a quantity at conditions (fields of ``Conditions``, those that tell
@@ -402,8 +425,9 @@ class Prediction:
     @property
     def verdict(self) -> tuple[VerdictLine, ...]:
         """Lines with the main figures, their validity, and the omitted figures with reasons."""
+        before = {figure.key: figure for figure in self.before}
         lines = [
-            VerdictLine(quantity, _shown(figure), _note(figure))
+            VerdictLine(quantity, _shown(figure), _note(figure, before.get(figure.key)))
             for quantity, figure in _main_figures(self.figures)
         ]
         why: dict[str, list[str]] = {}
@@ -525,8 +549,15 @@ def _shown(figure: Figure) -> str:
     return f"{value}, {figure.name} ({figure.model.name})"
 
 
-def _note(figure: Figure) -> str:
-    """Return flags and counterpart, else the interval of measurements, else the validity."""
+def _note(figure: Figure, before: Figure | None = None) -> str:
+    """Return what it was without the measured values, else flags and counterpart, else the interval
+    of measurements, else the validity.
+    """
+    if before is not None and figure.interval != before.interval:
+        return (
+            f"{before.value:.3g} {before.unit} ({before.range}) without what was measured on this "
+            f"actuator{'; ' * bool(figure.aside)}{figure.aside}"
+        )
     if figure.measured or figure.between or figure.flags:
         return figure.aside
     if figure.interval is not None and figure.quantity is not Quantity.BURST:
@@ -621,6 +652,7 @@ class AskedEntry(Document):
     loss_share: Rounded = attribute("factors.loss_share")
     calibration: str = attribute("factors.calibration")
     overrides: dict[str, PlainNumber] = attribute("given_overrides")
+    measured: list[str] = attribute("measured_texts")
 
 
 class PredictedFigure(Document):

@@ -25,6 +25,8 @@ from sbafab.models.actuator import NOT_MEASURED, Actuator, NearDiscs, near_discs
 from sbafab.models.calibration import (
     PAPER_3DOF,
     SHARE,
+    Reading,
+    Uncertainty,
     burst_uncertainty,
     factors_of,
     flags_at,
@@ -77,6 +79,8 @@ from sbafab.models.sizes import is_the_papers_3dof, sizes
 from sbafab.models.stack import Stack
 
 SAMPLES = 61
+LEAST_READING_ERROR = 0.01
+"""Relative standard error of a value that was measured on an actuator, which is assumed."""
 BY_STACK = (
     *(Quantity.BLOCKED_FORCE, Quantity.BENT_FORCE, *elastic.BENDS),
     *(Quantity.WATER_TIME, Quantity.WATER_HEIGHT),
@@ -121,8 +125,14 @@ def predict(
     discs = near_discs(design) if asked_request.wanted is None else None
     discs = discs if discs and discs.is_round else None
     form = discs and discs.form(design, discs.equal)
+    before: tuple[Figure, ...] = ()
     if asked_request.calibration is None:
         uncertainty = uncertainty_of(design, asked_request.overrides, flat, form)
+        if asked_request.measured:
+            before = predict(design, replace(asked_request, measured=()), flat, quick).figures
+            uncertainty = _built(
+                uncertainty, Actuator(design, flat, Factors(), form), asked_request
+            )
         factors = (
             uncertainty.factors if uncertainty else factors_of(design, asked_request.overrides)
         )
@@ -160,7 +170,35 @@ def predict(
         tuple(replace(figure, measured=_measured(figure, subject)) for figure in figures),
         relations,
         tuple(item for item in items if isinstance(item, LeftOut)),
+        before,
     )
+
+
+def _built(
+    uncertainty: Uncertainty | None, actuator: Actuator, request: PredictionRequest
+) -> Uncertainty:
+    """Return what is known of an actuator by the values that were measured on it. Raises
+    DesignError for one that no calibrated model gives, or that contradicts the prediction.
+    """
+    if uncertainty is None:
+        raise DesignError(
+            'measured values narrow what a calibration predicts, and models.calibration = "none"; '
+            "give a calibration or leave the measured values out"
+        )
+    readings = []
+    for text, quantity, at, value in request.measured:
+        kpa = () if at.kpa is None else (at.kpa,)
+        asked = replace(request, pressures_kpa=kpa, calibration=uncertainty.factors)
+        asked = replace(asked, measured=(), wanted=(quantity, at))
+        subject = replace(actuator, factors=uncertainty.factors)
+        states = _states(subject, uncertainty.moved, asked, quantity not in BY_STACK)
+        guides = elastic.Guides()
+        figures = [
+            _figure_of(_figures(state, asked, guides, checks_films=False), quantity, at, text)
+            for state in states
+        ]
+        readings.append(Reading(text, value, LEAST_READING_ERROR, figures))
+    return uncertainty.built(readings)
 
 
 def figure(
@@ -189,15 +227,28 @@ def figure(
         probability=probability or SHARE,
     )
     prediction = predict(design, request, laminate, quick=quantity not in BY_STACK)
-    figures = [item for item in prediction.figures if item.is_of(quantity, at)]
+    return _figure_of((*prediction.figures, *prediction.left_out), quantity, at, design.name)
+
+
+def _figure_of(
+    items: Iterable[FigureItem], quantity: Quantity, at: Conditions, name: str
+) -> Figure:
+    """Return the figure of a quantity at its conditions among items. Raises DesignError with the
+    reason why it is left out, or by the ``name`` of what asks for it.
+    """
+    figures, left_out = [], []
+    for item in items:
+        if isinstance(item, LeftOut):
+            left_out.append(item)
+        elif item.is_of(quantity, at):
+            figures.append(item)
     calibrated = [item for item in figures if item.model.id in paper.CALIBRATED_MODELS]
     if figures:
         return min(calibrated or figures, key=lambda item: item.value)
-    of_it = sorted(prediction.left_out, key=lambda item: quantity not in item.quantities)
-    for item in of_it:
+    for item in sorted(left_out, key=lambda item: quantity not in item.quantities):
         if not item.quantities or quantity in item.quantities:
             raise item.error or DesignError(f"{item.name}: {item.reason}")
-    raise DesignError(f"no model gives the {quantity.named(at)} of {design.name}")
+    raise DesignError(f"no model gives the {quantity.named(at)} of {name}")
 
 
 def _check_request(actuator: Actuator, request: PredictionRequest) -> None:

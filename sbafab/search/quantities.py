@@ -26,7 +26,7 @@ from sbafab.design.units import (
 )
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.models.figures import Figure
+from sbafab.models.figures import Figure, MeasuredValue
 from sbafab.models.paper import FULL_KPA, WATER_FLOW
 from sbafab.models.pneumatics import refuse_pressure, seconds
 from sbafab.models.prediction import figure
@@ -222,6 +222,28 @@ def read_quantity(
     if name not in NAMES and "." not in name:
         raise DesignError(f"{shown(text)} is not a quantity; {hint(name, [*NAMES, 'any key'])}")
     return RequestedQuantity(name)
+
+
+def read_measured(text: str) -> MeasuredValue:
+    """Return a value that was measured on an actuator, such as "stroke@10kPa=16.6mm"; with a
+    pressure "height" is the full height there. Raises DesignError.
+    """
+    name, is_given, value = (part.strip() for part in text.rpartition("="))
+    if not is_given:
+        raise DesignError(f'{shown(text)} has no value; write it as "stroke@10kPa=16.6mm"')
+    of_height, _, place = name.partition("@")
+    is_full = of_height.strip() == "height" and bool(place)
+    quantity = read_quantity(f"stroke@{place}" if is_full else name)
+    if quantity.figure is None:
+        raise DesignError(f"{shown(text)} is of the drawing, and narrows no prediction")
+    of, at = quantity.figure
+    try:
+        number = read_limit(quantity, value)
+    except ValueError as error:
+        raise DesignError(f"{shown(text)}: {shown(value)} {error}") from None
+    if number == 0:
+        raise DesignError(f"{shown(text)} must be above 0")
+    return MeasuredValue(text, Quantity.FREE_HEIGHT if is_full else of, at, number)
 
 
 def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:

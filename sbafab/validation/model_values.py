@@ -30,7 +30,7 @@ from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line, usua
 from sbafab.models.prediction import plate_of, predict
 from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count
 from sbafab.models.rippled_balloon import free_shapes
-from sbafab.models.stack import GRAVITY, Pose, Stack, stack
+from sbafab.models.stack import Pose, Stack, stack
 from sbafab.validation.evidence import QUANTITIES, MeasuredCurve
 
 ModelValue = float | None
@@ -181,8 +181,8 @@ class ModelledActuator:
     @property
     def tip_load(self) -> tuple[float, float, float]:
         """Force in N on the tip by what stands on it, for a base that lies level."""
-        probe = self.factors.tip_load if self.curve.setup.tip == "probed" else 0.0
-        return (0.0, 0.0, -1e-3 * GRAVITY * probe)
+        is_probed = self.curve.setup.tip == "probed"
+        return elastic.tip_force(self.factors) if is_probed else (0.0, 0.0, 0.0)
 
     @property
     def chambers_that_bend(self) -> dict[str, int]:
