@@ -26,7 +26,8 @@ LOADS: list[dict[str, Any]] = [{}, {"tip_load": (0.0, 0.005, -0.005)}]
 
 @pytest.fixture(scope="module")
 def three() -> Stack:
-    return sbafab.stack("3dof-15mm")
+    # Pockets as drawn, which hold what is asked for.
+    return sbafab.stack("3dof-15mm", "models.calibration=none")
 
 
 def contents(motion: Motion) -> np.ndarray[Any, np.dtype[np.float64]]:
