@@ -93,6 +93,21 @@ def test_the_film_is_the_design_s(tmp_path: Path) -> None:
     assert model.body_mass.sum() == pytest.approx(octagon * (2 * 3.25**2 - 0.5**2 / 3), rel=1e-6)
 
 
+def test_films_in_contact_have_the_memory_that_they_take(tmp_path: Path) -> None:
+    """MuJoCo's own count: 320 MB for four balloons, and that of a lone chamber is left to it."""
+    design = sbafab.build("3dof-15mm", "stack.balloons=4")
+    export(design, SimulationRequest(chambers={"chamber1": 20.0}), tmp_path)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "actuator.xml"))
+    assert 2 * 320e6 < 1.1 * model.narena < 4 * 320e6
+    assert "<size" not in written(tmp_path, *BALLOON).read_text()
+
+
+def test_a_run_says_what_mujoco_said_of_it() -> None:
+    words = "mujoco.FatalError: mj_stackAlloc: out of memory, stack overflow at mj_ipc, line 1130"
+    log = f"Traceback (most recent call last):\n{words}\n  max = 13\n  nefc = 0, ncon = 0\n"
+    assert of_mujoco.read_log(log) == (words, None)
+
+
 # Runs.
 
 
