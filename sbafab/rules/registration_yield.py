@@ -94,6 +94,8 @@ def finding_of(outcome: Yield, laminate: Laminate, design: Design) -> Finding:
         verdict, sentence = "pass" if low >= target else "fail", "target"
     elif high < PAPER_SUCCESS:
         sentence = "low-ears" if laminate.registration == "channel-pin" else "low"
+        if not design.uses("bond.width"):
+            sentence = "low-drawn"
         verdict = "warn"
     usual = Registration.model_construct()
     is_usual = (hand.hand_placement, hand.hand_turn) == (usual.hand_placement, usual.hand_turn)

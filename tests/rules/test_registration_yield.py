@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sbafab.actuators import build, load_design
 from sbafab.design.records import Design
 from sbafab.geometry.region import disc, rectangle
 from sbafab.laminate.laminate import Laminate
@@ -165,6 +166,18 @@ def test_without_a_target_less_than_the_papers_success_warns(good: Good) -> None
     assert many.measured is not None
     assert few.measured is not None
     assert few.measured < 0.9 <= many.measured
+
+
+@pytest.mark.parametrize(("template", "has_keys"), [("1dof-5mm", True), ("pouch", False)])
+def test_only_where_keys_widen_bonds_is_their_width_to_be_asked_for(
+    template: str, has_keys: bool
+) -> None:
+    """Drawn layers take no bond.width: `check --target-yield` has none to advise."""
+    design = load_design(template).with_("registration.hand_placement=0.6")
+    (finding,) = check(Measures(build(design), design))
+    assert finding.verdict == "warn"
+    assert ("--target-yield" in finding.remedy) == has_keys
+    assert ("draw bonds and overhangs wider" in finding.remedy) != has_keys
 
 
 # Builds that come short, against plain sums of their errors.
