@@ -50,6 +50,7 @@ FIRST = (
     Quantity.FOLDED_HEIGHT,
     Quantity.MASS,
     Quantity.REFERENCE_STROKE,
+    Quantity.BURST,
 )
 """The most important figures without a pressure."""
 MOVED = (Quantity.FREE_STROKE, Quantity.BEND, Quantity.BLOCKED_FORCE)
