@@ -37,13 +37,6 @@ def test_n_balloons_are_2n_tpe_n_chamber_masks_and_n_minus_1_separators(
     assert [layer.index for layer in lam.layers] == list(range(1, len(lam.layers) + 1))
 
 
-@pytest.mark.parametrize("name", TEMPLATES)
-@pytest.mark.parametrize("balloons", [1, 3])
-def test_every_layer_has_the_pieces_its_role_asks_for(name: str, balloons: int) -> None:
-    for layer in laminate(name, f"stack.balloons={balloons}").layers:
-        assert len(layer.profile.pieces) == layer.pieces, layer.name
-
-
 @pytest.mark.parametrize("count", range(2, 9))
 def test_lobes_keep_one_bond_from_lumen_and_from_each_other(count: int) -> None:
     lam = laminate("3dof-15mm", f"chamber.count={count}", "stack.balloons=2")
