@@ -10,8 +10,9 @@ from sbafab.actuators import build, load_design
 from sbafab.folders.run import RunRequest, generate
 from sbafab.rules.registration_yield import simulate
 from tests.judge.yields import judged_yield
-from tests.quick import few
 
+pytestmark = pytest.mark.long
+"""Closed formulas in tests/rules see what changes a yield; these look at whole folders."""
 TWO = "stack.balloons=2"
 DESIGNS = {
     "by hand": ("1dof-5mm", (TWO, "registration.hand_placement=0.12")),
@@ -40,16 +41,14 @@ def folder_of(name: str, out: Path) -> tuple[float, Path]:
     return share, generate(RunRequest(quick, out, ("cut", "press"))).folder
 
 
-@pytest.mark.parametrize(
-    "name", ["by hand", "middle first", pytest.param("round a tube", marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("name", DESIGNS)
 def test_a_predicted_yield_is_that_of_plain_builds(name: str, tmp_path: Path) -> None:
     share, folder = folder_of(name, tmp_path)
     assert share < 0.97
     assert judged_yield(folder, builds=10_000) == pytest.approx(share, abs=0.01)
 
 
-@pytest.mark.parametrize("line", few(ROUGHER, 2))
+@pytest.mark.parametrize("line", ROUGHER)
 def test_the_judge_counts_every_error_and_limit(line: str, tmp_path: Path) -> None:
     share, folder = folder_of("by hand", tmp_path)
     file = folder / "design.toml"
