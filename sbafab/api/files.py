@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sbafab.design.files import refuse_file_as_folder, template_summaries, write_new
+from sbafab.design.files import refuse_file_as_folder, template_names, template_summaries, write_new
 from sbafab.design.kits import write_kit
 from sbafab.design.units import (
     KILOPASCALS,

@@ -20,8 +20,9 @@ from sbafab.models.calibration import factors_of
 from sbafab.models.closed_forms import LOBES, folded_diameter
 from sbafab.models.sizes import deflated_diameter
 from sbafab.models.sizes import sizes as sizes_of
+from sbafab.rules.deck import weakened
 from sbafab.rules.finding import Finding, Place, Verdict, judged, marked
-from sbafab.rules.limits import holds, weakened
+from sbafab.rules.limits import holds
 from sbafab.rules.sentences import Clause, say
 
 if TYPE_CHECKING:

@@ -23,9 +23,8 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.pressing import dowels
 from sbafab.pressing.cycles import Runs, design_runs
 from sbafab.pressing.schedule import Schedule, plate_holes, schedule
-from sbafab.rules.deck import has_failed, run_deck
+from sbafab.rules.deck import CHECKED_AGAINST, has_failed, lowered, run_deck
 from sbafab.rules.finding import Finding
-from sbafab.rules.limits import CHECKED_AGAINST, lowered
 from sbafab.runtime import Progress
 from sbafab.version import GENERATOR
 

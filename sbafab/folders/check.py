@@ -70,8 +70,8 @@ from sbafab.folders.manifest import (
     read_design_index,
     read_index,
 )
-from sbafab.folders.order import JOB_SCHEMA, SCHEMA, Order, of_assembly
-from sbafab.folders.swap import MANIFEST, is_among_cut_files
+from sbafab.folders.order import Order, of_assembly
+from sbafab.folders.swap import JOB_SCHEMA, MANIFEST, SCHEMA, is_among_cut_files
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.netlist import read_netlist
 from sbafab.models.figures import PredictionRequest

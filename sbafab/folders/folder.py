@@ -30,7 +30,8 @@ from sbafab.folders.artefacts import (
 )
 from sbafab.folders.checks_json import checks
 from sbafab.folders.manifest import as_json, file_hashes, job_manifest, manifest
-from sbafab.folders.order import SCHEMA, Order
+from sbafab.folders.order import Order
+from sbafab.folders.swap import SCHEMA
 from sbafab.meshing.formats import Node, write_scene, write_stl
 from sbafab.runtime import Progress
 

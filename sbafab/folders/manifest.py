@@ -22,8 +22,7 @@ from sbafab.design.records import Design
 from sbafab.documents import Document, attribute
 from sbafab.errors import OutputError
 from sbafab.folders.build import Build, warnings
-from sbafab.folders.order import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
-from sbafab.folders.swap import MANIFEST, read_manifest
+from sbafab.folders.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, MANIFEST, SCHEMA, read_manifest
 from sbafab.geometry.edges import Point
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.joints import SeamKind, SeamTool

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any
 
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
@@ -21,19 +21,11 @@ from sbafab.design.records import Design
 from sbafab.design.toml_table import NAME_PATTERN
 from sbafab.errors import DefectError, DesignError, GeometryError, OutputError
 from sbafab.folders.build import Build, make_build, stocks
+from sbafab.folders.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, Schema
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding
 from sbafab.runtime import Progress, ignore_progress
 
-SCHEMA: Final = "sbafab/manifest@1"
-JOB_SCHEMA: Final = "sbafab/job@1"
-"""Schema of a folder with several designs cut together."""
-ASSEMBLY_SCHEMA: Final = "sbafab/assembly@1"
-"""Schema of a folder with the designs of an assembly, cut together."""
-SCHEMAS = (SCHEMA, JOB_SCHEMA, ASSEMBLY_SCHEMA)
-BatchSchema = Literal["sbafab/job@1", "sbafab/assembly@1"]
-Schema = Literal["sbafab/manifest@1"] | BatchSchema
-"""Schema of a folder's ``manifest.json``."""
 RESERVED = {
     "sheets": "the job's folder of film sheets",
     "manifest.json": "the job's index",

@@ -27,8 +27,15 @@ from sbafab.folders.as_cut import refuse_coarse
 from sbafab.folders.build import Build, make_build
 from sbafab.folders.folder import close_folder, write_folder
 from sbafab.folders.manifest import as_json, carried_over, file_hash, file_names, identity
-from sbafab.folders.order import JOB_SCHEMA, SCHEMA, Order, make_order
-from sbafab.folders.swap import listed_files, read_manifest, refuse_busy, replaced_folder
+from sbafab.folders.order import Order, make_order
+from sbafab.folders.swap import (
+    JOB_SCHEMA,
+    SCHEMA,
+    listed_files,
+    read_manifest,
+    refuse_busy,
+    replaced_folder,
+)
 from sbafab.laminate.burst import burst
 from sbafab.laminate.laminate import Laminate
 from sbafab.markup import table_html

@@ -11,14 +11,22 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path, PurePath
+from typing import Final, Literal
 
 from filelock import FileLock, Timeout
 
 from sbafab.design.files import refuse_file_as_folder
 from sbafab.errors import OutputError, SbafabError
-from sbafab.folders.order import SCHEMA, SCHEMAS
 
 MANIFEST = "manifest.json"
+SCHEMA: Final = "sbafab/manifest@1"
+JOB_SCHEMA: Final = "sbafab/job@1"
+"""Schema of a folder with several designs cut together."""
+ASSEMBLY_SCHEMA: Final = "sbafab/assembly@1"
+"""Schema of a folder with the designs of an assembly, cut together."""
+SCHEMAS = (SCHEMA, JOB_SCHEMA, ASSEMBLY_SCHEMA)
+Schema = Literal["sbafab/manifest@1", "sbafab/job@1", "sbafab/assembly@1"]
+"""Schema of a folder's ``manifest.json``."""
 CUT_FOLDERS = ("layers", "sheets")
 """Folders in which a foreign file would be cut together with the run's."""
 SYSTEM_FILES = (".DS_Store", "Thumbs.db", "desktop.ini")

@@ -16,8 +16,9 @@ from sbafab.laminate.base_plate import pin_deviations
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.laminate.lay_up import distinct_layers, press_steps
 from sbafab.rules.finding import Finding, Place, judged
-from sbafab.rules.limits import TOLERANCE, error_on_pins
+from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.measures import Measures
+from sbafab.rules.placement_errors import error_on_pins
 from sbafab.rules.rule import Rule
 from sbafab.rules.sentences import explained, layer_name, say
 

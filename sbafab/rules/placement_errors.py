@@ -22,7 +22,11 @@ from sbafab.geometry.spatial_index import boxes_meet
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import LOOSE, Laminate
 from sbafab.laminate.lay_up import LayUpStep, lay_up_steps
-from sbafab.rules.limits import error_on_pins
+
+
+def error_on_pins(design: Design, laminate: Laminate) -> float:
+    """Return the most by which a layer of a laminate lies off its place on its pins, mm."""
+    return design.pin_error if len(laminate.pins) > 1 else design.lone_pin_error
 
 
 class Part(NamedTuple):

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from sbafab import api
+from sbafab.api import files
 from sbafab.errors import DesignError, OutputError
 
 MOST_LISTED = 200
@@ -132,7 +132,7 @@ def named_files(text: str, folder: Path, above: frozenset[Path] = frozenset()) -
         return ()
     named: list[str] = []
     for key, value in _references(tables):
-        if value in (*api.templates(), "paper"):
+        if value in (*files.template_names(), "paper"):
             continue
         path = folder / value
         if "\0" in value or not _lies_in(path, folder):

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
 
-from sbafab import api
+from sbafab.api import designs
 from sbafab.api.designs import NAMED, ROW, JsonSchema, family_tables, schema_keys
 from sbafab.errors import SbafabError
 from sbafab.studio import design_files
@@ -74,7 +74,7 @@ def cards(schema: JsonSchema) -> dict[str, dict[str, str]]:
 
 def summaries() -> dict[str, str]:
     """The templates, each with the first sentence of its file."""
-    first = {name: api.template(name).partition("\n")[0] for name in api.templates()}
+    first = {name: designs.template(name).partition("\n")[0] for name in designs.templates()}
     return {name: line.lstrip("# ") if line[:1] == "#" else "" for name, line in first.items()}
 
 
@@ -161,12 +161,12 @@ def _named(reference: str, schema: JsonSchema) -> JsonSchema:
 
 def started(folder: Path) -> dict[str, Any]:
     """Return the first answer to the page, without the design that it opens."""
-    schema = api.schema()
+    schema = designs.schema()
     return {
         "version": __version__,
         "folder": str(folder),
         "files": design_files.listed(folder),
-        "templates": api.templates(),
+        "templates": designs.templates(),
         "summaries": summaries(),
         "families": families(schema),
         "cards": cards(schema),

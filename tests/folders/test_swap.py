@@ -13,8 +13,7 @@ from filelock import FileLock
 
 from sbafab.errors import OutputError
 from sbafab.folders import swap
-from sbafab.folders.order import SCHEMA
-from sbafab.folders.swap import replaced_folder
+from sbafab.folders.swap import SCHEMA, replaced_folder
 
 
 def write_run(folder: Path, text: str) -> None:

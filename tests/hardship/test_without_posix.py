@@ -19,8 +19,7 @@ import pytest
 
 from sbafab.cli import main
 from sbafab.folders import swap
-from sbafab.folders.order import SCHEMA
-from sbafab.folders.swap import replaced_folder
+from sbafab.folders.swap import SCHEMA, replaced_folder
 from sbafab.simulators import simulator
 
 PACKAGE = Path(__file__).parents[2] / "sbafab"

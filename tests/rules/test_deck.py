@@ -19,8 +19,7 @@ from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, disc, rectangle, strip
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import bond_width, film_limits, measures, pin_holes
-from sbafab.rules.deck import run_deck
-from sbafab.rules.limits import lowered
+from sbafab.rules.deck import lowered, run_deck
 from sbafab.rules.measures import Measures
 from tests.designs import PAPER, errors
 from tests.quick import few
