@@ -22,14 +22,6 @@ from sbafab.pressing.schedule_files import press_csv, press_json
 
 Stack = Callable[..., Laminate]
 PAPER = load_design("1dof-5mm")
-CASES = [
-    {"balloons": 1},
-    {"balloons": 1, "lumen": True},
-    {"balloons": 2},
-    {"balloons": 15, "lumen": True},
-    {"balloons": 1, "sheet": True},
-    {"balloons": 3, "sheet": True},
-]
 
 
 def test_fifteen_balloons_take_the_papers_steps(stack: Stack) -> None:
@@ -67,18 +59,6 @@ def test_radial_with_one_balloon_ends_on_its_sheet(stack: Stack) -> None:
     assert [step.bond for step in plan.steps] == ["flash", "full", "full"]
     assert plan.steps[-1].layers == (1, 2, 3, 4, 5)
     assert plan.total_press_minutes == 3 + 12 + 20
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_every_layer_joins_exactly_once(stack: Stack, case: dict[str, int]) -> None:
-    laminate = stack(**case)
-    plan = schedule(laminate, PAPER)
-    added = [index for step in plan.steps for index in step.adds]
-    assert sorted(added) == [layer.index for layer in laminate.layers]
-    assert set(plan.steps[-1].layers) == set(added)
-    for step in plan.steps:
-        assert set(step.adds) <= set(step.layers)
-        assert list(step.layers) == sorted(step.layers)
 
 
 BY_HAND = "no pin holds"
