@@ -21,11 +21,9 @@ if TYPE_CHECKING:
         Source,
         assemble,
         build,
-        dimensions,
         drawing,
         load,
         loads,
-        read_laminate,
         resolved,
         schema,
         solid,
@@ -36,10 +34,12 @@ if TYPE_CHECKING:
     from sbafab.api.predictions import grip, motion, predict, predict_assembly, stack
     from sbafab.api.runs import cut, generate, import_design, mesh, nest, press, simulate
     from sbafab.api.search import compare, find, reach_yield, sweep
+    from sbafab.design.laminate_file import read_laminate
     from sbafab.design.records import Design
     from sbafab.errors import DesignError
     from sbafab.laminate.laminate import Laminate
     from sbafab.models.stack import StackBatch
+    from sbafab.reports.drawing import dimensions
     from sbafab.rules.finding import Findings
 
 __all__ = [
@@ -94,7 +94,9 @@ MODULES = {
     "api.predictions": ("grip", "motion", "predict", "predict_assembly", "stack"),
     "api.runs": ("cut", "generate", "import_design", "mesh", "nest", "press", "simulate"),
     "api.search": ("compare", "find", "reach_yield", "sweep"),
+    "design.laminate_file": ("read_laminate",),
     "models.stack": ("StackBatch",),
+    "reports.drawing": ("dimensions",),
     "rules.finding": ("Findings",),
 }
 """Functions and records by module; a module is loaded on first use. ``api.designs`` has the rest.

@@ -19,7 +19,6 @@ from sbafab.assemblies.records import Assembly
 from sbafab.assemblies.shapes import bent_surface
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.sequence import cutting_sequence
-from sbafab.design import laminate_file
 from sbafab.design.files import (
     Change,
     as_in_a_file,
@@ -34,8 +33,6 @@ from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.meshing.solid import solid as surface_of
 from sbafab.meshing.surface import Surface
-from sbafab.reports.drawing import Dimension
-from sbafab.reports.drawing import dimensions as measured
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -226,14 +223,6 @@ def build(source: Source, *changes: Change, **tables: Any) -> Laminate:
     return actuators.build(load(source, *changes, **tables))
 
 
-def read_laminate(path: str | Path) -> Laminate:
-    """Return the laminate of a ``laminate.json``, equal to the one that was written.
-
-    Raises DesignError with the file and the place in it if the file is not a valid laminate.
-    """
-    return laminate_file.read_laminate(Path(path))
-
-
 def assemble(source: str | Path | Assembly, *changes: Change, **tables: Any) -> Assembled:
     """An assembly from a template's name, a TOML file or its record: parts, designs and places.
 
@@ -267,8 +256,3 @@ def drawing(layer: Layer) -> Drawing:
 
     text = dxf_text(cutting_sequence(layer.profile), {"PATTERN": layer.pattern, "UNITS": "mm"})
     return read(StringIO(text))
-
-
-def dimensions(laminate: Laminate, layer: Layer) -> list[Dimension]:
-    """Return the dimensions on a layer's drawing: circles, radii and widths in mm, with labels."""
-    return measured(laminate, layer)

@@ -201,13 +201,13 @@ def _rows(value: Any) -> str:
 # In.
 
 
-def read_laminate(path: Path) -> Laminate:
+def read_laminate(path: str | Path) -> Laminate:
     """Return the laminate of a ``laminate.json``, equal to the one that was written.
 
     Unknown keys are ignored. Raises DesignError with the file and the place in it for other files.
     """
     try:
-        document = LaminateDocument.model_validate_json(path.read_bytes())
+        document = LaminateDocument.model_validate_json(Path(path).read_bytes())
     except OSError as error:
         raise DesignError(f"{path} cannot be read as a laminate: {error}") from error
     except ValidationError as error:

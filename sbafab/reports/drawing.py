@@ -267,7 +267,10 @@ Dimension = Circle | WidthDimension
 
 
 def dimensions(laminate: Laminate, layer: Layer) -> list[Dimension]:
-    """Everything dimensioned in a drawing of a layer, beside its overall width and height."""
+    """Return the dimensions on a layer's drawing: circles, radii and widths in mm, with labels.
+
+    Overall width and height stand beside them.
+    """
     profile = layer.profile
     return [
         *_circles(laminate, layer),
