@@ -102,27 +102,16 @@ class Linearised(NamedTuple):
         pushes = (stiff[:, None] @ self.energy.deeper()[:, :WALL_POINTS])[:, 0]
         return pushes, stiff.sum(1)
 
-    def rates(
-        self,
-        pulls: Array,
-        volumes: Array | float = 0.0,
-        tip: Array | float = 0.0,
-        force: Array | float = 0.0,
-    ) -> Rates:
-        """Return the rates by k quantities that pull on the freedoms (n, freedoms, k) in mN or mN
-        mm; ``volumes`` (n, chambers, k), ``tip`` (n, 6, k) and ``force`` (n, k) in mN are rates at
-        rest. Of states by level. Raises DesignError for a pose that is about to buckle.
+    def moves(self, pulls: Array) -> Array:
+        """Return the moves of the freedoms (n, freedoms, k) by pulls on them (n, freedoms, k) in mN
+        or mN mm. Raises DesignError for a pose that is about to buckle.
         """
         try:
-            moves = self.energy.solved(pulls)
+            return self.energy.solved(pulls)
         except np.linalg.LinAlgError:
             raise DesignError(
                 "the stack is about to buckle and has no derivatives; change a pressure or load"
             ) from None
-        motion = self.tip_motion()[1] @ moves + tip
-        pushes = ((self.pushed()[0][:, None] @ moves)[:, 0] + force) / 1000
-        by_level = moves.reshape(*self.at.shape, -1)
-        return Rates(motion[:, :3], motion[:, 3:], self.filled(moves) + volumes, pushes, by_level)
 
 
 def linearised(
@@ -157,25 +146,24 @@ def linearised_poses(poses: BatchPoses) -> Linearised:
         room = RESIDUAL * (1 + 1e-3 * now.energy.push)
         if (np.abs(now.energy.gradient).max(1) < room).all():
             break
-        at = at + now.rates(-now.energy.gradient[..., None]).freedoms[..., 0]
+        at = at + now.moves(-now.energy.gradient[..., None]).reshape(at.shape)
     return now
 
 
 class Rates(NamedTuple):
     """Rates of a pose by n quantities: of the middle of the ``tip`` (3, n) in mm, the ``turn`` of
-    the top (3, n) in rad about x, y and z, ``volumes`` (chambers, n) in ul, the ``force`` (n) in N
-    on an outer plate, and ``freedoms`` (levels, 3, n) in mm and rad.
+    the top (3, n) in rad about x, y and z, ``volumes`` (chambers, n) in ul, and the ``force`` (n)
+    in N on an outer plate.
     """
 
     tip: Array
     turn: Array
     volumes: Array
     force: Array
-    freedoms: Array
 
-    def part(self, number: int, columns: Any = slice(None)) -> Rates:
-        """Return those of one of several poses, by some of the quantities."""
-        return Rates(*(part[number][..., columns] for part in self))
+    def by(self, quantities: slice) -> Rates:
+        """Return those by some of the quantities."""
+        return Rates(*(part[..., quantities] for part in self))
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,19 +205,18 @@ def derivatives(poses: BatchPoses) -> Derivatives:
     """Return the derivatives of the first of poses under its load. Raises DesignError for a pose
     that is about to buckle.
     """
-    now, chambers = linearised_poses(poses), poses.column.chambers
+    now, chambers = linearised_poses(poses.part(slice(1))), poses.column.chambers
     pushed, hardness = now.pushed()
-    has_plate = now.energy.touch is not None
-    pulls = [now.filling, 1000 * now.tip_motion()[1].swapaxes(1, 2), pushed[..., None]][
-        : 2 + has_plate
-    ]
-    count = chambers + 6 + has_plate
-    volumes = now.swelling[..., None] * np.eye(chambers, count)
-    force = -hardness[:, None] * (np.arange(count) == chambers + 6)
-    rates = now.rates(np.concatenate(pulls, axis=-1), volumes, force=force)
-    parts = [slice(chambers), slice(chambers, chambers + 6), slice(chambers + 6, None)]
-    by_pressure, by_wrench, by_plate = (rates.part(0, part) for part in parts)
-    return Derivatives(poses.pose(), by_pressure, by_wrench, by_plate if has_plate else None)
+    motion, has_plate = now.tip_motion()[1], now.energy.touch is not None
+    pulls = [now.filling, 1000 * motion.swapaxes(1, 2), *([pushed[..., None]] * has_plate)]
+    (moves,) = now.moves(np.concatenate(pulls, axis=-1))
+    tip, volumes, force = motion[0] @ moves, now.filled(moves[None])[0], pushed[0] @ moves
+    volumes += now.swelling[0, :, None] * np.eye(chambers, moves.shape[-1])
+    force[chambers + 6 :] -= hardness[0]
+    rates = Rates(tip[:3], tip[3:], volumes, force / 1000)
+    by_plate = rates.by(slice(chambers + 6, None)) if has_plate else None
+    by_wrench = rates.by(slice(chambers, chambers + 6))
+    return Derivatives(poses.pose(), rates.by(slice(chambers)), by_wrench, by_plate)
 
 
 # Freedoms and pressures together.
