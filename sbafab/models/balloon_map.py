@@ -16,6 +16,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -641,8 +642,7 @@ PLACE_DIGITS = 6
 """Decimals to which places in kPa and mm are distinguished."""
 
 
-@dataclass(frozen=True, eq=False)
-class MapRange:
+class MapRange(NamedTuple):
     """Cells of a map between ``pressures`` (n) and ``heights`` (m), and which of them hold:
     ``within`` (n - 1, m - 1), true where the map does at all four corners and in the middle.
     """
@@ -666,12 +666,10 @@ def map_range(made: BalloonMap) -> MapRange:
     map that it was stiffened from: heights are equal at equal pressure over modulus.
     """
     base, ratio = _base(made)
-    pressures, heights = _grid(base, 0.0)
-    corners = _is_near(base, pressures, heights)
+    pressures, heights, corners = _checked(base, 0.0)
     rows = corners[:-1] & corners[1:]
-    middles = _is_near(base, *(places[:-1] for places in _grid(base, 0.5)))
-    within = rows[:, :-1] & rows[:, 1:] & middles
-    return MapRange(ratio * pressures, heights, within)
+    middles = _checked(base, 0.5)[2][:-1, :-1]
+    return MapRange(ratio * pressures, heights, rows[:, :-1] & rows[:, 1:] & middles)
 
 
 def _base(stiffened_map: BalloonMap) -> tuple[BalloonMap, float]:
@@ -680,22 +678,22 @@ def _base(stiffened_map: BalloonMap) -> tuple[BalloonMap, float]:
     return base, stiffened_map.scale_pressure / base.scale_pressure
 
 
-def _grid(checked_map: BalloonMap, offset: float) -> tuple[Array, Array]:
-    """Return the pressures and the heights of the checks, ``offset`` cells further."""
-    x = (np.arange(PRESSURE_CHECKS) + offset) / (PRESSURE_CHECKS - 1)
-    scale = checked_map.scale_pressure
-    pressures = scale * np.sinh(x * math.asinh(checked_map.most_pressure / scale))
-    y = (np.arange(HEIGHT_CHECKS) + offset) / (HEIGHT_CHECKS - 1)
-    return np.minimum(pressures, checked_map.most_pressure), checked_map.most_height * (
-        y + y**2
-    ) / 2
-
-
-def _is_near(made: BalloonMap, pressures: Array, heights: Array) -> NDArray[np.bool_]:
-    """Return where a map is within CELL_ERROR: (pressures, heights)."""
-    grids = np.meshgrid(pressures, np.maximum(heights, FLAT), indexing="ij")
-    p, h = (grid.ravel() for grid in grids)
-    return (relative_errors(made, p, h) <= CELL_ERROR).reshape(grids[0].shape)
+def _checked(base: BalloonMap, offset: float) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return the pressures and the heights of the checks, ``offset`` cells further, and where the
+    map is within CELL_ERROR there: (pressures, heights).
+    """
+    x, y = (
+        np.minimum((np.arange(count) + offset) / (count - 1), 1.0)
+        for count in (PRESSURE_CHECKS, HEIGHT_CHECKS)
+    )
+    pressures = base.scale_pressure * np.sinh(
+        x * math.asinh(base.most_pressure / base.scale_pressure)
+    )
+    pressures = np.minimum(pressures, base.most_pressure)
+    heights = base.most_height * (y + y**2) / 2
+    p, h = np.meshgrid(pressures, np.maximum(heights, FLAT), indexing="ij")
+    near = relative_errors(base, p.ravel(), h.ravel()) <= CELL_ERROR
+    return pressures, heights, near.reshape(p.shape)
 
 
 def relative_errors(checked_map: BalloonMap, pressure: Array, height: Array) -> Array:

@@ -189,7 +189,10 @@ def _weights(u, order):
 def _spline(balloon, p, h, by_p, by_h):
     b = BALLOONS[balloon]
     if hasattr(p, "shape") or hasattr(h, "shape"):
-        return _array_spline(b, p, h, by_p, by_h)
+        import numpy as np
+
+        each = np.vectorize(lambda p, h: _spline(balloon, float(p), float(h), by_p, by_h), "d")
+        return each(p, h)
     if not (0.0 <= p <= b["most_pressure"] and 0.0 <= h <= b["most_height"]):
         most = (b["most_pressure"], b["most_height"])
         raise ValueError("outside the map: give 0 to %g kPa and 0 to %g mm" % most)
@@ -204,27 +207,6 @@ def _spline(balloon, p, h, by_p, by_h):
     rows = b["coefficients"][i : i + {count}]
     return rate * sum(
         a * sum(w * c for w, c in zip(along, row[j : j + {count}])) for a, row in zip(across, rows)
-    )
-
-
-def _array_spline(b, p, h, by_p, by_h):
-    import numpy as np
-
-    p, h = np.broadcast_arrays(np.asarray(p, float), np.asarray(h, float))
-    most = (b["most_pressure"], b["most_height"])
-    if not ((p >= 0) & (p <= most[0]) & (h >= 0) & (h <= most[1])).all():
-        raise ValueError("outside the map: give 0 to %g kPa and 0 to %g mm" % most)
-    _warn(all(_cell_holds(b, *place) for place in zip(p.ravel().tolist(), h.ravel().tolist())))
-    p0 = b["scale_pressure"]
-    each = SPANS_P / math.asinh(most[0] / p0)
-    x = np.minimum(np.arcsinh(p / p0) * each, SPANS_P * (1 - 1e-12))
-    y = np.minimum(h * SPANS_H / most[1], SPANS_H * (1 - 1e-12))
-    i, j = x.astype(int), y.astype(int)
-    across, along = _weights(x - i, by_p), _weights(y - j, by_h)
-    rate = (each / np.hypot(p, p0)) ** by_p * (SPANS_H / most[1]) ** by_h
-    table = np.array(b["coefficients"])
-    return rate * sum(
-        a * w * table[i + k, j + n] for k, a in enumerate(across) for n, w in enumerate(along)
     )
 
 
