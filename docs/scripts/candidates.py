@@ -22,7 +22,7 @@ from sbafab.models.balloon import inflate
 from sbafab.models.balloon_map import stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.elastic import blocked_force, pose_bent_by
-from sbafab.models.rippled_balloon import free_shapes
+from sbafab.models.rim_correction import free_shapes
 from sbafab.models.stack import Plate, Pose, Stack, stack
 
 COLUMNS = ("section", "case", "1-DoF", "3-DoF", "remark")

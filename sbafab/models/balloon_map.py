@@ -22,15 +22,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon import Balloon, Shapes, distinct, inflate
+from sbafab.models.balloon import Balloon, Shapes, distinct
 from sbafab.models.film_elements import Array
 from sbafab.models.least_energy import eliminated, solved
-from sbafab.models.rippled_balloon import (
-    FilmStates,
-    compressed_shapes,
-    least_free_states,
-    with_waves,
-)
+from sbafab.models.rim_correction import compressed_shapes, free_shapes
 from sbafab.runtime import one_blas_thread
 
 DEGREE = 5
@@ -326,8 +321,8 @@ def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     scale = SCALE_STRAIN * balloon.membrane_stiffness / balloon.pocket
     p = scale * np.sinh(_spread(PRESSURE_POINTS) * math.asinh(most_pressure / scale))
     rises = np.linspace(most_pressure / RISES, most_pressure, RISES)
-    smooth = inflate(balloon, np.concatenate([rises, p[1:]]))
-    rising = with_waves(balloon, smooth.rows(slice(RISES)))
+    free = free_shapes(balloon, np.concatenate([rises, p[1:]]))
+    rising, free = free.rows(slice(RISES)), free.rows(slice(RISES, None))
     # Up to the last pressure, or to the largest allowed stretch of its films.
     top = HEADROOM * float(np.interp(MOST_STRETCH, stretch(balloon, rising), rising.height))
     # The flatter a slack film lies, the lower the pressure that makes it taut.
@@ -338,8 +333,7 @@ def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     shapes = compressed_shapes(balloon, pressures, heights, tied=True)
     blank = np.zeros((PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE))
     frame = BalloonMap(balloon, most_pressure, top, blank, scale)
-    free = least_free_states(balloon, smooth.rows(slice(RISES, None)))
-    return replace(frame, coefficients=_fitted(frame, shapes, heights, p, free))
+    return replace(frame, coefficients=_fitted(frame, shapes, heights, free))
 
 
 def _spread(count: int) -> Array:
@@ -348,11 +342,9 @@ def _spread(count: int) -> Array:
     return (even + (1 - np.cos(math.pi * even)) / 2) / 2
 
 
-def _fitted(
-    frame: BalloonMap, shapes: Shapes, h: Array, pressures: Array, free: FilmStates
-) -> Array:
+def _fitted(frame: BalloonMap, shapes: Shapes, h: Array, free: Shapes) -> Array:
     """Return the coefficients of the potential: least squares of W, the force and the volume of
-    balloons between plates at heights ``h``, and of ``free`` ones at ``pressures`` but the first.
+    balloons between plates at heights ``h``, and of ``free`` ones.
 
     ``inflate`` fixes the wrinkles' stress while it seeks equilibrium, so its forces and volumes are
     not exactly slopes of one potential. Heights and bends depend on the forces.
@@ -362,7 +354,7 @@ def _fitted(
     push = 1 / (area * (p + LOW_PRESSURE) + 3 * np.abs(shapes.force))
     room = VOLUME_WEIGHT / (area * np.minimum(h + LOW_HEIGHT, top))
     inside = free.height < top
-    stands, at, held = free.height[inside], pressures[1:][inside], free.volume[inside]
+    stands, at, held = free.height[inside], free.pressure[inside], free.volume[inside]
     lift = FREE_WEIGHT / (area * (at + LOW_PRESSURE))
     roomy = FREE_WEIGHT * VOLUME_WEIGHT / (area * np.minimum(stands + LOW_HEIGHT, top))
     lowest = h == h.min()
@@ -384,7 +376,9 @@ def _fitted(
         )
     )
     most = shapes.volume.reshape(HEIGHT_POINTS, -1).max(0)
-    best = _admissible(matrix, right_side, _limits(frame, area, pressures, most))
+    best = _admissible(
+        matrix, right_side, _limits(frame, area, np.append(0.0, free.pressure), most)
+    )
     if best is None:
         raise DesignError(
             f"no smooth map of a balloon fits up to {frame.most_pressure:g} kPa; ask for less "

@@ -36,7 +36,7 @@ from sbafab.models.figures import (
 from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
 from sbafab.models.quantity import Conditions, Quantity, chamber_count
-from sbafab.models.rippled_balloon import compressed_shapes, free_shapes
+from sbafab.models.rim_correction import compressed_shapes, free_shapes
 from sbafab.models.stack import GRAVITY, MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
 
 Value = TypeVar("Value")

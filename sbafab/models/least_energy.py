@@ -112,10 +112,6 @@ def _where(good: NDArray[np.bool_], new: Array, old: Array) -> Array:
 # Banded symmetric systems, many small ones at once.
 
 
-BLOCK = 48
-"""Unknowns that are eliminated together: LAPACK is slow for more than 64."""
-
-
 def solve(band: Array, right_side: Array) -> Array:
     """Return the solution of A x = ``right_side``: (n, rows).
 
@@ -163,16 +159,6 @@ def solve_whole(band: Array, right_side: Array) -> Array | None:
         return np.asarray(np.linalg.solve(whole, right_side.T[..., None])[..., 0].T)
     except np.linalg.LinAlgError:
         return None
-
-
-def solve_blocks(band: Array, right_side: Array) -> Array | None:
-    """Return the solution as ``solve_whole`` does, row by row; faster for a wide band."""
-    reach = band.shape[1] - 1
-    try:
-        parts = [eliminated(matrix, BLOCK, reach) for matrix in dense(band)]
-    except np.linalg.LinAlgError:
-        return None
-    return np.stack([solved(*each) for each in zip(parts, right_side.T, strict=True)], 1)
 
 
 class Eliminated(NamedTuple):

@@ -29,7 +29,7 @@ from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line, usual_pressures
 from sbafab.models.prediction import plate_of, predict
 from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count
-from sbafab.models.rippled_balloon import free_shapes
+from sbafab.models.rim_correction import free_shapes
 from sbafab.models.stack import Pose, Stack, stack
 from sbafab.validation.evidence import QUANTITIES, MeasuredCurve
 

@@ -31,7 +31,7 @@ from sbafab.models.figures import Factors, Prediction, PredictionRequest
 from sbafab.models.pneumatics import AIR, Line, seconds
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import FigureKey, ModelId
-from sbafab.models.rippled_balloon import free_shapes
+from sbafab.models.rim_correction import free_shapes
 from sbafab.models.stack import Stack, stack
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.charts import relation_svg

@@ -66,12 +66,8 @@ def printed(code: str) -> list[str]:
 @pytest.mark.parametrize(
     ("solver", "call"),
     [
-        # The fit of a map, films with waves, two unlike films, and many stacks at once.
+        # The fit of a map, two unlike films, and many stacks at once.
         ("sbafab.models.balloon_map.nearest_admissible", "sbafab.predict('3dof-15mm')"),
-        (
-            "sbafab.models.rippled_balloon.equilibrium",
-            "rippled_balloon.rippled(Balloon(pocket=5.0), 8.0)",
-        ),
         ("np.linalg.pinv", "inflate(Balloon(mate=Balloon(thickness=0.1)), 8.0)"),
         (
             "sbafab.models.column.descent",
@@ -85,7 +81,7 @@ def test_models_are_solved_on_one_thread_and_the_caller_keeps_its_own(
     module, _, name = solver.rpartition(".")
     lines = printed(
         f"""
-from sbafab.models import column, rippled_balloon
+from sbafab.models import column
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.stack import StackBatch
 solve, within = {solver}, set()

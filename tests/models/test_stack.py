@@ -13,7 +13,7 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.elastic import blocked_force, pose_bent_by
-from sbafab.models.rippled_balloon import free_shapes
+from sbafab.models.rim_correction import free_shapes
 from sbafab.models.stack import Plate, Stack
 from sbafab.models.stack_loads import WALL_RIM, energy
 
