@@ -34,7 +34,7 @@ PRESSURES = (1.0, 2.0, 5.0, 10.0)
 CHAMBERS = ("chamber1", "chamber2", "chamber3")
 INNER = MeridianSection(neck=2.5, bore=1.0)
 STEP = {"frames": scene_files.FRAMES_DT}
-SECONDS = {"shell": 10.0, "frames": 4.0, "volume": 5.0, "beam": 6.0}
+SECONDS = {"shell": 10.0, "frames": 4.0, "volume": 5.0}
 CALCULIX = {1.0: 2.17, 2.0: 2.77, 5.0: 3.73, 10.0: 4.59}
 """Stroke in mm of three balloons on one axis: sbafab simulate 1dof-5mm --set stack.balloons=3
 --symmetry quarter --pressure 10 --with calculix, some ten minutes on a core."""
@@ -96,8 +96,8 @@ def told(done: Result) -> str:
 def scenes() -> Iterator[list[str]]:
     """Every scene at every pressure, in all chambers, in two and in one."""
     known = {name: pose for name, pose in OTHERS.items() if pose is not None}
-    yield row("kPa in chambers", "A shell", "B frames", "D beam", *known)
-    rates: dict[str, list[float]] = {"shell": [], "frames": [], "beam": []}
+    yield row("kPa in chambers", "A shell", "B frames", *known)
+    rates: dict[str, list[float]] = {"shell": [], "frames": []}
     for on in (3, 2, 1):
         for kpa in PRESSURES:
             pressures = [kpa] * on + [0.0] * (3 - on)

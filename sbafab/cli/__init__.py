@@ -98,7 +98,7 @@ EXTRAS = {
     "dask": ("distributed", "sweep --dask"),
     "mesh": ("netgen", "sbafab mesh, simulate --with calculix"),
     "mujoco": ("mujoco", "simulate --with mujoco"),
-    "python": ("meshio", "meshes for meshio and PyVista"),
+    "python": ("pandas", "tables as DataFrames of pandas"),
     "scan": ("skimage", "sbafab inspect"),
     "studio": ("starlette", "sbafab studio"),
     "yaml": ("yaml", "import of YAML, as foldable_robotics writes it"),

@@ -192,15 +192,6 @@ class SheetClaim(_Claim):
     estimated_minutes: Annotated[float, _rounded(2)] = attribute("minutes")
 
 
-class MeshClaim(_Claim):
-    file: str
-    kind: str
-    chamber: str | None
-    fill_ul: float
-    volume_mm3: Six
-    elements: int
-
-
 class PlaceClaim(_Claim):
     x: Six
     y: Six
@@ -248,7 +239,7 @@ class Manifest(_Claim, schema=SCHEMA):
     lumen: float | None
     fixture: str | None
     sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)] = ()
-    meshes: tuple[MeshClaim, ...] = ()
+    meshes: tuple[MeshFile, ...] = ()
     mesh_statistics: dict[str, Any] = Field(default_factory=dict)
     seams: Annotated[tuple[SeamClaim, ...], Field(max_length=200)] = ()
     files: dict[str, str]

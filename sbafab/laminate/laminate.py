@@ -13,13 +13,13 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Literal, get_args
 
+from sbafab import plugins
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Bounds, Point, box_round
-from sbafab.geometry.region import Region, coord, path_data, union
-from sbafab.laminate.films import Film, density_of, in_order, ink
+from sbafab.geometry.region import Region, union
+from sbafab.laminate.films import Film, density_of, in_order
 from sbafab.laminate.folding import flat_part, fold_roots, unfolded
 from sbafab.laminate.joints import PRESS, FaceBond, Fold, Net, Port, Seam, chamber_gaps
-from sbafab.markup import escape, table_html
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
 ROLES: tuple[Role, ...] = get_args(Role)
@@ -70,9 +70,6 @@ class Layer:
         plain = self.film.material.lower()
         upper, lower = self.film.faces or (plain, plain)
         return (lower, upper) if self.turned else (upper, lower)
-
-    def _repr_html_(self) -> str:
-        return _plan(f"{self.name} ({self.pattern})", (self,), 1.0)
 
 
 @dataclass(frozen=True)
@@ -342,14 +339,9 @@ class Laminate:
         )
 
     def _repr_html_(self) -> str:
-        title = f"{self.name}: {len(self.layers)} layers, {coord(self.thickness)} mm"
-        groups = self.patterns.values()
-        rows = [(layers[0], _numbers(layers)) for layers in groups]
-        table = table_html(
-            ("pattern", "film", "role", "layers, bottom to top"),
-            [(layer.pattern, layer.film.material, layer.role, numbers) for layer, numbers in rows],
-        )
-        return _plan(title, [layers[0] for layers in groups], 0.45) + table
+        # By name: pictures stand above laminates.
+        picture = str(plugins.load("sbafab.reports.layers_svg:layers_svg")(self))
+        return picture.partition("?>\n")[2]
 
 
 # Interfaces between consecutive TPE layers: bonded and open areas.
@@ -486,44 +478,3 @@ def _round_axis(regions: Iterable[Region]) -> float:
     return 2 * max(
         (edge.farthest_from((0.0, 0.0)) for region in regions for edge in region.edges), default=0.0
     )
-
-
-# Plan views of layers and laminates for notebooks.
-
-
-SHOWN_MM = 80.0
-BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
-
-
-def _plan(title: str, layers: Sequence[Layer], opacity: float) -> str:
-    """Return exact profiles in plan, enlarged to fit a notebook cell, a scale bar and a legend."""
-    low_x, low_y, high_x, high_y = box_round([layer.profile.bounds for layer in layers])
-    longer = max(high_x - low_x, high_y - low_y)
-    margin, scale = 0.03 * longer, SHOWN_MM / (1.06 * longer)
-    width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
-    box = " ".join(map(coord, (low_x - margin, -high_y - margin, width, height)))
-    shapes = "".join(
-        f'<path d="{path_data(layer.profile)}" fill="{ink(layer.film).fill}" '
-        f'stroke="{ink(layer.film).line}" fill-opacity="{coord(opacity)}"/>'
-        for layer in layers
-    )
-    bar = max((step for step in BARS if step < 1.06 * longer / 3), default=BARS[0])
-    swatches = "".join(
-        f'<span style="background:{ink(film).fill};border:1px solid {ink(film).line}">&emsp;</span>'
-        f" {film.material}, {escape(film.product)}, {coord(film.thickness)} mm &ensp; "
-        for film in dict.fromkeys(layer.film for layer in layers)
-    )
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{coord(width * scale)}mm" '
-        f'height="{coord(height * scale)}mm" viewBox="{box}"><title>{escape(title)}</title>'
-        f'<g transform="scale(1 -1)" fill-rule="evenodd" stroke-width="{coord(0.3 / scale)}">'
-        f"{shapes}</g></svg>"
-        f'<div><span style="display:inline-block;width:{coord(bar * scale)}mm;border-top:2px '
-        f'solid">{bar:g} mm</span> &ensp; {swatches}</div>'
-    )
-
-
-def _numbers(layers: Sequence[Layer]) -> str:
-    """Layer indices as text; many of them as first, second ... last."""
-    indices = [str(layer.index) for layer in layers]
-    return ", ".join(indices if len(indices) < 6 else [*indices[:2], "...", indices[-1]])

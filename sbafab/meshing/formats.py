@@ -5,15 +5,16 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, ConfigDict
 
 from sbafab import plugins
+from sbafab.documents import Document
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Chamber, Laminate
 from sbafab.meshing.conforming.mesh import VTK_TYPES, ElementKind, Mesh
@@ -385,8 +386,7 @@ def conforming_endings() -> tuple[str, ...]:
 MeshKind = Literal["solid", "cavity", "volume", "shell", "skin"]
 
 
-@dataclass(frozen=True)
-class MeshFile:
+class MeshFile(Document):
     """A mesh as the manifest lists it.
 
     ``file`` is relative to the output folder; ``chamber`` is None except for cavities; ``elements``
@@ -394,11 +394,13 @@ class MeshFile:
     balloon in ul for which the shape was computed.
     """
 
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+
     file: str
     kind: MeshKind
     chamber: str | None
     fill_ul: float
-    volume_mm3: float
+    volume_mm3: Annotated[float, AfterValidator(lambda volume: round(volume, 6))]
     elements: int
 
 
@@ -431,10 +433,15 @@ def write_meshes(
         except OutputError as error:
             left_out += [(file, str(error)) for file in files]
             continue
-        kind: MeshKind = "solid" if name is None else "cavity"
+        facts: dict[str, Any] = {
+            "chamber": name,
+            "volume_mm3": surface.volume,
+            "elements": len(surface.faces),
+        }
+        facts |= {"kind": "solid" if name is None else "cavity", "fill_ul": 0.0}
         for file, write in files.items():
             write(surface, folder / file, laminate.bonded_materials)
-            written.append(MeshFile(file, kind, name, 0.0, surface.volume, len(surface.faces)))
+            written.append(MeshFile(file=file, **facts))
             if progress is not None:
                 progress(len(written), total)
     return written, left_out

@@ -50,7 +50,7 @@ VACUUM = -6.0
 CHOICES = {
     "symmetry": ("full", "half", "quarter", "sector"),
     "procedure": ("dynamic", "static"),
-    "scene": ("shell", "frames", "volume", "beam"),
+    "scene": ("shell", "frames", "volume"),
 }
 """Allowed values of a request's settings, by name."""
 
@@ -505,9 +505,8 @@ RAMP = 1.0
 class RecordedFilms:
     """The shell of a laminate whose nodes are recorded, from which its motion is read.
 
-    It has no triangles and cavities if films bear nothing. The mean of the ``middle`` nodes is the
-    tip. ``pressures`` are kPa by chamber at the end, empty with volumes; ``requested`` are the
-    pressures or volumes of all chambers.
+    The mean of the ``middle`` nodes is the tip. ``pressures`` are kPa by chamber at the end, empty
+    with volumes; ``requested`` are the pressures or volumes of all chambers.
     """
 
     laminate: Laminate
@@ -539,17 +538,13 @@ class RecordedFilms:
 
     def figures(self, states: Sequence[State], nodes: Floats) -> dict[str, float]:
         """Figures of a run by name of ``FIGURES``, from its states and its last nodes."""
-        figures: dict[str, float] = {}
+        shell = self.shell
+        passed = {"overlap": overlap(nodes, shell.rest, shell.position, shell.triangles)}
         if self.laminate.tube is None:
-            figures["drift"] = drift(states)
-        else:
-            # Distance of the balloons' crowns from their tube's axis.
-            radii = np.linalg.norm(nodes[self.shell.tip, :2], axis=1)
-            figures["diameter"] = float(2 * radii.mean())
-        if self.shell.membranes:
-            flat, start = self.shell.rest, self.shell.position
-            figures["overlap"] = overlap(nodes, flat, start, self.shell.triangles)
-        return figures
+            return {"drift": drift(states), **passed}
+        # Distance of the balloons' crowns from their tube's axis.
+        radii = np.linalg.norm(nodes[shell.tip, :2], axis=1)
+        return {"diameter": float(2 * radii.mean()), **passed}
 
 
 def read_nodes(path: Path) -> list[tuple[float, Floats]]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.errors import DesignError, OutputError, VoidError
+from sbafab.errors import OutputError, VoidError
 from sbafab.laminate.laminate import Laminate
 from sbafab.runtime import ignore_progress
 from sbafab.simulators.shell_model import nearly_flat
@@ -225,8 +225,6 @@ def test_each_scene_is_run_with_its_own_step(tmp_path: Path, stand_in: StandIn) 
     stand_in("runSofa", f"{GOOD}open('arguments', 'w').write(' '.join(sys.argv[1:]))")
     ran(tmp_path, "frames")
     assert (tmp_path / "sofa" / "arguments").read_text() == "-g batch -n 5 recorded.scn"
-    with pytest.raises(DesignError, match="scene beam needs three chambers or more"):
-        ran(tmp_path, "beam")
 
 
 def test_other_words_of_a_log_and_other_plugins_void_nothing() -> None:

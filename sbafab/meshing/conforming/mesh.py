@@ -8,19 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib import import_module
 from itertools import product
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.errors import DesignError
 from sbafab.meshing.surface import Floats, Ints, Surface
-
-if TYPE_CHECKING:
-    import meshio
-    import pyvista
 
 ElementKind = Literal["wedge15", "tetra10", "triangle6"]
 
@@ -296,35 +290,6 @@ class Mesh:
         }
         return {"part": part, **faces}
 
-    def meshio(self) -> meshio.Mesh:
-        """Return the mesh for meshio (extra "python"), with its fields, point and cell sets.
-
-        meshio 5.3 refuses wedges of 15 nodes: they become wedges of their six corners, and their
-        mid-edge nodes belong to no cell. Tetrahedra keep their second order.
-        Raises DesignError without meshio.
-        """
-        kind = "wedge" if self.kind == "wedge15" else self.kind
-        count = CORNERS[self.kind] if kind == "wedge" else None
-        mesh: meshio.Mesh = _library("meshio").Mesh(
-            self.points,
-            [(kind, self.cells[:, :count])],
-            point_data=self.node_fields(),
-            cell_data={name: [values] for name, values in self.cell_fields().items()},
-            point_sets=dict(self.node_sets),
-            cell_sets={name: [cells] for name, cells in self.cell_sets.items()},
-        )
-        return mesh
-
-    def pyvista(self) -> pyvista.UnstructuredGrid:
-        """Return the mesh for PyVista (extra "python"), with the fields that a VTU file has.
-
-        Raises DesignError without pyvista.
-        """
-        grid = _library("pyvista").UnstructuredGrid({VTK_TYPES[self.kind]: self.cells}, self.points)
-        grid.point_data.update(self.node_fields())
-        grid.cell_data.update(self.cell_fields())
-        return grid
-
     def linear(self) -> tuple[Floats, Ints, Ints]:
         """Points, and tetrahedra or triangles of first order through the corners; the cell of each.
 
@@ -344,10 +309,3 @@ class Mesh:
 
 def _marked(count: int, indices: Ints) -> NDArray[np.uint8]:
     return np.minimum(np.bincount(indices, minlength=count), 1).astype(np.uint8)
-
-
-def _library(name: str) -> Any:
-    try:
-        return import_module(name)
-    except ImportError:
-        raise DesignError(f'{name} is not installed; pip install "sbafab[python]"') from None

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
@@ -27,18 +27,9 @@ from sbafab.meshing.conforming.layup import (
     sector,
 )
 from sbafab.meshing.conforming.mesh import Mesh
-from sbafab.meshing.conforming.meshes import skin, volume_mesh
+from sbafab.meshing.conforming.meshes import volume_mesh
 from sbafab.meshing.formats import write_fields
-from sbafab.meshing.surface import Floats, Ints, Surface
-from sbafab.reports.canvas import (
-    AMBIENT,
-    ENLARGED,
-    draw_length_bar,
-    image_of,
-    png,
-    rasterize,
-    view_of,
-)
+from sbafab.meshing.surface import Floats, Ints
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
 from sbafab.runtime import Progress
 from sbafab.simulators.calculix.deck import (
@@ -49,6 +40,7 @@ from sbafab.simulators.calculix.deck import (
     started,
     write_deck,
 )
+from sbafab.simulators.model_files import write_files
 from sbafab.simulators.simulator import (
     Result,
     SimulationRequest,
@@ -59,9 +51,6 @@ from sbafab.simulators.simulator import (
     run_program,
 )
 from sbafab.spreadsheet import csv_text
-
-if TYPE_CHECKING:
-    from PIL.ImageDraw import ImageDraw as Draw
 
 COMPONENTS = {b"DISP": 3, b"STRESS": 6}
 NODE, VALUE = 13, 12
@@ -299,63 +288,6 @@ def write_deformed(mesh: Mesh, frame: Frame, path: Path) -> None:
     write_fields(path, mesh.kind, mesh.points + frame.displacement, mesh.cells, fields, {})
 
 
-# A picture of the deformed actuator, coloured by its stress (Pillow).
-
-
-SIZE = 1100, 900
-MARGIN, FOOT = 60, 110
-INK = (34, 34, 34)
-SCALE = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37)])
-"""Viridis: even steps of lightness, readable by colour-blind people and in grey."""
-LAMP = (-0.35, 0.55, 0.76)
-"""Direction to the light, in the view."""
-DARKEST = 0.22
-ELEVATION, AZIMUTH = 28.0, -35.0
-"""View direction: degrees above the bench, and round it from x."""
-
-
-def deformed_png(mesh: Mesh, frame: Frame, caption: str) -> bytes:
-    """The deformed surface in oblique parallel view with a scale of von Mises stress."""
-    from PIL import ImageDraw
-
-    surface = Surface(mesh.points + frame.displacement, mesh.flat_triangles(skin(mesh)))
-    width, height = (side * ENLARGED for side in SIZE)
-    edge, foot = MARGIN * ENLARGED, FOOT * ENLARGED
-    view = view_of([surface], ELEVATION, AZIMUTH, (edge, edge, width - edge, height - edge - foot))
-    buffer = rasterize([surface], view, width, height, LAMP)
-    stress = frame.von_mises
-    most = float(stress.max()) or 1.0
-    colours = _coloured(stress[surface.faces].mean(axis=1) / most)
-    # Darken steep faces slightly: this shows wrinkles and keeps the colour readable.
-    shade = 1 - DARKEST * (1 - buffer.light) / (1 - AMBIENT)
-    rgb = np.where((buffer.body < 0)[..., None], 255, colours[buffer.face] * shade[..., None])
-    picture = image_of(rgb)
-    _write_key(ImageDraw.Draw(picture), caption, most, view.scale / ENLARGED)
-    return png(picture)
-
-
-def _coloured(share: Floats) -> Floats:
-    """The scale's red, green and blue (n, 3) for shares of the largest stress."""
-    steps = np.linspace(0, 1, len(SCALE))
-    return np.column_stack([np.interp(share, steps, channel) for channel in SCALE.T])
-
-
-def _write_key(draw: Draw, caption: str, most: float, pixels_per_mm: float) -> None:
-    from PIL import ImageFont
-
-    font = ImageFont.load_default(20)
-    width, height = SIZE
-    draw_length_bar(draw, width - MARGIN, height - 40, width / 4, pixels_per_mm, font)
-    draw.text((MARGIN, height - 100), caption, fill=INK, font=font)
-    start, end, top = MARGIN, MARGIN + 400, height - 64
-    for x, colour in enumerate(_coloured(np.linspace(0, 1, end - start)).round().astype(int)):
-        draw.line((start + x, top, start + x, top + 18), fill=tuple(colour.tolist()))
-    for part in (0.0, 0.5, 1.0):
-        at = start + part * (end - start)
-        draw.text((at, top + 24), f"{part * most:.3g}", fill=INK, font=font, anchor="ma")
-    draw.text((end + 20, top - 3), "von Mises stress, MPa", fill=INK, font=font)
-
-
 # Stroke, air and wall stress against pressure as one SVG, for screen and print.
 
 
@@ -507,7 +439,9 @@ def simulate(
                 "less in one chamber, or for less vacuum"
             )
         frames, states = frames[:number], states[: number + 1]
-    _write_results(run_mesh, laminate.name, mesh_settings.symmetry, states, frames[-1], folder)
+    plot = history_svg(f"{laminate.name}, CalculiX", states)
+    write_files({HISTORY: history_csv(states), "history.svg": plot}, folder)
+    write_deformed(run_mesh, frames[-1], folder / "deformed.vtu")
     _tidy(folder)
     stopped, last = None, f"{_largest(states[-1]):.3g} kPa"
     if wrong is not None:
@@ -579,25 +513,6 @@ def _advice(stop: Stop, settings: DeckSettings) -> str:
     if settings.procedure == "static":
         return "take --procedure dynamic, which gets past wrinkles"
     return "ask for less pressure or a smaller --h"
-
-
-def _write_results(
-    mesh: Mesh,
-    name: str,
-    symmetry: Symmetry,
-    states: Sequence[State],
-    last: Frame,
-    folder: Path,
-) -> None:
-    reached = states[-1]
-    pressures = ", ".join(f"{c} {value:.3g} kPa" for c, value in reached.pressures.items())
-    part = "" if symmetry == "full" else f", a {symmetry} of it"
-    caption = f"{name}{part}: {pressures}, stroke {reached.stroke:.3f} mm, true to scale"
-    (folder / HISTORY).write_text(history_csv(states), encoding="utf-8", newline="\n")
-    plot = history_svg(f"{name}, CalculiX", states)
-    (folder / "history.svg").write_text(plot, encoding="utf-8", newline="\n")
-    (folder / "deformed.png").write_bytes(deformed_png(mesh, last, caption))
-    write_deformed(mesh, last, folder / "deformed.vtu")
 
 
 def _tidy(folder: Path) -> None:

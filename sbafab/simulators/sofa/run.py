@@ -1,4 +1,4 @@
-"""SOFA: the films of an actuator, its four scenes from templates, and a scene run with runSofa."""
+"""SOFA: the films of an actuator, its three scenes from templates, and a scene run with runSofa."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.geometry.edges import Point
 from sbafab.laminate.films import density_of
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import Layup, MeshSettings, flat, layup, narrowest_ring
@@ -36,7 +35,6 @@ from sbafab.simulators.shell_model import (
     nearly_flat,
     pocket_radii,
     round_stack,
-    standing,
     why_not_round,
 )
 from sbafab.simulators.simulator import (
@@ -202,13 +200,12 @@ def _marks(stack: Layup, mesh: Mesh, number: Ints) -> list[int]:
 # The files of scenes.
 
 
-SceneName = Literal["shell", "frames", "volume", "beam"]
+SceneName = Literal["shell", "frames", "volume"]
 TEMPLATES = Path(__file__).parent / "templates"
 DATA, PYTHON = "actuator.json", "scene.py"
 
 PLUGINS = {
     "AMDOrderingMethod": "Sofa.Component.LinearSolver.Ordering",
-    "BeamFEMForceField": "Sofa.Component.SolidMechanics.FEM.Elastic",
     "CGLinearSolver": "Sofa.Component.LinearSolver.Iterative",
     "EulerImplicitSolver": "Sofa.Component.ODESolver.Backward",
     "FastTriangularBendingSprings": "Sofa.Component.SolidMechanics.Spring",
@@ -217,8 +214,6 @@ PLUGINS = {
     "GenericConstraintSolver": "Sofa.Component.Constraint.Lagrangian.Solver",
     "LinearSolverConstraintCorrection": "Sofa.Component.Constraint.Lagrangian.Correction",
     "MechanicalObject": "Sofa.Component.StateContainer",
-    "MeshTopology": "Sofa.Component.Topology.Container.Constant",
-    "RigidMapping": "Sofa.Component.Mapping.NonLinear",
     "SkinningMapping": "Sofa.Component.Mapping.Linear",
     "SparseLDLSolver": "Sofa.Component.LinearSolver.Direct",
     "SubsetMapping": "Sofa.Component.Mapping.Linear",
@@ -300,7 +295,7 @@ def imposed_volumes(stack: RoundStack, volumes: Mapping[str, float] | None) -> d
     return {name: volumes.get(name, 0.0) for name in stack.chambers}
 
 
-# Scenes B and D: nine frames on the backbone that carry the films, or replace them.
+# Scene B: nine frames on the backbone that carry the films.
 
 
 FRAMES = 9
@@ -311,32 +306,6 @@ FRAMES_START = nearly_flat
 FRAMES_DT = 0.05
 SOFTENING = 0.12
 """Share of the true modulus at which 5 kPa lift 15 balloons as high as in scene A."""
-LEAST_LOBES = 3
-"""A beam with fewer chambers cannot bend, or bends in one plane only."""
-
-
-class Beam(NamedTuple):
-    """The surrogate of a stack, scaled from the fit for 15 balloons of 5 mm.
-
-    ``height`` (mm) without pressure, effective ``area`` (mm2) and ``spring`` (mN/mm) of a chamber;
-    ``radius`` (mm) and ``young`` (kPa) of the beam with the stiffness of the chambers' springs on
-    their axes.
-    """
-
-    height: float
-    area: float
-    spring: float
-    radius: float
-    young: float
-
-
-def beam_of(stack: RoundStack) -> Beam:
-    """EA = N k H0 and EI = N k R^2 H0 / 2 of a round bar: its radius is R times root 2."""
-    height = 7.2 * stack.balloons / 15 * stack.size
-    spring = 7.0 * 15 / stack.balloons
-    radius = stack.radius * math.sqrt(2)
-    young = stack.lobes * spring * height / (math.pi * radius**2)
-    return Beam(height, 14.4 * stack.size**2, spring, radius, young)
 
 
 def _framed(stack: RoundStack, shell: Shell) -> dict[str, object]:
@@ -361,31 +330,6 @@ def pair_of_frames(
     return (below, below + 1), (round(1 - above, 6), above)
 
 
-def prism(
-    axis: Point, area: float, height: float, frames: int = FRAMES
-) -> tuple[Floats, Triangles]:
-    """A closed square prism on a chamber's axis, four points per frame, normals outward."""
-    half = math.sqrt(area) / 2
-    corners = ((half, half), (-half, half), (-half, -half), (half, -half))
-    points = [
-        (axis[0] + x, axis[1] + y, height * i / (frames - 1))
-        for i in range(frames)
-        for x, y in corners
-    ]
-    top = 4 * (frames - 1)
-    triangles = [(0, 2, 1), (0, 3, 2)]
-    for start in range(0, top, 4):
-        for i in range(4):
-            a, b = start + i, start + (i + 1) % 4
-            # Alternate the diagonals: with a single direction air would twist the prism.
-            if i % 2:
-                triangles += [(a, b, b + 4), (a, b + 4, a + 4)]
-            else:
-                triangles += [(a, b, a + 4), (b, b + 4, a + 4)]
-    triangles += [(top, top + 1, top + 2), (top, top + 2, top + 3)]
-    return np.array(points), np.array(triangles)
-
-
 # The scenes of a design.
 
 
@@ -395,19 +339,17 @@ def scenes_of(
     """The scenes of a laminate by name, the default one first.
 
     ``pressures`` in kPa by chamber; ``volumes`` (scene C, above its start) in ul by chamber, 0 for
-    omitted ones, by default some 80 ul in each. Scenes B and C require round pockets of one film,
-    scene D also three chambers or more. Raises DesignError if a chamber is unknown, or if other
-    pockets need a mesher that is not installed.
+    omitted ones, by default some 80 ul in each. Scenes B and C require round pockets of one film.
+    Raises DesignError if a chamber is unknown, or if other pockets need a mesher that is not
+    installed.
     """
     scenes: dict[str, Scene] = {}
 
     def add(name: SceneName, file: str, dt: float, shell: Shell, **values: object) -> None:
-        # The films of a beam bear nothing.
-        bearing = replace(shell, membranes=(), cavities={}) if name == "beam" else shell
         kpa, loads = pressures, pressures.values()
         if name == "volume":
             kpa, loads = {}, imposed.values()
-        films = RecordedFilms(laminate, bearing, shell.tip, kpa, loads)
+        films = RecordedFilms(laminate, shell, shell.tip, kpa, loads)
         values |= {"shell": shell, "pressures": pressures}
         scenes[name] = Scene(name, file, dt, films, values)
 
@@ -422,15 +364,6 @@ def scenes_of(
     half = round_shell(stack, COARSE_SECTORS, half_full)
     told = {"volumes": imposed, "usual": usual_volume(stack), **_mass(half, VOLUME_PRESSURE)}
     add("volume", "actuator_volume.scn", DT, half, **told)
-    if stack.lobes >= LEAST_LOBES:
-        beam = beam_of(stack)
-        upright = round_shell(stack, COARSE_SECTORS, standing(beam.height / stack.balloons))
-        framed = _framed(stack, upright)
-        prisms = {
-            name: prism(axis, beam.area, upright.height, min(FRAMES, stack.balloons + 1))
-            for name, axis in zip(stack.chambers, stack.axes, strict=True)
-        }
-        add("beam", "actuator_beam.scn", DT, upright, beam=beam, prisms=prisms, **framed)
     return scenes
 
 
@@ -509,7 +442,10 @@ def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: 
     scenes = export(laminate, request, folder)
     scene = scenes.get(request.scene or "shell")
     if scene is None:
-        raise DesignError(_no_such_scene(laminate, str(request.scene)))
+        raise DesignError(
+            f"scene {request.scene} is for round pockets of one film: {why_not_round(laminate)}; "
+            "take scene shell"
+        )
     program = program_path(
         "runSofa",
         "install SOFA 25.06 (https://www.sofa-framework.org) and put the folder that holds runSofa "
@@ -533,16 +469,6 @@ def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: 
     )
     recorded.unlink()
     return result
-
-
-def _no_such_scene(laminate: Laminate, scene: str) -> str:
-    reason = why_not_round(laminate)
-    if reason is not None:
-        return f"scene {scene} is for round pockets of one film: {reason}; take scene shell"
-    return (
-        f"scene {scene} needs three chambers or more, {laminate.name} has "
-        f"{len(laminate.chambers)}; take scene shell"
-    )
 
 
 # The log of SOFA, whose exit code is 0 even when the numbers have gone.
