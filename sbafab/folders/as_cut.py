@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
-from typing import NamedTuple
 
 from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.cut_settings import (
@@ -36,7 +35,8 @@ from sbafab.folders.differences import (
     CLAIMS,
     DESIGNED,
     INTEGRITY,
-    Problem,
+    problem,
+    reason_of,
     sound_digest,
 )
 from sbafab.geometry.contour import Contour, circle
@@ -45,9 +45,10 @@ from sbafab.geometry.offset import Kerf, shrink, widths
 from sbafab.geometry.region import Region, centroid
 from sbafab.laminate.folding import halves
 from sbafab.laminate.joints import Seam
-from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.laminate import Laminate
 from sbafab.rules import registration_yield
 from sbafab.rules.deck import RULES, run_rule
+from sbafab.rules.finding import Finding
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.measures import Measures
 
@@ -72,14 +73,6 @@ class CutPart:
     units: str = "mm"
 
 
-class LayerFile(NamedTuple):
-    """A layer of the design, the path of its file in the folder, and the part that this cuts."""
-
-    layer: Layer
-    path: str
-    part: CutPart | None
-
-
 # The layers as read.
 
 
@@ -90,71 +83,65 @@ def expected_laminate(build: Build) -> Laminate:
 
 def read_layers(
     folder: Path, build: Build, expected: Laminate
-) -> tuple[list[LayerFile], list[Problem]]:
-    """Read the file of every layer of the ``expected`` laminate, equal files once.
+) -> tuple[dict[int, CutPart], list[Finding]]:
+    """Read the file of every layer of the ``expected`` laminate, equal files once; return the parts
+    by layer, and problems.
 
     Contours that agree with one of the design's become that one: programs that save a file again
     round its coordinates, and rules would take the gap between two such edges for a bond or a leak.
     """
-    parts: dict[tuple[str, str, str], CutPart] = {}
-    files: list[LayerFile] = []
-    problems: list[Problem] = []
-    bare: list[LayerFile] = []
+    read: dict[tuple[str, str, str], CutPart] = {}
+    parts: dict[int, CutPart] = {}
+    bare: dict[int, str] = {}
     misstated: dict[str, list[int]] = {}
+    problems: list[Finding] = []
     contours_designed = {c.marks: c for layer in expected.layers for c in layer.profile.contours}
     for layer, designed in zip(expected.layers, build.laminate.layers, strict=True):
         cut, material = expected.layer(expected.cut_with(layer)), layer.film.material
         name = layer_path(cut.name, build.settings.kerf_width(material))
         pattern = build.laminate.layer(cut.index).pattern
         properties = file_properties(build.settings, material, pattern)
+        where = f"layer {layer.index} ({name})"
         try:
             key = sound_digest(folder / name), material, layer.profile.key
-            if key not in parts:
+            if key not in read:
                 beam = build.paths[designed.pattern]
                 part = read_part(folder / name, properties, layer.profile, beam)
-                parts[key] = _snapped(part, contours_designed.values()) if part.departure else part
+                read[key] = _snapped(part, contours_designed.values()) if part.departure else part
         except OutputError as error:
-            reason = str(error).removeprefix(f"{PurePosixPath(name).name}: ")
-            message = f"layer {layer.index} ({name}): {reason}"
-            problems.append(Problem(INTEGRITY, message, (layer.index,)))
-            files.append(LayerFile(layer, name, None))
+            message = f"{where}: {reason_of(error, name)}"
+            problems.append(problem(INTEGRITY, message, (layer.index,)))
             continue
-        part = parts[key]
-        files.append(LayerFile(layer, name, part))
+        part = parts[layer.index] = read[key]
         if part.departure:
-            message = (
-                f"layer {layer.index} ({name}) is not what design.toml makes: {part.departure}; "
-                "regenerate the folder"
-            )
-            problems.append(Problem(DESIGNED, message, (layer.index,)))
+            message = f"{where} is not what design.toml makes: {part.departure}"
+            problems.append(problem(DESIGNED, f"{message}; regenerate the folder", (layer.index,)))
         if not part.properties:
-            bare.append(files[-1])
+            bare[layer.index] = name
             continue
         for difference in property_differences(part.properties, properties):
             misstated.setdefault(difference, []).append(layer.index)
-    return files, [*problems, *_property_problems(bare, misstated)]
+    return parts, [*problems, *_property_problems(parts, bare, misstated)]
 
 
 def _property_problems(
-    bare: Sequence[LayerFile], misstated: Mapping[str, Sequence[int]]
-) -> list[Problem]:
-    """Return files without custom properties, and differing ones joined by value."""
-    problems = []
+    parts: Mapping[int, CutPart], bare: Mapping[int, str], misstated: Mapping[str, Sequence[int]]
+) -> Iterator[Finding]:
+    """Yield files without custom properties, and differing ones joined by value."""
     if bare:
-        of = f"the files of {len(bare)} layers" if len(bare) > 1 else f"the file {bare[0].path}"
-        has_units = all(file.part is not None and file.part.units for file in bare)
+        names = [*bare.values()]
+        of = f"the files of {len(bare)} layers" if len(bare) > 1 else f"the file {names[0]}"
+        has_units = all(parts[index].units for index in bare)
         lost = "custom properties" if has_units else "custom properties and no units"
         message = (
             f"{of} carry no {lost}: save as DXF R2004 or later to keep them; kerf, waivers and "
             "curves are taken to be as the design tells"
         )
-        layers = tuple(file.layer.index for file in bare)
-        problems.append(Problem(CLAIMS, message, layers, verdict="warn"))
+        yield problem(CLAIMS, message, [*bare], "warn")
     for message, indices in misstated.items():
         shown = ", ".join(map(str, indices[:5])) + (" ..." if len(indices) > 5 else "")
         plural = "layers" if len(indices) > 1 else "layer"
-        problems.append(Problem(CLAIMS, f"{plural} {shown}: {message}", tuple(indices)))
-    return problems
+        yield problem(CLAIMS, f"{plural} {shown}: {message}", indices)
 
 
 def property_differences(actual: Mapping[str, str], expected: Mapping[str, str]) -> list[str]:
@@ -198,19 +185,19 @@ def departure(path: Region, expected: Region, tolerance: float = TOLERANCE) -> s
     return ""
 
 
-def laminate_as_cut(files: Sequence[LayerFile], laminate: Laminate) -> Laminate:
+def laminate_as_cut(parts: Mapping[int, CutPart], laminate: Laminate) -> Laminate:
     """Return the design's laminate with each layer as cut; layers of equal shape share a pattern.
 
     Every file must have been read.
     """
-    parts = [file.part for file in files if file.part is not None]
-    if not any(part.departure for part in parts):
+    if not any(part.departure for part in parts.values()):
         return laminate
     roots = {fold.lower for fold in laminate.folds}
     folded = roots | {fold.upper for fold in laminate.folds}
     patterns: dict[tuple[str, str, int, bool], str] = {}
     layers = []
-    for layer, part in zip(laminate.layers, parts, strict=True):
+    for layer in laminate.layers:
+        part = parts[layer.index]
         region = part.region
         if part.departure:
             # As assembled: turned over, or its half of a folded film.
@@ -283,7 +270,7 @@ def _check_drawn(drawing: ReadBack) -> None:
 
 def read_seams(
     folder: Path, designed: Sequence[Seam], settings: CutSettings
-) -> tuple[tuple[Seam, ...], list[Problem]]:
+) -> tuple[tuple[Seam, ...], list[Finding]]:
     """Return the seams as their files draw them, and problems.
 
     A path within a micrometre of the design's is replaced by it. Each seam lies where its tool
@@ -291,20 +278,20 @@ def read_seams(
     head.
     """
     seams: list[Seam] = []
-    problems: list[Problem] = []
+    problems: list[Finding] = []
     for seam in designed:
         file = seam_path(seam)
         try:
             sound_digest(folder / file)
             chains, properties = read_seam(folder / file)
         except OutputError as error:
-            reason = str(error).removeprefix(f"{PurePosixPath(file).name}: ")
-            problems.append(Problem(INTEGRITY, f"seam {seam.name} ({file}): {reason}"))
+            message = f"seam {seam.name} ({file}): {reason_of(error, file)}"
+            problems.append(problem(INTEGRITY, message))
             continue
         layers = (seam.below, seam.above)
         for difference in property_differences(properties, seam_properties(seam, settings)):
             message = f"seam {seam.name} ({file}): {difference}"
-            problems.append(Problem(CLAIMS, message, layers))
+            problems.append(problem(CLAIMS, message, layers))
         drawn = moved(chains, settings.seam_offsets.get(seam.tool, CENTRED))
         mismatch = path_difference(drawn, seam.path)
         as_drawn = seam if mismatch is None else replace(seam, path=drawn)
@@ -314,7 +301,7 @@ def read_seams(
             mismatch = mismatch or f"{WIDTH} is {width:g} mm, not {seam.width:g}"
         if mismatch is not None:
             message = f"seam {seam.name} is not what design.toml makes: {mismatch}"
-            problems.append(Problem(DESIGNED, f"{message}; regenerate the folder", layers))
+            problems.append(problem(DESIGNED, f"{message}; regenerate the folder", layers))
         seams.append(as_drawn)
     return tuple(seams), problems
 
@@ -384,10 +371,10 @@ def _refusal(error: float, why: str) -> str:
 
 def as_cut(build: Build) -> Laminate:
     """Return the laminate of the parts that a beam along the paths of a build leaves."""
-    laminate, files = build.laminate, []
-    for layer in laminate.layers:
+    parts = {}
+    for layer in build.laminate.layers:
         path = build.paths[layer.pattern]
         check_clear(path.contours)
         region = _without_kerf(path, build.settings.kerf_width(layer.film.material) or 0.0)
-        files.append(LayerFile(layer, "", CutPart(region, "drawn in chords", {})))
-    return laminate_as_cut(files, laminate)
+        parts[layer.index] = CutPart(region, "drawn in chords", {})
+    return laminate_as_cut(parts, build.laminate)

@@ -10,11 +10,11 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from filecmp import cmp
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import TypeAdapter
 
@@ -36,9 +36,9 @@ from sbafab.folders.artefacts import (
     artefacts,
     tops_of,
     write_artefacts,
+    write_text,
 )
 from sbafab.folders.as_cut import (
-    LayerFile,
     expected_laminate,
     laminate_as_cut,
     path_in_folder,
@@ -50,11 +50,11 @@ from sbafab.folders.differences import (
     CLAIMS,
     DESIGNED,
     INTEGRITY,
-    Problem,
     bodies,
     file_difference,
     findings_of,
     has_lost_properties,
+    problem,
     unreadable,
     value_difference,
 )
@@ -77,7 +77,7 @@ from sbafab.laminate.netlist import read_netlist
 from sbafab.models.figures import PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.rules.deck import RULES, run_rule
-from sbafab.rules.finding import Finding, Place, Verdict
+from sbafab.rules.finding import Finding, Verdict
 from sbafab.rules.measures import Measures
 from sbafab.rules.nets import NAME as NETS
 from sbafab.rules.nets import NETLIST, netlist_findings
@@ -121,13 +121,12 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
     except DesignError as error:
         return _by_hashes(folder, index, [str(error)])
     order = Order(SCHEMA, built.design.name, (built.build,))
-    problems = [*built.problems, *_remade_problems(folder, index, order)]
-    findings = _findings(built, problems)
+    findings = _findings(built, [*built.problems, *_remade_problems(folder, index, order)])
     if netlist is None or nets is None:
         return findings
     if built.laminate is None:
         message = f"{nets.name} was not compared: not all layers could be read"
-        return (*findings, Finding(NETLIST, "fail", None, None, "", Place(), message))
+        return (*findings, problem(NETLIST, message))
     return (*findings, *netlist_findings(built.laminate, built.design, netlist, nets.name))
 
 
@@ -155,11 +154,18 @@ def _check_job(folder: Path, job: JobManifest) -> tuple[Finding, ...]:
         for finding in _findings(each, each.problems)
         if finding.rule != DESIGNED or finding.verdict == "fail"
     ]
+    passed = f"{len(job.sheets)} sheets read back", "designs"
+    return (*findings, *(order.between or ()), *_of_files(problems, *passed))
+
+
+def _of_files(
+    problems: Sequence[Finding], sound: str, designs: str, rules: Sequence[Finding] = ()
+) -> tuple[Finding, ...]:
+    """Return the findings on the files of a folder, those of ``rules`` between them."""
     return (
-        *findings,
-        *(order.between or ()),
-        *findings_of(INTEGRITY, problems, f"{len(job.sheets)} sheets read back"),
-        *findings_of(CLAIMS, problems, "hashes and manifest match the files and the designs"),
+        *findings_of(INTEGRITY, problems, sound),
+        *findings_of(CLAIMS, problems, f"hashes and manifest match the files and the {designs}"),
+        *rules,
         *findings_of(DESIGNED, problems, AS_DESIGNED),
     )
 
@@ -167,19 +173,18 @@ def _check_job(folder: Path, job: JobManifest) -> tuple[Finding, ...]:
 # The layers of a design's folder.
 
 
-@dataclass(frozen=True)
-class AsBuiltFolder:
+class AsBuiltFolder(NamedTuple):
     """The folder of a design read back.
 
-    ``build`` is the design with the findings on it, ``expected`` its laminate. ``laminate`` has the
-    layers as cut; None if one could not be read.
+    ``build`` is the design with the findings on it, ``expected`` its laminate. ``lost`` are layers
+    that could not be read; ``laminate`` has the layers as cut, None if one is lost.
     """
 
     build: Build
     expected: Laminate
-    files: tuple[LayerFile, ...]
+    lost: tuple[int, ...]
     laminate: Laminate | None
-    problems: tuple[Problem, ...]
+    problems: tuple[Finding, ...]
 
     @property
     def design(self) -> Design:
@@ -207,41 +212,34 @@ def read_folder(folder: Path) -> AsBuiltFolder:
         expected = expected_laminate(build)
     except DESIGN_ERRORS as error:
         raise DesignError(f"design.toml makes no laminate: {error}") from None
-    problems = file_problems(folder, claims)
-    files, errors = read_layers(folder, build, expected)
+    parts, errors = read_layers(folder, build, expected)
     seams, seam_errors = read_seams(folder, expected.seams, build.settings)
-    problems += [*errors, *seam_errors]
+    problems = [*file_problems(folder, claims), *errors, *seam_errors]
+    lost = tuple(layer.index for layer in expected.layers if layer.index not in parts)
     laminate: Laminate | None = None
-    if all(file.part is not None for file in files):
+    if not lost:
         try:
-            laminate = laminate_as_cut(files, expected)
+            laminate = laminate_as_cut(parts, expected)
             laminate = laminate if seams == laminate.seams else replace(laminate, seams=seams)
         except UNMEASURED as error:
             message = f"the layers do not lie over each other as films of one stack ({error})"
-            problems.append(Problem(INTEGRITY, message))
-    return AsBuiltFolder(build, expected, tuple(files), laminate, tuple(problems))
+            problems.append(problem(INTEGRITY, message))
+    return AsBuiltFolder(build, expected, lost, laminate, tuple(problems))
 
 
-def _findings(built: AsBuiltFolder, problems: Sequence[Problem]) -> tuple[Finding, ...]:
+def _findings(built: AsBuiltFolder, problems: Sequence[Finding]) -> tuple[Finding, ...]:
     """Return the findings on a design's folder, in the order of the report."""
-    count = len(built.files)
-    return (
-        *findings_of(
-            INTEGRITY, problems, f"{count} cut files read back: closed contours in millimetres"
-        ),
-        *findings_of(CLAIMS, problems, "hashes and manifest match the files and the design"),
-        *rules_as_cut(built),
-        *findings_of(DESIGNED, problems, AS_DESIGNED),
-    )
+    count = len(built.expected.layers)
+    sound = f"{count} cut files read back: closed contours in millimetres"
+    return _of_files(problems, sound, "design", rules_as_cut(built))
 
 
 def rules_as_cut(built: AsBuiltFolder) -> tuple[Finding, ...]:
     """Return the findings of the rules on the layers as cut."""
     if built.laminate is None:
-        lost = tuple(file.layer.index for file in built.files if file.part is None)
         message = "not run: it needs every layer, and not all could be read"
         return tuple(
-            Finding(rule.name, "warn", None, None, "", Place(None, lost), message)
+            problem(rule.name, message, built.lost, "warn")
             for rule in RULES
             if rule.name != NETS or built.design.has_nets
         )
@@ -257,13 +255,13 @@ def _findings_as_cut(rule: Rule, measures: Measures) -> list[Finding]:
         return run_rule(rule, measures)
     except UNMEASURED as error:
         message = f"cannot be measured on these files ({error}); regenerate them"
-        return [Finding(rule.name, "fail", None, None, "", Place(), message)]
+        return [problem(rule.name, message)]
 
 
 # Files against the hashes of the manifest.
 
 
-def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]:
+def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Finding]:
     """Return files that are missing, changed or not in the manifest.
 
     An unlisted file that could be cut by mistake fails; any other is a warning. Raises OutputError
@@ -278,21 +276,20 @@ def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]
     layer_of = {layer.file: (number,) for number, layer in enumerate(layers, start=1)}
     problems = []
     for path, digest in claims.files.items():
-        message = ""
-        if path not in hashes:
-            message = f"{path} is in the manifest and not in the folder"
-        elif hashes[path] != digest:
+        actual = hashes.get(path)
+        if actual != digest:
             message = (
-                f"{path} was changed: its sha256 is {hashes[path][:12]}..., the manifest's "
+                f"{path} is in the manifest and not in the folder"
+                if actual is None
+                else f"{path} was changed: its sha256 is {actual[:12]}..., the manifest's "
                 f"{digest[:12]}..."
             )
-        if message:
-            problems.append(Problem(CLAIMS, message, layer_of.get(path, ())))
+            problems.append(problem(CLAIMS, message, layer_of.get(path, ())))
     for path in (*hashes, *_links(folder)):
         if path not in claims.files:
             message = f"{path} lies in the folder and is not in the manifest; remove it"
             verdict: Verdict = "fail" if _could_be_cut(path) else "warn"
-            problems.append(Problem(CLAIMS, message, verdict=verdict))
+            problems.append(problem(CLAIMS, message, verdict=verdict))
     return problems
 
 
@@ -319,10 +316,8 @@ def _by_hashes(
 ) -> tuple[Finding, ...]:
     """Compare the files of a folder, whose design cannot be used, with the manifest's hashes."""
     problems = file_problems(folder, claims)
-    unusable = [
-        Problem(DESIGNED, f"{reason}; only the hashes of the files were compared")
-        for reason in reasons
-    ]
+    said = (f"{reason}; only the hashes of the files were compared" for reason in reasons)
+    unusable = [problem(DESIGNED, message) for message in said]
     passed = "every file has the hash that the manifest lists"
     return (*findings_of(CLAIMS, problems, passed), *findings_of(DESIGNED, unusable, ""))
 
@@ -330,38 +325,37 @@ def _by_hashes(
 # The folder made again, and compared.
 
 
-def _remade_problems(folder: Path, index: Manifest | JobManifest, order: Order) -> list[Problem]:
+def _remade_problems(folder: Path, index: Manifest | JobManifest, order: Order) -> list[Finding]:
     """Return the files of a folder that differ from those made again; layers are read before."""
     is_of_job = isinstance(index, Manifest) and is_job(folder.absolute().parent)
-    problems: list[Problem] = []
+    problems: list[Finding] = []
     if is_of_job:
         message = "the film sheets are those of the job, and were not compared; check the folder "
-        problems.append(Problem(CLAIMS, f"{message}above this one", verdict="warn"))
+        problems.append(problem(CLAIMS, f"{message}above this one", verdict="warn"))
     with TemporaryDirectory() as name:
         fresh = Path(name)
         try:
-            remade = _remake(folder, index, order, is_of_job, fresh)
+            _remake(folder, index, order, is_of_job, fresh)
             problems += _foreign_problems(index, file_names(fresh), is_of_job)
-            problems += _compared(folder, fresh, index.files, index.generator)
+            problems += _compared(folder, fresh, index.files, index.generator, is_of_job)
             if index.generator == GENERATOR:
-                problems += _index_problems(folder, remade, is_of_job)
                 problems += _prediction_problems(folder, index, order.builds[0], fresh)
         except DESIGN_ERRORS as error:
             message = f"{folder.name} could not be made again to be compared: {error}"
-            problems.append(Problem(DESIGNED, message))
+            problems.append(problem(DESIGNED, message))
     if index.generator != GENERATOR:
         message = (
             f"the folder was made by {index.generator}, and this is {GENERATOR}: only what is cut "
             "and pressed was compared; regenerate the folder"
         )
-        problems.append(Problem(DESIGNED, message))
+        problems.append(problem(DESIGNED, message))
     return problems
 
 
 def _remake(
     folder: Path, index: Manifest | JobManifest, order: Order, is_of_job: bool, fresh: Path
-) -> dict[str, Any]:
-    """Write the files of a run to ``fresh``; return its manifest without hashes.
+) -> None:
+    """Write the files of a run to ``fresh``, its manifest without hashes.
 
     A design of a job has no film sheets and no pages in its own folder.
     """
@@ -374,7 +368,8 @@ def _remake(
             parts |= {"press", "preview"}
     nests = order.nests(folder, ignore_progress) if "cut" in parts and not is_of_job else ()
     extras = {"has_pages": not is_of_job} if order.schema == SCHEMA else {}
-    return write_folder(order, parts, nests, fresh, ignore_progress, **extras).index
+    written = write_folder(order, parts, nests, fresh, ignore_progress, **extras)
+    write_text(fresh / MANIFEST, as_json(written.index))
 
 
 def _parts(files: Collection[str]) -> set[RunPart]:
@@ -391,7 +386,7 @@ def _parts(files: Collection[str]) -> set[RunPart]:
 
 def _foreign_problems(
     index: Manifest | JobManifest, remade: Collection[str], is_of_job: bool
-) -> list[Problem]:
+) -> list[Finding]:
     """Return the files that a manifest lists and its design does not make.
 
     Files of other commands may be there, except those that could be cut.
@@ -403,7 +398,7 @@ def _foreign_problems(
     # The pages of a job's design show the sheets of the job, and are compared there.
     excluded = (*excluded, *PAGES) if is_of_job else excluded
     return [
-        Problem(
+        problem(
             DESIGNED, f"{path} is listed, but is not a file of this design; regenerate the folder"
         )
         for path in index.files
@@ -413,24 +408,26 @@ def _foreign_problems(
     ]
 
 
-def _compared(folder: Path, fresh: Path, listed: Collection[str], generator: str) -> list[Problem]:
+def _compared(
+    folder: Path, fresh: Path, listed: Collection[str], generator: str, is_of_job: bool = False
+) -> list[Finding]:
     """Return the files that differ from those made again; those in ``layers`` were read before."""
-    problems: list[Problem] = []
+    problems: list[Finding] = []
     bare: list[str] = []
     for name in file_names(fresh):
         path, actual = fresh / name, folder / name
         is_layer = path.parent.name == LAYERS and path.suffix == ".dxf"
-        if name == MANIFEST or is_layer or not _is_compared(name, generator):
+        if is_layer or not _is_compared(name, generator):
             continue
         rule = DESIGNED
-        if name not in listed or not os.path.lexists(actual):
+        if name != MANIFEST and (name not in listed or not os.path.lexists(actual)):
             difference = f"{name} is missing"
         elif not actual.is_file():
             rule, difference = INTEGRITY, f"{name}: not a plain file"
         elif cmp(actual, path, shallow=False):
             continue
-        elif name.endswith(f"/{MANIFEST}"):
-            rule, difference = CLAIMS, _index_difference(actual, _read_json(path), {"files"})
+        elif path.name == MANIFEST:
+            rule, difference = CLAIMS, _index_difference(folder, fresh, name, is_of_job)
             difference = difference and f"{name}: {difference}"
         elif unsound := unreadable(actual):
             rule, difference = INTEGRITY, f"{name}: {unsound}"
@@ -438,12 +435,12 @@ def _compared(folder: Path, fresh: Path, listed: Collection[str], generator: str
             difference = file_difference(actual, path, name)
             bare += [name] if has_lost_properties(actual) else []
         if difference:
-            problems.append(Problem(rule, f"{difference}; regenerate the folder"))
+            problems.append(problem(rule, f"{difference}; regenerate the folder"))
     if bare:
         message = (
             f"{', '.join(bare)}: no custom properties; save as DXF R2004 or later to keep them"
         )
-        problems.append(Problem(CLAIMS, message, verdict="warn"))
+        problems.append(problem(CLAIMS, message, verdict="warn"))
     return problems
 
 
@@ -456,30 +453,23 @@ def _read_json(path: Path) -> Any:
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-def _index_difference(path: Path, expected: dict[str, Any], left_out: Collection[str]) -> str:
-    """Return the first difference of a manifest, except the keys ``left_out``; "" if none."""
-    actual = _read_json(path)
+def _index_difference(folder: Path, fresh: Path, name: str, is_of_job: bool) -> str:
+    """Return the first difference of a manifest from the one made again; "" if none."""
+    actual, expected = _read_json(folder / name), _read_json(fresh / name)
     if not isinstance(actual, dict):
         return "it is not an index"
+    # Meshes may be of several commands, and sheets those of the job.
+    is_design = name == MANIFEST and expected["schema"] == SCHEMA
+    left_out = {"files"} | ({"mesh_statistics", "meshes"} if is_design else set())
+    left_out |= {"sheets", "films"} if is_of_job else set()
     here, there = (
         {key: value for key, value in index.items() if key not in left_out}
         for index in (actual, expected)
     )
-    return value_difference(here, there)
-
-
-def _index_problems(folder: Path, index: dict[str, Any], is_of_job: bool) -> list[Problem]:
-    """Return the first difference of the manifest from the one made again."""
-    expected = json.loads(as_json(index))
-    # Hashes, or meshes of several commands.
-    left_out = {"files"} | ({"mesh_statistics", "meshes"} if index["schema"] == SCHEMA else set())
-    left_out |= {"sheets", "films"} if is_of_job else set()
-    difference = _index_difference(folder / MANIFEST, expected, left_out)
-    if not difference and "meshes" in left_out:
-        difference = _mesh_difference(folder, _read_json(folder / MANIFEST), expected)
-    return (
-        [Problem(CLAIMS, f"{MANIFEST}: {difference}; regenerate the folder")] if difference else []
-    )
+    difference = value_difference(here, there)
+    if difference or not is_design:
+        return difference
+    return _mesh_difference(folder, actual, expected)
 
 
 def _mesh_difference(folder: Path, actual: dict[str, Any], expected: dict[str, Any]) -> str:
@@ -501,7 +491,7 @@ def _mesh_difference(folder: Path, actual: dict[str, Any], expected: dict[str, A
 
 def _prediction_problems(
     folder: Path, index: Manifest | JobManifest, build: Build, fresh: Path
-) -> list[Problem]:
+) -> list[Finding]:
     """Return differences of the prediction from one for the same request."""
     if "predict.json" not in index.files:
         return []
@@ -517,5 +507,5 @@ def _prediction_problems(
         write_artefacts(again, [row for row in artefacts() if row.part == "predict"])
     except (ValueError, LookupError, TypeError, OSError):
         message = "predict.json does not say what was asked for; regenerate the folder"
-        return [Problem(DESIGNED, message)]
+        return [problem(DESIGNED, message)]
     return _compared(folder, written, index.files, index.generator)

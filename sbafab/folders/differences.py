@@ -14,10 +14,9 @@ import re
 import tomllib
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from io import BytesIO
 from itertools import zip_longest
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 from zipfile import BadZipFile, ZipFile
 
@@ -59,31 +58,29 @@ MAX_ENTITIES = 300_000
 MARK = re.compile(rb"\n *1?0\r?\n")
 
 
-@dataclass(frozen=True)
-class Problem:
-    """A fault outside the rule deck, in these layers."""
-
-    rule: str
-    message: str
-    layers: tuple[int, ...] = ()
-    verdict: Verdict = "fail"
+def problem(
+    rule: str, message: str, layers: Sequence[int] = (), verdict: Verdict = "fail"
+) -> Finding:
+    """Return the finding of a fault outside the rule deck, in these layers."""
+    return Finding(rule, verdict, None, None, "", Place(None, tuple(layers)), message)
 
 
-def findings_of(rule: str, problems: Sequence[Problem], passed: str) -> list[Finding]:
+def findings_of(rule: str, problems: Sequence[Finding], passed: str) -> list[Finding]:
     """Return the findings of a rule: at most MAX_SHOWN problems in full, or one that passes."""
-    of_rule = [problem for problem in problems if problem.rule == rule]
-    if not any(problem.verdict == "fail" for problem in of_rule):
-        of_rule.append(Problem(rule, passed, verdict="pass"))
+    of_rule = [each for each in problems if each.rule == rule]
+    if not any(each.verdict == "fail" for each in of_rule):
+        of_rule.append(problem(rule, passed, verdict="pass"))
     shown, rest = of_rule[:MAX_SHOWN], of_rule[MAX_SHOWN:]
     if rest:
-        layers = tuple(dict.fromkeys(index for problem in rest for index in problem.layers))
-        has_failed = any(problem.verdict == "fail" for problem in rest)
-        message = f"and {len(rest)} more like these"
-        shown.append(Problem(rule, message, layers, "fail" if has_failed else "warn"))
-    return [
-        Finding(rule, each.verdict, None, None, "", Place(None, each.layers), each.message)
-        for each in shown
-    ]
+        layers = dict.fromkeys(index for each in rest for index in each.where.layers)
+        verdict: Verdict = "fail" if any(each.verdict == "fail" for each in rest) else "warn"
+        shown.append(problem(rule, f"and {len(rest)} more like these", [*layers], verdict))
+    return shown
+
+
+def reason_of(error: Exception, file: str) -> str:
+    """Return what an error says of a file, without the file's name."""
+    return str(error).removeprefix(f"{PurePosixPath(file).name}: ")
 
 
 # Files that are sound.
@@ -147,7 +144,7 @@ def unreadable(path: Path) -> str:
         sound_digest(path)
         check_sequence(read_profile(path))
     except (OutputError, *UNREADABLE) as error:
-        return str(error).removeprefix(f"{path.name}: ").rstrip(".")
+        return reason_of(error, path.name).rstrip(".")
     return ""
 
 

@@ -66,7 +66,6 @@ def test_a_simulator_that_is_missing(tmp_path: Path, name: str) -> None:
         (["--with", "ansys"], "calculix"),
         (["--with", "calculix", "--pressure", "2000"], "pressure of chamber1 = 2000 kPa"),
         (["--with", "calculix", "--symmetry", "sector"], "symmetry sector is not this laminate's"),
-        (["--with", "sofa", "--scene", "beam"], "must be one of shell, frames, volume"),
         (["--with", "sofa", "--pressure", "0"], "0 kPa in every chamber"),
         (["--with", "mujoco", "--pressure", "-5"], "to 1000 kPa; a vacuum is for calculix"),
         (["--with", "sofa", "--scene", "volume", "--volume", "left=3"], "left"),
