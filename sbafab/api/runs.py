@@ -17,7 +17,7 @@ from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
 from sbafab.folders.artefacts import EVERYTHING
 from sbafab.folders.checks_json import FindingEntry, checks
-from sbafab.folders.run import Conforming, Run, RunRequest, Simulated, result_json
+from sbafab.folders.run import Run, RunRequest, Simulated, result_json
 from sbafab.folders.run import generate as run
 from sbafab.folders.run import simulate as run_simulator
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
@@ -169,7 +169,7 @@ def mesh(
     settings = MeshSettings(h, element, symmetry, fill_ul, gaps, wrapped)
     each = (formats,) if isinstance(formats, str) else tuple(formats)
     design = load(source, *changes, **tables)
-    request = RunRequest(design, Path(out), ("mesh",), conforming=Conforming(settings, each))
+    request = RunRequest(design, Path(out), ("mesh",), meshes=settings, formats=each)
     return run(request, progress)
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from sbafab import plugins
 from sbafab.cutting.cut_settings import CutSettings
@@ -199,19 +199,12 @@ def write_text(path: Path, text: str) -> None:
 
 def _write_layers(folder: DesignFolder) -> None:
     """Write the layer files, the paths of seams and the base plate."""
-    build, progress = folder.build, partial(folder.progress, "cut files")
-    folder.verified |= write_layer_files(
-        build.laminate, build.paths, folder.path, build.settings, progress
-    )
-    write_plates(build, folder.path)
-
-
-def write_plates(build: Build, folder: Path) -> None:
-    """Write the base plate and the paths of seams."""
-    design, laminate = build.design, build.laminate
-    write_seam_files(laminate, folder, build.settings)
+    build, path, progress = folder.build, folder.path, partial(folder.progress, "cut files")
+    design, laminate, settings = build.design, build.laminate, build.settings
+    folder.verified |= write_layer_files(laminate, build.paths, path, settings, progress)
+    write_seam_files(laminate, path, settings)
     places, notes = build.cycles.places, hole_notes(design, laminate)
-    write_fixture(laminate, folder, build.settings, design.press.platen, places, notes)
+    write_fixture(laminate, path, settings, design.press.platen, places, notes)
 
 
 def write_nested_sheets(
@@ -230,11 +223,10 @@ def write_nested_sheets(
 
 
 def _press_json(folder: DesignFolder) -> str:
-    schedule = folder.build.schedule
+    schedule, more = folder.build.schedule, {}
     if folder.build.cycles.copies > 1:
-        batch = batch_entry(folder.design, folder.laminate, schedule)
-        return as_json(press_json(schedule, batch=batch))
-    return as_json(press_json(schedule))
+        more = {"batch": batch_entry(folder.design, folder.laminate, schedule)}
+    return as_json(press_json(schedule, **more))
 
 
 def _has_tray(folder: DesignFolder) -> bool:
@@ -281,11 +273,6 @@ def prediction_json(design: Design, prediction: Prediction) -> dict[str, Any]:
     }
 
 
-def _predict_json(folder: DesignFolder) -> str:
-    assert folder.prediction is not None
-    return as_json(prediction_json(folder.design, folder.prediction))
-
-
 def _write_plots(folder: DesignFolder) -> None:
     assert folder.prediction is not None
     relations = folder.prediction.relations
@@ -325,11 +312,6 @@ def work_of(build: Build, sheets: Sequence[SheetFile], folder: str = "") -> Any:
     """
     work = plugins.load("sbafab.reports.traveller.work:Work")
     return work(build.design, build.laminate, build.findings, build.curves, sheets, folder)
-
-
-def _checks(folder: DesignFolder) -> str:
-    design = folder.design
-    return as_json(checks(folder.build.findings, "design", design.name, [design]))
 
 
 def _design(folder: DesignFolder) -> str:
@@ -421,7 +403,7 @@ _OWN: tuple[Artefact, ...] = (
         "predict.json",
         "predict",
         "from `sbafab predict`: every figure with model and trust",
-        _predict_json,
+        lambda of: as_json(prediction_json(of.design, cast(Prediction, of.prediction))),
         PredictDocument.SCHEMA,
     ),
     Artefact("predict", "predict", "its plots", _write_plots),
@@ -475,7 +457,13 @@ _OWN: tuple[Artefact, ...] = (
         ),
         is_page=True,
     ),
-    Artefact("checks.json", "", "what the rules found", _checks, Checks.SCHEMA),
+    Artefact(
+        "checks.json",
+        "",
+        "what the rules found",
+        lambda of: as_json(checks(of.build.findings, "design", of.design.name, [of.design])),
+        Checks.SCHEMA,
+    ),
     Artefact(
         LAMINATE_FILE,
         "",

@@ -368,8 +368,8 @@ def _remake(
             parts |= {"press", "preview"}
     nests = order.nests(folder, ignore_progress) if "cut" in parts and not is_of_job else ()
     extras = {"has_pages": not is_of_job} if order.schema == SCHEMA else {}
-    written = write_folder(order, parts, nests, fresh, ignore_progress, **extras)
-    write_text(fresh / MANIFEST, as_json(written.index))
+    remade, *_ = write_folder(order, parts, nests, fresh, ignore_progress, **extras)
+    write_text(fresh / MANIFEST, as_json(remade))
 
 
 def _parts(files: Collection[str]) -> set[RunPart]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -39,19 +39,6 @@ SOLID = "mesh/assembled.glb"
 PICTURE = "preview/assembled.png"
 
 
-@dataclass(frozen=True)
-class WrittenFolder:
-    """The ``index`` (manifest) of a written folder without its files' hashes.
-
-    ``verified``: the sha256 of each cut file that was read back. ``left_out``: meshes and
-    simulators' inputs that could not be, with the reason.
-    """
-
-    index: dict[str, Any]
-    verified: Mapping[str, str]
-    left_out: tuple[tuple[str, str], ...] = ()
-
-
 def write_folder(
     order: Order,
     wanted: Collection[RunPart],
@@ -59,10 +46,12 @@ def write_folder(
     path: Path,
     progress: Progress,
     **extras: Any,
-) -> WrittenFolder:
+) -> tuple[dict[str, Any], dict[str, str], tuple[tuple[str, str], ...]]:
     """Write film sheets and designs; several designs get a folder each, named after it.
 
-    ``extras`` are fields of the ``DesignFolder`` of a single design.
+    ``extras`` are fields of the ``DesignFolder`` of a single design. Return the manifest without
+    its files' hashes; the sha256 of each cut file that was read back; and the meshes and inputs of
+    simulators that could not be, with the reason.
     """
     parts, first = frozenset(wanted), order.builds[0]
     sheets = write_nested_sheets(nests, first.design, path, order.settings, progress)
@@ -70,7 +59,7 @@ def write_folder(
     if order.schema == SCHEMA:
         folder = DesignFolder(first, parts, sheets, path, progress, **extras)
         index = write_design(folder)
-        return WrittenFolder(index, {**verified, **folder.verified}, tuple(folder.left_out))
+        return index, verified | folder.verified, tuple(folder.left_out)
     from_below = _from_below(sheets)
     left_out: list[tuple[str, str]] = []
     for build in order.builds:
@@ -88,7 +77,7 @@ def write_folder(
     if order.assembled is not None:
         more = _write_assembly(order, order.assembled, sheets, path, progress)
     index = job_manifest(order.name, order.settings, designs, sheets, more)
-    return WrittenFolder(index, verified, tuple(left_out))
+    return index, verified, tuple(left_out)
 
 
 def write_design(

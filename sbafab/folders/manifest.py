@@ -131,28 +131,28 @@ class KerfClaim(_Claim):
     """Full width in mm, or that along x and along y."""
 
 
-class _OfFilm(_Claim):
-    material: Material
-
-
-class _FilmNeed(_OfFilm):
-    product: str
-    thickness: Thickness
-    layers: int
-    area: Six
-
-
-class FilmUseClaim(_OfFilm):
+class FilmUseClaim(_Claim):
     """Sheets of a film and their area in mm2; zeros without sheets."""
 
+    material: Material
     sheets: int = 0
     sheet_area: Three = 0.0
     waste: Three = 0.0
     density: Annotated[float, _rounded(4)] = 0.0
 
 
-class FilmClaim(FilmUseClaim, _FilmNeed):
-    """A design's need of a film and the sheets it is cut from; keys in this order."""
+class FilmClaim(_Claim):
+    """A design's need of a film and the sheets it is cut from, as in ``FilmUseClaim``."""
+
+    material: Material
+    product: str
+    thickness: Thickness
+    layers: int
+    area: Six
+    sheets: int = 0
+    sheet_area: Three = 0.0
+    waste: Three = 0.0
+    density: Annotated[float, _rounded(4)] = 0.0
 
 
 class SheetPinClaim(_Claim):

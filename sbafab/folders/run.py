@@ -59,21 +59,14 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Conforming:
-    """Volume and shell meshes, in the formats of these file endings; they take the extra "mesh"."""
-
-    settings: MeshSettings
-    formats: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class RunRequest:
     """A folder to be written: ``out/<name>/`` of a design, an assembly or several designs.
 
     ``name`` is for several designs, a design or assembly has its own; ``parts`` and what follows
-    are for a design. ``conforming`` comes with the part "mesh", ``prediction`` with "predict";
-    of a part named after a simulator, ``simulated`` is the folder in which it has run, without it
-    what the simulator reads is written.
+    are for a design. Volume and shell ``meshes`` in the ``formats`` of these file endings, which
+    take the extra "mesh", come with the part "mesh", ``prediction`` with "predict"; of a part named
+    after a simulator, ``simulated`` is the folder in which it has run, without it what the
+    simulator reads is written.
     """
 
     source: Design | Assembly | Sequence[Design]
@@ -81,7 +74,8 @@ class RunRequest:
     parts: Sequence[RunPart] = EVERYTHING
     curves: Curves = TRUE_ARCS
     name: str = "job"
-    conforming: Conforming | None = None
+    meshes: MeshSettings | None = None
+    formats: tuple[str, ...] = ()
     prediction: Prediction | None = None
     simulated: Path | None = None
 
@@ -183,15 +177,13 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     extras = {} if order.schema != SCHEMA else _extras(request, order.builds[0], parts, progress)
     listed = listed_files(target)
     with replaced_folder(target) as folder:
-        written = write_folder(order, parts, nests, folder, progress, **extras)
+        index, verified, left_out = write_folder(order, parts, nests, folder, progress, **extras)
         if order.schema == SCHEMA and not order.failed:
-            carry_over(target, folder, written.index)
-        close_folder(folder, written.index, written.verified)
-    removed = removed_files(listed, written.index)
+            carry_over(target, folder, index)
+        close_folder(folder, index, verified)
+    dropped = tuple(path for path in listed if path not in index["files"])
     meshes = extras.get("conforming")
-    return Run(
-        order, target, written.index, meshes, removed, beside=beside, left_out=written.left_out
-    )
+    return Run(order, target, index, meshes, dropped, beside=beside, left_out=left_out)
 
 
 def _parts_to_write(request: RunRequest, order: Order, target: Path) -> set[RunPart] | None:
@@ -229,12 +221,12 @@ def _extras(
 ) -> dict[str, Any]:
     """Return what a run on one design writes beside what follows from the design."""
     extras = {"prediction": request.prediction, "simulated": request.simulated}
-    if request.conforming is None or "mesh" not in parts:
+    if request.meshes is None or "mesh" not in parts:
         return extras
     progress("meshing", 0, 1)
     conforming_meshes = plugins.load("sbafab.meshing.conforming.meshes:conforming_meshes")
-    meshes = conforming_meshes(build.laminate, request.conforming.settings)
-    return {**extras, "conforming": meshes, "formats": request.conforming.formats}
+    meshes = conforming_meshes(build.laminate, request.meshes)
+    return {**extras, "conforming": meshes, "formats": request.formats}
 
 
 # A simulator run on a design, its results in the design's folder.
@@ -378,11 +370,6 @@ def would_replace(
     return [path for path in listed_files(target) if worth & set(path.split("/"))]
 
 
-def removed_files(listed: Sequence[str], index: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the files that an earlier run listed and the new manifest does not."""
-    return tuple(path for path in listed if path not in index["files"])
-
-
 def refuse_to_replace(target: Path, build: Build, replaced: Collection[str]) -> None:
     """Raises OccupiedError where a run that writes ``replaced`` would lose others' files."""
     mine = identity(build)
@@ -432,18 +419,10 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     old = read_manifest(old_folder)
     if old is None or not carried_over(old, index):
         return
-    written = file_names(folder)
-    files = old.get("files")
-    existing = set(file_names(old_folder))
-    carried: set[str] = set()
+    written, existing = file_names(folder), file_names(old_folder)
     # Results belong to the input beside them: with other input they go, whole.
-    anew: set[str] = {
-        name
-        for name in SIMULATORS
-        if any(
-            _differs(path, old_folder, folder) for path in written if path.startswith(f"{name}/")
-        )
-    }
+    inputs = [path for path in written if path.startswith(tuple(f"{name}/" for name in SIMULATORS))]
+    anew = {path.partition("/")[0] for path in inputs if _differs(path, old_folder, folder)}
     for name in anew:
         if f"{name}/{RESULTS}" in existing and f"{name}/{RESULTS}" not in written:
             raise OutputError(
@@ -454,10 +433,11 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     if "mesh_statistics" in index and old_meshes not in (None, index["mesh_statistics"]):
         anew.update(tops_of("mesh"))
     anew |= WHOLE & {path.partition("/")[0] for path in written}
+    files, carried = old.get("files"), set()
+    tops = {row.top for row in artefacts() if row.part} - anew
     for path, digest in (files if isinstance(files, dict) else {}).items():
-        if path in written or path not in existing or not _may_stay(path, anew):
-            continue
-        if file_hash(old_folder / path) == digest:
+        may_stay = path.partition("/")[0] in tops and path not in written and path in existing
+        if may_stay and file_hash(old_folder / path) == digest:
             target = folder / path
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(old_folder / path, target)
@@ -475,13 +455,6 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
         index["meshes"] += kept_meshes
         if any(mesh.get("kind") == "volume" for mesh in kept_meshes):
             index["mesh_statistics"] = old.get("mesh_statistics", {})
-
-
-def _may_stay(path: str, anew: Collection[str]) -> bool:
-    """Return True if an old run's file belongs to a part of a run that is not written again."""
-    first = path.partition("/")[0]
-    is_part = any(row.part and row.top == first for row in artefacts())
-    return is_part and first not in anew
 
 
 def _differs(path: str, old_folder: Path, folder: Path) -> bool:

@@ -15,7 +15,7 @@ from sbafab.errors import OutputError
 from sbafab.folders.artefacts import RunPart
 from sbafab.folders.check import check_folder
 from sbafab.folders.manifest import file_hashes
-from sbafab.folders.run import Conforming, RunRequest, generate
+from sbafab.folders.run import RunRequest, generate
 from sbafab.meshing.conforming.layup import MeshSettings
 from tests.quick import few
 
@@ -118,8 +118,7 @@ def test_meshes_of_another_fill_are_not_mixed(tmp_path: Path) -> None:
 
     def meshed(fill: float | None, *formats: str) -> set[str]:
         settings = MeshSettings(h=0.7, fill_ul=fill)
-        conforming = Conforming(settings, formats)
-        run = generate(RunRequest(design, tmp_path, ("mesh",), conforming=conforming))
+        run = generate(RunRequest(design, tmp_path, ("mesh",), meshes=settings, formats=formats))
         return set(run.manifest["files"])
 
     assert "mesh/volume.vtu" in meshed(5.0, "vtu")

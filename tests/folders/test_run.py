@@ -17,7 +17,7 @@ from sbafab.design.laminate_file import read_laminate
 from sbafab.errors import OutputError
 from sbafab.folders import artefacts
 from sbafab.folders.check import check_folder
-from sbafab.folders.run import Conforming, RunRequest, generate
+from sbafab.folders.run import RunRequest, generate
 from sbafab.meshing import formats
 from sbafab.meshing.conforming.layup import MeshSettings
 from tests.quick import few
@@ -196,8 +196,8 @@ def test_a_drawn_outline_travels_with_the_output(tmp_path: Path) -> None:
 
 def test_conforming_meshes_stay_beside_those_of_a_later_run(tmp_path: Path) -> None:
     design = load_design("1dof-5mm", ["stack.balloons=1"])
-    asked = Conforming(MeshSettings(h=0.7, symmetry="quarter"), ("vtu",))
-    made = generate(RunRequest(design, tmp_path, ("mesh",), conforming=asked))
+    asked = MeshSettings(h=0.7, symmetry="quarter")
+    made = generate(RunRequest(design, tmp_path, ("mesh",), meshes=asked, formats=("vtu",)))
     figures = made.manifest["mesh_statistics"]
     assert figures["volume"]["least_scaled_jacobian"] > 0
     assert made.manifest["meshes"][-1]["kind"] == "shell"
