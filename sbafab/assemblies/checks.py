@@ -14,7 +14,7 @@ from sbafab.assemblies.records import AssemblyRules, Cup, Line, Seat, Tube, girt
 from sbafab.assemblies.shapes import face, placed_surface
 from sbafab.design.records import Discs
 from sbafab.geometry.region import Region, rectangle
-from sbafab.laminate.laminate import outline_diameter
+from sbafab.laminate.laminate import outline_diameter, overall_diameter
 from sbafab.meshing.surface import Vector
 from sbafab.models.calibration import factors_of
 from sbafab.models.closed_forms import LOBES, folded_diameter
@@ -205,14 +205,6 @@ def folded_diameter_with_tubes(placed: PlacedPart, assembled: Assembled) -> floa
     return 2 * (inside + films + max(inlet.tube_diameter for inlet in laminate.inlets))
 
 
-def reach(placed: PlacedPart) -> float:
-    """Return the diameter in mm of the circle that holds an actuator with its tabs unfolded."""
-    assert placed.made is not None
-    layers = [layers[0] for layers in placed.made.laminate.patterns.values()]
-    edges = (edge for layer in layers for edge in layer.profile.edges)
-    return 2 * max(edge.farthest_from((0.0, 0.0)) for edge in edges)
-
-
 def supply_runs(placed: PlacedPart, assembled: Assembled) -> tuple[SupplyRun, ...]:
     """Return the runs along a tube of the supply tubes of an actuator on its end or start."""
     tube = assembled.on(placed)
@@ -364,11 +356,13 @@ def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
         sizes, key=lambda entry: (round(entry[0], 6), entry[1].radius is None)
     )
     tabs, thinner = "no-tabs", "no-tabs"
-    if is_folded:
-        is_untied = part.radius is None and reach(part) > lumen
+    unfolded = 0.0
+    if is_folded and part.made is not None:
+        unfolded = overall_diameter(part.made.laminate)
+        is_untied = part.radius is None and unfolded > lumen
         tabs, thinner = "tabs-tied" if is_untied else "tabs-folded", "thinner-tubes"
     facts: dict[str, Any] = {"thinner": say(f"lumen-pass.{thinner}")}
-    facts["tabs"] = say(f"lumen-pass.{tabs}", unfolded=reach(part) if is_folded else 0.0)
+    facts["tabs"] = say(f"lumen-pass.{tabs}", unfolded=unfolded)
     yield _judged("lumen-pass", widest < lumen, lumen, widest, "widest", (part,), **facts)
 
 
@@ -388,19 +382,17 @@ def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
     lumen = assembled.assembly.deploy.lumen_diameter
     if lumen is None:
         return
-    made = [placed for placed in assembled.parts if placed.made is not None]
-    sizes = ((_reached(placed), placed.name) for placed in made)
+    sizes = [
+        (sizes_of(placed.made.design, placed.made.laminate).get("reached_diameter"), placed.name)
+        for placed in assembled.parts
+        if placed.made is not None
+    ]
     widest, name = max((size for size in sizes if size[0]), default=(None, ""))
     if widest is None:
         yield _judged("lumen-brace", False, lumen, None, "none", ())
         return
     part, good = (assembled[name],), holds(widest, lumen)
     yield _judged("lumen-brace", good, lumen, widest, "reaches", part)
-
-
-def _reached(placed: PlacedPart) -> float | None:
-    assert placed.made is not None
-    return sizes_of(placed.made.design, placed.made.laminate).get("reached_diameter")
 
 
 # Collisions of solids in place, deflated, their pockets filled.
@@ -469,18 +461,13 @@ def run_checks(assembled: Assembled) -> tuple[Finding, ...]:
 def lowered_checks(rules: AssemblyRules, name: str | None = None) -> tuple[str, ...]:
     """Each limit (of one check) that an assembly weakens, with its value and the usual one."""
     usual = AssemblyRules()
-    weak = {
-        "line_clearance": rules.line_clearance < usual.line_clearance,
-        "tube_tolerance": rules.tube_tolerance > usual.tube_tolerance,
-        "seat_share": rules.seat_share < usual.seat_share,
-    }
-    checks = {
-        "line_clearance": "line-clearance",
-        "tube_tolerance": "tube-match",
-        "seat_share": "seat",
-    }
+    limits = (
+        ("line_clearance", "line-clearance", rules.line_clearance < usual.line_clearance),
+        ("tube_tolerance", "tube-match", rules.tube_tolerance > usual.tube_tolerance),
+        ("seat_share", "seat", rules.seat_share < usual.seat_share),
+    )
     return tuple(
         weakened(key, getattr(rules, key), getattr(usual, key), "default")
-        for key, check in checks.items()
-        if weak[key] and name in (None, check)
+        for key, check, is_weak in limits
+        if is_weak and name in (None, check)
     )

@@ -57,6 +57,12 @@ class Sba(Fixed):
     """Keys of that design to override, as tables."""
 
 
+def _with_a_wall(part: Tube | Line) -> Tube | Line:
+    if part.inner_diameter >= part.outer_diameter:
+        raise ValueError("must have an inner_diameter smaller than its outer_diameter")
+    return part
+
+
 class Tube(Fixed):
     kind: Literal["tube"]
     """A tube."""
@@ -69,11 +75,7 @@ class Tube(Fixed):
     material: Words = "silicone"
     """Printed on the traveller."""
 
-    @model_validator(mode="after")
-    def _has_a_wall(self) -> Self:
-        if self.inner_diameter >= self.outer_diameter:
-            raise ValueError("must have an inner_diameter smaller than its outer_diameter")
-        return self
+    _is_hollow = model_validator(mode="after")(_with_a_wall)
 
 
 class Magnet(Fixed):
@@ -132,11 +134,7 @@ class Line(Fixed):
     chamber: Words = "chamber1"
     """The chamber whose inlet it goes into, at an inlet."""
 
-    @model_validator(mode="after")
-    def _has_a_wall(self) -> Self:
-        if self.inner_diameter >= self.outer_diameter:
-            raise ValueError("must have an inner_diameter smaller than its outer_diameter")
-        return self
+    _is_hollow = model_validator(mode="after")(_with_a_wall)
 
 
 class Base(Fixed):

@@ -11,7 +11,15 @@ from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.records import AnyPart, Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.solid import Slab, TubeWrap, closed_surface, solid_slabs, wrapped
+from sbafab.meshing.solid import (
+    Slab,
+    TubeWrap,
+    closed_surface,
+    film_slab,
+    gap_slab,
+    solid_slabs,
+    wrapped,
+)
 from sbafab.meshing.surface import Surface
 
 SAGITTA = 0.02
@@ -54,15 +62,8 @@ def _slabs(placed: PlacedPart, filled: bool) -> list[Slab]:
 
 def filled_slabs(laminate: Laminate) -> list[Slab]:
     """Return slabs of the films and the gaps between them, pockets included, for collisions."""
-    slabs = [
-        Slab(layer.profile, layer.z, layer.z + layer.film.thickness)
-        for layer in laminate.tpe_layers
-    ]
-    slabs += [
-        Slab(interface.contact, interface.z, interface.z + interface.gap)
-        for interface in laminate.interfaces
-        if interface.masks
-    ]
+    slabs = [film_slab(layer) for layer in laminate.tpe_layers]
+    slabs += [gap_slab(gap, gap.contact) for gap in laminate.interfaces if gap.masks]
     return sorted(slabs, key=lambda slab: slab.bottom)
 
 
@@ -158,10 +159,8 @@ def colours(assembled: Assembled) -> dict[str, RGB]:
 
 def linear(colour: RGB) -> tuple[float, float, float]:
     """Return a screen (sRGB) colour in linear light, 0 to 1."""
-    r, g, b = (round(_light(value / 255), 6) for value in colour)
+    r, g, b = (
+        round(value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4, 6)
+        for value in (part / 255 for part in colour)
+    )
     return r, g, b
-
-
-def _light(value: float) -> float:
-    low = 0.04045
-    return value / 12.92 if value <= low else ((value + 0.055) / 1.055) ** 2.4

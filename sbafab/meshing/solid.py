@@ -266,20 +266,20 @@ def body_bond(interface: Interface) -> Region:
     return union([interface.bond, folded_strips(interface)])
 
 
-def _film_slab(layer: Layer) -> Slab:
+def film_slab(layer: Layer) -> Slab:
     return Slab(layer.profile, layer.z, layer.z + layer.film.thickness)
 
 
-def _gap_slab(interface: Interface, region: Region) -> Slab:
+def gap_slab(interface: Interface, region: Region) -> Slab:
     return Slab(region, interface.z, interface.z + interface.gap)
 
 
 def solid_slabs(laminate: Laminate) -> list[Slab]:
     """Every TPE layer, and every bond as the mask's thickness filled with TPE, bottom to top."""
     laminate = parted(laminate)
-    slabs = [_film_slab(layer) for layer in laminate.tpe_layers]
+    slabs = [film_slab(layer) for layer in laminate.tpe_layers]
     slabs += [
-        _gap_slab(interface, body_bond(interface))
+        gap_slab(interface, body_bond(interface))
         for interface in laminate.interfaces
         if interface.gap and not interface.bond.is_empty
     ]
@@ -313,7 +313,7 @@ def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
         axes = [((a + c) / 2, (b + d) / 2) for a, b, c, d in boxes]
     levels = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
     pockets = [
-        _gap_slab(interface, Region(tuple(contours)))
+        gap_slab(interface, Region(tuple(contours)))
         for balloon, interface in enumerate(levels, start=1)
         if chamber.is_in(balloon) and (contours := [*_pocket(interface, chamber.centres, axes)])
     ]
@@ -364,9 +364,9 @@ def _channels(
 ) -> Iterator[Slab]:
     """The openings on the chamber's axes through the bonded films between its pockets."""
     low, high = pockets[0].top, pockets[-1].bottom
-    slabs = [(f"layer {layer.index}", _film_slab(layer)) for layer in laminate.tpe_layers]
+    slabs = [(f"layer {layer.index}", film_slab(layer)) for layer in laminate.tpe_layers]
     slabs += [
-        (f"interface {gap.index}", _gap_slab(gap, gap.bond))
+        (f"interface {gap.index}", gap_slab(gap, gap.bond))
         for gap in laminate.interfaces
         if gap.kind == "separator"
     ]
@@ -388,7 +388,7 @@ def _holes_between(
     laminate: Laminate, _chamber: Chamber, _axes: Sequence[Point], pockets: Sequence[Slab]
 ) -> Iterator[Slab]:
     """The holes of films that open to a pocket below and to one above."""
-    for film in map(_film_slab, laminate.tpe_layers):
+    for film in map(film_slab, laminate.tpe_layers):
         below = [pocket.region for pocket in pockets if math.isclose(pocket.top, film.bottom)]
         above = [pocket.region for pocket in pockets if math.isclose(pocket.bottom, film.top)]
         for hole in film.region.holes:

@@ -532,7 +532,7 @@ class RecordedFilms:
             pressures=pressures,
             height=height,
             tip=(x, y, z),
-            tilt=tilt_of(nodes[shell.tip]),
+            tilt=tilt_of(shell.rest[shell.tip], nodes[shell.tip]),
             volumes=volumes,
         )
 
@@ -637,7 +637,16 @@ def _why_void(program: str, code: int, trouble: str | None) -> str:
     return f"{program} ended with exit code {code}" if code > 0 else ""
 
 
-def tilt_of(points: Floats) -> float:
-    """Angle in degrees between the normal of a polygon of points (n, 3) and the axis."""
-    x, y, z = np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0).tolist()
-    return math.degrees(math.atan2(math.hypot(x, y), z))
+def tilt_of(flat: Floats, points: Floats) -> float | None:
+    """Return the angle in degrees by which the plane of points (n, 3) has turned since they were
+    ``flat``; None of fewer than three.
+    """
+    if len(points) < 3:
+        return None
+    x, y, _ = (flat - flat.mean(axis=0)).T
+    order = np.arctan2(y, x).argsort()
+    start, end = (
+        np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+        for corners in (flat[order], points[order])
+    )
+    return math.degrees(math.atan2(np.linalg.norm(np.cross(start, end)), start @ end))

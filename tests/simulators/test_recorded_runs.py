@@ -24,6 +24,7 @@ from sbafab.simulators.simulator import (
     overlap,
     read_nodes,
     run_program,
+    tilt_of,
 )
 from sbafab.simulators.sofa.run import read_log, run, scenes_of
 from tests.simulators.conftest import StandIn
@@ -231,3 +232,14 @@ def test_other_words_of_a_log_and_other_plugins_void_nothing() -> None:
     assert read_log("nanometre and banana\n", []) == (None, None)
     missing = '[ERROR] [PluginManager] Plugin not found: "SofaOpenGL"'
     assert read_log(missing, ["Sofa.Component.Mass"]) == (None, None)
+
+
+def test_tilt_is_the_angle_that_a_plane_has_turned_past_a_right_angle_too() -> None:
+    # The corners of two stacks by two, row by row, so that their own order would cross itself.
+    flat = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [4, 4, 0.0]])
+    for degrees in (0.0, 30.0, 90.0, 135.0):
+        turn = np.radians(degrees)
+        cos, sin = np.cos(turn), np.sin(turn)
+        turned = flat @ np.array([[1, 0, 0], [0, cos, -sin], [0, sin, cos]]).T
+        assert tilt_of(flat, turned + 3) == pytest.approx(degrees, abs=1e-9)
+    assert tilt_of(flat[:2], flat[:2]) is None

@@ -5,7 +5,6 @@ The layout of the result file follows the CalculiX GraphiX manual: fixed columns
 
 from __future__ import annotations
 
-import math
 import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -49,6 +48,7 @@ from sbafab.simulators.simulator import (
     impossible,
     program_path,
     run_program,
+    tilt_of,
 )
 from sbafab.spreadsheet import csv_text
 
@@ -194,7 +194,7 @@ def history(
                 pressures=pressures,
                 height=flat + z,
                 tip=(x, y, z),
-                tilt=_tilt(mesh.points[tips], points[tips]),
+                tilt=tilt_of(mesh.points[tips], points[tips]),
                 volumes=volumes,
                 stress=float(frame.von_mises.max()),
                 work=work,
@@ -230,14 +230,6 @@ def _poles(mesh: Mesh, laminate: Laminate, name: str) -> Ints:
             if apart.min() <= NEAR:
                 nearest.append(nodes[apart.argmin()])
     return np.array(nearest) if nearest else nodes
-
-
-def _tilt(before: Floats, after: Floats) -> float | None:
-    """Angle in degrees between the planes of three or more poles, before and after."""
-    if len(before) < 3:
-        return None
-    normals = [np.linalg.svd(points - points.mean(axis=0))[2][2] for points in (before, after)]
-    return math.degrees(math.acos(min(1.0, abs(float(normals[0] @ normals[1])))))
 
 
 def _walls(mesh: Mesh, chamber: str) -> Ints:
