@@ -36,6 +36,7 @@ from sbafab.folders.artefacts import (
     artefacts,
     tops_of,
     write_artefacts,
+    write_folder,
     write_text,
 )
 from sbafab.folders.as_cut import (
@@ -58,7 +59,6 @@ from sbafab.folders.differences import (
     unreadable,
     value_difference,
 )
-from sbafab.folders.folder import write_folder
 from sbafab.folders.manifest import (
     AssemblyManifest,
     JobManifest,

@@ -22,10 +22,17 @@ from sbafab.cutting.cut_settings import TRUE_ARCS, Curves
 from sbafab.design.files import shown
 from sbafab.design.records import Design, dotted, resolved
 from sbafab.errors import OccupiedError, OutputError
-from sbafab.folders.artefacts import EVERYTHING, PICTURES, RunPart, artefacts, tops_of
+from sbafab.folders.artefacts import (
+    EVERYTHING,
+    PICTURES,
+    RunPart,
+    artefacts,
+    close_folder,
+    tops_of,
+    write_folder,
+)
 from sbafab.folders.as_cut import refuse_coarse
 from sbafab.folders.build import Build, make_build
-from sbafab.folders.folder import close_folder, write_folder
 from sbafab.folders.manifest import as_json, carried_over, file_hash, file_names, identity
 from sbafab.folders.order import Order, make_order
 from sbafab.folders.swap import (

@@ -17,9 +17,14 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.meshing.formats import write_inp
 from sbafab.meshing.surface import Floats
-from sbafab.simulators.model_files import rendered, write_files
 from sbafab.simulators.shell_model import elastic_of
-from sbafab.simulators.simulator import LARGEST_VACUUM, SimulationRequest, chamber_pressures
+from sbafab.simulators.simulator import (
+    LARGEST_VACUUM,
+    SimulationRequest,
+    chamber_pressures,
+    rendered,
+    write_files,
+)
 
 Procedure = Literal["dynamic", "static"]
 

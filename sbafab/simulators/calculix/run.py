@@ -39,7 +39,6 @@ from sbafab.simulators.calculix.deck import (
     started,
     write_deck,
 )
-from sbafab.simulators.model_files import write_files
 from sbafab.simulators.simulator import (
     Result,
     SimulationRequest,
@@ -49,6 +48,7 @@ from sbafab.simulators.simulator import (
     program_path,
     run_program,
     tilt_of,
+    write_files,
 )
 from sbafab.spreadsheet import csv_text
 

@@ -13,7 +13,7 @@ from sbafab.models.film_elements import Array
 from sbafab.models.joint_chain import JOINTS, axis_of, disc_inertia, joint_values, plate_mass
 from sbafab.models.stack import Pose, Stack
 from sbafab.models.stack_loads import plate_chain
-from sbafab.simulators.model_files import model_file
+from sbafab.simulators.simulator import model_file
 
 TEMPLATE = Path(__file__).parent / "templates" / "chain.xml.j2"
 ACCURACY = 0.02

@@ -18,7 +18,6 @@ import numpy as np
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.runtime import Progress
-from sbafab.simulators.model_files import model_file, write_files
 from sbafab.simulators.shell_model import (
     FILMS,
     RoundStack,
@@ -38,8 +37,10 @@ from sbafab.simulators.simulator import (
     Result,
     SimulationRequest,
     chamber_pressures,
+    model_file,
     refuse_time,
     run_model,
+    write_files,
 )
 
 TEMPLATES = Path(__file__).parent / "templates"

@@ -6,7 +6,7 @@ import json
 import math
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -21,7 +21,6 @@ from sbafab.meshing.conforming.mesh import Mesh, volumes
 from sbafab.meshing.conforming.meshes import shell_mesh, thin
 from sbafab.meshing.surface import Floats, Ints
 from sbafab.runtime import Progress
-from sbafab.simulators.model_files import model_file, write_files
 from sbafab.simulators.shell_model import (
     FilmGroup,
     Meridian,
@@ -46,10 +45,12 @@ from sbafab.simulators.simulator import (
     Result,
     SimulationRequest,
     chamber_pressures,
+    model_file,
     program_path,
     refuse_time,
     refuse_unknown,
     run_model,
+    write_files,
 )
 
 # Stacks of round pockets use the coarse shell, others the conforming mesh.
@@ -74,10 +75,9 @@ def round_shell(stack: RoundStack, sectors: int = SECTORS, start: Start = nearly
 # The shell of any laminate, from its conforming mesh: drawn pockets, several films, tubes.
 
 
+Groups = tuple[FilmGroup, ...]
 STEPS_ACROSS = 3.0
 """Triangle sides across the smallest pocket's radius, unless its bonds are narrower."""
-STRETCH, MASS, BENDING, RATIO, LOWEST = range(5)
-"""Properties of a cell: E t in mN/mm, kg/mm2, mN mm, Poisson's ratio, its lowest film."""
 
 
 def conforming_shell(laminate: Laminate) -> Shell:
@@ -99,7 +99,7 @@ def conforming_shell(laminate: Laminate) -> Shell:
     corners = corners.reshape(-1, 3)
     number = np.full(len(mesh.points), -1)
     number[used] = np.arange(len(used))
-    cells = _cells(stack, mesh)
+    membranes, bending, mass = _films(stack, mesh, corners)
     # Adding 0.0 turns a rounded -0.0 into 0.0.
     rest = position = mesh.points[used].round(6) + 0.0
     start = "flat"
@@ -118,12 +118,12 @@ def conforming_shell(laminate: Laminate) -> Shell:
     return Shell(
         rest=rest,
         position=position,
-        membranes=_membranes(corners, cells),
-        bending=_bending(corners, cells),
+        membranes=membranes,
+        bending=bending,
         cavities=cavities,
         fixed=base[base >= 0],
         tip=number[_marks(stack, mesh, number)],
-        mass=float(volumes(mesh.kind, mesh.points, mesh.cells) @ cells[:, MASS]),
+        mass=mass,
         size=max(radii) / 2.5,
         about=(
             f"{len(rest)} nodes, {len(corners)} triangles, inlets and their strips among them.\n"
@@ -134,53 +134,47 @@ def conforming_shell(laminate: Laminate) -> Shell:
     )
 
 
-def _cells(stack: Layup, mesh: Mesh) -> Floats:
-    """Return the properties of each cell, one row each, for its stack of bonded films."""
-    properties = np.zeros((len(mesh.cells), 5))
-    thickness = np.zeros(len(mesh.cells))
-    properties[:, LOWEST] = -1
-    for k, ply in enumerate(stack.plies):
-        of_ply = mesh.cell_sets[ply.name]
-        young, ratio = elastic_of(ply.layer.film)
-        dense = density_of(ply.layer.film, "a simulation")
-        properties[of_ply, STRETCH] += 1000 * young * ply.thickness
-        properties[of_ply, MASS] += 1e-9 * dense * ply.thickness
-        properties[of_ply, RATIO] += ratio * ply.thickness
-        thickness[of_ply] += ply.thickness
-        properties[of_ply[properties[of_ply, LOWEST] < 0], LOWEST] = k
-    properties[:, RATIO] /= thickness
-    properties[:, BENDING] = (
-        properties[:, STRETCH] * thickness**2 / (12 * (1 - properties[:, RATIO] ** 2))
-    )
-    return properties.round(12)
+def _films(stack: Layup, mesh: Mesh, corners: Triangles) -> tuple[Groups, Groups, float]:
+    """Return the membranes and the bending groups of the films, and their mass in kg.
 
-
-def _membranes(corners: Triangles, cells: Floats) -> tuple[FilmGroup, ...]:
-    kinds, kind = np.unique(cells[:, [STRETCH, RATIO]], axis=0, return_inverse=True)
-    return tuple(
-        FilmGroup(f"membrane{n + 1}", corners[kind.ravel() == n], stretch, ratio)
-        for n, (stretch, ratio) in enumerate(kinds.tolist())
-    )
-
-
-def _bending(corners: Triangles, cells: Floats) -> tuple[FilmGroup, ...]:
-    """Groups in which no edge has more than two triangles.
-
-    Cells with the same lowest film lie side by side; separate films share a group if they share no
-    node.
+    In a bending group no edge has more than two triangles: cells with the same lowest film lie side
+    by side, and separate films share a group if they share no node.
     """
+    stretch, mass, ratio, thickness = sums = np.zeros((4, len(corners)))
+    lowest = np.zeros(len(corners))
+    for k, ply in reversed([*enumerate(stack.plies)]):
+        of_ply, t = mesh.cell_sets[ply.name], ply.thickness
+        young, poisson = elastic_of(ply.layer.film)
+        dense = density_of(ply.layer.film, "a simulation")
+        sums[:, of_ply] += np.array([[1000 * young * t], [1e-9 * dense * t], [poisson * t], [t]])
+        lowest[of_ply] = k
+    ratio = (ratio / thickness).round(12)
+    bend = (stretch * thickness**2 / (12 * (1 - ratio**2))).round(12)
+    membranes = [
+        FilmGroup(f"membrane{n}", triangles, e_t, poisson)
+        for n, (triangles, (e_t, poisson)) in enumerate(_kinds(corners, stretch, ratio), start=1)
+    ]
     groups: list[FilmGroup] = []
-    kinds, kind = np.unique(cells[:, [BENDING, LOWEST]], axis=0, return_inverse=True)
-    for n, (stiffness, _) in enumerate(kinds.tolist()):
-        of_kind = corners[kind.ravel() == n]
-        for place, (name, triangles, other, _) in enumerate(groups):
-            if other == stiffness and not np.isin(of_kind, triangles).any():
-                together = np.concatenate([triangles, of_kind])
+    for triangles, (stiffness, _) in _kinds(corners, bend, lowest):
+        for place, (name, others, other, _) in enumerate(groups):
+            if other == stiffness and not np.isin(triangles, others).any():
+                together = np.concatenate([others, triangles])
                 groups[place] = FilmGroup(name, together, stiffness, 0.0)
                 break
         else:
-            groups.append(FilmGroup(f"bend{len(groups) + 1}", of_kind, stiffness, 0.0))
-    return tuple(groups)
+            groups.append(FilmGroup(f"bend{len(groups) + 1}", triangles, stiffness, 0.0))
+    total = float(volumes(mesh.kind, mesh.points, mesh.cells) @ mass)
+    return tuple(membranes), tuple(groups), total
+
+
+def _kinds(
+    corners: Triangles, *properties: Floats
+) -> Iterator[tuple[Triangles, tuple[float, ...]]]:
+    """Yield the triangles with equal properties, and these."""
+    rows = np.column_stack(properties).round(12)
+    kinds, kind = np.unique(rows, axis=0, return_inverse=True)
+    for n, values in enumerate(kinds.tolist()):
+        yield corners[kind.ravel() == n], tuple(values)
 
 
 def _marks(stack: Layup, mesh: Mesh, number: Ints) -> list[int]:
