@@ -27,7 +27,7 @@ from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.laser_programs import ENDING, PROGRAMS, rdworks_difference
 from sbafab.cutting.verify import TOLERANCE, check_contours, check_sequence
 from sbafab.errors import OutputError
-from sbafab.folders.swap import CUT_FOLDERS
+from sbafab.folders.swap import CUT_FOLDERS, sound_bytes
 from sbafab.geometry.edges import Edge, Point
 from sbafab.meshing.surface import Surface, open_edges
 from sbafab.rules.finding import Finding, Place, Verdict
@@ -87,28 +87,18 @@ def reason_of(error: Exception, file: str) -> str:
 
 
 def sound_digest(path: Path) -> str:
-    """Return the sha256 of a file. Raises OutputError if it is missing, unreadable or too large."""
-    try:
-        # Reading a pipe or a device would never end.
-        if path.exists() and not path.is_file():
-            raise OutputError("not a plain file; regenerate it")
-        if path.stat().st_size > MAX_BYTES:
-            raise OutputError(f"larger than {MAX_BYTES:,} bytes; regenerate it")
-        data = path.read_bytes()
-        # Each mark is on a separate line, and counting lines is fast.
-        is_long = data.count(b"\n") > MAX_ENTITIES
-        marks = sum(1 for _ in MARK.finditer(data)) if is_long else 0
-        if marks > MAX_ENTITIES:
-            raise OutputError(
-                f"drawn with {marks:,} entities and points, where at most {MAX_ENTITIES:,} may be"
-            )
-        return hashlib.sha256(data).hexdigest()
-    except (FileNotFoundError, NotADirectoryError):
-        raise OutputError("missing; regenerate it") from None
-    except OSError as error:
-        if isinstance(error, OutputError):
-            raise
-        raise OutputError(f"cannot be read ({error.strerror or error}); regenerate it") from None
+    """Return the sha256 of a cut file. Raises OutputError if it is missing, unreadable or too
+    large.
+    """
+    data = sound_bytes(path, MAX_BYTES)
+    # Each mark is on a separate line, and counting lines is fast.
+    is_long = data.count(b"\n") > MAX_ENTITIES
+    marks = sum(1 for _ in MARK.finditer(data)) if is_long else 0
+    if marks > MAX_ENTITIES:
+        raise OutputError(
+            f"drawn with {marks:,} entities and points, where at most {MAX_ENTITIES:,} may be"
+        )
+    return hashlib.sha256(data).hexdigest()
 
 
 # Two files compared.

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -22,7 +23,15 @@ from sbafab.design.records import Design
 from sbafab.documents import Document, attribute
 from sbafab.errors import OutputError
 from sbafab.folders.build import Build, warnings
-from sbafab.folders.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, MANIFEST, SCHEMA, read_manifest
+from sbafab.folders.swap import (
+    ASSEMBLY_SCHEMA,
+    JOB_SCHEMA,
+    MANIFEST,
+    MAX_MANIFEST_BYTES,
+    SCHEMA,
+    read_manifest,
+    sound_bytes,
+)
 from sbafab.geometry.edges import Point
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.joints import SeamKind, SeamTool
@@ -484,18 +493,12 @@ def carried_over(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
 # Manifests of folders read.
 
 
-MAX_MANIFEST_BYTES = 50_000_000
 RECORDS = {record.SCHEMA: record for record in (Manifest, JobManifest, AssemblyManifest)}
 
 
 def is_job(folder: Path) -> bool:
     """Return True if a folder holds several designs, of a job or an assembly."""
-    path = folder / MANIFEST
-    try:
-        is_small = path.is_file() and path.stat().st_size <= MAX_MANIFEST_BYTES
-    except OSError:
-        return False
-    return is_small and (read_manifest(folder) or {}).get("schema") in (JOB_SCHEMA, ASSEMBLY_SCHEMA)
+    return (read_manifest(folder) or {}).get("schema") in (JOB_SCHEMA, ASSEMBLY_SCHEMA)
 
 
 def read_design_index(folder: Path) -> Manifest:
@@ -509,23 +512,14 @@ def read_design_index(folder: Path) -> Manifest:
 def read_index(folder: Path) -> Manifest | JobManifest:
     """Return the manifest of an output folder. Raises OutputError if it is missing or unsound."""
     path = folder / MANIFEST
-    try:
-        # Reading a pipe or a device would never end.
-        if path.exists() and not path.is_file():
-            raise OutputError(f"{path} is not a plain file; regenerate the folder")
-        if path.stat().st_size > MAX_MANIFEST_BYTES:
-            raise OutputError(
-                f"{path} is larger than {MAX_MANIFEST_BYTES:,} bytes; regenerate the folder"
-            )
-        data = path.read_bytes()
-    except (FileNotFoundError, NotADirectoryError):
+    if not os.path.lexists(path):
         raise OutputError(
             f"{folder} holds no manifest.json; give a folder that sbafab generate has written"
-        ) from None
-    except OSError as error:
-        if isinstance(error, OutputError):
-            raise
-        raise OutputError(f"{path} cannot be read: {error.strerror or error}") from None
+        )
+    try:
+        data = sound_bytes(path, MAX_MANIFEST_BYTES)
+    except OutputError as error:
+        raise OutputError(f"{path}: {error}") from None
     schema = (read_manifest(folder) or {}).get("schema")
     try:
         if schema is not None:

@@ -11,7 +11,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path, PurePath
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from filelock import FileLock, Timeout
 
@@ -19,6 +19,7 @@ from sbafab.design.files import refuse_file_as_folder
 from sbafab.errors import OutputError, SbafabError
 
 MANIFEST = "manifest.json"
+MAX_MANIFEST_BYTES = 50_000_000
 SCHEMA: Final = "sbafab/manifest@1"
 JOB_SCHEMA: Final = "sbafab/job@1"
 """Schema of a folder with several designs cut together."""
@@ -182,12 +183,30 @@ def _keep(old: Path, new: Path) -> None:
         shutil.copy2(old, new, follow_symlinks=False)
 
 
-def read_manifest(folder: Path) -> dict[str, object] | None:
-    """The manifest of an output folder, or None if there is none."""
-    path = folder / MANIFEST
+def sound_bytes(path: Path, most: int) -> bytes:
+    """Return a file's contents. Raises OutputError, without the file's name, if it is missing, no
+    plain file, unreadable, or of more bytes than ``most``.
+    """
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
-    except (OSError, ValueError, RecursionError):
+        # Reading a pipe or a device would never end.
+        if path.exists() and not path.is_file():
+            raise OutputError("not a plain file; regenerate it")
+        if path.stat().st_size > most:
+            raise OutputError(f"larger than {most:,} bytes; regenerate it")
+        return path.read_bytes()
+    except OutputError:
+        raise
+    except (FileNotFoundError, NotADirectoryError):
+        raise OutputError("missing; regenerate it") from None
+    except OSError as error:
+        raise OutputError(f"cannot be read ({error.strerror or error}); regenerate it") from None
+
+
+def read_manifest(folder: Path) -> dict[str, Any] | None:
+    """The manifest of an output folder, or None if there is none."""
+    try:
+        manifest = json.loads(sound_bytes(folder / MANIFEST, MAX_MANIFEST_BYTES))
+    except (OutputError, ValueError, RecursionError):
         return None
     is_ours = isinstance(manifest, dict) and manifest.get("schema") in SCHEMAS
     return manifest if is_ours else None

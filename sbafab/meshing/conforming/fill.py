@@ -24,7 +24,6 @@ from sbafab.meshing.conforming.layup import (
     Layup,
     bodies,
     crossing,
-    crossing_clause,
     flat,
 )
 from sbafab.meshing.conforming.mesh import integrals
@@ -287,7 +286,7 @@ def filled(stack: Layup, fill_ul: float | Fill) -> tuple[Fill, list[FormedFilm]]
         amounts = ", ".join(f"{name}={ul:g}ul" for name, ul in fill.items())
         minima = [f"{least[name]:.1f} ul in {name}" for name in fill if fill[name] < least[name]]
         raise DesignError(
-            f"with fill {amounts} {crossing_clause(stack, worst)}, for balloons lean by what "
+            f"with fill {amounts} {worst}, for balloons lean by what "
             f"their chambers differ; ask for at least {' and '.join(minima)}, or for less in the "
             "others"
         )

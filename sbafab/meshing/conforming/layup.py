@@ -533,43 +533,35 @@ TOUCHING = 0.002
 """mm of apparent overlap allowed between films: the error of chords on curved films."""
 
 
-class Crossing(NamedTuple):
-    """Two films, by their index in the layup, that pass ``depth`` mm through each other, and the
-    place of the deepest overlap on the flat laminate, in mm.
-    """
-
-    lower: int
-    upper: int
-    depth: float
-    x: float
-    y: float
+Overlap = tuple[float, int, int, Point]
+"""Depth in mm, the two films by their index in the layup, and the place of the deepest overlap on
+the flat laminate, in mm.
+"""
 
 
 def check_apart(stack: Layup, forms: Sequence[FormedFilm]) -> None:
     """Raises OutputError if films of a mesh cross; ``forms`` are not wrapped round a tube."""
     if (deepest := crossing(stack, forms)) is not None:
-        raise OutputError(f"{crossing_clause(stack, deepest)}; ask for a more even fill")
+        raise OutputError(f"{deepest}; ask for a more even fill")
 
 
-def crossing_clause(stack: Layup, worst: Crossing) -> str:
-    """Return a clause that says which films cross, how deep and where."""
-    lower, upper = (stack.plies[k].layer.index for k in (worst.lower, worst.upper))
-    return (
-        f"films {lower} and {upper} would pass through each other by {worst.depth:.2f} mm at "
-        f"x {worst.x:.3f}, y {worst.y:.3f}"
-    )
-
-
-def crossing(stack: Layup, forms: Sequence[FormedFilm]) -> Crossing | None:
-    """Return the deepest crossing of two films; None if all are apart or touch."""
+def crossing(stack: Layup, forms: Sequence[FormedFilm]) -> str | None:
+    """Return a clause on the deepest crossing of two films; None if all are apart or touch."""
     films = [_Film(stack, k, form) for k, form in enumerate(forms)]
     plane = _Plane(stack)
-    crossings = [each for pair in pairwise(films) for each in _between(plane, *pair)]
+    overlaps = [each for pair in pairwise(films) for each in _between(plane, *pair)]
     # Films farther apart matter only if neighbours are in order.
-    if not crossings:
+    if not overlaps:
         far = ((lower, upper) for k, lower in enumerate(films) for upper in films[k + 2 :])
-        crossings = [each for pair in far for each in _between(plane, *pair)]
-    return max(crossings, key=lambda each: each.depth, default=None)
+        overlaps = [each for pair in far for each in _between(plane, *pair)]
+    if not overlaps:
+        return None
+    depth, *numbers, (x, y) = max(overlaps)
+    lower, upper = (stack.plies[k].layer.index for k in numbers)
+    return (
+        f"films {lower} and {upper} would pass through each other by {depth:.2f} mm at "
+        f"x {x:.3f}, y {y:.3f}"
+    )
 
 
 class _Film:
@@ -643,12 +635,12 @@ class _Plane:
         return pierced[film.nodes]
 
 
-def _between(plane: _Plane, lower: _Film, upper: _Film) -> list[Crossing]:
+def _between(plane: _Plane, lower: _Film, upper: _Film) -> list[Overlap]:
     """The deepest overlap of two films at the nodes of either; empty if they are apart."""
     faces = [[film.in_frame(face) for face in (lower.top, upper.bottom)] for film in (lower, upper)]
     if any(high[:, 2].min() >= low[:, 2].max() - TOUCHING for low, high in faces):
         return []
-    crossings = []
+    overlaps: list[Overlap] = []
     for film, gap in (
         (upper, plane.over(lower, lower.top, faces[0][1])),
         (lower, -plane.over(upper, upper.bottom, faces[1][0])),
@@ -659,5 +651,5 @@ def _between(plane: _Plane, lower: _Film, upper: _Film) -> list[Crossing]:
         if (depth > TOUCHING).any():
             deepest = int(np.nanargmax(depth))
             x, y = plane.points[film.nodes[deepest]].tolist()
-            crossings.append(Crossing(lower.number, upper.number, float(depth[deepest]), x, y))
-    return crossings
+            overlaps.append((float(depth[deepest]), lower.number, upper.number, (x, y)))
+    return overlaps
