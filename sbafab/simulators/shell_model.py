@@ -23,6 +23,7 @@ from sbafab.geometry.region import disc
 from sbafab.laminate.films import Film, density_of
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.meshing.surface import Floats, Ints, Surface
+from sbafab.models.closed_forms import last_positive
 
 Triangles = Ints
 """Node numbers (k, 3), counter-clockwise seen from outside."""
@@ -295,15 +296,6 @@ RISE = 0.15
 """Start height in mm of a 5 mm balloon: a dome flat enough to leave the film nearly at rest."""
 
 
-def _turning(is_low: Callable[[float], bool], high: float) -> float:
-    """Return the number from 0 to ``high`` at which ``is_low`` turns false, by bisection."""
-    low = 0.0
-    for _ in range(80):
-        middle = (low + high) / 2
-        low, high = (middle, high) if is_low(middle) else (low, middle)
-    return high
-
-
 @dataclass(frozen=True)
 class Meridian:
     """One film of a balloon: flat up to ``neck``, then down to height 0 at ``edge``.
@@ -343,10 +335,10 @@ class Meridian:
             return self.neck + distance, 0.0
         scale = self.run / (2 * self.slope)
 
-        def is_short(m: float) -> bool:
-            return scale * (m * math.hypot(1, m) + math.asinh(m)) <= distance
+        def short(m: float) -> float:
+            return distance - scale * (m * math.hypot(1, m) + math.asinh(m))
 
-        share = _turning(is_short, self.slope) / self.slope
+        share = last_positive(short, 0.0, self.slope) / self.slope
         return self.neck + share * self.run, self.height * (1 - share * share)
 
 
@@ -364,26 +356,18 @@ def fullest(pocket: float, neck: float) -> Meridian:
     return holding(neck, pocket - neck, min(most, spare))
 
 
-def standing(balloon: float) -> Start:
-    """Start with balloons ``balloon`` mm high, or as high as their film allows."""
-
-    def start(pocket: float, neck: float) -> Meridian:
-        length = pocket - neck
-        slope = _turning(lambda k: 2 * Meridian(neck, length, k).height < balloon, STEEPEST)
-        return Meridian(neck, length, slope)
-
-    return start
-
-
 def nearly_flat(pocket: float, neck: float) -> Meridian:
     """A balloon that has only just risen."""
-    return standing(RISE * pocket / 2.5)(pocket, neck)
+    length = pocket - neck
+    half = RISE * pocket / 2.5 / 2
+    slope = last_positive(lambda k: half - Meridian(neck, length, k).height, 0.0, STEEPEST)
+    return Meridian(neck, length, slope)
 
 
 def holding(neck: float, length: float, volume: float) -> Meridian:
     """The shape with this volume, or the shape with the largest volume."""
     most = _holding_most(neck, length).slope
-    slope = _turning(lambda k: Meridian(neck, length, k).volume < volume, most)
+    slope = last_positive(lambda k: volume - Meridian(neck, length, k).volume, 0.0, most)
     return Meridian(neck, length, slope)
 
 
