@@ -32,7 +32,6 @@ from sbafab.folders.swap import (
     read_manifest,
     sound_bytes,
 )
-from sbafab.geometry.edges import Point
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.joints import SeamKind, SeamTool
 from sbafab.laminate.laminate import InterfaceKind, Laminate, Layer, Role
@@ -442,17 +441,14 @@ def _films(laminate: Laminate, sheets: Sequence[SheetFile]) -> list[dict[str, An
 
 def _layer(build: Build, layer: Layer, is_cut: bool) -> LayerClaim:
     kerf, laminate = build.settings.kerf_width(layer.film.material), build.laminate
-    cut = laminate.layer(laminate.cut_with(layer))
+    cut, holes = laminate.layer(laminate.cut_with(layer)), layer.profile.holes
+    open_bores = (b for b in laminate.bores if any(hole.winding(b.centre) for hole in holes))
     return LayerClaim.read(
         layer,
         file=layer_path(cut.name, kerf) if is_cut else None,
         pieces=len(layer.profile.pieces),
-        bores=[bore.chamber for bore in laminate.bores if _is_open(layer, bore.centre)],
+        bores=[bore.chamber for bore in open_bores],
     )
-
-
-def _is_open(layer: Layer, place: Point) -> bool:
-    return any(hole.winding(place) != 0 for hole in layer.profile.holes)
 
 
 def _seams(laminate: Laminate, is_cut: bool) -> list[SeamClaim]:

@@ -460,7 +460,6 @@ class ConformingMeshes:
     gaps all mid-surfaces of a flat shell lie at z = 0, and the volume is as high as its TPE films.
     """
 
-    name: str
     settings: MeshSettings
     volume: Mesh
     shell: Mesh
@@ -497,7 +496,7 @@ def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) 
     notes = tuple(_notes(laminate, settings, fill, thinning(shell, flat_shell)))
     volume = _noted(volume, Sweep(stack, flat(stack)).points, (HEIGHTS[settings.gaps], *notes))
     shell = _noted(shell, flat_shell.points, (HEIGHT_OF_SHELL, *notes))
-    return ConformingMeshes(laminate.name, settings, volume, shell, flat_shell, fill)
+    return ConformingMeshes(settings, volume, shell, flat_shell, fill)
 
 
 def _noted(mesh: Mesh, rest: Floats, notes: tuple[str, ...]) -> Mesh:
