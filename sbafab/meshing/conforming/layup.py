@@ -533,7 +533,7 @@ TOUCHING = 0.002
 """mm of apparent overlap allowed between films: the error of chords on curved films."""
 
 
-Overlap = tuple[float, int, int, Point]
+FilmOverlap = tuple[float, int, int, Point]
 """Depth in mm, the two films by their index in the layup, and the place of the deepest overlap on
 the flat laminate, in mm.
 """
@@ -635,12 +635,12 @@ class _Plane:
         return pierced[film.nodes]
 
 
-def _between(plane: _Plane, lower: _Film, upper: _Film) -> list[Overlap]:
+def _between(plane: _Plane, lower: _Film, upper: _Film) -> list[FilmOverlap]:
     """The deepest overlap of two films at the nodes of either; empty if they are apart."""
     faces = [[film.in_frame(face) for face in (lower.top, upper.bottom)] for film in (lower, upper)]
     if any(high[:, 2].min() >= low[:, 2].max() - TOUCHING for low, high in faces):
         return []
-    overlaps: list[Overlap] = []
+    overlaps: list[FilmOverlap] = []
     for film, gap in (
         (upper, plane.over(lower, lower.top, faces[0][1])),
         (lower, -plane.over(upper, upper.bottom, faces[1][0])),

@@ -75,7 +75,6 @@ def round_shell(stack: RoundStack, sectors: int = SECTORS, start: Start = nearly
 # The shell of any laminate, from its conforming mesh: drawn pockets, several films, tubes.
 
 
-Groups = tuple[FilmGroup, ...]
 STEPS_ACROSS = 3.0
 """Triangle sides across the smallest pocket's radius, unless its bonds are narrower."""
 
@@ -118,8 +117,8 @@ def conforming_shell(laminate: Laminate) -> Shell:
     return Shell(
         rest=rest,
         position=position,
-        membranes=membranes,
-        bending=bending,
+        membranes=tuple(membranes),
+        bending=tuple(bending),
         cavities=cavities,
         fixed=base[base >= 0],
         tip=number[_marks(stack, mesh, number)],
@@ -134,7 +133,9 @@ def conforming_shell(laminate: Laminate) -> Shell:
     )
 
 
-def _films(stack: Layup, mesh: Mesh, corners: Triangles) -> tuple[Groups, Groups, float]:
+def _films(
+    stack: Layup, mesh: Mesh, corners: Triangles
+) -> tuple[list[FilmGroup], list[FilmGroup], float]:
     """Return the membranes and the bending groups of the films, and their mass in kg.
 
     In a bending group no edge has more than two triangles: cells with the same lowest film lie side
@@ -164,7 +165,7 @@ def _films(stack: Layup, mesh: Mesh, corners: Triangles) -> tuple[Groups, Groups
         else:
             groups.append(FilmGroup(f"bend{len(groups) + 1}", triangles, stiffness, 0.0))
     total = float(volumes(mesh.kind, mesh.points, mesh.cells) @ mass)
-    return tuple(membranes), tuple(groups), total
+    return membranes, groups, total
 
 
 def _kinds(
@@ -223,20 +224,25 @@ PLUGINS = {
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A scene: its file, time step ``dt`` in s, and the values of the template of its name."""
+    """A scene: its time step ``dt`` in s, and the values of the template of its name."""
 
     name: SceneName
-    file: str
     dt: float
     films: RecordedFilms
     values: Mapping[str, object]
 
+    @property
+    def file(self) -> str:
+        return "actuator.scn" if self.name == "shell" else f"actuator_{self.name}.scn"
+
     def text(self, record: bool = False) -> str:
         """The scene as a file, with a record of all nodes of its films if ``record``."""
-        common = {"dt": self.dt, "ramp": RAMP, "period": PERIOD, "nodes_file": NODES_FILE}
+        films = self.films
+        values = {"dt": self.dt, "ramp": RAMP, "period": PERIOD, "nodes_file": NODES_FILE}
+        values |= {"shell": films.shell, "pressures": films.pressures, "record": record}
         template = TEMPLATES / f"{self.name}.j2"
-        name = self.films.laminate.name
-        return model_file(template, name, _add_plugins, **common, **self.values, record=record)
+        name = films.laminate.name
+        return model_file(template, name, _add_plugins, **values, **self.values)
 
 
 def _add_plugins(root: ET.Element) -> None:
@@ -295,8 +301,6 @@ def imposed_volumes(stack: RoundStack, volumes: Mapping[str, float] | None) -> d
 FRAMES = 9
 """Reference frames on the backbone (paper, Sec. 3.2.2), if the stack has enough balloons: at most
 as many as levels, or a balloon would wave."""
-FRAMES_START = nearly_flat
-"""Nine frames cannot draw in a pocket's edge, so the start must not have it drawn in either."""
 FRAMES_DT = 0.05
 SOFTENING = 0.12
 """Share of the true modulus at which 5 kPa lift 15 balloons as high as in scene A."""
@@ -337,28 +341,23 @@ def scenes_of(
     Raises DesignError if a chamber is unknown, or if other pockets need a mesher that is not
     installed.
     """
-    scenes: dict[str, Scene] = {}
-
-    def add(name: SceneName, file: str, dt: float, shell: Shell, **values: object) -> None:
-        kpa, loads = pressures, pressures.values()
-        if name == "volume":
-            kpa, loads = {}, imposed.values()
-        films = RecordedFilms(laminate, shell, shell.tip, kpa, loads)
-        values |= {"shell": shell, "pressures": pressures}
-        scenes[name] = Scene(name, file, dt, films, values)
-
     stack = None if why_not_round(laminate) else round_stack(laminate)
     shell = conforming_shell(laminate) if stack is None else round_shell(stack)
-    add("shell", "actuator.scn", DT, shell, **_mass(shell, max(pressures.values())))
-    if stack is None:
-        return scenes
-    frames = round_shell(stack, COARSE_SECTORS, FRAMES_START)
-    add("frames", "actuator_frames.scn", FRAMES_DT, frames, **_framed(stack, frames))
-    imposed = imposed_volumes(stack, volumes)
-    half = round_shell(stack, COARSE_SECTORS, half_full)
-    told = {"volumes": imposed, "usual": usual_volume(stack), **_mass(half, VOLUME_PRESSURE)}
-    add("volume", "actuator_volume.scn", DT, half, **told)
-    return scenes
+
+    def films(shell: Shell) -> RecordedFilms:
+        return RecordedFilms(laminate, shell, shell.tip, pressures, pressures.values())
+
+    scenes = [Scene("shell", DT, films(shell), _mass(shell, max(pressures.values())))]
+    if stack is not None:
+        # Nine frames cannot draw in a pocket's edge, so the start must not have it drawn in either.
+        framed = round_shell(stack, COARSE_SECTORS, nearly_flat)
+        scenes.append(Scene("frames", FRAMES_DT, films(framed), _framed(stack, framed)))
+        imposed = imposed_volumes(stack, volumes)
+        half = round_shell(stack, COARSE_SECTORS, half_full)
+        by_volume = RecordedFilms(laminate, half, half.tip, {}, imposed.values())
+        values = {"volumes": imposed, "usual": usual_volume(stack)}
+        scenes.append(Scene("volume", DT, by_volume, {**values, **_mass(half, VOLUME_PRESSURE)}))
+    return {scene.name: scene for scene in scenes}
 
 
 def write_scenes(scenes: Mapping[str, Scene], folder: Path) -> list[Path]:
