@@ -183,7 +183,7 @@ def _refuse_unused(suffix: str) -> None:
 
 def _draw_inflated(design: api.Design, picture: api.PictureRequest, path: Path) -> None:
     laminate, pressures = api.build(design), [*picture.pressures_kpa.values()]
-    api.refuse_pressure(pressures)
+    api.refuse_pressure(pressures, may_be_zero=True)
     api.refuse_beyond_burst(laminate, max(pressures))
     most = max(api.MOST_PRESSURE, *pressures)
     with show.progress(False) as progress:

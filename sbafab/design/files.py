@@ -11,7 +11,7 @@ from copy import deepcopy
 from fnmatch import fnmatchcase
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -121,7 +121,10 @@ def sentence(
         short = ".".join(where[:-1])
         return f"{short} is a list without value {first['loc'][-1] + 1}; add it{more}"
     if first["type"] == "missing":
-        return f"{field} is missing; add it to the {file}{more}"
+        table = next(_tables_at(record, where[:-1]), None)
+        kind = _keys(table)[where[-1]].annotation if table else None
+        which = f", as one of {listed(get_args(kind))}" if get_origin(kind) is Literal else ""
+        return f"{field} is missing; add it to the {file}{which}{more}"
     is_of_table = first["type"] == "value_error" and isinstance(first["input"], Mapping)
     if not where or is_of_table:
         return f"{field} {_allowed(first)}{more}"

@@ -177,7 +177,7 @@ def _without_sources(table: Mapping[str, Any], prefix: str, path: Path) -> dict[
     plain: dict[str, Any] = {}
     for key, value in table.items():
         where = f"{prefix}{key}"
-        if isinstance(value, dict) and VALUE in value:
+        if isinstance(value, dict) and (VALUE in value or SOURCE in value):
             source = value.get(SOURCE)
             if set(value) != {VALUE, SOURCE} or not isinstance(source, str) or not source.strip():
                 raise DesignError(

@@ -541,6 +541,8 @@ class Rules(Section):
     """Random builds drawn for registration-yield; by default 10,000, fewer for tall stacks."""
     validated_balloons: int = Field(default=20, ge=1, le=1000)
     """More balloons than this draw a warning (paper Sec. 6)."""
+    validated_height: Length = 2.5
+    """A higher sum of films draws a warning: 20 balloons of the paper's films are 2.495 mm high."""
     opening_pressure_kpa: float | None = Field(default=None, gt=0, le=10000)
     """A channel of a net must open at this pressure: one of its films lifts by its thickness. By
     default 100 kPa, at which the paper gives forces."""

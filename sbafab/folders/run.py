@@ -216,7 +216,7 @@ def refuse_unmakable(order: Order, parts: Collection[RunPart]) -> None:
     of an order.
     """
     for build in order.builds:
-        if "press" in parts:
+        if {"press", "predict"} & set(parts):
             # Computing it refuses what the press cannot do.
             _ = build.schedule
         if "cut" in parts and build.curves.in_chords:

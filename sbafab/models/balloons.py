@@ -67,11 +67,11 @@ def balloons_of(
 def _films(laminate: Laminate, factors: Factors | None) -> list[list[tuple[float, float, float]]]:
     """Return thickness in mm, modulus in kPa and Poisson's ratio of each balloon's two films."""
     films = {layer.film for layer in laminate.layers if not layer.is_mask}
-    unknown = {film.material for film in films if film.elastic is None}
+    unknown = sorted((film for film in films if film.elastic is None), key=lambda film: film.table)
     if unknown:
         raise DesignError(
-            f"modulus and Poisson's ratio of {min(unknown)} are not known; add "
-            f"films.{min(unknown).lower()}.modulus, in MPa, and poisson, its ratio"
+            f"modulus or Poisson's ratio of {unknown[0].product} is not known; give both, "
+            f"{unknown[0].table}.modulus, in MPa, and {unknown[0].table}.poisson"
         )
     measured = None if factors is None else factors.modulus_mpa
     ratio = 1.0 if factors is None else factors.modulus_ratio

@@ -155,17 +155,17 @@ def usual_pressures(form: Form) -> tuple[float, ...]:
     return tuple(-kpa if form.works_under_vacuum else kpa for kpa in USUAL_PRESSURES)
 
 
-def refuse_pressure(kpa: ArrayLike, is_vacuum: bool = False) -> None:
+def refuse_pressure(kpa: ArrayLike, is_vacuum: bool = False, may_be_zero: bool = False) -> None:
     """Raise DesignError for a pressure in kPa that no model takes: pressures of inflated pockets
-    are from 0 up, pressures of pockets that work under a vacuum from 0 down.
+    are above 0, pressures of pockets that work under a vacuum below 0.
     """
     low, high = (-ATMOSPHERE_KPA, 0.0) if is_vacuum else (0.0, MOST_PRESSURE)
+    span = f"at least {low:g} and less than 0" if is_vacuum else f"more than 0, at most {high:g}"
     for each in np.atleast_1d(kpa).tolist():
-        if low <= each <= high:
+        if low <= each <= high and (each != 0 or may_be_zero):
             continue
         hint = f"; a vacuum is negative: write {-each:g}" if is_vacuum and each > 0 else ""
         hint = "; it is inflated, and a vacuum does nothing" if not is_vacuum and each < 0 else hint
         raise DesignError(
-            f"pressure = {each:g} kPa is out of range; give {low:g} to {high:g} kPa, as a gauge "
-            f"shows it{hint}"
+            f"pressure = {each:g} kPa is out of range; give {span} kPa, as a gauge shows it{hint}"
         )

@@ -178,7 +178,9 @@ def pad_thickness(press: Press, stacks: Sequence[StackShape]) -> float:
         ):
             return thickness
     highest = max(stacks, key=lambda under: under.height)
-    why = _refusal(press, 8 * PADS[-1], highest) or "it is too uneven; take a softer one"
+    why = _refusal(press, 8 * PADS[-1], highest) or (
+        f"over a stack {highest.height:.3f} mm high it is too uneven; {FEWER}, or take a softer one"
+    )
     raise DesignError(f"no press pad of {of_pad} (press.pad_hardness) can {aim}: {why}")
 
 

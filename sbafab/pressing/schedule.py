@@ -515,7 +515,8 @@ def _refuse_temperature(laminate: Laminate, press: Press) -> None:
         if melts and press.temperature_c <= (film.softens_above or 0.0):
             raise DesignError(
                 f"{is_set} does not bond {film.product}, which melts at {film.softens_above:g} C; "
-                "raise it (the paper presses at 135 C)"
+                "set it higher than that"
+                + (" (the paper presses at 135 C)" if film.product == PAPER_PRODUCT else "")
             )
         if press.temperature_c >= film.limit and film.material != FIRST[0]:
             is_ptfe = film.material == "PTFE"
@@ -585,6 +586,14 @@ def _cautions(
         yield Caution(
             f"{laminate.balloons} balloons are more than the {validated} validated; "
             "heat must pass the whole laminate, so try the bond on a sample first"
+        )
+    elif (tall := max((step.stack_mm for step in steps), default=0.0)) > (
+        most := design.rules.validated_height
+    ):
+        yield Caution(
+            f"{tall:.3f} mm of films are more than the {most:g} mm validated; heat takes about "
+            f"{(tall / most) ** 2:.1f} times as long to the middle, behind the plate's edge, so "
+            "try the bond on a sample first"
         )
     uneven = [step for step in steps if is_tried and not low <= step.film_kpa <= high]
     if uneven:

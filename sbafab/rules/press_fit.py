@@ -1,8 +1,9 @@
 """press-fit: the laminate fits the heated area; a warning for untested heights and press minutes,
 and for a film that is not an elastomer.
 
-Heights are untested above ``validated_balloons``; minutes if no kit or design states them for a
-film.
+Heights are untested above ``validated_balloons`` or ``validated_height``: heat takes a time in
+proportion to the height's square to a stack's middle. Minutes are if no kit or design states them
+for a film.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from sbafab.rules.finding import Finding, Place, judged
 from sbafab.rules.limits import TOLERANCE
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Rule
-from sbafab.rules.sentences import explained
+from sbafab.rules.sentences import explained, say
 
 NAME = "press-fit"
 STIFFEST = 1000.0
@@ -52,10 +53,16 @@ def _warnings(measures: Measures) -> Iterator[Finding]:
     if balloons > validated:
         limit, count = float(validated), float(balloons)
         yield judged(NAME, "warn", limit, count, "balloons", nowhere, "tall")
+    elif laminate.thickness > design.rules.validated_height + TOLERANCE:
+        high, most = laminate.thickness, design.rules.validated_height
+        longer = (high / most) ** 2
+        yield judged(NAME, "warn", most, high, "mm", nowhere, "high", longer=longer)
     films = films_without_minutes(laminate, design.press.timed_films)
     if films:
         names = [film.said for film in films]
-        yield judged(NAME, "warn", None, None, "", nowhere, "unstated", films=names)
+        timed = design.press.minutes_for
+        only = say(f"{NAME}.only", timed=timed) if timed else say(f"{NAME}.only-none")
+        yield judged(NAME, "warn", None, None, "", nowhere, "unstated", films=names, only=only)
     for film in dict.fromkeys(layer.film for layer in laminate.tpe_layers):
         modulus, _ = film.elastic or (0.0, 0.0)
         if film.melts and modulus > STIFFEST:

@@ -538,7 +538,8 @@ def _walk(space: SearchSpace, point: GridPoint, stride: Sequence[int]) -> GridPo
     stale = 0
     while stale < len(moves) and not space.is_over:
         to = space.inside(point + moves[0])
-        if to != point and space.trial(to).rank < space.trial(point).rank:
+        here = space.trial(point).rank
+        if to != point and not space.is_over and space.trial(to).rank < here:
             point, stale = to, 0
         else:
             stale += 1

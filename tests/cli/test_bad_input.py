@@ -78,7 +78,10 @@ explain mask-overhag | did you mean mask-overhang?
 predict 1dof-5mm --volume 17 | give 0 to 16.94 ul a balloon
 predict 1dof-5mm --volume nan | the units are ul, ml, mm3
 predict 1dof-5mm --volume "0.02 ml" | give 0 to 16.94 ul a balloon
-predict 1dof-5mm --pressure "11 bar" | give 0 to 1000 kPa
+predict 1dof-5mm --pressure "11 bar" | give more than 0, at most 1000 kPa
+predict 1dof-5mm --pressure 0 | pressure = 0 kPa is out of range; give more than 0
+sweep 1dof-5mm --vary stack.balloons=2,3 --pressure 0 | pressure = 0 kPa is out of range
+find 1dof-5mm --min stroke@0kPa=5 | pressure = 0 kPa is out of range
 predict 1dof-5mm --pressure "4 atm" | '4 atm' must be a pressure such as
 predict 1dof-5mm --pressure -20 | a vacuum does nothing
 predict 1dof-5mm --flow 0 | must be from 1e-06 to 1e+06 ml/min

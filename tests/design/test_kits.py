@@ -124,6 +124,16 @@ BAD = {
         "thickness = 0.038",
         r"films.tpe.thickness = 0.038 has no source; write films.tpe.thickness = \{ value",
     ),
+    "misspelt value": (
+        "modulus = { value",
+        "modulus = { valu",
+        r"films.tpe.modulus must be \{ value = ..., source = .* and nothing else",
+    ),
+    "film without its kind": (
+        "[rules]",
+        '[films.tpu]\nproduct = "TPU"\n[rules]',
+        r'films.tpu.kind is missing; add it to the kit, as one of "structural", "mask"',
+    ),
     "unknown key": (
         "cutting_error =",
         "cuting_error =",

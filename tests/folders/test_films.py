@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import pytest
 
@@ -117,6 +118,13 @@ def test_the_folder_holds_the_kit_that_it_cites(run: Run, design: Design) -> Non
     assert load_design(run.folder / "design.toml").kit == "kit.toml"
     checks = json.loads((run.folder / "checks.json").read_text())
     assert checks["kits"] == [{"design": design.name, **run.manifest["kit"]}]
+
+
+def test_what_the_press_cannot_do_is_not_predicted(design: Design, tmp_path: Path) -> None:
+    cold = design.with_("press.temperature_c=118")
+    with pytest.raises(DesignError, match="does not bond Stretchlon 200, which melts at 120 C"):
+        generate(RunRequest(cold, tmp_path, ("predict",)))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_press_knows_what_melts(design: Design) -> None:

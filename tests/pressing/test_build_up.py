@@ -110,6 +110,12 @@ def test_a_set_up_that_cannot_give_the_pressure_is_refused(
         schedule(stack(15), PAPER.with_(press=pad))
 
 
+def test_a_stack_too_high_for_every_pad_is_named() -> None:
+    high = StackShape(height=50.0, area=250.0, rim=60.0, below=0.0)
+    with pytest.raises(DesignError, match=r"stack 50.000 mm high .* \(stack.balloons\)"):
+        pad_thickness(Press(), [high])
+
+
 def test_a_pad_that_does_not_reach_the_base_plate_is_refused() -> None:
     # A quarter of the platen lies 2 mm high under 3 mm of hard rubber.
     wide = StackShape(height=2.0, area=5800.0, rim=300.0, below=0.0)

@@ -80,6 +80,9 @@ def test_the_tpe_must_melt(stack: Stack) -> None:
     for temperature in (20, 120):
         with pytest.raises(DesignError, match="does not bond Stretchlon 200, which melts at 120"):
             schedule(stack(2), PAPER.with_(press={"temperature_c": temperature}))
+    tpu = {"films": {"tpe": {"product": "TPU", "thickness": 0.038, "melting_point": 135}}}
+    with pytest.raises(DesignError, match=r"TPU, which melts at 135 C; set it higher than that$"):
+        schedule(stack(2), PAPER.with_(tpu))
     warm = schedule(stack(2), PAPER.with_("press.temperature_c=121"))
     (only,) = beside_hand_placing(warm.warnings)
     assert only.startswith("minutes stated for 135 C, the press is set to 121 C")
@@ -97,6 +100,11 @@ def test_the_masks_must_stand_the_heat(stack: Stack) -> None:
         ("press.temperature_c=151", "151 C is hotter than the 150 C"),
         ("press.pressure_kpa=69", "69 kPa lies outside 70 to 200"),
         ("press.pressure_kpa=201", "201 kPa lies outside 70 to 200"),
+        # 6 balloons: 12 x 0.038 + 11 x 0.025 mm; heat's time goes with the square of the height.
+        (
+            "rules.validated_height=0.3655",
+            "0.731 mm of films are more than the 0.3655 mm validated",
+        ),
         ("rules.validated_balloons=5", "6 balloons are more than the 5 validated"),
     ],
 )

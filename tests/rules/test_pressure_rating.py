@@ -74,4 +74,6 @@ def test_a_film_that_nobody_burst_is_not_compared() -> None:
     explained = CliRunner().invoke(app, ["explain", "pressure-rating"]).output
     assert "not compared" in " ".join(explained.split())
     stated = rating("1dof-5mm", films={"tpe": film}, acceptance={"working_pressure_kpa": 10.0})
+    # No key takes a burst pressure: what cannot clear the warning is not said to.
+    assert "this warning stays" in stated.remedy
     assert (stated.verdict, stated.measured) == ("warn", None)

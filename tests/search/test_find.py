@@ -123,6 +123,9 @@ def test_no_more_designs_are_tried_than_asked_for() -> None:
     assert found.tries == 30
     assert found.is_cut_short
     assert told == [(done, 30) for done in range(30)]
+    for tries in range(12, 80):
+        for stroke in (25, 90, 500):
+            assert find(_request([f"stroke@50kPa={stroke}"], tries=tries)).tries <= tries
 
 
 def test_the_front_is_shown_from_end_to_end(search: Search) -> None:

@@ -67,7 +67,7 @@ stroke@50% | only a force takes one
 force@50%@5mm | needs one stroke
 force@50kPa | a force needs one stroke
 force@150% | must be a fraction from 0 to 1
-stroke@1001kPa | give 0 to 1000 kPa
+stroke@1001kPa | give more than 0, at most 1000 kPa
 stroke@-5kPa | a vacuum does nothing
 slip@50kPa | a vacuum is negative: write -50
 """
