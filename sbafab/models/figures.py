@@ -143,11 +143,6 @@ class Figure:
         """The unit of the value."""
         return self.quantity.unit
 
-    @property
-    def pressure_kpa(self) -> float | None:
-        """The figure's gauge pressure, if any; a vacuum is below 0."""
-        return self.at.kpa
-
     def is_of(self, quantity: Quantity, at: Conditions | None = None) -> bool:
         """Return True for a figure of a quantity, at conditions that meet ``at``."""
         return self.quantity is quantity and (at is None or self.at.meet(at))
@@ -482,11 +477,17 @@ STROKES = (
     Quantity.CONTRACTION,
 )
 CALIBRATED_STROKES = (STROKES[1], STROKES[0], *STROKES[2:])
-BENDS = (Quantity.BEND, Quantity.REFERENCE_BEND, Quantity.FREE_BEND)
 BLOCKED = (Quantity.BLOCKED_FORCE, Quantity.FORCE_BOUND)
 LOADS = (Quantity.WRINKLING_LOAD, Quantity.COLLAPSE_LOAD, Quantity.SLIP_LOAD)
-PULLS = ((Quantity.PULL,), (Quantity.MOMENT,), LOADS)
-"""Forces of drawn mechanisms."""
+MAIN = (
+    ("bend", (Quantity.BEND, Quantity.REFERENCE_BEND, Quantity.FREE_BEND)),
+    ("force", BLOCKED),
+    ("force", (Quantity.PULL,)),
+    ("moment", (Quantity.MOMENT,)),
+    ("force", LOADS),
+    ("burst", (Quantity.BURST,)),
+)
+"""Lines of a verdict after the strokes: of each the first quantity that has a figure."""
 INTERVAL_NOTE = (
     "in parentheses the 90 % interval: from the calibration's uncertainty, and from what the model "
     "missed of the measured curves"
@@ -512,33 +513,19 @@ def _main_figures(figures: Sequence[Figure]) -> Iterator[tuple[str, Figure]]:
     """Yield strokes, a bend, forces and burst with their quantities, each by the model to design
     with.
     """
-    chosen_ones = [figure for figure in figures if not figure.other]
-    is_calibrated = any(figure.interval is not None for figure in chosen_ones)
-    for quantity in CALIBRATED_STROKES if is_calibrated else STROKES:
-        yield from (("stroke", item) for item in _of(chosen_ones, quantity)[:1])
-    yield from (("bend", item) for item in _of(chosen_ones, *BENDS)[:1])
-    flat = [item for item in _of(chosen_ones, *BLOCKED) if not item.at.share]
-    yield from (("force", item) for item in _strongest(flat))
-    for quantities in PULLS:
-        # If the film does not withstand the highest pressure, use the highest it withstands.
-        for item in _strongest(_of(chosen_ones, *quantities)):
-            yield "moment" if item.quantity is Quantity.MOMENT else "force", item
-    yield from (("burst", item) for item in _of(chosen_ones, Quantity.BURST)[:1])
-
-
-def _of(figures: Sequence[Figure], *quantities: Quantity) -> list[Figure]:
-    """Return the figures of the first of the quantities that has any."""
-    for quantity in quantities:
-        of_quantity = [figure for figure in figures if figure.quantity is quantity]
-        if of_quantity:
-            return of_quantity
-    return []
-
-
-def _strongest(figures: list[Figure]) -> list[Figure]:
-    """Return the first figure at the highest pressure, or the largest vacuum; none of none."""
-    highest = max((abs(figure.at.kpa or 0.0) for figure in figures), default=0.0)
-    return [f for f in figures if abs(f.at.kpa or 0.0) == highest][:1]
+    of: dict[Quantity, list[Figure]] = {}
+    for figure in figures:
+        is_flat = figure.quantity is not Quantity.BLOCKED_FORCE or not figure.at.share
+        if is_flat and not figure.other:
+            of.setdefault(figure.quantity, []).append(figure)
+    is_calibrated = any(figure.interval is not None for each in of.values() for figure in each)
+    strokes = CALIBRATED_STROKES if is_calibrated else STROKES
+    for words, quantities in (*(("stroke", (stroke,)) for stroke in strokes), *MAIN):
+        each = next((of[quantity] for quantity in quantities if quantity in of), [])
+        if words in ("force", "moment"):
+            # At the highest pressure, or the largest vacuum, that the film withstands.
+            each = sorted(each, key=lambda figure: -abs(figure.at.kpa or 0.0))
+        yield from ((words, figure) for figure in each[:1])
 
 
 def _shown(figure: Figure) -> str:
@@ -674,7 +661,7 @@ class PredictedFigure(Document):
     """bounds of a drawn pocket that is taken for a disc"""
     interval: tuple[Rounded, Rounded] | None
     """90 % interval of what would be measured, where a calibration says so"""
-    pressure_kpa: PlainNumber | None
+    pressure_kpa: PlainNumber | None = attribute("at.kpa")
     """gauge, a vacuum below 0; null at none"""
     flags: FlagList
 

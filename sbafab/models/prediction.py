@@ -107,10 +107,11 @@ def predict(
     request: PredictionRequest | None = None,
     laminate: Laminate | None = None,
     quick: bool = False,
+    curves: bool = True,
 ) -> Prediction:
-    """Return the figures and curves of a design of any family; ``quick`` leaves out curves and the
-    elastic stack. If factors are given, intervals are not computed, and figures are not flagged for
-    lying outside the checked part of a balloon's map.
+    """Return the figures and ``curves`` of a design of any family; ``quick`` leaves out curves and
+    the elastic stack. If factors are given, intervals are not computed, and figures are not flagged
+    for lying outside the checked part of a balloon's map.
 
     Raises DesignError if the design cannot be built, or for pressures, a flow or volumes that
     are out of range.
@@ -149,7 +150,8 @@ def predict(
     if uncertainty is not None:
         moved_items = (_figures(each, request, guides, checks_films=False) for each in others)
         items = uncertainty.bounded(items, moved_items, request.probability)
-    relations = () if quick or wanted else tuple(_relations(state, request))
+    has_curves = curves and not quick and not wanted
+    relations = tuple(_relations(state, request)) if has_curves else ()
     if discs is not None:
         ends = []
         for diameter in (discs.inner, discs.outer):
@@ -292,12 +294,12 @@ def _flagged(item: FigureItem, laminate: Laminate) -> FigureItem:
     """Return a figure, flagged if its pressure is near the estimated burst, or left out if it is
     past that.
     """
-    if isinstance(item, LeftOut) or item.pressure_kpa is None:
+    if isinstance(item, LeftOut) or item.at.kpa is None:
         return item
-    past = _past_burst(laminate, item.pressure_kpa)
+    past = _past_burst(laminate, item.at.kpa)
     if past:
         return LeftOut.of(item.name, past, item.quantity)
-    is_near = is_near_burst(laminate, item.pressure_kpa)
+    is_near = is_near_burst(laminate, item.at.kpa)
     return replace(item, flags=(*item.flags, NEAR_BURST)) if is_near else item
 
 

@@ -267,20 +267,18 @@ Steps = tuple[int, int]
 AS_GIVEN = (0, 0)
 
 
+@dataclass
 class _Trials:
     """A design with wider bond and overhang, of which those without a ``start`` stay.
 
     ``shares`` of good builds by steps and seed; None if the design cannot be built.
     """
 
-    def __init__(
-        self, design: Design, start: Mapping[str, float], target: float, progress: Progress
-    ) -> None:
-        self.design = design
-        self.start = start
-        self.target = target
-        self.progress = progress
-        self.shares: dict[tuple[Steps, int], Share | None] = {}
+    design: Design
+    start: Mapping[str, float]
+    target: float
+    progress: Progress
+    shares: dict[tuple[Steps, int], Share | None] = field(default_factory=dict)
 
     def lengths(self, steps: Steps) -> dict[str, float]:
         """Return bond and overhang in mm, by key."""

@@ -286,7 +286,10 @@ def compare(
         figures = tuple(
             figure
             for figure in predict(
-                design, PredictionRequest(pressures, flow_ml_min), each_build.laminate
+                design,
+                PredictionRequest(pressures, flow_ml_min),
+                each_build.laminate,
+                curves=False,
             ).figures
             if not figure.other or (figure.interval and _is_main(figure.quantity, figure.at))
         )

@@ -11,12 +11,13 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tomli_w
+from pydantic import Field
 
 from sbafab.actuators import build
 from sbafab.design.files import (
@@ -37,7 +38,7 @@ from sbafab.folders.swap import writing
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.balloons import balloons_of, has_balloons
 from sbafab.models.calibration import SHARE, uncertainty_of
-from sbafab.models.figures import FLAGS, Flag, FlagList
+from sbafab.models.figures import FLAGS, Figure, Flag, FlagList
 from sbafab.models.paper import Counterpart, CounterpartEntry
 from sbafab.rules.finding import Place
 from sbafab.runtime import Progress, ignore_progress
@@ -74,9 +75,8 @@ class FoundDesign:
 
     ``front``: Pareto-optimal passing designs, in the goal and every requirement, a selection of
     ``on_front`` designs. ``ends``: keys limited only by their range. ``is_cut_short``: more tries
-    might have led to a better one. By quantity of the best design: ``intervals``, 90 % intervals
-    for measurements in its unit, if it has a calibration; ``flags`` and ``measured``, limits to
-    trust and the paper's values as ``predict`` gives them.
+    might have led to a better one. ``figures`` are those of ``predict`` of the best design, by
+    quantity.
     """
 
     request: FindRequest
@@ -88,9 +88,22 @@ class FoundDesign:
     tries: int
     is_cut_short: bool
     free: tuple[Free, ...]
-    intervals: dict[str, tuple[float, float]] = field(default_factory=dict)
-    flags: dict[str, tuple[Flag, ...]] = field(default_factory=dict)
-    measured: dict[str, Counterpart] = field(default_factory=dict)
+    figures: Mapping[str, Figure]
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """90 % intervals of measurements of the best design, by quantity in its unit."""
+        return {name: f.interval for name, f in self.figures.items() if f.interval}
+
+    @property
+    def flags(self) -> dict[str, tuple[Flag, ...]]:
+        """Limits to trust in figures of the best design, by quantity."""
+        return {name: f.flags for name, f in self.figures.items() if f.flags}
+
+    @property
+    def measured(self) -> dict[str, Counterpart]:
+        """The paper's values beside figures of the best design, by quantity."""
+        return {name: f.measured for name, f in self.figures.items() if f.measured}
 
     @property
     def holds(self) -> bool:
@@ -150,8 +163,8 @@ class RangeEnd:
     value: Any
     low: float
     high: float
-    step: float
-    above: bool
+    step: Annotated[float, Field(exclude=True)]
+    above: Annotated[bool, Field(exclude=True)]
 
     @property
     def wider(self) -> tuple[float, float]:
@@ -182,7 +195,7 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
             f"no design could be made: {nearest.refused} ({count} of the {len(refused)} tried)"
         )
     shown_front, count = pareto_front(space, best) if best.holds else ([], 0)
-    outcome = FoundDesign(
+    return FoundDesign(
         request,
         best,
         tuple(bindings(space, point, best)),
@@ -192,27 +205,18 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
         len(space.trials),
         request.tries <= len(space.trials) < space.size,
         space.free,
+        dict(_figures(request, best)),
     )
-    if best.laminate is not None:
-        _add_trust(outcome, best.laminate)
-    return outcome
 
 
-def _add_trust(outcome: FoundDesign, laminate: Laminate) -> None:
-    """Add intervals, flags and measured values of the best design to a result."""
-    request = outcome.request
-    design = request.design.with_(dict(outcome.best.values))
+def _figures(request: FindRequest, best: Trial) -> Iterator[tuple[str, Figure]]:
+    """Yield the figures of the best design by quantity, with intervals and flags."""
+    design = request.design.with_(dict(best.values))
     for quantity in request.quantities:
-        if quantity.figure is None:
-            continue
-        label = quantity.label
-        _, figure = request.measured(quantity, design, laminate, probability=SHARE)
-        if figure and figure.flags:
-            outcome.flags[label] = figure.flags
-        if figure and figure.measured:
-            outcome.measured[label] = figure.measured
-        if figure and figure.interval:
-            outcome.intervals[label] = figure.interval
+        if best.laminate is not None and quantity.figure is not None:
+            _, figure = request.measured(quantity, design, best.laminate, probability=SHARE)
+            if figure is not None:
+                yield quantity.label, figure
 
 
 # The free keys of a request, and what no search could answer.
@@ -388,7 +392,7 @@ def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[Ra
         if is_inside or free.choices or space.is_excluded(axis, neighbour):
             continue
         if space.with_rules(space.peek(neighbour)).rank < best.rank:
-            steps = space.lows[axis], space.highs[axis]
+            steps = int(space.lows[axis]), int(space.highs[axis])
             low, high = (round(free.low + step * free.step, 6) for step in steps)
             above = neighbour[axis] > point[axis]
             yield RangeEnd(free.key, space.number(axis, point), low, high, free.step, above)
@@ -431,7 +435,7 @@ def place_text(laminate: Laminate, where: Place) -> str:
     if where.x is None or where.y is None:
         return ""
     x, y = where.x, where.y
-    if laminate.lumen is not None and math.hypot(x, y) <= laminate.lumen / 2 + RING:
+    if math.hypot(x, y) <= (laminate.lumen or -math.inf) / 2 + RING:
         return "at the lumen"
     for bore in laminate.bores:
         if math.dist((x, y), bore.centre) <= bore.diameter / 2 + RING:
@@ -471,15 +475,6 @@ class RequirementEntry(Document):
     holds: bool
 
 
-class RangeEndEntry(Document):
-    """A key that only its range stops."""
-
-    key: str
-    value: Any
-    low: PlainNumber
-    high: PlainNumber
-
-
 class FindDocument(Document, schema="sbafab/find@1"):
     """Output of ``find --json``; names that are keys are quantities."""
 
@@ -501,7 +496,7 @@ class FindDocument(Document, schema="sbafab/find@1"):
     measured: dict[str, CounterpartEntry]
     missed: list[str]
     binds: list[Binding]
-    range_ends: list[RangeEndEntry] = attribute("ends")
+    range_ends: list[RangeEnd] = attribute("ends")
     without_room: list[Spare]
     front: list[TrialEntry]
     on_front: int

@@ -469,10 +469,8 @@ def _explore(space: SearchSpace) -> None:
             break
         else:
             point = tuple(map(dice.randint, space.lows.tolist(), space.highs.tolist()))
-        share = 4
-        while share <= 2 * max(space.counts) and not space.is_over:
-            point = _walk(space, point, [max(1, count // share) for count in space.counts])
-            share *= 2
+        most = 2 * max(space.counts)
+        point = _walks(space, point, [2**n for n in range(2, 64) if 2**n <= most])
 
 
 def _grid(space: SearchSpace) -> Iterator[list[int]]:
@@ -517,13 +515,22 @@ def _has_better_walk(space: SearchSpace, point: GridPoint) -> bool:
         start = space.inside(np.add(point, by * np.eye(len(point), dtype=int)[axis]))
         if start == point or space.is_over:
             continue
-        for share in (32, 128, max(counts)):
-            stride = [max(1, count // share) for count in counts]
-            stride[axis] = 0
-            start = _walk(space, start, stride)
+        start = _walks(space, start, (32, 128, max(counts)), axis)
         if start in space.trials and space.trial(start).rank < space.trial(point).rank:
             return True
     return False
+
+
+def _walks(
+    space: SearchSpace, point: GridPoint, shares: Iterable[int], fixed: int | None = None
+) -> GridPoint:
+    """Return the end of walks with strides of each key's range over a share; one key is fixed."""
+    for share in shares:
+        strides = [max(1, count // share) for count in space.counts]
+        if fixed is not None:
+            strides[fixed] = 0
+        point = _walk(space, point, strides)
+    return point
 
 
 def _walk(space: SearchSpace, point: GridPoint, stride: Sequence[int]) -> GridPoint:

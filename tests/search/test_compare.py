@@ -135,7 +135,7 @@ def test_yields_without_a_target_are_held_against_each_other(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # Figures take the longest, and are none of a rule's.
-    monkeypatch.setattr(module, "predict", lambda *_: SimpleNamespace(figures=()))
+    monkeypatch.setattr(module, "predict", lambda *_, **__: SimpleNamespace(figures=()))
     small = sbafab.load("1dof-5mm", "stack.balloons=1", "rules.yield_builds=400")
     found = compare(small, small.with_("registration.cutting_error=0.12"))
     rows = {row.rule: row.margins for row in found.rules}
