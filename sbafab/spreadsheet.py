@@ -9,7 +9,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from io import StringIO
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from sbafab.errors import DesignError
 
@@ -22,19 +22,13 @@ TEXT_MARK = "'"
 
 
 def csv_text(rows: Iterable[Sequence[Any]]) -> str:
-    """Return rows as the text of a CSV file."""
-    text = StringIO()
-    write_rows(text, rows)
-    return text.getvalue()
-
-
-def write_rows(opened: IO[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write rows as CSV: commas, a line feed after each, None as an empty cell.
+    """Return rows as the text of a CSV file: commas, a line feed after each, None as an empty cell.
 
     Numbers are written as they are; a text that would be a formula gets TEXT_MARK before it.
     """
-    writer = csv.writer(opened, lineterminator="\n")
-    writer.writerows([_cell(value) for value in row] for row in rows)
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows([_cell(value) for value in row] for row in rows)
+    return text.getvalue()
 
 
 def _cell(value: Any) -> Any:

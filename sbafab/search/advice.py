@@ -267,7 +267,7 @@ Steps = tuple[int, int]
 AS_GIVEN = (0, 0)
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Trials:
     """A design with wider bond and overhang, of which those without a ``start`` stay.
 

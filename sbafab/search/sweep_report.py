@@ -11,17 +11,17 @@ import json
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from functools import cached_property, lru_cache
 from itertools import chain
 from operator import le
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from sbafab.design.files import rule_names
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
+from sbafab.folders.swap import replace_text
 from sbafab.markup import environment
 from sbafab.models.calibration import factors_of
 from sbafab.models.paper import CALIBRATED_MODELS, counterpart
@@ -29,7 +29,7 @@ from sbafab.models.quantity import ANYWHERE, Conditions, FigureKey, Quantity
 from sbafab.reports.charts import ChartBars, ChartCurve, ChartSpecks, Panel, chart_svg
 from sbafab.search.trials import SweepOutcome, SweepRow
 from sbafab.search.vary import Values, Varied, format_value
-from sbafab.spreadsheet import write_rows
+from sbafab.spreadsheet import csv_text
 from sbafab.version import GENERATOR
 
 # The tables: one design per row, in the order requested.
@@ -174,27 +174,16 @@ def _cell(value: Any) -> Any:
     return json.dumps(value, ensure_ascii=False)
 
 
-@contextmanager
-def replacing(path: Path) -> Iterator[IO[str]]:
-    """A file that is swapped in once it is complete."""
-    begun = path.with_name(f".{path.name}.part")
-    with begun.open("w", encoding="utf-8", newline="") as opened:
-        yield opened
-    begun.replace(path)
-
-
 def write_tables(table: Table, folder: Path) -> list[str]:
     """Write every row in the table's ``written`` columns, and the time of each design, s.
 
     Unknown values are empty cells. Returns the files' names.
     """
-    with replacing(folder / CSV) as opened:
-        write_rows(opened, chain([table.written], table.cells(table.written)))
+    replace_text(folder / CSV, csv_text(chain([table.written], table.cells(table.written))))
     times = (
         [n, row.get("sha256", ""), row.get("seconds")] for n, row in enumerate(table.rows(), 1)
     )
-    with replacing(folder / TIMES) as opened:
-        write_rows(opened, chain([["number", "sha256", "seconds"]], times))
+    replace_text(folder / TIMES, csv_text(chain([["number", "sha256", "seconds"]], times)))
     return [CSV, TIMES]
 
 
