@@ -23,6 +23,7 @@ from sbafab.models.balloons import has_balloons
 from sbafab.models.calibration import factors_of
 from sbafab.models.figures import (
     FLAGS,
+    INTERVAL_NOTE,
     LEFT_OUT,
     NEAR_BURST,
     Figure,

@@ -208,8 +208,9 @@ def print_prediction(prediction: api.Prediction, verbose: bool = False) -> None:
         is_left_out = line.quantity == api.LEFT_OUT
         text = f"{line.figure}: {line.note}" if is_left_out else line.figure
         show.wrapped(text, indent=" " * label, first=head.ljust(label))
-        # A note of several lines stands once, under the last of them.
-        if not is_left_out and all(line.note != other.note for other in lines[number:]):
+        # What intervals are stands once, under the last of them.
+        later = [other.note for other in lines[number:]]
+        if not is_left_out and not (line.note == api.INTERVAL_NOTE and line.note in later):
             show.wrapped(line.note, indent=" " * (label + 2))
     if verbose:
         _print_figures(prediction)

@@ -399,8 +399,11 @@ class Prediction:
         reasons = [omitted.reason for omitted in self.left_out if sought in omitted.quantities]
         why = "; ".join(f"{figure.at.as_dict()} by {figure.model.id}" for figure in every)
         why = f"there are {why}" if why else (reasons or ["it is not predicted"])[0]
-        by = f" by {model}" if model else ""
-        raise DesignError(f"{sought.key} at {at}{by} is not one figure: {why}")
+        by = (f" at {at}" if at else "") + (f" by {model}" if model else "")
+        kpa = at.get("kpa")
+        is_asked = kpa is None or kpa in self.asked.pressures_kpa
+        how = "" if is_asked else f"; predict it with pressures_kpa=[{kpa:g}]"
+        raise DesignError(f"{sought.key}{by} is not one figure: {why}{how}")
 
     def value(self, quantity: Quantity | str, model: str = "", **at: Any) -> float:
         """Return the value of ``figure``, in its unit: ``value("blocked_force", kpa=100,

@@ -19,6 +19,7 @@ from sbafab.design.records import Design, Slots
 from sbafab.errors import BeyondError, DesignError, GeometryError
 from sbafab.geometry.region import Region
 from sbafab.laminate.burst import NOT_BURST, burst, is_near_burst, refuse_beyond_burst
+from sbafab.laminate.films import PAPER_PRODUCT
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models import elastic, paper
 from sbafab.models.actuator import NOT_MEASURED, Actuator, NearDiscs, near_discs, why_no_disc
@@ -27,6 +28,7 @@ from sbafab.models.calibration import (
     SHARE,
     Reading,
     Uncertainty,
+    bonding_products,
     burst_uncertainty,
     factors_of,
     flags_at,
@@ -97,6 +99,11 @@ SIZES = {
 """Models of sizes that the press changes."""
 PAPER_SLOTS = Slots(width=10.0, run=8.5)
 """The paper's SBAs of 11.5 x 20 mm less a bond of 0.75 all round (Sec. 2.1)."""
+AT_REFERENCE = (
+    *(Quantity.REFERENCE_STROKE, Quantity.REFERENCE_HEIGHT, Quantity.REFERENCE_VOLUME),
+    *(Quantity.TOTAL_VOLUME, Quantity.REFERENCE_TIME, Quantity.WORK_BOUND, Quantity.POWER_DENSITY),
+)
+"""Quantities that are known with the reference stroke alone."""
 GROUPS = ("size", "inlet", "strength", "stroke", "force", "actuation", "bending", "stiffness")
 EXACT_GROUPS = ("size", "inlet")
 """Groups of figures that are computed for a drawn pocket itself."""
@@ -246,7 +253,8 @@ def _figure_of(
             figures.append(item)
     calibrated = [item for item in figures if item.model.id in paper.CALIBRATED_MODELS]
     if figures:
-        return min(calibrated or figures, key=lambda item: item.value)
+        main = [item for item in figures if not item.other]
+        return min(calibrated or main or figures, key=lambda item: item.value)
     for item in sorted(left_out, key=lambda item: quantity not in item.quantities):
         if not item.quantities or quantity in item.quantities:
             raise item.error or DesignError(f"{item.name}: {item.reason}")
@@ -521,7 +529,7 @@ def _strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[FigureI
     else:
         name = "reference stroke and height, and what is predicted at them"
         error = DesignError(f"reference stroke: {NOT_MEASURED}")
-        yield LeftOut(name, NOT_MEASURED, error=error)
+        yield LeftOut(name, NOT_MEASURED, AT_REFERENCE, error)
     for each in actuator.pockets:
         yield Figure(Quantity.LARGEST_VOLUME, each.largest_volume, each.model)
         yield Figure(Quantity.LARGEST_STROKE, each.largest_stroke, each.model)
@@ -572,6 +580,10 @@ def _forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
     stroke.
     """
     shares = paper.HEIGHTS if actuator.has_reference else paper.HEIGHTS[:1]
+    products = set(bonding_products(actuator.laminate))
+    sizes_here = sizes_of(actuator.form, actuator.laminate)
+    farther = sizes_here.farther(PAPER_3DOF, products != {PAPER_PRODUCT})
+    flags = flags_at(farther) if actuator.radii else ()
     every = product(request.pressures_kpa, shares)
     usual = (Conditions(kpa=kpa, share=share) for kpa, share in every)
     for at in request.places(usual, Quantity.BLOCKED_FORCE):
@@ -580,7 +592,8 @@ def _forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
         stroke = (at.share or 0.0) * actuator.reference_stroke if at.rise is None else at.rise
         for model, push in _pushes(actuator, request):
             value = float(push(at.kpa or 0.0, stroke))
-            yield Figure(Quantity.BLOCKED_FORCE, value, model, at._replace(each=_each(actuator)))
+            at_each = at._replace(each=_each(actuator))
+            yield Figure(Quantity.BLOCKED_FORCE, value, model, at_each, flags=flags)
 
 
 def _power(actuator: Actuator, request: PredictionRequest, mass: FigureItem) -> Iterator[Figure]:

@@ -36,6 +36,7 @@ from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError, OutputError, SbafabError, Stopped
 from sbafab.folders.swap import writing
 from sbafab.laminate.laminate import Laminate
+from sbafab.markup import table_html
 from sbafab.models.balloons import balloons_of, has_balloons
 from sbafab.models.calibration import SHARE, uncertainty_of
 from sbafab.models.figures import FLAGS, Figure, Flag, FlagList
@@ -69,7 +70,7 @@ COUNT = "chamber.count"
 """Key of the number of chambers side by side."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FoundDesign:
     """Result of a search: the ``best`` design, or the nearest miss if none passes.
 
@@ -109,6 +110,21 @@ class FoundDesign:
     def holds(self) -> bool:
         """True if the best design meets all requirements and every rule passes."""
         return self.best.holds
+
+    def __repr__(self) -> str:
+        missed = "" if self.holds else f", nearest miss: {'; '.join(self.missed)}"
+        return f"FoundDesign({format_keys(self.best.values)}{missed})"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (row.quantity.label, figure_text(self.request, self.best, row), row.bound, met)
+            for row in self.request.requirements
+            for met in ("holds" if self.best.meets(row) else "missed",)
+        ]
+        rows += [("", rule, "", "missed") for rule in self.best.broken_rules]
+        title = "Best design" if self.holds else "Nearest miss"
+        head = ("quantity", "value", "requirement", "")
+        return table_html(head, rows, f"{title}: {format_keys(self.best.values)}")
 
     @property
     def without_room(self) -> list[Spare]:
@@ -285,7 +301,10 @@ def _refuse_unknown_films(request: FindRequest) -> None:
                 request.measured(quantity, design, laminate)
             elif quantity.at.share:
                 request.measured(RequestedQuantity("reference_stroke"), design, laminate)
-            if quantity.kpa is not None and has_balloons(design.form) and not has_modulus:
+            # The flat force has a closed form.
+            is_flat = quantity.figure is not None and quantity.figure[1].share == 0
+            needs_modulus = quantity.kpa is not None and not is_flat and not has_modulus
+            if needs_modulus and has_balloons(design.form):
                 balloons_of(design, laminate)
         except DesignError as error:
             raise DesignError(f"{quantity.label}: {error}") from None

@@ -191,7 +191,9 @@ class RequestedQuantity:
         if self.name not in FIGURES:
             return None
         of, usual = FIGURES[self.name]
-        return of, Conditions(**{**usual.as_dict(), **self.at.as_dict()})
+        at = Conditions(**{**usual.as_dict(), **self.at.as_dict()})
+        # Flat is no rise, and no share of a reference stroke, which may not be known.
+        return of, at._replace(rise=None, share=0.0) if at.rise == 0 else at
 
     @property
     def kpa(self) -> float | None:

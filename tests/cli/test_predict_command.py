@@ -5,10 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
 
 import sbafab
+from sbafab.cli.predict import print_prediction
 from sbafab.folders.manifest import file_hashes
 from sbafab.folders.run import RunRequest, generate
+from sbafab.models.figures import FLAGS, INTERVAL_NOTE, VerdictLine
 from tests.cli.conftest import Run
 from tests.site.formats import hold
 
@@ -109,3 +114,12 @@ def test_failing_design_is_predicted_but_not_written(run: Run) -> None:
     assert "bond-width" in err
     assert "no prediction was written" in err
     assert not Path("out/1dof-5mm/predict.json").exists()
+
+
+def test_every_figure_that_is_an_extrapolation_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    flag = FLAGS["extrapolation"]
+    notes = {"stroke": flag, "bend": flag, "force": flag, "burst": INTERVAL_NOTE}
+    lines = tuple(VerdictLine(name, "1", note) for name, note in notes.items())
+    print_prediction(SimpleNamespace(verdict=(*lines, lines[-1])))  # type: ignore[arg-type]
+    out = " ".join(capsys.readouterr().out.split())
+    assert (out.count(flag), out.count(INTERVAL_NOTE)) == (3, 1)

@@ -10,7 +10,7 @@ from sbafab.actuators import build, load_design
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import film_mass
-from sbafab.models.figures import Prediction, PredictionRequest
+from sbafab.models.figures import EXTRAPOLATION, Prediction, PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import Quantity
 from sbafab.models.stack import stack
@@ -74,6 +74,28 @@ def test_what_the_paper_measured_of_its_film_holds_for_no_other() -> None:
     assert "own film" in thicker["reference stroke and height, and what is predicted at them"]
 
 
+def test_a_force_that_nobody_measured_of_such_a_film_is_an_extrapolation() -> None:
+    """With a modulus and without, with a calibration and without: a film 2.6 times as thick."""
+    thick = (TPU[0], "films.tpe.thickness=0.1")
+    for more in ((), (UNCALIBRATED,)):
+        found = predict(load_design("1dof-5mm", (*thick, *more)), quick=True)
+        forces = [each for each in found.figures if each.quantity is Quantity.BLOCKED_FORCE]
+        assert forces
+        assert all(each.flags == (EXTRAPOLATION,) for each in forces)
+    papers = predict(load_design("1dof-5mm"), quick=True)
+    assert not papers.figure("blocked_force", "work-on-eq-4", kpa=100, share=0).flags
+
+
+def test_why_there_is_not_one_figure() -> None:
+    found = predict(load_design("1dof-5mm", TPU), quick=True)
+    with pytest.raises(
+        DesignError, match=r"^reference_stroke is not one figure: the paper measured"
+    ):
+        found.value("reference_stroke")
+    with pytest.raises(DesignError, match=r"predict it with pressures_kpa=\[50\]$"):
+        found.value("blocked_force", kpa=50, share=0)
+
+
 def test_the_elastic_balloon_takes_the_films_own_numbers() -> None:
     """Shapes hang on p / E and on t alone: twice the modulus and the pressure, the same stroke."""
     same = ("films.tpe.product=A", "films.tpe.thickness=0.038", "films.tpe.poisson=0.2")
@@ -115,7 +137,7 @@ def test_simulators_need_modulus_and_poisson() -> None:
     flat = build(load_design("1dof-5mm", (*TPU, "films.tpe.density=1200", "films.tpe.modulus=20")))
     with pytest.raises(DesignError, match=r"add films.tpe.modulus, in MPa, and poisson"):
         deck_settings(flat)
-    with pytest.raises(DesignError, match=r"add films.tpe.modulus, in MPa, and poisson"):
+    with pytest.raises(DesignError, match=r"^modulus or Poisson's ratio of TPU 85A is not known"):
         stack(load_design("1dof-5mm", TPU))
 
 

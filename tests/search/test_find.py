@@ -492,6 +492,26 @@ def test_what_no_film_of_the_design_is_known_for_is_refused_before_any_is_tried(
     assert free_keys(FindRequest(design, *read_all([], [f"{asked}=1"], "width"), free)) == free
 
 
+def test_a_flat_force_needs_no_modulus_as_in_predict() -> None:
+    film = {key: value for key, value in TPU.items() if key != "modulus"}
+    free = ["stack.balloons=6:6:1"]
+    asked = {"least": {"force@0mm@100kPa": 2}, "free": free, "best": "width"}
+    found = sbafab.find("1dof-5mm", films={"tpe": film}, **asked)
+    said = sbafab.predict("1dof-5mm", films={"tpe": film})
+    predicted = said.value("blocked_force", kpa=100, share=0)
+    assert found.best.figures["force@0mm@100kPa"] == pytest.approx(predicted)
+    assert found.flags["force@0mm@100kPa"] == ("extrapolation",)
+
+
+def test_a_nearest_miss_says_that_it_is_one() -> None:
+    free = ["stack.balloons=6:6:1"]
+    missed = sbafab.find("1dof-5mm", most={"outline_diameter": 4}, free=free)
+    assert "nearest miss: outline_diameter" in repr(missed)
+    assert "Nearest miss: stack.balloons = 6" in missed._repr_html_()
+    met = sbafab.find("1dof-5mm", most={"outline_diameter": 40}, free=free)
+    assert repr(met) == "FoundDesign(stack.balloons = 6)"
+
+
 def test_the_reason_that_holds_for_most_is_given_and_not_that_of_the_smallest() -> None:
     """Pockets of 2.5 mm are too small for the model; the other four stretch by over 15 %."""
     free = ["chamber.diameter=2.5:5.1:0.65", "stack.balloons=6:6:1"]
