@@ -1,6 +1,6 @@
 """Coverage of a calibration's 90 % intervals in synthetic labs: docs/measured/synthetic_labs.json.
 
-python -m docs.scripts.synthetic_labs takes about fifteen minutes; it needs the extra "calibrate".
+python -m docs.scripts.synthetic_labs takes about twenty minutes; it needs the extra "calibrate".
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from tests.validation.synthetic import held_out_inside, share_and_error
 
 COMMAND = "python -m docs.scripts.synthetic_labs"
 NAME = "synthetic_labs"
-LABS, ROW = 200, 50
+LABS, ROW = 300, 50
 """Labs in all, whose numbers are their seeds from 0 on, and in a row of the table."""
 COLUMNS = ("labs", "left-out values", "in their 90 % intervals", "share")
 ALL = "all"

@@ -150,7 +150,7 @@ def test_the_same_curves_give_the_same_samples() -> None:
 
 @pytest.mark.long
 def test_intervals_of_synthetic_labs_hold_nine_points_in_ten() -> None:
-    """Ten labs; ``python -m docs.scripts.synthetic_labs`` takes 200."""
+    """Ten labs; ``python -m docs.scripts.synthetic_labs`` takes 300."""
     inside = [held_out_inside(number) for number in range(10)]
     share, error = share_and_error(inside)
     # Where all lie inside, labs do not differ: chance alone has the binomial's error.
@@ -158,11 +158,11 @@ def test_intervals_of_synthetic_labs_hold_nine_points_in_ten() -> None:
     assert abs(share - 0.9) < 3 * error + 0.02
 
 
-def test_the_record_of_200_labs_holds_nine_points_in_ten_and_the_page_says_so() -> None:
+def test_the_record_of_300_labs_holds_nine_points_in_ten_and_the_page_says_so() -> None:
     *rows, every = record("synthetic_labs").tables["coverage"].rows
     labs = [row[0].split(" to ") for row in rows]
     assert [int(first) for first, _ in labs] == [0, *(int(last) + 1 for _, last in labs[:-1])]
-    assert int(labs[-1][1]) == 199
+    assert int(labs[-1][1]) == 299
     points, inside = (sum(int(row[column]) for row in rows) for column in (1, 2))
     assert every[1:3] == [str(points), str(inside)]
     share, error = (float(text) for text in every[3].removesuffix(" %").split(" +- "))
@@ -171,7 +171,7 @@ def test_the_record_of_200_labs_holds_nine_points_in_ten_and_the_page_says_so() 
     # Values of one lab are not independent: the error is no less than chance alone would have it.
     assert error >= 100 * math.sqrt(0.9 * 0.1 / points)
     page = " ".join((FOLDER.parent / "prediction.md").read_text(encoding="utf-8").split())
-    assert f"In 200 synthetic labs {every[3]} of {points} left-out values lay in" in page
+    assert f"In 300 synthetic labs {every[3]} of {points} left-out values lay in" in page
 
 
 def test_probabilities_of_set_ups_are_their_densities() -> None:
