@@ -61,8 +61,9 @@ BUCKLES = (
 """Flag of the force of a column that would buckle (docs/measured/candidates.csv)."""
 SAMPLES, SERIES_SAMPLES = 21, 401
 ANGLES = (30.0, 60.0, 90.0)
-LEAST_PRESSURE, NO_FURTHER = 0.01, 1e-10
-"""Lowest pressure of a bend in kPa, and the relative tolerance of its pressure."""
+LEAST_PRESSURE, NO_FURTHER, NONE = 0.01, 1e-10, 1e-6
+"""Lowest pressure of a bend in kPa; the relative tolerance of its pressure, and that within which
+there is none."""
 NEARBY = 2.0
 """Largest ratio of a bend's pressure to that of another stack which guides the search."""
 PROBE_FORCE = 1e-5
@@ -500,7 +501,7 @@ def poses_bent_by(
     low, high = np.array(list(all_ends)).reshape(-1, 2).T
     high = np.minimum(high, stack.most_pressure)
     below, above, before = np.full((3, len(bends)), math.nan)
-    while (live := np.flatnonzero(high > low * (1 + NO_FURTHER))).size:
+    while (live := np.flatnonzero(high > low * (1 + np.where(above > 0, NO_FURTHER, NONE)))).size:
         share = below[live] / (below[live] - above[live])
         ratio = high[live] / low[live]
         middle = low[live] * ratio ** np.where(np.isfinite(share), share, 0.5)

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -301,8 +302,11 @@ def _bent_forces(of: ModelledActuator) -> NamedSeries:
     angles = curve.x if curve.x_name == "bend_deg" else (stated,) * len(curve.y)
     pairs = list(zip(angles, _pressures(curve), strict=True))
 
+    bends = list(product(bending.values(), angles))
+    poses = dict(zip(bends, elastic.poses_bent_by(of.stack, bends), strict=True))
+
     def force(bent: int, filled: int, angle: float, pressure: float) -> float:
-        pose = elastic.pose_bent_by(of.stack, bent, angle)
+        pose = poses[bent, angle]
         if pose is None or pose.pressures[0] > pressure:
             raise DesignError("it does not bend so far")
         return elastic.pressed_further(of.stack, filled, pressure, pose).force
