@@ -169,7 +169,7 @@ def test_the_record_of_300_labs_holds_nine_points_in_ten_and_the_page_says_so() 
     assert share == pytest.approx(100 * inside / points, abs=0.05)
     assert abs(share - 90) < 2
     # Values of one lab are not independent: the error is no less than chance alone would have it.
-    assert error >= 100 * math.sqrt(0.9 * 0.1 / points)
+    assert error >= math.sqrt(share * (100 - share) / points)
     page = " ".join((FOLDER.parent / "prediction.md").read_text(encoding="utf-8").split())
     assert f"In 300 synthetic labs {every[3]} of {points} left-out values lay in" in page
 
