@@ -32,8 +32,9 @@ class UnreachableError(DesignError):
 class BeyondError(DesignError):
     """A state that a film does not stand; ``excess`` is by what share it is beyond."""
 
-    def __init__(self, sentence: str, excess: float) -> None:
+    def __init__(self, sentence: str, excess: float = 0.0) -> None:
         super().__init__(sentence)
+        # With a default, so that it can be pickled: an error is made again from its sentence.
         self.excess = excess
 
 
