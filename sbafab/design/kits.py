@@ -30,6 +30,7 @@ from sbafab.design.files import (
 )
 from sbafab.design.films import FaceBondings, Films, LayerFilms, without_other_products
 from sbafab.design.sections import (
+    MINUTES,
     Acceptance,
     Laser,
     Models,
@@ -42,6 +43,7 @@ from sbafab.design.sections import (
 from sbafab.design.toml_table import NAME_PATTERN, Section, writable
 from sbafab.design.units import Length, is_measured
 from sbafab.errors import DesignError
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS
 
 DEFAULT = "paper"
 SCHEMA = "sbafab/kit@1"
@@ -157,11 +159,27 @@ def read_kit(path: Path) -> Kit:
         record = checked(KitFile, plain, {}, file="kit")
     except DesignError as error:
         raise DesignError(f"{path}: {error}") from None
+    _complete_press(plain.get("press", {}), record.press, path)
     text = json.dumps(tables, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     sha256 = hashlib.sha256(text.encode()).hexdigest()
     return Kit(
         record, {key: plain[key] for key in SECTIONS if key in plain}, sha256, path.read_bytes()
     )
+
+
+def _complete_press(table: dict[str, Any], press: Press, path: Path) -> None:
+    """Add to a kit's table the minutes that it leaves out, as not known, if it names another film
+    than the paper's, whose values do not hold for it. Raises DesignError without temperature or
+    pressure, which those minutes are for.
+    """
+    films = [film for film in press.timed_films if film != (PAPER_PRODUCT, PAPER_THICKNESS)]
+    for key in ("temperature_c", "pressure_kpa") if films else ():
+        if key not in table:
+            raise DesignError(
+                f"{path}: press.minutes_for names {films[0][0]}, and press.{key} is missing; state "
+                "that at which its minutes held"
+            )
+    table.update({key: None for key in MINUTES if films and key not in table})
 
 
 _shipped = cache(read_kit)

@@ -361,6 +361,12 @@ TimeConstant = Annotated[float | Literal["not measured"], BeforeValidator(_time_
 """Minutes, or "not measured"."""
 
 
+MINUTES = tuple(
+    f"{step}_minutes" for step in ("flash_bottom", "bond_bottom", "flash_middle", "bond_all")
+)
+"""Keys of the minutes of press steps."""
+
+
 class Press(Section):
     """The heat press: temperature, pressure, minutes, platen."""
 
@@ -392,19 +398,20 @@ class Press(Section):
     pad_hardness: float = Field(default=10.0, ge=5, le=90)
     """Shore A; 10 is a soft closed-cell silicone sponge, between grades 3 and 4 of ASTM D1056 class
     D; sheets of solid silicone rubber have 40 to 70."""
-    flash_bottom_minutes: float = Field(default=3.0, gt=0, le=600)
+    flash_bottom_minutes: float | None = Field(default=3.0, gt=0, le=600)
     """Step 1: the bottom balloon's upper two layers."""
-    bond_bottom_minutes: float = Field(default=12.0, gt=0, le=600)
+    bond_bottom_minutes: float | None = Field(default=12.0, gt=0, le=600)
     """Step 2: the bottom balloon, full bond."""
-    flash_middle_minutes: float = Field(default=10.0, gt=0, le=600)
+    flash_middle_minutes: float | None = Field(default=10.0, gt=0, le=600)
     """Step 3: all layers between the bottom balloon and the top layer."""
-    bond_all_minutes: float = Field(default=20.0, gt=0, le=600)
+    bond_all_minutes: float | None = Field(default=20.0, gt=0, le=600)
     """Step 4: the whole laminate, full bond."""
     minutes_for: tuple[Annotated[str, Field(max_length=120), AfterValidator(_named_film)], ...] = (
         Field(default=(PAPER_FILM,), max_length=20, strict=False)
     )
     """Films that the minutes above were stated for, each as "product, thickness". A laminate of any
-    other structural film gets no minutes: blanks on the traveller, null in press.json."""
+    other structural film gets no minutes: blanks on the traveller, null in press.json. Of a kit
+    that names another film than the paper's, minutes that it leaves out are not known either."""
     time_constant: TimeConstant = NOT_MEASURED
     """Minutes in which the edge of the base plate, laid cold between the hot platens under the pad,
     covers 63 % of the temperature difference; measured once at the bench."""

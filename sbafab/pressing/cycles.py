@@ -120,7 +120,7 @@ def design_runs(design: Design, laminate: Laminate) -> Runs:
         # As many as one person makes in a cycle. Minutes that are not stated count as 0.
         timed = not films_without_minutes(laminate, design.press.timed_films)
         parts = press_steps(laminate) if timed else ()
-        pressing = sum([minutes_closed(design.press, part.name) for part in parts], 0.0)
+        pressing = sum([minutes_closed(design.press, part.name) or 0.0 for part in parts], 0.0)
         by_hand = (60 * CYCLE_HOURS - pressing) / HANDLING_MINUTES
         most = max(1, math.floor(by_hand + ROUNDING))
     return runs_of(laminate, order.quantity, design.press.platen, most)

@@ -122,9 +122,12 @@ HANDLING_MINUTES = 60.0
 """The paper's total build time of 1.75 h less its 45 minutes in the press."""
 
 
-def minutes_closed(press: Press, step: StepName) -> float:
-    """Return the minutes that the press stays closed in a step; tacking is a flash bond."""
-    return float(getattr(press, STEPS[step][2]))
+def minutes_closed(press: Press, step: StepName) -> float | None:
+    """Return the minutes that the press stays closed in a step, None if not known; tacking is a
+    flash bond.
+    """
+    minutes: float | None = getattr(press, STEPS[step][2])
+    return minutes
 
 
 @dataclass(frozen=True)
@@ -269,7 +272,8 @@ def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,))
         steps.append(_step(laminate, part, press, bed, warming.line(minutes), minutes))
     if laminate.registration == "ears" and steps:
         steps[-1] = replace(steps[-1], instructions=f"{steps[-1].instructions} {SNIP}")
-    total = sum(step.minutes or 0.0 for step in steps) if has_minutes else None
+    times = [step.minutes for step in steps if step.minutes is not None]
+    total = sum(times, 0.0) if len(times) == len(steps) else None
     pressed = "no minutes stated for this film" if total is None else f"{total:g} min"
     is_timed = not design.form.is_drawn
     by_hand = (
@@ -650,6 +654,13 @@ def _of_films(laminate: Laminate, press: Press, parts: Sequence[LayUpStep]) -> I
             f"{names}; try the bond on a sample at {heat}",
             "set press.temperature_c, press.pressure_kpa and the press minutes to what held, and "
             "name the film in press.minutes_for",
+        )
+    blank = [str(part.number) for part in parts if minutes_closed(press, part.name) is None]
+    if blank and not untimed:
+        yield Caution(
+            f"the minutes of step{'s' * (len(blank) > 1)} {joined_words(blank)} are blank, for "
+            f"nobody stated them; try the bond on a sample at {heat}",
+            "set the press minutes to what held",
         )
     for film in dict.fromkeys(layer.film for layer in pressed):
         if not film.is_mask and film.softens_above is None and not film.stays_solid:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from sbafab.design.sections import MINUTES
 from sbafab.laminate.lay_up import films_without_minutes
 from sbafab.rules.finding import Finding, Place, judged
 from sbafab.rules.limits import TOLERANCE
@@ -63,6 +64,9 @@ def _warnings(measures: Measures) -> Iterator[Finding]:
         timed = design.press.minutes_for
         only = say(f"{NAME}.only", timed=timed) if timed else say(f"{NAME}.only-none")
         yield judged(NAME, "warn", None, None, "", nowhere, "unstated", films=names, only=only)
+    keys = [f"press.{key}" for key in MINUTES if getattr(design.press, key) is None]
+    if keys and not films:
+        yield judged(NAME, "warn", None, None, "", nowhere, "left-out", keys=keys)
     for film in dict.fromkeys(layer.film for layer in laminate.tpe_layers):
         modulus, _ = film.elastic or (0.0, 0.0)
         if film.melts and modulus > STIFFEST:

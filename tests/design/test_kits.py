@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import sbafab
-from sbafab.actuators import load_design
+from sbafab.actuators import build, load_design
 from sbafab.design.files import read_toml, templates_folder
 from sbafab.design.films import Films
 from sbafab.design.identity import OTHER_TUBE, citation, cure_hours, design_sha256, tube_name
@@ -17,6 +17,7 @@ from sbafab.design.kits import read_kit, write_kit
 from sbafab.design.records import Design, design_toml, dotted
 from sbafab.design.sections import Acceptance, Laser, Press, Registration, Rules, Sheets
 from sbafab.errors import DesignError
+from sbafab.pressing.schedule import schedule
 
 SECTIONS = {
     "films": Films(),
@@ -159,6 +160,36 @@ def test_moduli_temperatures_and_densities_take_units(tmp_path: Path) -> None:
     assert design.films == usual.films
     assert design.press == usual.press
     assert sbafab.load("1dof-5mm", "films.tpe.modulus=500 kPa").films.tpe.modulus == 0.5
+
+
+def test_minutes_of_another_film_are_the_kits_alone(tmp_path: Path) -> None:
+    path = write_kit(tmp_path / "lab.toml")
+    text = re.sub("(?m)^(minutes_for|bond_all_minutes) .*\n", "", path.read_text())
+    changes = ("films.tpe.product=TPU", "films.tpe.thickness=0.05", f"kit={path}")
+    for named, minutes in (
+        ("TPU, 0.05 mm", [3, 12, 10, None]),
+        ("Stretchlon 200, 0.038 mm", [None] * 4),
+    ):
+        path.write_text(text.replace("[press]", f'[press]\nminutes_for = ["{named}"]'))
+        design = load_design("1dof-5mm", changes)
+        plan = schedule(build(design), design)
+        assert [step.minutes for step in plan.steps] == minutes
+        assert plan.total_press_minutes is plan.estimated_build_minutes is None
+        assert [each for each in plan.warnings if "blank" in each]
+    (said,) = (f.remedy for f in sbafab.check(design) if f.id == "press-fit.unstated")
+    assert "name TPU, 0.05 mm in press.minutes_for, which names Stretchlon 200, 0.038 mm" in said
+    path.write_text(text.replace("[press]", '[press]\nminutes_for = ["TPU, 0.05 mm"]'))
+    (said,) = (f.remedy for f in sbafab.check("1dof-5mm", *changes) if f.id == "press-fit.left-out")
+    assert said == "try the bond on a sample, and state press.bond_all_minutes in the kit"
+    path.write_text(path.read_text().replace("temperature_c = ", "cool_minutes = "))
+    with pytest.raises(
+        DesignError, match=r"minutes_for names TPU, and press.temperature_c is miss"
+    ):
+        load_design("1dof-5mm", changes)
+    # The paper's own film keeps the paper's.
+    path.write_text(text)
+    papers = load_design("1dof-5mm", [f"kit={path}"])
+    assert [step.minutes for step in schedule(build(papers), papers).steps] == [3, 12, 10, 20]
 
 
 @pytest.mark.parametrize("case", BAD)

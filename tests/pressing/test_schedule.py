@@ -80,9 +80,10 @@ def test_the_tpe_must_melt(stack: Stack) -> None:
     for temperature in (20, 120):
         with pytest.raises(DesignError, match="does not bond Stretchlon 200, which melts at 120"):
             schedule(stack(2), PAPER.with_(press={"temperature_c": temperature}))
-    tpu = {"films": {"tpe": {"product": "TPU", "thickness": 0.038, "melting_point": 135}}}
+    film = {"product": "TPU", "thickness": 0.038, "melting_point": 135}
+    tpu = PAPER.with_(films={"tpe": film})
     with pytest.raises(DesignError, match=r"TPU, which melts at 135 C; set it higher than that$"):
-        schedule(stack(2), PAPER.with_(tpu))
+        schedule(build(tpu), tpu)
     warm = schedule(stack(2), PAPER.with_("press.temperature_c=121"))
     (only,) = beside_hand_placing(warm.warnings)
     assert only.startswith("minutes stated for 135 C, the press is set to 121 C")
