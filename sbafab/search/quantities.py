@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import permutations
 from string import ascii_letters
@@ -24,7 +25,7 @@ from sbafab.design.units import (
     millimetres,
     share_of,
 )
-from sbafab.errors import DesignError
+from sbafab.errors import BeyondError, DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import Figure, MeasuredValue
 from sbafab.models.paper import FULL_KPA, WATER_FLOW
@@ -502,9 +503,15 @@ def measured(
             stroke = at.share * figure(design, laminate, Quantity.REFERENCE_STROKE).value
         is_beyond = isinstance(form.pockets, Slots) and stroke > largest
         item = None if is_beyond else figure(design, laminate, of, at, pressures_kpa, probability)
-        if item is None or item.value <= 0:
-            # For the search: the less, the farther the stroke is beyond the balloons'.
-            return -abs(at.kpa or 0.0) / 1000 * stroke / largest, None
+        if item is None:
+            return largest - stroke, None
+        if item.value <= 0 and isinstance(form.pockets, Discs):
+            # For the search: the shortfall of stroke, as the force for that much of it.
+            with suppress(BeyondError):
+                rise = figure(design, laminate, Quantity.FREE_STROKE, Conditions(kpa=at.kpa))
+                largest = rise.value
+            flat = (at.kpa or 0.0) / 1000 * math.pi * (min(form.pockets.diameters) / 2) ** 2
+            return -flat * max(stroke / largest - 1, 0.0), None
         return item.value, item
     item = figure(design, laminate, of, at, pressures_kpa, probability)
     return item.value, item
