@@ -547,9 +547,8 @@ class Rules(Section):
     yield_builds: Annotated[int, Field(ge=100, le=1_000_000)] | None = None
     """Random builds drawn for registration-yield; by default 10,000, fewer for tall stacks."""
     validated_balloons: int = Field(default=20, ge=1, le=1000)
-    """More balloons than this draw a warning (paper Sec. 6)."""
-    validated_height: Length = 2.5
-    """A higher sum of films draws a warning: 20 balloons of the paper's films are 2.495 mm high."""
+    """More balloons than this draw a warning (paper Sec. 6), and films that are higher than as many
+    of the paper's, 0.125 mm a balloon."""
     opening_pressure_kpa: float | None = Field(default=None, gt=0, le=10000)
     """A channel of a net must open at this pressure: one of its films lifts by its thickness. By
     default 100 kPa, at which the paper gives forces."""
@@ -557,6 +556,13 @@ class Rules(Section):
     """Largest ratio of length to width of a branch of a net without a port; by default 2."""
     waive: tuple[Annotated[str, *name_of(rule_names)], ...] = Field(default=(), strict=False)
     """Rules whose failure does not stop the cut files; every file then says so."""
+
+    @property
+    def validated_height(self) -> float:
+        """Height in mm of as many balloons of the paper's films as are validated: a key of its own
+        would change the hash of every design.
+        """
+        return 0.125 * self.validated_balloons
 
     @field_validator("waive", mode="before")
     @classmethod

@@ -109,7 +109,6 @@ KEYS = (
     _Key("worst_bond_width", WORST, lambda d: d.rules.worst_bond_width, "default"),
     _Key("worst_mask_overhang", WORST, lambda d: d.rules.worst_mask_overhang, "default"),
     _Key("validated_balloons", ("press-fit",), lambda d: d.rules.validated_balloons, "paper", True),
-    _Key("validated_height", ("press-fit",), lambda d: d.rules.validated_height, "paper", True),
     _Key("least_feature", ("film-limits",), lambda d: d.laser.least_feature, "default"),
     _Key("unknown_kerf", ("tube-fit", "nets"), lambda d: d.laser.unknown_kerf, "default"),
     _Key("pin_stretch", ("pin-fit",), lambda d: d.registration.pin_stretch, "default", True),

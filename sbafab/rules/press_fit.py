@@ -1,9 +1,9 @@
 """press-fit: the laminate fits the heated area; a warning for untested heights and press minutes,
 and for a film that is not an elastomer.
 
-Heights are untested above ``validated_balloons`` or ``validated_height``: heat takes a time in
-proportion to the height's square to a stack's middle. Minutes are if no kit or design states them
-for a film.
+Heights are untested above ``validated_balloons``, or that many of the paper's films: heat takes a
+time in proportion to the height's square to a stack's middle. Minutes are untested if no kit or
+design states them for a film.
 """
 
 from __future__ import annotations

@@ -352,7 +352,6 @@ WEAKER = [
     ("rules.worst_bond_width=0", "worst_bond_width 0 (default 0.5)"),
     ("rules.worst_mask_overhang=0.1", "worst_mask_overhang 0.1 (default 0.25)"),
     ("rules.validated_balloons=40", "validated_balloons 40 (paper 20)"),
-    ("rules.validated_height=4", "validated_height 4 (paper 2.5)"),
     ("laser.least_feature=0.1", "least_feature 0.1 (default 0.2)"),
     ("laser.unknown_kerf=0.05", "unknown_kerf 0.05 (default 0.1)"),
     ("registration.pin_stretch=0.5", "pin_stretch 0.5 (default 0.3)"),

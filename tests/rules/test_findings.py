@@ -201,8 +201,8 @@ ROWS: dict[str, list[Row]] = {
             (None, (7,), 8.75, 200),
         ),
         Row("warn tall", 3.0, one(), settings=("rules.validated_balloons=2",)),
-        # 3 balloons of two films of 0.038 mm and a mask of 0.025, and 2 separators.
-        Row("warn high", 0.353, one(), settings=("rules.validated_height=0.3",)),
+        # 3 balloons of two films of 0.038 mm and a mask of 0.5, and 2 separators.
+        Row("warn high", 2.728, of((*ONE, "films.ptfe.thickness=0.5"))),
         Row("warn unstated", None, one(), settings=("press.minutes_for=[]",)),
         Row("warn stiff", 20000.0, of((*ONE, 'films.tpe.modulus="20 GPa"'))),
     ],
