@@ -112,7 +112,7 @@ def design_keys(document: JsonSchema | None = None) -> list[DesignKey]:
     families: dict[DesignKey, list[str]] = {}
     for name, record in family_tables(document):
         for key, rule in schema_keys(record, document):
-            meaning = " ".join(rule.get("description", "").split())
+            meaning = " ".join(rule.get("description", "").replace("``", "").split())
             default = "required" if "const" in rule else _default(rule)
             allowed = rule["const"] if "const" in rule and key != "family" else _allowed(rule)
             row = DesignKey(key.replace(ROW, ""), meaning, default, allowed)

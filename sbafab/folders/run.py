@@ -20,6 +20,7 @@ from sbafab import plugins
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.cut_settings import TRUE_ARCS, Curves
 from sbafab.design.files import shown
+from sbafab.design.identity import kit_of
 from sbafab.design.records import Design, dotted, resolved
 from sbafab.errors import OccupiedError, OutputError
 from sbafab.folders.artefacts import (
@@ -400,6 +401,9 @@ def _unlike(target: Path, design: Design, mine: Mapping[str, Any]) -> str:
         there = {}
     here = dict(dotted(resolved(design)))
     keys = [key for key in {**there, **here} if there.get(key) != here.get(key)]
+    # The folder has a copy of the kit, under another path.
+    if "kit" in keys and (old.get("kit") or {}).get("sha256") == kit_of(design).sha256:
+        keys.remove("kit")
     if there and keys:
         differences = [
             f"{key} = {_value(there, key)} there, {_value(here, key)} here"

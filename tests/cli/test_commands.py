@@ -107,3 +107,9 @@ def test_templates_schema_and_new(run: Run) -> None:
     assert unsaid == []
     assert run("new 1dof-5mm")[0] == 0
     assert run("check 1dof-5mm.toml")[0] == 0
+
+
+def test_keys_are_explained_without_the_marks_of_source_text(run: Run) -> None:
+    code, out, _ = run("explain seams")
+    assert code == 0
+    assert "by their numbers in layers" in " ".join(out.split())

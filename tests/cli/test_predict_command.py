@@ -11,6 +11,7 @@ import pytest
 
 import sbafab
 from sbafab.cli.predict import print_prediction
+from sbafab.design.kits import write_kit
 from sbafab.folders.manifest import file_hashes
 from sbafab.folders.run import RunRequest, generate
 from sbafab.models.figures import FLAGS, INTERVAL_NOTE, VerdictLine
@@ -92,10 +93,12 @@ def test_twice_the_same_bytes_and_a_later_run_keeps_them(run: Run) -> None:
 
 
 def test_a_prediction_goes_beside_another_designs_folder_and_says_so(run: Run) -> None:
-    wide = sbafab.load("1dof-5mm", "stack.balloons=1", "chamber.diameter=6")
+    # The kit is the same, whatever path it is under there and here.
+    kit = write_kit(Path("lab.toml"))
+    wide = sbafab.load("1dof-5mm", "stack.balloons=1", "chamber.diameter=6", f"kit={kit}")
     folder = generate(RunRequest(wide, Path("out"), ("cut",))).folder
     before = file_hashes(folder)
-    code, out, err = run("predict 1dof-5mm --set stack.balloons=1 --json")
+    code, out, err = run("predict 1dof-5mm --set stack.balloons=1 --set kit=lab.toml --json")
     assert code == 0
     told = " ".join(err.split())
     assert f"{folder} holds layers, sheets" in told
