@@ -65,7 +65,7 @@ def predict(
     modulus_mpa: float | None = None,
     tip_load: float | None = None,
     measured: Sequence[str] = (),
-    serial: str = "",
+    serial: str | None = None,
     lab: str | Path = "lab.sqlite",
     quick: bool = False,
     laminate: Laminate | None = None,

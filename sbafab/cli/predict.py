@@ -57,9 +57,7 @@ FORMULA_OPTIONS = ("flow_ml_min", "volumes_ul", "contact_factor")
     "What was measured on this actuator, such as stroke@10kPa=16.6mm or force@0mm@100kPa=4.8N: "
     "narrows the intervals to those of this one.",
 )
-@opt.option(
-    "--serial NAME", "Actuator whose recorded force and height count as measured.", default=""
-)
+@opt.option("--serial NAME", "Actuator whose recorded force and height count as measured.")
 @opt.option(
     "--lab FILE",
     "File of the lab's records, for --serial.",
