@@ -55,7 +55,9 @@ from sbafab.folders.differences import (
     file_difference,
     findings_of,
     has_lost_properties,
+    is_saved_anew,
     problem,
+    saved_anew,
     unreadable,
     value_difference,
 )
@@ -121,7 +123,8 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
     except DesignError as error:
         return _by_hashes(folder, index, [str(error)])
     order = Order(SCHEMA, built.design.name, (built.build,))
-    findings = _findings(built, [*built.problems, *_remade_problems(folder, index, order)])
+    remade, equal = _remade_problems(folder, index, order)
+    findings = _findings(built, [*file_problems(folder, index, equal), *built.problems, *remade])
     if netlist is None or nets is None:
         return findings
     if built.laminate is None:
@@ -147,13 +150,17 @@ def _check_job(folder: Path, job: JobManifest) -> tuple[Finding, ...]:
             unusable.append(f"the parts were not put together, for {error or type(error).__name__}")
     if unusable:
         return _by_hashes(folder, job, unusable)
-    problems = [*file_problems(folder, job), *_remade_problems(folder, job, order)]
-    findings = [
-        replace(finding, design=each.design.name)
-        for each in built
-        for finding in _findings(each, each.problems)
-        if finding.rule != DESIGNED or finding.verdict == "fail"
-    ]
+    remade, equal = _remade_problems(folder, job, order)
+    problems = [*file_problems(folder, job, equal), *remade]
+    findings = []
+    for entry, each in zip(job.designs, built, strict=True):
+        own = {name.removeprefix(f"{entry.folder}/") for name in equal}
+        of_files = file_problems(folder / entry.folder, each.claims, own)
+        findings += [
+            replace(finding, design=each.design.name)
+            for finding in _findings(each, [*of_files, *each.problems])
+            if finding.rule != DESIGNED or finding.verdict == "fail"
+        ]
     passed = f"{len(job.sheets)} sheets read back", "designs"
     return (*findings, *(order.between or ()), *_of_files(problems, *passed))
 
@@ -177,9 +184,11 @@ class AsBuiltFolder(NamedTuple):
     """The folder of a design read back.
 
     ``build`` is the design with the findings on it, ``expected`` its laminate. ``lost`` are layers
-    that could not be read; ``laminate`` has the layers as cut, None if one is lost.
+    that could not be read; ``laminate`` has the layers as cut, None if one is lost. ``problems``
+    are those of the layers and seams.
     """
 
+    claims: Manifest
     build: Build
     expected: Laminate
     lost: tuple[int, ...]
@@ -192,7 +201,7 @@ class AsBuiltFolder(NamedTuple):
 
 
 def read_folder(folder: Path) -> AsBuiltFolder:
-    """Read the layers of a design's folder, with the problems of its files.
+    """Read the layers and seams of a design's folder.
 
     Raises OutputError for a folder without a sound manifest or without cut files, and DesignError
     if ``design.toml`` is missing or does not make a laminate.
@@ -214,7 +223,7 @@ def read_folder(folder: Path) -> AsBuiltFolder:
         raise DesignError(f"design.toml makes no laminate: {error}") from None
     parts, errors = read_layers(folder, build, expected)
     seams, seam_errors = read_seams(folder, expected.seams, build.settings)
-    problems = [*file_problems(folder, claims), *errors, *seam_errors]
+    problems = [*errors, *seam_errors]
     lost = tuple(layer.index for layer in expected.layers if layer.index not in parts)
     laminate: Laminate | None = None
     if not lost:
@@ -224,7 +233,7 @@ def read_folder(folder: Path) -> AsBuiltFolder:
         except UNMEASURED as error:
             message = f"the layers do not lie over each other as films of one stack ({error})"
             problems.append(problem(INTEGRITY, message))
-    return AsBuiltFolder(build, expected, lost, laminate, tuple(problems))
+    return AsBuiltFolder(claims, build, expected, lost, laminate, tuple(problems))
 
 
 def _findings(built: AsBuiltFolder, problems: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -261,11 +270,13 @@ def _findings_as_cut(rule: Rule, measures: Measures) -> list[Finding]:
 # Files against the hashes of the manifest.
 
 
-def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Finding]:
+def file_problems(
+    folder: Path, claims: Manifest | JobManifest, equal: Collection[str] = ()
+) -> list[Finding]:
     """Return files that are missing, changed or not in the manifest.
 
-    An unlisted file that could be cut by mistake fails; any other is a warning. Raises OutputError
-    if the folder cannot be read.
+    A changed file that is ``equal`` to that of the design is a warning, and so is an unlisted one
+    that could not be cut by mistake. Raises OutputError if the folder cannot be read.
     """
     try:
         hashes = file_hashes(folder)
@@ -273,18 +284,23 @@ def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Finding]
         raise OutputError(f"{folder} cannot be read: {error.strerror or error}") from None
     hashes.pop(MANIFEST, None)
     layers = claims.layers if isinstance(claims, Manifest) else ()
-    layer_of = {layer.file: (number,) for number, layer in enumerate(layers, start=1)}
-    problems = []
+    layer_of = {layer.file: number for number, layer in enumerate(layers, start=1)}
+    problems: list[Finding] = []
+    resaved: dict[str, int | None] = {}
     for path, digest in claims.files.items():
         actual = hashes.get(path)
-        if actual != digest:
+        if actual is not None and actual != digest and path in equal:
+            resaved[path] = layer_of.get(path)
+        elif actual != digest:
             message = (
                 f"{path} is in the manifest and not in the folder"
                 if actual is None
                 else f"{path} was changed: its sha256 is {actual[:12]}..., the manifest's "
                 f"{digest[:12]}..."
             )
-            problems.append(problem(CLAIMS, message, layer_of.get(path, ())))
+            index = layer_of.get(path)
+            problems.append(problem(CLAIMS, message, () if index is None else (index,)))
+    problems += saved_anew(resaved)
     for path in (*hashes, *_links(folder)):
         if path not in claims.files:
             message = f"{path} lies in the folder and is not in the manifest; remove it"
@@ -325,10 +341,15 @@ def _by_hashes(
 # The folder made again, and compared.
 
 
-def _remade_problems(folder: Path, index: Manifest | JobManifest, order: Order) -> list[Finding]:
-    """Return the files of a folder that differ from those made again; layers are read before."""
+def _remade_problems(
+    folder: Path, index: Manifest | JobManifest, order: Order
+) -> tuple[list[Finding], set[str]]:
+    """Return the files of a folder that differ from those made again, and those that were saved
+    anew and are equal; differences of layers are told before.
+    """
     is_of_job = isinstance(index, Manifest) and is_job(folder.absolute().parent)
     problems: list[Finding] = []
+    equal: set[str] = set()
     if is_of_job:
         message = "the film sheets are those of the job, and were not compared; check the folder "
         problems.append(problem(CLAIMS, f"{message}above this one", verdict="warn"))
@@ -337,7 +358,8 @@ def _remade_problems(folder: Path, index: Manifest | JobManifest, order: Order) 
         try:
             _remake(folder, index, order, is_of_job, fresh)
             problems += _foreign_problems(index, file_names(fresh), is_of_job)
-            problems += _compared(folder, fresh, index.files, index.generator, is_of_job)
+            differing, equal = _compared(folder, fresh, index.files, index.generator, is_of_job)
+            problems += differing
             if index.generator == GENERATOR:
                 problems += _prediction_problems(folder, index, order.builds[0], fresh)
         except DESIGN_ERRORS as error:
@@ -349,7 +371,7 @@ def _remade_problems(folder: Path, index: Manifest | JobManifest, order: Order) 
             "and pressed was compared; regenerate the folder"
         )
         problems.append(problem(DESIGNED, message))
-    return problems
+    return problems, equal
 
 
 def _remake(
@@ -410,14 +432,18 @@ def _foreign_problems(
 
 def _compared(
     folder: Path, fresh: Path, listed: Collection[str], generator: str, is_of_job: bool = False
-) -> list[Finding]:
-    """Return the files that differ from those made again; those in ``layers`` were read before."""
+) -> tuple[list[Finding], set[str]]:
+    """Return the files that differ from those made again, and those that were saved anew.
+
+    Differences of the files in ``layers`` were told when they were read.
+    """
     problems: list[Finding] = []
+    equal: set[str] = set()
     bare: list[str] = []
     for name in file_names(fresh):
         path, actual = fresh / name, folder / name
         is_layer = path.parent.name == LAYERS and path.suffix == ".dxf"
-        if is_layer or not _is_compared(name, generator):
+        if not _is_compared(name, generator):
             continue
         rule = DESIGNED
         if name != MANIFEST and (name not in listed or not os.path.lexists(actual)):
@@ -433,15 +459,16 @@ def _compared(
             rule, difference = INTEGRITY, f"{name}: {unsound}"
         else:
             difference = file_difference(actual, path, name)
-            bare += [name] if has_lost_properties(actual) else []
-        if difference:
+            bare += [name] if not is_layer and has_lost_properties(actual) else []
+            equal |= {name} if not difference and is_saved_anew(actual, path) else set()
+        if difference and not is_layer:
             problems.append(problem(rule, f"{difference}; regenerate the folder"))
     if bare:
         message = (
             f"{', '.join(bare)}: no custom properties; save as DXF R2004 or later to keep them"
         )
         problems.append(problem(CLAIMS, message, verdict="warn"))
-    return problems
+    return problems, equal
 
 
 def _is_compared(path: str, generator: str) -> bool:
@@ -508,4 +535,4 @@ def _prediction_problems(
     except (ValueError, LookupError, TypeError, OSError):
         message = "predict.json does not say what was asked for; regenerate the folder"
         return [problem(DESIGNED, message)]
-    return _compared(folder, written, index.files, index.generator)
+    return _compared(folder, written, index.files, index.generator)[0]

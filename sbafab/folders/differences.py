@@ -13,17 +13,18 @@ import math
 import re
 import tomllib
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from io import BytesIO
 from itertools import zip_longest
 from pathlib import Path, PurePosixPath
 from typing import Any
+from xml.etree.ElementTree import canonicalize
 from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.laser_programs import ENDING, PROGRAMS, rdworks_difference
 from sbafab.cutting.verify import TOLERANCE, check_contours, check_sequence
 from sbafab.errors import OutputError
@@ -40,7 +41,7 @@ VISIBLE, VISIBLE_SHARE = 48, 2e-4
 """Visible difference of a pixel, of 255 levels, and permitted share of such pixels."""
 UNREADABLE = (
     *(ValueError, LookupError, ArithmeticError, RecursionError, csv.Error, BadZipFile, OSError),
-    *(NotImplementedError, zlib.error),
+    *(NotImplementedError, SyntaxError, zlib.error),
 )
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
@@ -69,7 +70,7 @@ def findings_of(rule: str, problems: Sequence[Finding], passed: str) -> list[Fin
     """Return the findings of a rule: at most MAX_SHOWN problems in full, or one that passes."""
     of_rule = [each for each in problems if each.rule == rule]
     if not any(each.verdict == "fail" for each in of_rule):
-        of_rule.append(problem(rule, passed, verdict="pass"))
+        of_rule.append(problem(rule, f"otherwise {passed}" if of_rule else passed, verdict="pass"))
     shown, rest = of_rule[:MAX_SHOWN], of_rule[MAX_SHOWN:]
     if rest:
         layers = dict.fromkeys(index for each in rest for index in each.where.layers)
@@ -102,6 +103,47 @@ def sound_digest(path: Path) -> str:
 
 
 # Two files compared.
+
+
+SAVED_ANEW = {
+    ".dxf": "same cuts to 1 um",
+    **dict.fromkeys((".svg", ENDING), "same elements and values"),
+    **dict.fromkeys((".stl", ".glb"), "same surfaces to 1 um"),
+}
+"""Sameness of cut files and meshes of which only the bytes differ, by suffix."""
+
+
+def is_saved_anew(actual: Path, expected: Path) -> bool:
+    """Return True if a file without a ``file_difference`` is a cut file or mesh that another
+    program may save: it has the expected one's contours and strokes, in their order.
+    """
+    if actual.parent.name not in (*CUT_FOLDERS, "mesh") or actual.suffix not in SAVED_ANEW:
+        return False
+    if not _is_cut(actual):
+        return True
+    runs = (_ends(read_profile(path)) for path in (actual, expected))
+    return all(math.dist(p, q) <= 2 * TOLERANCE for p, q in zip(*runs, strict=True))
+
+
+def _ends(drawing: ReadBack) -> list[Point]:
+    """Return two points of every contour and stroke, in the order of the file."""
+    boxes = [contour.bounds for contour in drawing.region.contours]
+    corners = [point for box in boxes for point in (box[:2], box[2:])]
+    return [*corners, *(p for _, edges in drawing.strokes for p in (edges[0].start, edges[-1].end))]
+
+
+def saved_anew(layer_of: Mapping[str, int | None]) -> list[Finding]:
+    """Return warnings of files saved anew, one for each kind; ``layer_of`` gives their layers."""
+    problems = []
+    kinds: dict[str, list[str]] = {}
+    for path in layer_of:
+        kinds.setdefault(SAVED_ANEW[PurePosixPath(path).suffix], []).append(path)
+    for sameness, paths in kinds.items():
+        more = f" and {len(paths) - MAX_SHOWN} more" if len(paths) > MAX_SHOWN else ""
+        message = f"saved anew by another program, {sameness}: {', '.join(paths[:MAX_SHOWN])}{more}"
+        layers = tuple(index for path in paths if (index := layer_of[path]) is not None)
+        problems.append(problem(CLAIMS, message, layers, "warn"))
+    return problems
 
 
 def file_difference(actual: Path, expected: Path, name: str) -> str:
@@ -220,7 +262,7 @@ def _shown(value: object) -> str:
 
 def _text_difference(*paths: Path) -> str:
     """Return the first difference of two texts of XML or HTML, in which comments do not count."""
-    actual, expected = (COMMENT.sub("", _text(path)) for path in paths)
+    actual, expected = map(_markup, paths)
     pictures = [[*map(base64.b64decode, PICTURE.findall(text))] for text in (actual, expected)]
     if len(pictures[0]) != len(pictures[1]):
         return f"it has {len(pictures[0])} pictures, not {len(pictures[1])}"
@@ -229,6 +271,14 @@ def _text_difference(*paths: Path) -> str:
         if difference:
             return f"picture {number}: {difference}"
     return _words_difference(PICTURE.sub("", actual), PICTURE.sub("", expected))
+
+
+def _markup(path: Path) -> str:
+    """Return the text of a page without comments, or of XML in canonical form."""
+    text = _text(path)
+    if path.suffix == ".html":
+        return COMMENT.sub("", text)
+    return canonicalize(text, strip_text=True, rewrite_prefixes=True)
 
 
 def _words_difference(actual: str, expected: str) -> str:
