@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import pypdfium2
 import pytest
 from lxml import html as lxml_html
 from PIL import Image
@@ -96,6 +97,33 @@ def test_the_first_page_has_order_steps_picture_and_tests(template: str, tmp_pat
     for paper in PAPERS:
         assert pages_of(printed(tmp_path, alone, paper)) == 1
         assert pages_of(printed(tmp_path, text, paper)) <= MOST_PAGES[template]
+
+
+@pytest.mark.parametrize(("template", "paper"), [("3dof-15mm", "letter"), ("brace", "A4")])
+def test_no_page_but_the_last_is_less_than_half_full(
+    template: str, paper: str, tmp_path: Path
+) -> None:
+    is_assembly = template == "brace"
+    design = load_assembly(template) if is_assembly else load_design(template)
+    folder = generate(RunRequest(design, tmp_path, ("cut", "press", "preview"))).folder
+    text = (folder / "traveller.html").read_text(encoding="utf-8")
+    *shares, _ = filled(printed(tmp_path, text, paper))
+    assert len(shares) >= 6
+    assert min(shares) >= 0.5
+
+
+def filled(file: Path) -> list[float]:
+    """The share of every page, between its margins of 11 and 14 mm, down to its last ink."""
+    shares = []
+    for page in pypdfium2.PdfDocument(file):
+        height = page.get_height() / 72 * 25.4
+        with page.render(scale=0.5).to_pil().convert("L") as picture:
+            mm = height / picture.height
+            body = picture.crop((0, 0, picture.width, int((height - 14) / mm)))
+        # The box round the dark pixels.
+        _, _, _, low = body.point(lambda grey: 255 * (grey < 200)).getbbox()
+        shares.append((low * mm - 11) / (height - 25))
+    return shares
 
 
 def check_pages(file: Path, pages: int) -> None:
