@@ -106,6 +106,16 @@ def test_bonds_are_measured_on_the_seam_as_it_is_drawn(
     assert (bond.verdict, bond.measured) == ("fail", pytest.approx(0.7, abs=1e-6))
 
 
+def test_a_seam_file_saved_anew_is_a_warning(welded: dict[str, bytes], tmp_path: Path) -> None:
+    folder = laid_out(welded, tmp_path)
+    resave(folder, lambda document: None)
+    assert failures(folder) == {}
+    told = [f.message for f in check_folder(folder) if f.rule == "manifest-claims"]
+    assert told[0] == f"saved anew by another program, same cuts to 1 um: {SEAM_FILE}"
+    resave(folder, lambda document: moved(document, 0.002))
+    assert set(failures(folder)) == {"manifest-claims", "as-designed"}
+
+
 def test_a_path_that_is_moved_or_ends_early_is_found(
     welded: dict[str, bytes], tmp_path: Path
 ) -> None:
