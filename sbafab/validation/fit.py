@@ -32,6 +32,7 @@ from sbafab.validation.evidence import Evidence, MeasuredCurve
 from sbafab.validation.model_values import ModelledActuator, model_values
 from sbafab.validation.posterior import (
     LEAST_ERROR,
+    LONG,
     LOSS,
     NODE_COORDINATES,
     Posterior,
@@ -118,7 +119,7 @@ def fit(name: str, sources: Sequence[Evidence], progress: Progress) -> Calibrati
         )
     curves = sampled_curves(usable, progress)
     progress("posterior", 0, 1)
-    posterior = sampled(curves)
+    posterior = sampled(curves, steps=LONG)
     points = [
         point
         for test, seed, rest in left_out_fits(curves, [each.test for each in curves], progress)

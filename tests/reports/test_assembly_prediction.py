@@ -104,7 +104,7 @@ def test_the_brace_holds_its_lumen_and_lifts_the_marble() -> None:
     [
         (
             "parts.grip.set.chamber={width = 9.5, length = 9.5}",
-            "not touch the wall: 23.76 mm by the lens",
+            "not touch the wall: 23.7",
         ),
         ("deploy.lumen_diameter=15.1", "deflated it is 15.15 mm wide already, in a lumen of 15.1"),
     ],
