@@ -635,8 +635,9 @@ class Uncertainty:
                 )
             by_factors = dict(zip((self.factors, *self.moved), values, strict=True))
             term = TERMS.get(reading.figures[0].quantity, "")
-            value, slopes, _ = self.slopes(group, by_factors.__getitem__, term)
-            rows.append(self.calibration.rates(group, slopes))
+            value, slopes, is_log = self.slopes(group, by_factors.__getitem__, term)
+            logs = slopes if is_log else [slope / value for slope in slopes]
+            rows.append(self.calibration.rates(group, logs))
             missed.append(math.log(reading.measured / value))
             own.append(
                 math.hypot(self.calibration.own_miss(group, self.farther(group)), reading.error)
