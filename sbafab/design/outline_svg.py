@@ -50,8 +50,11 @@ def svg_polylines(path: Path, layer: str | None = None) -> tuple[Iterator[Polyli
 # Numbers, paths and transforms as SVG 2 writes them: the library reads damaged ones in its own way.
 
 
-_SPACE = r"[ \t\r\n]*"
-_BETWEEN = rf"{_SPACE},?{_SPACE}"
+# Numbers and what stands between them are atomic, so that repetitions of them cannot backtrack.
+# Possessive repetitions of groups would say the same, and end in the wrong place before Python
+# 3.11.5 (python/cpython issue 106052).
+_SPACE = r"[ \t\r\n]*+"
+_BETWEEN = rf"(?>{_SPACE},?{_SPACE})"
 
 
 def _row(*kinds: str) -> str:
@@ -59,7 +62,7 @@ def _row(*kinds: str) -> str:
 
 
 def _repeated(*kinds: str) -> str:
-    return rf"{_SPACE}{_row(*kinds)}(?:{_BETWEEN}{_row(*kinds)})*+"
+    return rf"{_SPACE}{_row(*kinds)}(?:{_BETWEEN}{_row(*kinds)})*"
 
 
 _ARC = (*[NUMBER] * 3, "[01]", "[01]", NUMBER, NUMBER)
@@ -73,8 +76,8 @@ _COMMAND = "|".join(
         ("Aa", _ARC),
     )
 )
-_PATH = re.compile(rf"{_SPACE}(?:(?:{_COMMAND}|[Zz]){_SPACE})*+", re.ASCII)
-_POINTS = re.compile(rf"(?:{_repeated(NUMBER, NUMBER)})?+{_SPACE}", re.ASCII)
+_PATH = re.compile(rf"{_SPACE}(?:(?:{_COMMAND}|[Zz]){_SPACE})*", re.ASCII)
+_POINTS = re.compile(rf"(?:{_repeated(NUMBER, NUMBER)})?{_SPACE}", re.ASCII)
 _VIEW = re.compile(rf"{_SPACE}{_row(*[f'({NUMBER})'] * 4)}{_SPACE}", re.ASCII)
 _CALL = "|".join(
     rf"{name}{_SPACE}\({_SPACE}{_row(*[NUMBER] * count)}{_SPACE}\)"
@@ -87,7 +90,7 @@ _CALL = "|".join(
     }.items()
     for count in counts
 )
-_TRANSFORM = re.compile(rf"{_SPACE}(?:(?:{_CALL}){_BETWEEN})*+", re.ASCII)
+_TRANSFORM = re.compile(rf"{_SPACE}(?:(?:{_CALL}){_BETWEEN})*", re.ASCII)
 _UNLIKE = re.compile(r"([CcSs][^A-DF-Za-df-z]*)(?=[Tt])|([QqTt][^A-DF-Za-df-z]*)(?=[Ss])")
 """Curves before smooth ones of the other degree, which begin without a tangent to continue. The
 library would mirror one; a line of zero length between them prevents it."""
