@@ -129,37 +129,30 @@ def left_out_curves(
         usable, _ = usable_curves([source])
         if usable:
             curves = sampled_curves(usable, _print_progress)
-            yield from _left_out_by_test(source, usable, curves, only)
+            yield from _left_out("test", source, usable, curves, only)
 
 
-def _left_out_by_test(
+def _left_out(
+    what: str,
     source: Evidence,
     usable: Sequence[MeasuredCurve],
     curves: Sequence[SampledCurve],
     only: Collection[str] = (),
 ) -> Iterator[LeftOutCurve]:
-    keys = [curve.test for curve in curves]
-    for test, seed, posterior in left_out_fits(curves, keys, _print_progress, only):
+    """Yield curves by fits without their test or their actuator; ``predict`` is asked for the
+    former.
+    """
+    keys = [KEYS[what](curve) for curve in curves]
+    for key, seed, posterior in left_out_fits(curves, keys, _print_progress, only):
         generator = np.random.default_rng(seed)
-        for measured, curve in zip(usable, curves, strict=True):
-            if curve.test == test:
+        for measured, curve, its in zip(usable, curves, keys, strict=True):
+            if its == key:
                 drawn = posterior.predicted(curve, generator)
-                stated = _stated(source, measured, posterior)
-                yield LeftOutCurve(source.id, measured, curve, drawn, stated)
-
-
-def _left_out_by_actuator(
-    source: Evidence, usable: Sequence[MeasuredCurve], curves: Sequence[SampledCurve]
-) -> Iterator[LeftOutCurve]:
-    keys = [KEYS["actuator"](curve) for curve in curves]
-    for name, seed, posterior in left_out_fits(curves, keys, _print_progress):
-        generator = np.random.default_rng(seed)
-        for measured, curve, key in zip(usable, curves, keys, strict=True):
-            if key == name:
-                # By actuators, so that what stands together in a draw is one of these.
-                as_one = curve._replace(test=key)
-                drawn = posterior.predicted(curve, generator)
-                yield LeftOutCurve(source.id, measured, as_one, drawn, [None] * len(measured.y))
+                is_asked = what == "test"
+                none = [None] * len(measured.y)
+                stated = _stated(source, measured, posterior) if is_asked else none
+                # What is left out together stands together in a draw.
+                yield LeftOutCurve(source.id, measured, curve._replace(test=key), drawn, stated)
 
 
 def _print_progress(step: str, done: int, total: int) -> None:
@@ -270,8 +263,8 @@ def main() -> None:
         usable, _ = usable_curves([source])
         if usable:
             curves = sampled_curves(usable, _print_progress)
-            by_test += _left_out_by_test(source, usable, curves)
-            by_actuator += _left_out_by_actuator(source, usable, curves)
+            by_test += _left_out("test", source, usable, curves)
+            by_actuator += _left_out("actuator", source, usable, curves)
             variants += variant_rows(curves)
     coverage = [*coverage_rows("test", by_test), *coverage_rows("actuator", by_actuator)]
     tables = {

@@ -17,6 +17,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, reduce
 from pathlib import Path
+from statistics import NormalDist
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
@@ -403,11 +404,7 @@ class ModelCalibration(Section):
 @cache
 def deviations(share: float) -> float:
     """Return the half width of the middle ``share`` of a normal distribution, in deviations."""
-    low, high = 0.0, 40.0
-    for _ in range(80):
-        middle = (low + high) / 2
-        low, high = (middle, high) if math.erf(middle / math.sqrt(2)) < share else (low, middle)
-    return (low + high) / 2
+    return NormalDist().inv_cdf((1 + share) / 2)
 
 
 @cache

@@ -175,28 +175,26 @@ class Posterior:
         squares = np.exp(2 * self.scales).mean(0)
         return dict(zip(GROUPS, np.sqrt(squares).tolist(), strict=True))
 
-    def logarithms(self, curve: SampledCurve, is_new: bool = False) -> Array:
+    def logarithms(self, curve: SampledCurve) -> Array:
         """Return logarithms of the models' values of a curve (n, set-ups, points); its actuators
-        are taken as new ones if the fit has not seen them, or ``is_new``.
+        are new ones, with one drawn loss, if the fit has not seen them.
         """
         new = dict.fromkeys(curve.actuators, self.new_loss)
-        return curve.logarithms(self.unknowns, new if is_new else {**new, **self.losses})
+        return curve.logarithms(self.unknowns, {**new, **self.losses})
 
-    def predicted(
-        self, curve: SampledCurve, generator: np.random.Generator, is_new: bool = False
-    ) -> Array:
+    def predicted(self, curve: SampledCurve, generator: np.random.Generator) -> Array:
         """Return drawn logarithms of measured values of a curve (n, points)."""
-        values = self.logarithms(curve, is_new)
+        values = self.logarithms(curve)
         count, setups, points = values.shape
         chosen = values[np.arange(count), generator.integers(setups, size=count)]
         missed = discrepancies(np.exp(self.scales[:, curve.group]), points, generator)
         return np.asarray(chosen + missed + curve.errors * generator.standard_normal(missed.shape))
 
-    def log_score(self, curve: SampledCurve, is_new: bool = False) -> float:
+    def log_score(self, curve: SampledCurve) -> float:
         """Return the logarithm of the density that a curve's measured values have by the fit: their
         log score, in units of the logarithms of the values.
         """
-        logs = curve.densities(self.logarithms(curve, is_new), self.scales[:, curve.group])
+        logs = curve.densities(self.logarithms(curve), self.scales[:, curve.group])
         most = float(logs.max())
         return most + math.log(float(np.exp(logs - most).mean()))
 
