@@ -53,9 +53,10 @@ LENGTH = 10.0
 """Model length unit, mm. MuJoCo's film contact keeps films a thousandth of a unit apart and treats
 them as at rest below a twentieth of a unit per second: with cm the gap is 0.01 mm, a quarter of a
 film; with mm the solver needs forty times the iterations."""
-CONTACT_MEMORY = 0.25
-"""MB per triangle that films in contact may take, of what MuJoCo reserves and fills as needed: four
-balloons at 20 kPa in one of three chambers take 0.13. By itself it reserves a twentieth of that."""
+CONTACT_MEMORY = 0.0625
+"""MB per triangle and balloon of a stack that films in contact may take, of what MuJoCo reserves
+and fills as needed: at 20 kPa in one of three chambers four balloons take half of that, and fifteen
+more than 0.25 MB a triangle. By itself it reserves a twentieth."""
 START = "inflated"
 SECTORS = 16
 """Nodes per ring. Eight, as in SOFA's scenes, take a quarter of the time and rise 13 % less."""
@@ -109,7 +110,7 @@ def model_text(
         masses=node_masses(shell, stack.film).tolist(),
         flexes=flexes,
         triangles=len(shell.triangles),
-        memory=math.ceil(CONTACT_MEMORY * len(shell.triangles)),
+        memory=math.ceil(CONTACT_MEMORY * stack.balloons * len(shell.triangles)),
         height=shell.height,
         length=LENGTH,
         dt=DT,
