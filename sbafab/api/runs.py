@@ -22,6 +22,8 @@ from sbafab.folders.run import generate as run
 from sbafab.folders.run import simulate as run_simulator
 from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
 from sbafab.meshing.formats import conforming_endings
+from sbafab.models.balloons import has_balloons
+from sbafab.models.calibration import factors_of
 from sbafab.pressing.cycles import batch_times
 from sbafab.runtime import Progress
 from sbafab.simulators.simulator import CHOICES, NAMES, Result, SimulationRequest

@@ -429,7 +429,7 @@ def simulate(design: Design, as_json: bool, **settings: Any) -> None:
     if as_json:
         show.document({**runs.result_json(result), "folder": str(simulation.folder)})
     else:
-        _print_result(design.name, result, simulation.folder)
+        _print_result(design, result, simulation.folder)
     if simulation.beside:
         print_error(f"{simulation.beside}; the results were put into {simulation.folder}")
     if result is not None and result.stopped is not None:
@@ -446,12 +446,20 @@ def _printed_warnings() -> Iterator[None]:
         yield
 
 
-def _print_result(name: str, result: runs.Result | None, folder: Path) -> None:
+def _print_result(design: Design, result: runs.Result | None, folder: Path) -> None:
     if result is None:
-        show.verdict(f"{name} exported. Written to {folder}", folder)
+        show.verdict(f"{design.name} exported. Written to {folder}", folder)
         return
     width = max(len(label) for label, _, _ in result.rows)
     for label, value, unit in result.rows:
-        click.echo(f"{label:{width}} {value:10.3f} {unit}".rstrip())
+        # Adding 0 makes -0 a plain 0.
+        click.echo(f"{label:{width}} {round(value, 3) + 0:10.3f} {unit}".rstrip())
+    factors = runs.factors_of(design)
+    if factors.calibration and runs.has_balloons(design.form):
+        show.wrapped(
+            "(films as bought, pockets as drawn; predict takes the calibration "
+            f"{factors.calibration}: modulus times {factors.modulus_ratio:.3g}, pocket radius less "
+            f"{factors.pocket_loss:.2g} mm)"
+        )
     outcome = "simulated" if result.stopped is None else "failed: the simulation stopped early"
-    show.verdict(f"{name} {outcome}. Written to {folder}", folder)
+    show.verdict(f"{design.name} {outcome}. Written to {folder}", folder)

@@ -12,7 +12,9 @@ import pytest
 from click.testing import CliRunner
 from filelock import FileLock
 
+import sbafab
 from sbafab.cli import app
+from sbafab.models.calibration import factors_of
 from sbafab.simulators.simulator import NAMES, SimulationRequest, chamber_pressures
 from tests.simulators.conftest import StandIn
 from tests.simulators.test_recorded_runs import SOFA
@@ -173,6 +175,19 @@ def risen(tmp_path: Path, stand_in: StandIn) -> list[str]:
     stand_in("runSofa", f"{SOFA}\nfor t in (0, 0.1): write(t, 1)\n")
     given = ["simulate", "1dof-5mm", "--set", "stack.balloons=1", "--with", "sofa"]
     return [*given, "--seconds", "0.1", "-o", str(tmp_path / "out")]
+
+
+def test_a_result_says_which_films_and_pockets_it_is_of(risen: list[str]) -> None:
+    """Simulators take neither the pressed film's modulus nor the pockets' loss of ``predict``."""
+    factors = factors_of(sbafab.load("1dof-5mm"))
+    words = " ".join(CliRunner().invoke(app, risen).stdout.split())
+    assert "(films as bought, pockets as drawn; predict takes the calibration paper:" in words
+    assert f"modulus times {factors.modulus_ratio:.3g}, pocket radius less" in words
+    own = " ".join(
+        CliRunner().invoke(app, [*risen, "--set", "models.calibration=none"]).stdout.split()
+    )
+    assert "simulated." in own
+    assert "as bought" not in own
 
 
 def test_a_folder_that_another_run_holds_is_asked_for_before_the_run(
