@@ -38,13 +38,16 @@ from sbafab.search.sweep import SweepDocument, SweepRequest, SweptDesigns
 from sbafab.search.sweep import sweep as run_sweep
 from sbafab.search.vary import format_keys, format_value, varied_keys
 
+Limits = Mapping[str, float | str] | Sequence[str]
+"""Limits by quantity, or texts ``QUANTITY=VALUE``."""
+
 
 @command
 def find(
     source: Source,
     *changes: Change,
-    least: Mapping[str, float | str] | None = None,
-    most: Mapping[str, float | str] | None = None,
+    least: Limits = (),
+    most: Limits = (),
     best: str = "mass",
     flow_ml_min: float = 35.0,
     free: str | Sequence[Free | str] | None = None,
@@ -63,12 +66,16 @@ def find(
     the found keys, ``found.intervals`` the 90 % intervals. Raises DesignError for an unknown
     quantity, with the known ones.
     """
-    at_least = [f"{name}={value}" for name, value in (least or {}).items()]
-    at_most = [f"{name}={value}" for name, value in (most or {}).items()]
-    requirements, goal = read_all(at_least, at_most, best, flow_ml_min)
+    requirements, goal = read_all(_texts(least), _texts(most), best, flow_ml_min)
     design = load(source, *changes, **tables)
     keys = None if free is None else free_of(design, free)
     return run_find(FindRequest(design, requirements, goal, keys, tries, sure))
+
+
+def _texts(limits: Limits) -> list[str]:
+    if isinstance(limits, Mapping):
+        return [f"{name}={value}" for name, value in limits.items()]
+    return list(limits)
 
 
 @command
@@ -127,6 +134,8 @@ def sweep(
     dask: str | None = None,
     seconds: float = SweepRequest.seconds,
     all_columns: bool = False,
+    least: Limits = (),
+    most: Limits = (),
     progress: Progress | None = None,
     **tables: Any,
 ) -> SweptDesigns:
@@ -136,7 +145,8 @@ def sweep(
     numpy.linspace(4, 8, 9), "stack.balloons": [3, 6, 9]}`` (lengths in mm), or their range as
     text, ``"4:8:0.5"``; or it holds texts such as ``"chamber.diameter=4:8:0.5"``. ``samples`` and
     the arguments after it are the fields of ``SweepRequest``, with the ``seconds`` s that a design
-    may take; ``progress`` is called with each design; ``tables`` override tables of the design.
+    may take; ``least`` and ``most`` are limits as in ``find``, and a design that misses one fails;
+    ``progress`` is called with each design; ``tables`` override tables of the design.
     ``swept.frame()`` returns the rows. Raises DesignError for an unknown key, and OutputError.
     """
     request = SweepRequest(
@@ -149,5 +159,6 @@ def sweep(
         dask,
         seconds,
         all_columns,
+        read_all(_texts(least), _texts(most))[0],
     )
     return run_sweep(request, Path(out), progress or ignore_progress)

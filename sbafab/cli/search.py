@@ -36,16 +36,20 @@ which round pockets have of the paper's film alone:
 """
 
 
-@click.command(help=HELP.format(quantities=api.quantity_lines()))
-@opt.design_argument(metavar="[DESIGN]", required=False)
-@opt.option(
+LEAST = opt.option(
     "--min least QUANTITY=VALUE...",
     'At least this much, e.g. lumen=3, stroke=25 or "force@12.5mm@50kPa=3".',
 )
-@opt.option(
+MOST = opt.option(
     "--max most QUANTITY=VALUE...",
     "At most this much, e.g. overall_diameter=20, mass=0.5 or time=0.5.",
 )
+
+
+@click.command(help=HELP.format(quantities=api.quantity_lines()))
+@opt.design_argument(metavar="[DESIGN]", required=False)
+@LEAST
+@MOST
 @opt.option(
     "--sure P",
     "Probability with which each requirement on a predicted quantity must hold, e.g. 0.9.",
@@ -282,6 +286,8 @@ def _print_front(result: api.FoundDesign) -> None:
     "swept.",
     required=True,
 )
+@LEAST
+@MOST
 @opt.option(
     "--samples N",
     "Sample N designs by Latin hypercube instead of the full grid; ranges need no step.",
@@ -316,7 +322,8 @@ def sweep(
 
     OUT/<name>-sweep/ receives sweep.csv with a row for
     each design, times.csv, and the page sweep.html. Run the same command again to resume a sweep
-    that was stopped.
+    that was stopped. A design that misses a --min or --max fails; `sbafab find --help` lists the
+    quantities.
     """
     with show.progress(as_json) as progress:
         swept = api.sweep(design, out=out, progress=progress, **settings)
@@ -333,7 +340,8 @@ def sweep(
             "columns: varied, requested and binding; --all-columns writes all without computing "
             "again"
         )
-    words = {"passes": "passed", "fails": "failed"}
+    failed = ", ".join(f"{cause} {number}" for cause, number in swept.failed.items())
+    words = {"passes": "passed", "fails": f"failed ({failed})"}
     counts = [f"{count} {words.get(each, each)}" for each, count in swept.outcomes.items()]
     resumed = swept.designs - swept.measured
     counts[-1] += f"; {resumed} from an earlier run" if resumed else ""

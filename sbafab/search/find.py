@@ -24,7 +24,6 @@ from sbafab.design.files import (
     KIT,
     Change,
     design_path,
-    key_paths,
     kit_names,
     override,
     read_toml,
@@ -45,11 +44,10 @@ from sbafab.rules.finding import Place
 from sbafab.runtime import Progress, ignore_progress
 from sbafab.search.quantities import (
     NAMES,
-    ROUND_A_TUBE,
     Goal,
     RequestedQuantity,
     Requirement,
-    refuse_bend,
+    refuse_absent,
     shown_interval,
     shown_value,
 )
@@ -66,8 +64,6 @@ from sbafab.search.sweep_report import front
 from sbafab.search.vary import format_keys, key_values
 
 LEAST_TRIES = 4
-COUNT = "chamber.count"
-"""Key of the number of chambers side by side."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -255,7 +251,7 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
     free = [key for key in every if not key.asked or key.asked in names]
     keys = [key.key for key in free]
     for quantity in request.quantities:
-        _refuse_unknown(quantity, design, keys)
+        refuse_absent(quantity, design, keys, "--free")
     if request.sure is not None:
         _refuse_unsure(request, request.sure)
     for requirement in request.requirements:
@@ -268,21 +264,6 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
     if not any(key.startswith(OF_FILMS) for key in keys):
         _refuse_unknown_films(request)
     return narrowed
-
-
-def _refuse_unknown(quantity: RequestedQuantity, design: Design, free: Sequence[str]) -> None:
-    """Raises DesignError for an unknown key, with the likely one, and for a quantity that the
-    design's family does not have; also for a bend for which no chamber would stay empty.
-    """
-    name, form = quantity.name, design.form
-    if "." in name and name not in key_paths(type(design)):
-        design.with_({name: 1})
-    if name == "lumen" and form.lumen is None:
-        raise DesignError(f"{design.name} has no lumen; ask for one of a lobed design")
-    if name in ROUND_A_TUBE and form.wrap is None:
-        raise DesignError(f"{design.name} has no {name}; only radial designs do")
-    if name == "bend" and COUNT not in free:
-        refuse_bend(quantity, design, f"; ask for more with --free {COUNT}=LOW:HIGH:STEP")
 
 
 def _refuse_unknown_films(request: FindRequest) -> None:

@@ -16,7 +16,7 @@ from itertools import permutations
 from string import ascii_letters
 from typing import Any, NamedTuple
 
-from sbafab.design.files import hint, shown
+from sbafab.design.files import hint, key_paths, shown
 from sbafab.design.records import Design, Discs, Form, Slots
 from sbafab.design.units import (
     KILOPASCALS,
@@ -129,6 +129,8 @@ OF_MECHANISMS = {
 CALIBRATED = ("height", "stroke", "bend", "force", "lateral_stiffness", "time")
 """Quantities that calibrated models give: of oblong pockets the height alone."""
 USUAL_KPA = 10.0
+COUNT = "chamber.count"
+"""Key of the number of chambers side by side."""
 _CHAMBERS = re.compile(r"\s*([1-9]\d?)\s*chambers?\s*", re.IGNORECASE)
 NAMES = {row.name: row for row in QUANTITIES}
 AT_PRESSURE = tuple(row.name for row in QUANTITIES if "@" in row.written)
@@ -419,7 +421,7 @@ class Goal:
 
 
 def read_all(
-    least: Sequence[str], most: Sequence[str], best: str, flow_ml_min: float = WATER_FLOW
+    least: Sequence[str], most: Sequence[str], best: str = "mass", flow_ml_min: float = WATER_FLOW
 ) -> tuple[tuple[Requirement, ...], Goal]:
     """The requirements of ``QUANTITY=VALUE`` texts, and the goal. Raises DesignError.
 
@@ -515,6 +517,24 @@ def measured(
         return item.value, item
     item = figure(design, laminate, of, at, pressures_kpa, probability)
     return item.value, item
+
+
+def refuse_absent(
+    quantity: RequestedQuantity, design: Design, free: Sequence[str], option: str
+) -> None:
+    """Raises DesignError for an unknown key, with the likely one, and for a quantity that the
+    design's family does not have; also for a bend for which no chamber would stay empty. The
+    ``free`` keys vary by the ``option``.
+    """
+    name, form = quantity.name, design.form
+    if "." in name and name not in key_paths(type(design)):
+        design.with_({name: 1})
+    if name == "lumen" and form.lumen is None:
+        raise DesignError(f"{design.name} has no lumen; ask for one of a lobed design")
+    if name in ROUND_A_TUBE and form.wrap is None:
+        raise DesignError(f"{design.name} has no {name}; only radial designs do")
+    if name == "bend" and COUNT not in free:
+        refuse_bend(quantity, design, f"; ask for more with {option} {COUNT}=LOW:HIGH:STEP")
 
 
 def refuse_bend(quantity: RequestedQuantity, design: Design, more: str = "") -> None:

@@ -8,6 +8,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ from sbafab.markup import data_frame
 from sbafab.models.calibration import factors_of
 from sbafab.models.pneumatics import refuse_pressure, usual_pressures
 from sbafab.runtime import Progress, ignore_progress
+from sbafab.search.quantities import Requirement, refuse_absent, shown_value
 from sbafab.search.sweep_report import (
     CSV,
     JOURNAL,
@@ -38,6 +40,7 @@ from sbafab.search.trials import (
     SweepOutcome,
     SweepRow,
     dask_pool,
+    failure,
     fingerprint,
     local_pool,
     run_jobs,
@@ -58,7 +61,8 @@ class SweepRequest:
 
     ``workers`` processes of this machine (as many as processors by default), or the cluster behind
     ``dask``; each design may take ``seconds``. ``all_columns``: the tables hold every key, rule and
-    figure. ``pressures_kpa`` default to a prediction's.
+    figure. ``pressures_kpa`` default to a prediction's. A design that misses one of the
+    ``requirements`` fails.
     """
 
     design: Design
@@ -70,12 +74,15 @@ class SweepRequest:
     dask: str | None = None
     seconds: float = SECONDS
     all_columns: bool = False
+    requirements: tuple[Requirement, ...] = ()
 
     def __post_init__(self) -> None:
         form = self.design.form
         pressures = self.pressures_kpa or usual_pressures(form)
         refuse_pressure(pressures, form.works_under_vacuum)
         object.__setattr__(self, "pressures_kpa", pressures)
+        for row in self.requirements:
+            refuse_absent(row.quantity, self.design, [key.key for key in self.varied], "--vary")
 
 
 @dataclass(frozen=True)
@@ -93,6 +100,15 @@ class SweptDesigns:
     files: tuple[str, ...]
     table: Table = field(repr=False, compare=False)
     no_longer_asked: int = 0
+
+    @property
+    def failed(self) -> dict[str, int]:
+        """Number of designs by each rule and limit that they fail."""
+        return {
+            cause: len(told)
+            for cause, told in self.table.causes.items()
+            if cause not in self.outcomes
+        }
 
     @property
     def rows(self) -> list[dict[str, Any]]:
@@ -114,6 +130,8 @@ class SweepDocument(Document, schema="sbafab/sweep@1"):
     no_longer_asked: int
     outcomes: dict[str, int]
     """designs by outcome"""
+    failed: dict[str, int]
+    """designs by each rule and limit that they fail"""
     files: list[str]
     """files in the folder"""
 
@@ -151,10 +169,14 @@ def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress
         progress("writing tables", 0, 1)
         is_calibrated = bool(factors_of(request.design).calibration)
         settings = (values, request.pressures_kpa, request.all_columns, is_calibrated)
-        table = Table(lambda: journal.rows(keys), *settings)
+        judge = partial(_judged, requirements=request.requirements)
+        limits = {row.quantity.label: row for row in request.requirements}
+        table = Table(lambda: map(judge, journal.rows(keys)), *settings, tuple(limits))
         gone = stale_designs(folder / CSV, table)
         files = (*write_tables(table, folder), PAGE, JOURNAL)
-        replace_text(folder / PAGE, sweep_html(request.design, request.varied, table))
+        limit_lines = [f"{row.quantity.label}: {row.bound}" for row in request.requirements]
+        page = sweep_html(request.design, request.varied, table, limit_lines)
+        replace_text(folder / PAGE, page)
     outcomes = dict(table.outcomes)
     return SweptDesigns(folder, len(values), len(missing), outcomes, files, table, gone)
 
@@ -170,6 +192,7 @@ def _measure(
         "tables": plain_tables(request.design),
         "folder": str(request.design.folder.absolute()),
         "pressures": list(request.pressures_kpa),
+        "quantities": _labels(request),
     }
     pool = local_pool(request.workers) if request.dask is None else dask_pool(request.dask)
     jobs = ((key, {**base, "values": dict(values)}) for key, values in missing.items())
@@ -183,9 +206,37 @@ def _measure(
             progress(MEASURED, done, len(missing))
 
 
+def _labels(request: SweepRequest) -> list[str]:
+    """The labels of the quantities that have limits."""
+    return list(dict.fromkeys(row.quantity.label for row in request.requirements))
+
+
+def _judged(row: SweepRow, requirements: Sequence[Requirement]) -> SweepRow:
+    """Return the row with each quantity that has limits as a rule, which fails if one is missed."""
+    if "quantities" not in row:
+        return row
+    rules, failed = dict(row["rules"]), dict(row.get("failed", {}))
+    for each in requirements:
+        label, limit = each.quantity.label, each.limit
+        value, _, problem = row["quantities"][label]
+        is_met = value is not None and each.holds(value)
+        margin = None
+        if value is not None:
+            margin = round(value - limit if each.at_least else limit - value, 6)
+        cells = ["pass" if is_met else "fail", margin, value, limit, each.quantity.unit]
+        # Of a lower and an upper limit the one that is missed, or nearer.
+        both = rules.get(label, cells), cells
+        rules[label] = min(both, key=lambda cells: (cells[0] != "fail", cells[1] or 0.0))
+        if not is_met:
+            failed[label] = problem or f"{shown_value(each.quantity, value)}, not {each.bound}"
+    is_failure = row["outcome"] in ("passes", "fails") and failed
+    return {**row, "rules": rules, **(failure(failed) if is_failure else {})}
+
+
 def _keys(request: SweepRequest, values: Sequence[Values]) -> list[str]:
     """A hash of each design and of the request, for this program version."""
     question = [fingerprint(), design_sha256(request.design), list(request.pressures_kpa)]
+    question += [_labels(request)] if request.requirements else []
     return [
         hashlib.sha256(json.dumps([*question, _contents(design_values)]).encode()).hexdigest()
         for design_values in values

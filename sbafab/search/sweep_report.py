@@ -74,7 +74,11 @@ class Table:
         pressures_kpa: Sequence[float] = (),
         is_whole: bool = False,
         is_calibrated: bool = False,
+        limited: Sequence[str] = (),
     ) -> None:
+        self.limited = limited
+        """Labels of the quantities that have limits; they stand among the rules."""
+        self.limited_columns: dict[str, None] = {}
         self.rows = rows
         self.values = values
         self.pressures_kpa = pressures_kpa
@@ -104,6 +108,8 @@ class Table:
                 told = f"no. {number}: {cause}: {message}"
                 self.causes.setdefault(cause, []).append(told)
             self.figures |= {_heading(key): FigureKey.read(key) for key in row.get("figures", ())}
+            columns = [cells[1] for cells in row.get("quantities", {}).values()]
+            self.limited_columns |= dict.fromkeys(columns)
             for name, (verdict, margin, _, limit, _) in row.get("rules", {}).items():
                 is_tight = margin is not None and limit and abs(margin) < LITTLE * abs(limit)
                 if verdict != "pass" or is_tight:
@@ -116,7 +122,7 @@ class Table:
         rules = row.get("rules", {})
         by_rule = {
             f"{name}.{part}": cell
-            for name in rule_names()
+            for name in (*rule_names(), *self.limited)
             for part, cell in zip(PARTS, rules.get(name, ()), strict=False)
         }
         figures = dict(zip(YIELD, row.get("yield", ()), strict=False))
@@ -131,11 +137,16 @@ class Table:
         moved = [(of, Conditions(kpa=kpa)) for kpa in self.pressures_kpa for of in MOVED]
         leading = (self.first(*sought) for sought in (*((of, ANYWHERE) for of in FIRST), *moved))
         binding = (
-            f"{name}.{part}" for name in rule_names() if name in self._binding for part in PARTS[:2]
+            f"{name}.{part}"
+            for name in (*rule_names(), *self.limited)
+            if name in {*self._binding, *self.limited}
+            for part in PARTS[:2]
         )
         varied = (name for values in self.values for name in values)
         every = self.columns if self.is_whole else ()
-        names = dict.fromkeys([*HEAD, *varied, *leading, *YIELD, *binding, *every])
+        names = dict.fromkeys(
+            [*HEAD, *varied, *leading, *self.limited_columns, *YIELD, *binding, *every]
+        )
         return [name for name in names if name in self.columns]
 
     def first(self, quantity: Quantity, at: Conditions = ANYWHERE) -> str:
@@ -216,7 +227,7 @@ def stale_designs(path: Path, table: Table) -> int:
 
 OUTCOMES: Mapping[SweepOutcome, tuple[str, str]] = {
     "passes": ("#009e73", "pass every rule"),
-    "fails": ("#d55e00", "fail a rule"),
+    "fails": ("#d55e00", "fail a rule or limit"),
     "refused": ("#999999", "cannot be made"),
     "crashed": ("#000000", "crashed"),
     "too long": ("#cc79a7", "took too long"),
@@ -360,8 +371,10 @@ def page_html(
     return template.render(title=title, lines=lines, sections=sections, footer=footer, tiles=tiles)
 
 
-def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
-    """Return the whole page of a sweep."""
+def sweep_html(
+    design: Design, varied: Sequence[Varied], table: Table, limits: Iterable[str] = ()
+) -> str:
+    """Return the whole page of a sweep, whose ``limits`` are told at its head."""
     keys = [swept.key for swept in varied]
     costs, gains = _objectives(table)
     names = ["outcome", *keys, *costs, *gains]
@@ -386,7 +399,7 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
         f"Design {design_sha256(design)[:12]}, {GENERATOR}. Values: sweep.csv; all of them: sbafab "
         "sweep --all-columns. Predictions are models, each with its validity: sbafab predict."
     )
-    lines = [f"{swept.key} {_values_text(swept)}" for swept in varied]
+    lines = [*(f"{swept.key} {_values_text(swept)}" for swept in varied), *limits]
     tiles = [
         (colour, counts[outcome], words)
         for outcome, (colour, words) in OUTCOMES.items()

@@ -28,7 +28,7 @@ from sbafab.actuators import records
 from sbafab.design.files import checked as checked_record
 from sbafab.design.identity import design_sha256
 from sbafab.errors import DesignError, OutputError, SbafabError
-from sbafab.folders.build import make_build, refuse_undoable
+from sbafab.folders.build import Build, make_build, refuse_undoable
 from sbafab.models.calibration import factors_of
 from sbafab.models.figures import PredictionRequest
 from sbafab.models.prediction import predict
@@ -36,6 +36,8 @@ from sbafab.plugins import FAMILIES, RULES, installed
 from sbafab.rules.deck import AT_MOST
 from sbafab.rules.finding import Finding, Verdict
 from sbafab.runtime import prepare, processors
+from sbafab.search.quantities import RequestedQuantity, read_quantity
+from sbafab.search.quantities import measured as measured_quantity
 from sbafab.search.vary import key_values
 
 SweepOutcome = Literal["passes", "fails", "refused", "crashed", "too long"]
@@ -44,16 +46,22 @@ SweepOutcome = Literal["passes", "fails", "refused", "crashed", "too long"]
 SweepRow = dict[str, Any]
 """The measurements of one design, as JSON values. ``outcome`` and ``reason`` are always present;
 ``sha256``, ``keys``, ``rules``, ``yield`` (share of good builds and the ends of its interval),
-``figures`` by their ``FigureKey`` if the design could be measured so far, and the messages of the
-rules that ``failed``."""
+``figures`` by their ``FigureKey`` if the design could be measured so far, the ``quantities`` that
+have limits (value, column, and the reason if there is no value), and the messages of the rules that
+``failed``."""
 
 
 def measured(
-    tables: Mapping[str, Any], folder: str, values: Mapping[str, Any], pressures: Sequence[float]
+    tables: Mapping[str, Any],
+    folder: str,
+    values: Mapping[str, Any],
+    pressures: Sequence[float],
+    quantities: Sequence[str] = (),
 ) -> SweepRow:
     """Return the row of the design in ``tables`` with ``values`` set; never raises a SbafabError.
 
-    Relative paths start at ``folder``; ``pressures``, kPa, are for forces and strokes.
+    Relative paths start at ``folder``; ``pressures``, kPa, are for forces and strokes;
+    ``quantities`` are labels of those that have limits.
     """
     row: SweepRow = {"outcome": "refused", "reason": ""}
     families = records()
@@ -73,14 +81,38 @@ def measured(
         request = PredictionRequest(tuple(pressures), calibration=factors_of(design))
         figures = predict(design, request, made_build.laminate, curves=False).figures
         row["figures"] = {str(figure.key): figure.as_dict()["value"] for figure in figures}
+        _add_quantities(row, [read_quantity(text) for text in quantities], made_build)
         failed = {name: rule.message for name, rule in worst.items() if rule.verdict == "fail"}
         if failed:
-            reason = " | ".join(f"{name}: {message}" for name, message in failed.items())
-            return row | {"outcome": "fails", "failed": failed, "reason": reason}
+            return row | failure(failed)
         refuse_undoable([made_build])
         return row | {"outcome": "passes"}
     except SbafabError as error:
         return row | {"reason": _one_line(error)}
+
+
+def failure(messages: Mapping[str, str]) -> SweepRow:
+    """Return the outcome of a design that fails, of the message of each rule and limit."""
+    reason = " | ".join(f"{name}: {message}" for name, message in messages.items())
+    return {"outcome": "fails", "failed": dict(messages), "reason": reason}
+
+
+def _add_quantities(row: SweepRow, quantities: Sequence[RequestedQuantity], of: Build) -> None:
+    """Add quantities to a row, and figures of theirs that it has not."""
+    good = row["yield"][0] if row["yield"] else None
+    kpa = [quantity.kpa for quantity in quantities if quantity.kpa is not None]
+    row["quantities"] = {}
+    for each in quantities:
+        column = each.key or each.name
+        try:
+            value, figure = measured_quantity(each, of.design, of.laminate, good, kpa)
+        except DesignError as error:
+            row["quantities"][each.label] = [None, "", _one_line(error)]
+            continue
+        if figure is not None:
+            column = figure.key.heading
+            row["figures"].setdefault(str(figure.key), figure.as_dict()["value"])
+        row["quantities"][each.label] = [value, column, ""]
 
 
 def _one_line(error: Exception) -> str:

@@ -14,7 +14,7 @@ from scipy.stats import binomtest
 
 import sbafab
 from sbafab.design.identity import design_sha256
-from sbafab.errors import OutputError
+from sbafab.errors import DesignError, OutputError
 from sbafab.models.quantity import Conditions, FigureKey, ModelId, Quantity
 from sbafab.search import sweep as module
 from sbafab.search.sweep import SweepDocument, SweptDesigns
@@ -24,6 +24,8 @@ from tests.site.formats import hold
 
 VARY = ("chamber.diameter=2,5", "bond.width=0.7,0.75")
 QUICK: dict[str, Any] = {"rules": {"yield_builds": 100}, "pressures_kpa": (10.0,)}
+
+FIXED = "bond.width=0.75:0.76:0.01"
 
 
 def _swept(out: Path, **more: Any) -> SweptDesigns:
@@ -164,6 +166,50 @@ def test_a_sweep_of_arrays_is_that_of_texts_and_has_its_table_as_rows(
     for name in ("mass [g]", "bond-width.margin"):
         written = [float(row[name] or "nan") for row in _rows(swept)]
         assert table[name].tolist() == pytest.approx(written, nan_ok=True)
+
+
+def test_rows_that_miss_a_limit_fail_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The paper's pockets of 5 mm burst at 367 kPa (Sec. 4), others in proportion to d."""
+    monkeypatch.setattr(module, "run_jobs", _here)
+    limits: dict[str, Any] = {
+        "least": {"burst": 300, "force@1mm@320kPa": "1 N", "stack.balloons": 6},
+        "most": {"stroke@12kPa": 9, "burst": "0.35 MPa"},
+    }
+    vary = {"chamber.diameter": [5, 5.5, 6]}
+    swept = sbafab.sweep("1dof-5mm", vary=vary, out=tmp_path, **limits, **QUICK)
+    paper, middle, wide = swept.rows
+    assert [row["outcome"] for row in swept.rows] == ["fails", "passes", "fails"]
+    assert (paper["burst.verdict"], paper["burst.margin"]) == ("fail", pytest.approx(-17, abs=0.1))
+    assert paper["reason"] == "burst: 367 kPa, not at most 350 kPa"
+    assert middle["burst.margin"] == pytest.approx(350 - 367 * 5 / 5.5, abs=0.1)
+    assert wide["burst.margin"] == pytest.approx(367 * 5 / 6 - 300, abs=0.1)
+    assert swept.failed == {"burst": 1, "force@1mm@320kPa": 1, "stroke@12kPa": 1}
+    for row in swept.rows:
+        changes = {"chamber.diameter": row["chamber.diameter"], "rules.yield_builds": 100}
+        said = sbafab.predict("1dof-5mm", changes, pressures_kpa=[12.0])
+        stroke = row["free stroke at 12 kPa [mm]"]
+        assert stroke == pytest.approx(said.value("free_stroke", kpa=12), rel=1e-4)
+        assert row["stroke@12kPa.margin"] == pytest.approx(9 - stroke, abs=1e-5)
+        assert row["stroke@12kPa.verdict"] == ("pass" if stroke <= 9 else "fail")
+    # Past its burst a force is not known, in the words of ``find``.
+    forces = [name for name in paper if name.startswith("blocked force at 320 kPa")]
+    assert [wide[name] for name in forces] == [None]
+    assert wide["force@1mm@320kPa.verdict"] == "fail"
+    with pytest.raises(DesignError) as refused:
+        sbafab.find("1dof-5mm", {"chamber.diameter": 6}, least=limits["least"], free=FIXED)
+    (told,) = re.findall("320 kPa is past [^(]*[^( ]", str(refused.value))
+    assert f"force@1mm@320kPa: {told}" in wide["reason"]
+    page = (swept.folder / "sweep.html").read_text()
+    assert "burst: at least 300 kPa" in page
+    assert "<td>stroke@12kPa</td><td>1</td>" in page
+    hold("sweep", SweepDocument.of(swept))
+    # Another limit of the same quantities measures nothing anew.
+    again = {"least": limits["least"] | {"burst": 100}, "most": limits["most"]}
+    assert sbafab.sweep("1dof-5mm", vary=vary, out=tmp_path, **again, **QUICK).measured == 0
+    with pytest.raises(DesignError, match="1dof-5mm has no lumen"):
+        sbafab.sweep("1dof-5mm", vary=vary, out=tmp_path, least=["lumen=3"])
 
 
 def test_tables_of_an_earlier_sweep_are_not_replaced_in_silence(
