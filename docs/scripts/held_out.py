@@ -19,7 +19,7 @@ from docs.scripts.measured import Record, keep, texts, versions
 from docs.scripts.tables import Table
 from sbafab.models.calibration import BENT, FIELDS, GROUPS
 from sbafab.validation.comparison import curve_intervals, uncertainty_for
-from sbafab.validation.evidence import Evidence, MeasuredCurve, shipped_evidence
+from sbafab.validation.evidence import Evidence, MeasuredCurve, load_evidence
 from sbafab.validation.fit import (
     as_calibration,
     film_of,
@@ -255,7 +255,7 @@ def source_rows(sources: Sequence[Evidence], curves: Sequence[LeftOutCurve]) -> 
 
 def main() -> None:
     """Predict all curves and keep the record."""
-    sources = shipped_evidence()
+    sources = [load_evidence("paper")]
     by_test: list[LeftOutCurve] = []
     by_actuator: list[LeftOutCurve] = []
     variants: list[list[str]] = []

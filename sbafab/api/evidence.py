@@ -7,8 +7,8 @@ from sbafab.design.toml_table import NAME_PATTERN
 from sbafab.folders.swap import replace_text
 from sbafab.lab.evidence import load_source
 from sbafab.models.calibration import NONE, UNKNOWNS, load_calibration, shipped_names
-from sbafab.validation.comparison import ComparisonDocument, compare, table_lines
-from sbafab.validation.evidence import shipped_evidence
+from sbafab.validation.comparison import ComparedCurve, ComparisonDocument, compare
+from sbafab.validation.evidence import AXES, PAPER, QUANTITIES
 from sbafab.validation.fit import CalibrationFit, HeldOutPoint, calibration_text, fit
-from sbafab.validation.paper_table import PAPER, TITLE, PaperTable
+from sbafab.validation.paper_table import TITLE, PaperTable
 from sbafab.validation.paper_table import as_json as table_json

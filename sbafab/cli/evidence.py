@@ -16,7 +16,6 @@ from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
 
 FOLDER = "reproduction"
-ALL = "all"
 
 
 @click.command()
@@ -35,9 +34,9 @@ def reproduce(source: str | None, calibration: str | None, out: Path, as_json: b
     each predicted figure of the paper, with its error bars. All values stand beside the models of
     films as drawn and bought, and those that were calibrated on also beside the calibrated models.
 
-    SOURCE is evidence that ships (paper, pneudots, ...), "all" of it, a file of your own (.toml or
-    .csv), or the lab's build records (.sqlite): its curves are printed beside the models, and
-    nothing is written. Ranges of model and 90 % interval span what the source leaves open.
+    SOURCE is the evidence that ships (paper), a file of your own (.toml or .csv), or the lab's
+    build records (.sqlite): its curves are printed beside the models, and nothing is written.
+    Ranges of model and 90 % interval span what the source leaves open.
     """
     if source is not None:
         _print_comparison(source, calibration or api.PAPER, as_json)
@@ -55,8 +54,7 @@ def reproduce(source: str | None, calibration: str | None, out: Path, as_json: b
             predicted = row.predicted_text or "-"
             click.echo(f"  {row.figure:<58}{row.measured_text:>20}{predicted:>16}  {row.model}")
     click.echo(f"\n{api.TITLE}")
-    for line in api.table_lines(table.curves):
-        click.echo(f"  {line}")
+    _print_curves(table.curves)
     count = sum(row.predicted is not None for row in table.rows)
     show.verdict(
         f"\nPaper reproduced: {count} of {len(table.rows)} values predicted; {table.summary}. "
@@ -67,28 +65,44 @@ def reproduce(source: str | None, calibration: str | None, out: Path, as_json: b
 
 def _print_comparison(source: str, name: str, as_json: bool) -> None:
     calibration = api.load_calibration(name, key="--calibration")
-    evidences = api.shipped_evidence() if source == ALL else (api.load_source(source),)
-    curves = [curve for evidence in evidences for curve in api.compare(evidence, calibration)]
+    evidence = api.load_source(source)
+    curves = api.compare(evidence, calibration)
     if as_json:
         show.document(
-            api.ComparisonDocument.of(None, calibration=name, sources=evidences, curves=curves)
+            api.ComparisonDocument.of(None, calibration=name, sources=[evidence], curves=curves)
         )
         return
-    for evidence in evidences:
-        click.echo(evidence.citation + (f", doi:{evidence.doi}" if evidence.doi else ""))
-        for line in api.table_lines([curve for curve in curves if curve.source == evidence.id]):
-            click.echo(line)
-        for sentence in evidence.missing:
-            click.echo(f"Not had: {sentence}")
-        click.echo()
+    click.echo(evidence.citation + (f", doi:{evidence.doi}" if evidence.doi else ""))
+    _print_curves(curves)
+    for sentence in evidence.missing:
+        show.wrapped(f"Not had: {sentence}")
     points = [point for curve in curves for point in curve.points]
     predicted = sum(point.model is not None for point in points)
     bounded = [point for point in points if point.within is not None]
     inside = sum(point.within is True for point in bounded)
     show.verdict(
-        f"{source} compared: {predicted} of {len(points)} values in {len(curves)} curves predicted"
-        + (f", {inside} of {len(bounded)} in their 90 % intervals" if bounded else "")
+        f"\n{source} compared: {predicted} of {len(points)} values in {len(curves)} curves "
+        "predicted" + (f", {inside} of {len(bounded)} in their 90 % intervals" if bounded else "")
     )
+
+
+def _print_curves(curves: Sequence[api.ComparedCurve]) -> None:
+    """Print a table of each curve, and below it what was assumed and why there is no model."""
+    for curve in curves:
+        axis = api.AXES[curve.x_name]
+        rows = [
+            ("" if point.x is None else f"{point.x:g} {axis}".rstrip(), *point.texts(curve.unit))
+            for point in curve.points
+        ]
+        names = (curve.x_name, "measured", "model", "deviation", "90 % interval", "inside")
+        title = f"\n{curve.curve}: {api.QUANTITIES[curve.quantity].title}, {curve.place}"
+        show.table(title, names, rows)
+        if curve.no_model:
+            show.wrapped(f"{curve.no_model[:1].upper()}{curve.no_model[1:]}.")
+        if curve.assumptions:
+            show.wrapped(f"Not stated, so assumed: {'; '.join(curve.assumptions)}.")
+        if not curve.comparable:
+            show.wrapped(f"Not comparable: {curve.reason}")
 
 
 # Fits.
@@ -120,7 +134,7 @@ class CalibrateDocument(Document, schema="sbafab/calibrate@1"):
 def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) -> None:
     """Fit the models to measurements.
 
-    EVIDENCE is what reproduce takes: evidence that ships (paper), a file of your own (.toml or
+    EVIDENCE is what reproduce takes: the evidence that ships (paper), a file of your own (.toml or
     .csv), or build records (.sqlite); several are fitted together. By default it is the paper's.
     The fit gives modulus ratio, pocket loss, press factor and delays with their uncertainty, and
     what the models miss beyond that. Each test is then predicted from a fit without it. A design

@@ -113,7 +113,6 @@ FORMATS: Mapping[str, Format] = {
     "comparison": Format(
         "validation.comparison:ComparisonDocument", "what `reproduce SOURCE --json` prints"
     ),
-    "balloon-map": Format("models.map_files:MapDocument", "what `map --to FILE.json` writes"),
     "inspection": Format(
         "lab.inspection:InspectionDocument", "what `inspect` writes, and prints with `--json`"
     ),

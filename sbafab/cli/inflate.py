@@ -24,14 +24,13 @@ MODEL_PRESSURE = 10.0
 @opt.set_option
 @opt.option(
     "--to FILE",
-    "Write FILE.csv, FILE.json, FILE.py, FILE.xml (MuJoCo) or FILE.urdf.  [default: CSV on "
-    "standard output]",
+    "Write FILE.csv, FILE.py or FILE.xml (MuJoCo).  [default: CSV on standard output]",
     opt.file_path(dir_okay=False),
 )
 @opt.option("--pressure P", "Highest pressure of the map.", opt.PRESSURE, default="110 kPa")
 @opt.option(
     "--points N",
-    "Number of pressures, and of heights, in CSV and JSON.",
+    "Number of pressures, and of heights, in CSV.",
     click.IntRange(2, 1000),
     default=31,
 )
@@ -53,7 +52,7 @@ def map_(
     """Map force and volume of the balloons.
 
     The map covers all pressures and heights, for use in other programs. FILE.xml is a MuJoCo model
-    of the stack about its pose at the given pressures, FILE.urdf its kinematic chain.
+    of the stack about its pose at the given pressures.
     """
     form = "csv" if to is None else to.suffix.removeprefix(".")
     formats = (*api.FORMATS, MUJOCO)

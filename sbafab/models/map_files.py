@@ -1,20 +1,17 @@
-"""The balloons of a design as files for other programs: CSV, JSON, and Python without dependencies
-that takes numpy arrays too.
+"""The balloons of a design as files for other programs: CSV, and Python without dependencies that
+takes numpy arrays too.
 
-Tables cover only where the map holds, by a balloon computed at each place: CSV has no row
-elsewhere, JSON null.
+CSV has rows only where the map holds, by a balloon computed at each place.
 Pressures kPa, heights mm (that a balloon has risen by), forces mN, volumes ul, potentials uJ.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sbafab.documents import Document, PlainNumber, Short, attribute
 from sbafab.models.balloon_map import (
     DEGREE,
     HEIGHT_SPANS,
@@ -23,117 +20,30 @@ from sbafab.models.balloon_map import (
     holds_at,
     map_range,
 )
-from sbafab.models.joint_chain import urdf_text
 from sbafab.spreadsheet import csv_text
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from sbafab.models.balloon_map import BalloonMap
-    from sbafab.models.film_elements import Array
     from sbafab.models.stack import Stack
 
-POINTS = 31
 COLUMNS = ("balloon", "pressure_kpa", "height_mm", "force_mn", "volume_ul", "potential_uj")
-FORMATS = ("csv", "json", "py", "urdf")
+FORMATS = ("csv", "py")
 
 
-def map_text(name: str, stack: Stack, form: str, points: int = POINTS) -> str:
-    """Return the text of a file of one of FORMATS."""
+def map_text(name: str, stack: Stack, form: str, points: int) -> str:
+    """Return the text of a file of one of FORMATS; CSV with so many pressures, closer together
+    where they are low, and heights.
+    """
     if form == "py":
         return _python(name, stack)
-    if form == "urdf":
-        return urdf_text(name, stack)
-    if form == "json":
-        return json.dumps(_record(name, stack, points), indent=1) + "\n"
-    return _csv(stack, points)
-
-
-def _tables(balloon: BalloonMap, points: int) -> tuple[Array, NDArray[np.bool_]]:
-    """Return pressures, closer together where they are low, heights, forces, volumes and
-    potentials, (5, pressures, heights), and where the map holds.
-    """
-    even = np.linspace(0.0, 1.0, points)
-    p, h = np.meshgrid(balloon.most_pressure * even**2, balloon.most_height * even, indexing="ij")
-    values = balloon.force(p, h), balloon.volume(p, h), balloon.potential(p, h)
-    return np.stack([p, h, *values]), holds_at(balloon, p.ravel(), h.ravel()).reshape(p.shape)
-
-
-def _csv(stack: Stack, points: int) -> str:
     rows: list[Sequence[str]] = [COLUMNS]
-    for number, balloon in enumerate(stack.maps, start=1):
-        columns, holds = _tables(balloon, points)
-        for row in columns[:, holds].T.tolist():
+    even = np.linspace(0.0, 1.0, points)
+    for number, of in enumerate(stack.maps, start=1):
+        grid = np.meshgrid(of.most_pressure * even**2, of.most_height * even, indexing="ij")
+        p, h = (axis.ravel() for axis in grid)
+        columns = np.stack([p, h, of.force(p, h), of.volume(p, h), of.potential(p, h)])
+        for row in columns[:, holds_at(of, p, h)].T.tolist():
             rows.append([str(number), *(f"{value:.7g}" for value in row)])
     return csv_text(rows)
-
-
-class BalloonSizes(Document):
-    """Sizes of a balloon, and its film."""
-
-    pocket_radius_mm: PlainNumber = attribute("balloon.pocket")
-    neck_radius_mm: PlainNumber = attribute("balloon.neck")
-    bore_radius_mm: PlainNumber = attribute("balloon.bore")
-    film_mm: PlainNumber = attribute("balloon.thickness")
-    modulus_kpa: PlainNumber = attribute("balloon.modulus")
-    poisson: PlainNumber = attribute("balloon.poisson")
-
-
-MapGrid = list[list[Short | None]]
-
-
-class MappedBalloon(BalloonSizes):
-    """A balloon over pressures and heights: rows of the tables are by pressure, columns by height;
-    null where the map does not hold.
-    """
-
-    pressure: list[Short]
-    height: list[Short]
-    force: MapGrid
-    volume: MapGrid
-    potential: MapGrid
-
-
-class MapDocument(Document, schema="sbafab/balloon-map@1"):
-    """The balloons of a design."""
-
-    design: str
-    units: dict[str, str]
-    levels: list[int]
-    """number of the balloon at each level, from 1"""
-    flat_level_mm: Short = attribute("pitch")
-    chamber_axes_mm: list[list[Short]]
-    balloons: list[MappedBalloon]
-
-
-def _record(name: str, stack: Stack, points: int) -> dict[str, Any]:
-    return MapDocument.of(
-        stack,
-        design=name,
-        units={"pressure": "kPa", "height": "mm", "force": "mN", "volume": "ul"},
-        levels=[int(kind) + 1 for kind in stack.levels],
-        chamber_axes_mm=stack.axes.tolist(),
-        balloons=[_balloon(balloon, points) for balloon in stack.maps],
-    )
-
-
-def _balloon(balloon: BalloonMap, points: int) -> MappedBalloon:
-    (p, h, *values), holds = _tables(balloon, points)
-    force, volume, potential = (
-        [
-            [x if here else None for x, here in zip(*row, strict=True)]
-            for row in zip(each.tolist(), holds.tolist(), strict=True)
-        ]
-        for each in values
-    )
-    return MappedBalloon.read(
-        balloon,
-        pressure=p[:, 0].tolist(),
-        height=h[0].tolist(),
-        force=force,
-        volume=volume,
-        potential=potential,
-    )
 
 
 def _short(value: float) -> float:
@@ -243,17 +153,22 @@ def area(p, h, balloon=0):
 
 def _python(name: str, stack: Stack) -> str:
     balloons = []
-    for balloon in stack.maps:
-        covered = map_range(balloon)
+    for each in stack.maps:
+        of, covered = each.balloon, map_range(each)
         within = [["-+"[cell] for cell in row] for row in covered.within.tolist()]
-        sizes = ("most_pressure", "most_height", "scale_pressure")
+        coefficients = each.coefficients.tolist()
         balloons.append(
             {
-                **BalloonSizes.of(balloon),
-                **{size: getattr(balloon, size) for size in sizes},
-                "coefficients": [
-                    [float(f"{c:.10g}") for c in row] for row in balloon.coefficients.tolist()
-                ],
+                "pocket_radius_mm": of.pocket,
+                "neck_radius_mm": of.neck,
+                "bore_radius_mm": of.bore,
+                "film_mm": of.thickness,
+                "modulus_kpa": of.modulus,
+                "poisson": of.poisson,
+                "most_pressure": each.most_pressure,
+                "most_height": each.most_height,
+                "scale_pressure": each.scale_pressure,
+                "coefficients": [[float(f"{c:.10g}") for c in row] for row in coefficients],
                 "cell_pressures": [_short(p) for p in covered.pressures.tolist()],
                 "cell_heights": [_short(h) for h in covered.heights.tolist()],
                 "holds": ["".join(row) for row in within],

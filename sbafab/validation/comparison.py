@@ -1,13 +1,12 @@
-"""Measured curves beside the models, point by point with 90 % intervals, and as a table."""
+"""Measured curves beside the models, point by point with 90 % intervals."""
 
 from __future__ import annotations
 
 import math
-import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import starmap
 from statistics import NormalDist
-from typing import NamedTuple
+from typing import Any
 
 from sbafab.documents import Document, Short, attribute
 from sbafab.errors import DesignError
@@ -23,9 +22,6 @@ from sbafab.models.figures import Factors
 from sbafab.validation.evidence import Evidence, MeasuredCurve
 from sbafab.validation.fit import MIDDLES, relative_errors, term_of
 from sbafab.validation.model_values import ModelledActuator, ModelValue, model_values
-
-WIDTH = 100
-
 
 ShortEnds = tuple[Short, Short] | None
 
@@ -65,8 +61,26 @@ class ComparedPoint(Document):
             within=interval and interval[0] <= measured <= interval[1],
         )
 
+    def texts(self, unit: str) -> tuple[str, str, str, str, str]:
+        """Return the measured value with its error, the model's range, the deviation as a share of
+        the measured value, the interval, and if it holds the value, as texts.
+        """
+        shares = self.deviation and tuple(end / self.measured for end in self.deviation)
+        return (
+            f"{self.measured:g}{f' +- {self.error:.2g}' if self.error else ''} {unit}".rstrip(),
+            (self.model and f"{_span(self.model, '.4g')} {unit}".rstrip()) or "-",
+            _span(shares, "+.0%") if self.measured else _span(self.deviation, "+.4g"),
+            _span(self.interval, ".3g"),
+            {True: "yes", False: "no", None: "-"}[self.within],
+        )
 
-class ComparedCurve(NamedTuple):
+
+def _span(ends: tuple[float, ...] | None, form: str) -> str:
+    """Return a range as text, or one number if its ends look the same; "" for None."""
+    return " to ".join(dict.fromkeys(format(end, form) for end in ends or ()))
+
+
+class ComparedCurve(Document):
     """A measured curve with its points.
 
     ``assumptions`` are the assumptions behind the model's range; ``no_model`` explains a missing
@@ -74,36 +88,45 @@ class ComparedCurve(NamedTuple):
     """
 
     source: str
-    curve: MeasuredCurve
-    points: Sequence[ComparedPoint]
-    model: str = ""
-    assumptions: Sequence[str] = ()
-    no_model: str = ""
+    curve: str = attribute("id")
+    quantity: str
+    unit: str = attribute("y_unit")
+    place: str
+    x_name: str
+    comparable: bool
+    reason: str
+    unknown: list[str]
+    model: str
+    assumptions: list[str]
+    no_model: str
+    points: list[ComparedPoint] = attribute("compared")
 
 
 def compare(evidence: Evidence, calibration: ModelCalibration | None = None) -> list[ComparedCurve]:
     """Return the curves of a source beside the models, with a calibration beside the calibrated
     ones and their 90 % intervals, which span the set-ups that the source leaves open.
     """
-    return [_compared(evidence.id, curve, calibration) for curve in evidence.curves]
+    return [
+        ComparedCurve.read(curve, source=evidence.id, **_beside_models(curve, calibration))
+        for curve in evidence.curves
+    ]
 
 
-def _compared(
-    source: str, curve: MeasuredCurve, calibration: ModelCalibration | None
-) -> ComparedCurve:
+def _beside_models(curve: MeasuredCurve, calibration: ModelCalibration | None) -> dict[str, Any]:
     uncertainty = calibration and uncertainty_for(curve, calibration)
     points = list(curve.points())
     try:
         answer = model_values(curve, uncertainty.factors if uncertainty else None)
     except DesignError as error:
         plain = list(starmap(ComparedPoint.at, points))
-        return ComparedCurve(source, curve, plain, no_model=str(error))
+        return {"compared": plain, "model": "", "assumptions": [], "no_model": str(error)}
     intervals = (uncertainty and curve_intervals(curve, uncertainty)) or [None] * len(points)
     compared = [
         ComparedPoint.at(*point, model, interval)
         for point, model, interval in zip(points, answer.ranges(), intervals, strict=True)
     ]
-    return ComparedCurve(source, curve, compared, answer.model, [*filter(None, answer.series)])
+    assumed = [*filter(None, answer.series)]
+    return {"compared": compared, "model": answer.model, "assumptions": assumed, "no_model": ""}
 
 
 def uncertainty_for(curve: MeasuredCurve, calibration: ModelCalibration) -> Uncertainty:
@@ -201,82 +224,7 @@ def widened(value: float, ends: Ends, error: float) -> Ends:
     return value - span, value + span
 
 
-# The table.
-
-
-HEADER = ("curve", "x", "measured", "model", "deviation", "within interval")
-COLUMN = "{:<8}{:>12}{:>20}{:>22}{:>18}  {}"
-
-
-def table_lines(curves: Sequence[ComparedCurve]) -> Iterator[str]:
-    """Yield the lines of the table, and below it the notes on its curves."""
-    yield COLUMN.format(*HEADER)
-    for compared in curves:
-        curve = compared.curve
-        yield f"{curve.id}: {curve.y_name} [{curve.y_unit or '-'}], {curve.place}"
-        for point in compared.points:
-            yield COLUMN.format(
-                "",
-                "" if point.x is None else f"{point.x:g} {curve.x_unit}".rstrip(),
-                measured_text(point),
-                span(point.model) or "-",
-                _deviation(point),
-                {None: "-", True: "yes", False: "no"}[point.within],
-            ).rstrip()
-        yield from _remarks(compared)
-
-
-def measured_text(point: ComparedPoint) -> str:
-    """Return a measured value with its standard error."""
-    return f"{point.measured:g}" + (f" +- {point.error:.2g}" if point.error else "")
-
-
-def span(ends: Ends | None, sign: str = "", digits: int = 4) -> str:
-    """Return a range as text, or one number if its ends look the same; "" for None."""
-    if ends is None:
-        return ""
-    low, high = (f"{end:{sign}.{digits}g}" for end in ends)
-    return low if low == high else f"{low} to {high}"
-
-
-def _deviation(point: ComparedPoint) -> str:
-    if point.deviation is None:
-        return "-"
-    if point.measured == 0:
-        return span(point.deviation, "+")
-    low, high = (f"{end / point.measured:+.0%}" for end in point.deviation)
-    return low if low == high else f"{low} to {high}"
-
-
-def _remarks(compared: ComparedCurve) -> Iterator[str]:
-    notes = []
-    if compared.no_model:
-        notes.append(f"{compared.no_model[:1].upper()}{compared.no_model[1:]}.")
-    if compared.assumptions:
-        notes.append(f"Not stated, so assumed: {'; '.join(compared.assumptions)}.")
-    if not compared.curve.comparable:
-        notes.append(f"Not comparable: {compared.curve.reason}")
-    indent = " " * 4
-    for note in notes:
-        yield from textwrap.wrap(note, WIDTH, initial_indent=indent, subsequent_indent=indent)
-
-
-class CurveDocument(Document):
-    """A curve with its points."""
-
-    source: str
-    curve: str = attribute("curve.id")
-    quantity: str = attribute("curve.quantity")
-    unit: str = attribute("curve.y_unit")
-    place: str = attribute("curve.place")
-    x_name: str = attribute("curve.x_name")
-    comparable: bool = attribute("curve.comparable")
-    reason: str = attribute("curve.reason")
-    unknown: list[str] = attribute("curve.unknown")
-    model: str
-    assumptions: list[str]
-    no_model: str
-    points: list[ComparedPoint]
+# The documents.
 
 
 class SourceDocument(Document):
@@ -294,4 +242,4 @@ class ComparisonDocument(Document, schema="sbafab/comparison@1"):
     calibration: str
     """name of the models' calibration, or none"""
     sources: list[SourceDocument]
-    curves: list[CurveDocument]
+    curves: list[ComparedCurve]

@@ -1,5 +1,5 @@
-"""Measured curves as data, with set-up, error and what a source leaves out; the sources that ship,
-TOML files, and CSV tables of a lab's curves.
+"""Measured curves as data, with set-up, error and what a source leaves out: the paper's, TOML
+files, and CSV tables of a lab's curves.
 """
 
 from __future__ import annotations
@@ -7,10 +7,11 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
@@ -20,7 +21,8 @@ from sbafab.errors import DesignError
 from sbafab.models.calibration import BENT
 from sbafab.spreadsheet import plain_text, table_rows
 
-FOLDER = Path(__file__).parent
+PAPER = "paper"
+"""Name of the paper's evidence, and of the calibration that is fitted to it."""
 MOST_POINTS = 10_000
 
 
@@ -51,7 +53,7 @@ counts it; ``volume_ul`` is one balloon's for ``balloon_stroke_mm``, else all ch
 
 
 def _quantities() -> Iterator[tuple[str, CurveQuantity]]:
-    with (FOLDER / "quantities.csv").open(encoding="utf-8", newline="") as opened:
+    with Path(__file__).with_name("quantities.csv").open(encoding="utf-8", newline="") as opened:
         for name, unit, title, axes, group, reason in list(csv.reader(opened))[1:]:
             names = tuple(axis.removeprefix("-") for axis in axes.split())
             yield name, CurveQuantity(unit, title, names, group, reason)
@@ -232,68 +234,45 @@ class Evidence(Section):
     ``missing``: sentences on figures of the source that could not be had.
     """
 
+    schema_name: Literal["sbafab/evidence@1"] = Field(default="sbafab/evidence@1", alias="schema")
     id: str
     citation: str = Field(min_length=1, max_length=400)
     doi: ShortText = ""
-    curves: tuple[MeasuredCurve, ...]
+    curves: Annotated[tuple[MeasuredCurve, ...], Field(strict=False, min_length=1)]
     missing: Sentences = ()
+
+    @model_validator(mode="after")
+    def _ids_differ(self) -> Self:
+        names = [curve.id for curve in self.curves]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"has two curves {shown(name)}; give each its id")
+        return self
 
     def curve(self, name: str) -> MeasuredCurve:
         """Return the curve of an id. Raises KeyError without one."""
         return {curve.id: curve for curve in self.curves}[name]
 
 
-class _EvidenceFile(Section):
-    schema_name: Literal["sbafab/evidence@1"] = Field(alias="schema")
-    citation: str = Field(min_length=1, max_length=400)
-    doi: ShortText = ""
-    missing: Sentences = ()
-    curves: list[dict[str, Any]] = Field(min_length=1)
-
-
-@cache
-def evidence_ids() -> tuple[str, ...]:
-    """Return the ids of the sources that ship, the paper first."""
-    names = sorted(path.stem for path in FOLDER.glob("*.toml"))
-    return tuple(sorted(names, key=lambda name: name != "paper"))
-
-
 def load_evidence(source: str | Path) -> Evidence:
-    """Return the evidence of a shipped source, or of a file (``.toml``, ``.csv``).
+    """Return the paper's evidence, or that of a file (``.toml``, ``.csv``).
 
     Raises DesignError with one sentence if the source does not exist or has a fault.
     """
-    if str(source) in evidence_ids():
-        return _shipped(str(source))
+    if str(source) == PAPER:
+        return _papers()
     path = Path(source)
     if path.suffix.lower() not in (".toml", ".csv"):
         raise DesignError(
             f"{shown(source)} is neither evidence that ships nor a file that ends in .toml or "
-            f".csv; {hint(str(source), evidence_ids())}"
+            f".csv; {hint(str(source), (PAPER,))}"
         )
     return read_csv(path) if path.suffix.lower() == ".csv" else read_evidence(path)
 
 
 @cache
-def _shipped(name: str) -> Evidence:
-    return read_evidence(FOLDER / f"{name}.toml")
-
-
-def shipped_evidence() -> tuple[Evidence, ...]:
-    """Return all evidence that ships, the paper first."""
-    return tuple(map(_shipped, evidence_ids()))
-
-
-AnySection = TypeVar("AnySection", bound=Section)
-
-
-def _read(kind: type[AnySection], table: Mapping[str, Any], where: object) -> AnySection:
-    try:
-        return checked(kind, table, {}, file="file of evidence")
-    except DesignError as error:
-        # A message on the whole table begins with its verb.
-        message = str(error)
-        raise DesignError(f"{where}{'' if message[0] == ' ' else ': '}{message}") from None
+def _papers() -> Evidence:
+    return read_evidence(Path(__file__).with_name("paper.toml"))
 
 
 def read_evidence(path: Path) -> Evidence:
@@ -301,30 +280,21 @@ def read_evidence(path: Path) -> Evidence:
 
     A ``design`` that is a file is taken to lie beside it. Raises DesignError with one sentence.
     """
-    record = _read(_EvidenceFile, read_toml(path), path)
-    curves: dict[str, MeasuredCurve] = {}
-    for place, table in enumerate(record.curves, start=1):
-        name = table.get("id", place)
-        where = f"{path}, curve {shown(name) if isinstance(name, str) else place}"
-        curve = _curve(table, path, where)
-        if curve.id in curves:
-            raise DesignError(f"{path} has two curves {shown(curve.id)}; give each its id")
-        curves[curve.id] = curve
-    return Evidence(
-        id=path.stem,
-        citation=record.citation,
-        doi=record.doi,
-        curves=tuple(curves.values()),
-        missing=record.missing,
-    )
+    return _evidence(path, {"schema": "", **read_toml(path)})
 
 
-def _curve(table: Mapping[str, Any], path: Path, where: str) -> MeasuredCurve:
-    """Return the curve of a table; a design file lies beside the evidence."""
-    design = table.get("design", "")
-    if str(design).endswith(".toml"):
-        table = {**table, "design": str(path.parent / design)}
-    return _read(MeasuredCurve, table, where)
+def _evidence(path: Path, tables: Mapping[str, Any]) -> Evidence:
+    """Return the evidence of tables; design files lie beside the evidence."""
+    curves = tables.get("curves")
+    for curve in curves if isinstance(curves, list) else ():
+        if isinstance(curve, dict) and str(curve.get("design")).endswith(".toml"):
+            curve["design"] = str(path.parent / curve["design"])
+    try:
+        return checked(Evidence, {**tables, "id": path.stem}, {}, file="file of evidence")
+    except DesignError as error:
+        # A message on the whole table begins with its verb.
+        message = str(error)
+        raise DesignError(f"{path}{'' if message[0] == ' ' else ': '}{message}") from None
 
 
 # CSV: one row for each value; a curve's cells are in its first row, and may be repeated below.
@@ -338,10 +308,11 @@ COLUMNS = ("curve", *OF_A_VALUE, *OF_CURVE, *OF_ERROR, *OF_SETUP)
 """Columns of a lab's table; only quantity and y are needed. ``unknown`` parts its sentences by "|".
 """
 COUNTS = ("runs", "chambers")
-NUMBERS = tuple(name for name, key in Setup.model_fields.items() if key.annotation == float | None)
+NUMBERS = (
+    *("x", "y", "error"),
+    *(name for name, key in Setup.model_fields.items() if key.annotation == float | None),
+)
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
-TableRow = tuple[str, dict[str, str]]
-"""The place of a row for messages, and its cells that are not empty by column."""
 
 
 def read_csv(path: Path) -> Evidence:
@@ -352,7 +323,7 @@ def read_csv(path: Path) -> Evidence:
     cell that applies to the whole curve may be in any of its rows. Raises DesignError with the
     line.
     """
-    rows_by_curve: dict[str, list[TableRow]] = {}
+    curves: dict[str, dict[str, list[Any]]] = defaultdict(lambda: defaultdict(list))
     for where, cells in table_rows(path, ("quantity", "y")):
         row = {name: _unmarked(cell) for name, cell in cells.items() if name and cell}
         for name in row.keys() - set(COLUMNS):
@@ -362,11 +333,36 @@ def read_csv(path: Path) -> Evidence:
         name = row.get("curve") or row.get("quantity", "")
         if not name:
             raise DesignError(f"{where} names no curve and no quantity; fill in one of the two")
-        rows_by_curve.setdefault(name, []).append((where, row))
-    if not rows_by_curve:
+        for key, cell in row.items():
+            value, values = _cell_value(cell, key, where), curves[name][key]
+            if key not in OF_A_VALUE and values and values[0] != value:
+                raise DesignError(
+                    f"{where}: {key} is {shown(cell)}, and {shown(values[0])} in an earlier line "
+                    "of this curve; write one of the two, or name two curves"
+                )
+            values.append(value)
+    if not curves:
         raise DesignError(f"{path} has no row below its columns; fill in one for each value")
-    curves = tuple(_curve_of_rows(name, rows, path) for name, rows in rows_by_curve.items())
-    return Evidence(id=path.stem, citation=f"measurements in {path.name}", curves=curves)
+    tables = [_table(name, columns, path.name) for name, columns in curves.items()]
+    return _evidence(path, {"citation": f"measurements in {path.name}", "curves": tables})
+
+
+def _table(name: str, columns: Mapping[str, list[Any]], file: str) -> dict[str, Any]:
+    """Return the table of a curve from the filled cells of its columns."""
+    cells = {key: values[0] for key, values in columns.items()}
+    x, y, error, actuators = (columns.get(key, []) for key in OF_A_VALUE)
+    stated = {key: cells[column] for column, key in OF_ERROR.items() if column in cells}
+    return {
+        "id": name,
+        "place": file,
+        "group": name,
+        **{key: cells[key] for key in OF_CURVE if key in cells},
+        "actuators": actuators[:1] if len(set(actuators)) == 1 else actuators,
+        "x": x,
+        "y": y,
+        "error": {"source": file, **stated, "absolute": error},
+        "setup": {key: cells[key] for key in OF_SETUP if key in cells},
+    }
 
 
 def _unmarked(cell: str) -> str:
@@ -374,67 +370,19 @@ def _unmarked(cell: str) -> str:
     return cell[1:] if cell[:1] == "'" and plain_text(cell[1:]) == cell else cell
 
 
-def _curve_of_rows(name: str, rows: Sequence[TableRow], path: Path) -> MeasuredCurve:
-    where = f"{path}, curve {shown(name)}"
-    cells = _cells_of_curve(rows)
-    x, y, error = (
-        [_number(row[key], key, place) for place, row in rows if key in row]
-        for key in ("x", "y", "error")
-    )
-    names = [row["actuator"] for _, row in rows if "actuator" in row]
-    stated = {key: cells[column] for column, key in OF_ERROR.items() if column in cells}
-    return _curve(
-        {
-            "id": name,
-            "place": path.name,
-            "group": name,
-            **{key: cells[key] for key in OF_CURVE if key in cells},
-            "actuators": names[:1] if len(set(names)) == 1 else names,
-            "x": x,
-            "y": y,
-            "error": _read(StatedError, {"source": path.name, **stated, "absolute": error}, where),
-            "setup": _read(Setup, {key: cells[key] for key in OF_SETUP if key in cells}, where),
-        },
-        path,
-        where,
-    )
-
-
-def _cells_of_curve(rows: Sequence[TableRow]) -> dict[str, Any]:
-    """Return the curve's values from its rows, by column. Raises DesignError if two rows do not
-    agree.
-    """
-    cells: dict[str, str] = {}
-    values: dict[str, Any] = {}
-    for where, row in rows:
-        for key, cell in row.items():
-            if key in OF_A_VALUE:
-                continue
-            if cells.setdefault(key, cell) != cell:
-                raise DesignError(
-                    f"{where}: {key} is {shown(cell)}, and {shown(cells[key])} in an earlier line "
-                    "of this curve; write one of the two, or name two curves"
-                )
-            values[key] = _cell_value(cell, key, where)
-    return values
-
-
 def _cell_value(cell: str, key: str, where: str) -> Any:
+    """Return the value of a cell. Raises DesignError for one that its column does not take."""
     if key in NUMBERS:
-        return _number(cell, key, where)
+        number = float(cell.replace(",", ".")) if _NUMBER.fullmatch(cell) else math.nan
+        if math.isfinite(number):
+            return number
+        raise DesignError(f"{where}: {key} is {shown(cell)}, not a number such as 16.8")
     if key in COUNTS:
-        if not re.fullmatch(r"\d{1,6}", cell, re.ASCII):
-            raise DesignError(f"{where}: {key} is {shown(cell)}; it must be a whole number")
-        return int(cell)
+        if re.fullmatch(r"\d{1,6}", cell, re.ASCII):
+            return int(cell)
+        raise DesignError(f"{where}: {key} is {shown(cell)}; it must be a whole number")
     if key == "comparable":
-        if cell not in ("yes", "no"):
-            raise DesignError(f"{where}: comparable is {shown(cell)}; write yes or no")
-        return cell == "yes"
+        if cell in ("yes", "no"):
+            return cell == "yes"
+        raise DesignError(f"{where}: comparable is {shown(cell)}; write yes or no")
     return list(filter(None, map(str.strip, cell.split("|")))) if key == "unknown" else cell
-
-
-def _number(text: str, key: str, where: str) -> float:
-    number = float(text.replace(",", ".")) if _NUMBER.fullmatch(text) else math.nan
-    if not math.isfinite(number):
-        raise DesignError(f"{where}: {key} is {shown(text)}, not a number such as 16.8")
-    return number

@@ -20,7 +20,6 @@ import numpy as np
 from sbafab.actuators import build, load_design
 from sbafab.documents import Document, PlainNumber, Short, attribute
 from sbafab.errors import OutputError
-from sbafab.laminate.lay_up import FoldedHeight
 from sbafab.markup import environment
 from sbafab.models import paper
 from sbafab.models.balloons import balloons_of
@@ -30,30 +29,23 @@ from sbafab.models.elastic import air_time, pose_bent_by, time_to_fill
 from sbafab.models.figures import Factors, Prediction, PredictionRequest
 from sbafab.models.pneumatics import AIR, Line, seconds
 from sbafab.models.prediction import predict
-from sbafab.models.quantity import FigureKey, ModelId
+from sbafab.models.quantity import FigureKey
 from sbafab.models.rim_correction import free_shapes
 from sbafab.models.stack import Stack, stack
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.charts import relation_svg
 from sbafab.validation.comparison import (
     ComparedCurve,
-    ComparedPoint,
-    CurveDocument,
     compare,
-    measured_text,
-    span,
 )
-from sbafab.validation.evidence import MeasuredCurve, load_evidence
+from sbafab.validation.evidence import AXES, PAPER, QUANTITIES, load_evidence
 
-PAPER = "paper"
-"""Name of the calibration, and of the evidence, whose values stand side by side."""
 TITLE = "Calibrated on the paper"
 COLUMNS = ("figure", "paper", "", "predicted", "residual", "model", "why they part")
 CALIBRATED_COLUMNS = (
     *("figure", "paper", "where", "calibrated", "90 % interval", "inside", "left open"),
 )
 FOLDER = Path(__file__).parent
-FORCE_MODELS = (ModelId.WORK_ON_EQ_4, ModelId.WORK_ON_EQS_1_TO_3, ModelId.ELASTIC_STACK)
 LENGTHS = (50.0, 100.0, 150.0)
 """Lengths of tube in mm for which the water's time is shown."""
 CHARTS = {
@@ -175,7 +167,7 @@ class PaperTable:
         return tuple(
             compared
             for compared in compare(load_evidence(PAPER), self.calibration)
-            if compared.curve.comparable and any(point.interval for point in compared.points)
+            if compared.comparable and any(point.interval for point in compared.points)
         )
 
     @property
@@ -198,7 +190,6 @@ class PaperTable:
             calibrated_rows=[*_calibrated_rows(self.curves)],
             columns=COLUMNS,
             sections=sections,
-            factors=[*_factors(self.predictions)],
             table=_markdown,
         )
 
@@ -229,26 +220,14 @@ def _markdown(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def _calibrated_rows(curves: Sequence[ComparedCurve]) -> Iterator[tuple[str, ...]]:
     """Yield the cells of each value of the paper, by CALIBRATED_COLUMNS."""
-    for compared in curves:
-        unit = compared.curve.y_unit
-        for point in compared.points:
-            yield (
-                _figure(compared.curve, point),
-                f"{measured_text(point)} {unit}".rstrip(),
-                compared.curve.place,
-                f"{span(point.model)} {unit}".rstrip(),
-                span(point.interval, digits=3),
-                {True: "yes", False: "no", None: "-"}[point.within],
-                "; ".join(compared.assumptions),
-            )
-
-
-def _figure(curve: MeasuredCurve, point: ComparedPoint) -> str:
-    name = f"{curve.y_name} ({curve.id})"
-    if point.x is None:
-        return name
-    axis = curve.x_name.removesuffix(f"_{curve.x_unit.lower()}").replace("_", " ")
-    return f"{name}, {axis} {point.x:g} {curve.x_unit}".rstrip()
+    for curve in curves:
+        title, axis = QUANTITIES[curve.quantity].title, AXES[curve.x_name]
+        x_name = curve.x_name.removesuffix(f"_{axis.lower()}").replace("_", " ")
+        for point in curve.points:
+            at = "" if point.x is None else f", {x_name} {point.x:g} {axis}".rstrip()
+            measured, model, _, interval, inside = point.texts(curve.unit)
+            figure, open_set_ups = f"{title} ({curve.curve}){at}", "; ".join(curve.assumptions)
+            yield figure, measured, curve.place, model, interval, inside, open_set_ups
 
 
 # Values that are no figures of a prediction.
@@ -320,33 +299,10 @@ def _of_stack(whole: Stack) -> Iterator[tuple[str, float]]:
         yield f"bend_{angle.value:g}", put_in / (paper.WATER_FLOW * 1000 / 60)
 
 
-def _films() -> FoldedHeight:
-    return Factors().folded(build(load_design("3dof-15mm")))
-
-
 def press_factor() -> float:
     """Return pressed over nominal film thickness of the 3-DoF, if its masks kept theirs."""
-    folded = _films()
+    folded = Factors().folded(build(load_design("3dof-15mm")))
     return (paper.FLAT_HEIGHT.value - folded.solid) / folded.molten
-
-
-def _factors(predictions: Mapping[str, Prediction]) -> Iterator[tuple[str, str, str]]:
-    """Yield the cells of the table of factors."""
-    folded = _films()
-    measured = f"3-DoF deflated: {paper.FLAT_HEIGHT.value:g}, less masks of {folded.solid:g}"
-    yield "press factor", f"{measured}, over films of {folded.molten:g}", f"{press_factor():.3f}"
-    for name, template, forces in (
-        ("1-DoF", "1dof-5mm", paper.FORCE_1DOF),
-        ("3-DoF", "3dof-15mm", paper.FORCE_3DOF),
-    ):
-        for model in FORCE_MODELS:
-            models = [
-                predictions[template].value("blocked_force", model, kpa=100, share=share)
-                for share in paper.HEIGHTS
-            ]
-            shown = ", ".join(f"{m.value / by:.2f}" for m, by in zip(forces, models, strict=True))
-            of = f"measured force over {model.words}"
-            yield of, f"{name} at 100 kPa: flat, 25 %, 75 %", shown
 
 
 # The documents.
@@ -359,7 +315,7 @@ class CalibratedDocument(Document):
     held_out: HeldOut = attribute("calibration.held_out")
     discrepancy: dict[str, float] = attribute("calibration.discrepancy")
     """relative standard deviation that the models miss, by group"""
-    curves: list[CurveDocument]
+    curves: list[ComparedCurve]
 
 
 class ReproductionDocument(Document, schema="sbafab/reproduction@1"):

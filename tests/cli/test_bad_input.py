@@ -104,7 +104,7 @@ map 1dof-5mm --to a.xml --pressures 5,5 | has 2 of 1 pressures
 map 1dof-5mm --to a.xml --pressures x | must be a pressure such as
 map 1dof-5mm --to a.xml --pressures 200 | give 0 to 110 kPa
 map radial-15mm | no round pockets
-map 1dof-5mm --to map.txt | must end with .csv, .json, .py, .urdf, .xml
+map 1dof-5mm --to map.txt | must end with .csv, .py, .xml
 map 1dof-5mm --pressure 400 | 400 kPa is past the estimated burst pressure, 367 kPa
 map 1dof-5mm --pressure 0 | give more than 0 kPa
 map 1dof-5mm --pocket-loss 2 | a pocket loss of 2 mm leaves 0.5
@@ -113,7 +113,6 @@ calibrate nosuch | neither evidence that ships
 calibrate --name paper | which stands for another one
 calibrate --name none | which stands for another one
 calibrate --name "my lab" | use letters, digits
-calibrate textile-array | no curve can be fitted to (force-8mm:
 find 1dof-5mm --max mass=1 --to tip.txt | tip.txt must end in .toml
 find 1dof-5mm --max mass=1 --to tip.toml -o out | --out names a folder and --to a file
 find 1dof-5mm --min strok=5 | did you mean stroke?

@@ -43,6 +43,14 @@ def test_a_labs_curves_become_a_calibration_that_a_folder_holds(run: Run) -> Non
     assert run("check", str(folder))[0] == 0
 
 
+def test_curves_that_no_design_describes_are_not_fitted(run: Run) -> None:
+    pytest.importorskip("emcee")
+    Path("bench.csv").write_text("quantity,y\nforce_n,1\n")
+    code, out, err = run("calibrate bench.csv")
+    assert (code, out) == (2, "")
+    assert "no curve can be fitted to (force_n: no design describes the actuator)" in err
+
+
 def test_a_kit_is_not_overwritten(run: Run) -> None:
     assert run("new kit lab.toml")[0] == 0
     kit = Path("lab.toml").read_bytes()

@@ -37,21 +37,6 @@ def test_csv_holds_force_and_volume(balloon: BalloonMap, run: Run) -> None:
         assert float(row["volume_ul"]) == pytest.approx(float(balloon.volume(p, h)), rel=1e-4)
 
 
-def test_json_says_where_each_balloon_is(tmp_path: Path, run: Run) -> None:
-    file = tmp_path / "map.json"
-    drawn = ["--set", "models.calibration=none"]
-    code, out, _ = run("map", "3dof-15mm", *drawn, "--points", "3", "--to", str(file))
-    assert (code, out) == (0, f"3dof-15mm mapped up to 110 kPa. Written to {file}\n")
-    found = json.loads(file.read_text())
-    hold("balloon-map", found)
-    assert found["levels"] == [1] * 15
-    # Paper, Sec. 2: the axes stand 4.25 from the middle.
-    assert found["chamber_axes_mm"][0] == pytest.approx([4.25, 0.0])
-    (one,) = found["balloons"]
-    assert (one["pocket_radius_mm"], one["modulus_kpa"]) == (2.5, 10_000)
-    assert len(one["force"]) == len(one["pressure"]) == 3
-
-
 def test_python_file_needs_nothing_and_says_the_same(
     balloon: BalloonMap, tmp_path: Path, run: Run
 ) -> None:
@@ -106,7 +91,6 @@ def test_models_of_robots_are_files_of_xml(tmp_path: Path, run: Run) -> None:
     for file, options, root in (
         ("stack.xml", ["--pressures", "10,0 kPa,0"], "mujoco"),
         ("even.xml", [], "mujoco"),
-        ("stack.urdf", [], "robot"),
     ):
         path = tmp_path / file
         design = ["3dof-15mm", "--set", "stack.balloons=2"]

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.models.joint_chain import JOINTS, joint_values, urdf_text
 from sbafab.models.stack import Stack
-from sbafab.simulators.mujoco.mjcf import ACCURACY, chain_text, length_of
+from sbafab.simulators.mujoco.mjcf import ACCURACY, JOINTS, chain_text, joint_values, length_of
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 
@@ -103,16 +102,13 @@ def test_a_film_without_density_has_a_mass_that_stands_in(stacks: dict[str, Stac
     assert float(model.body_mass.sum()) == pytest.approx(6e-5)
 
 
-def test_mujoco_reads_the_urdf_as_the_same_chain(stacks: dict[str, Stack]) -> None:
+def test_plates_of_a_pose_stand_as_in_the_stack(stacks: dict[str, Stack]) -> None:
     stack = stacks["lobed"]
-    model = mujoco.MjModel.from_xml_string(urdf_text("lobed", stack))
-    state = mujoco.MjData(model)
+    model, state = loaded(stack, (10.0, 0.0, 0.0))
     pose = stack.pose((10.0, 0.0, 0.0))
-    values = joint_values(pose.freedoms)
-    values[:, 2] /= 1000
-    for (level, place), value in np.ndenumerate(values):
+    for (level, place), value in np.ndenumerate(joint_values(pose.freedoms)):
         state.joint(f"level{level + 1}_{JOINTS[place]}").qpos = value
     mujoco.mj_kinematics(model, state)
     for level, place in enumerate(pose.frames[0][1:], start=1):
-        assert 1000 * state.body(f"plate_{level}").xpos == pytest.approx(place, abs=1e-3)
+        assert state.body(f"plate{level}").xpos == pytest.approx(place, abs=1e-3)
     assert float(model.body_mass.sum()) == pytest.approx(5 * stack.level_weight / 9806.65)

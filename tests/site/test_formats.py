@@ -113,8 +113,14 @@ def test_the_reproduction_is_of_its_schema() -> None:
     )  # fmt: skip
     table = PaperTable()
     table.__dict__["rows"] = [row, row.model_copy(update={"predicted": None})]
-    points = (ComparedPoint.at(1.0, 0.5, 0.1, (0.4, 0.6), (0.3, 0.7)),)
-    curve = ComparedCurve("paper", load_evidence("paper").curves[0], points, "m", ("a",), "")
+    curve = ComparedCurve.read(
+        load_evidence("paper").curves[0],
+        source="paper",
+        compared=[ComparedPoint.at(1.0, 0.5, 0.1, (0.4, 0.6), (0.3, 0.7))],
+        model="m",
+        assumptions=["a"],
+        no_model="",
+    )
     table.__dict__["curves"] = (curve,)
     hold("reproduction", as_json(table))
 

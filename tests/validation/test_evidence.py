@@ -16,11 +16,9 @@ from sbafab.validation.evidence import (
     QUANTITIES,
     MeasuredCurve,
     StatedError,
-    evidence_ids,
     load_evidence,
     read_csv,
     read_evidence,
-    shipped_evidence,
 )
 from tests.validation.tables import evidence_csv
 
@@ -110,9 +108,8 @@ def test_the_paper_and_the_constants_of_the_models_agree() -> None:
     assert curves["time-air"].setup.flow_ml_min == paper.AIR_FLOW
 
 
-@pytest.mark.parametrize("name", evidence_ids())
-def test_curves_have_a_source_and_a_design_that_can_be_built(name: str) -> None:
-    evidence = load_evidence(name)
+def test_curves_have_a_source_and_a_design_that_can_be_built() -> None:
+    evidence = load_evidence("paper")
     assert evidence.citation
     assert evidence.doi.startswith("10.")
     for curve in evidence.curves:
@@ -122,19 +119,10 @@ def test_curves_have_a_source_and_a_design_that_can_be_built(name: str) -> None:
             load_design(curve.design, [curve.changes])
 
 
-def test_files_that_ship_are_all_found_the_paper_first() -> None:
-    files = {path.stem for path in (ROOT / "sbafab" / "validation").glob("*.toml")}
-    assert set(evidence_ids()) == files
-    assert evidence_ids()[0] == shipped_evidence()[0].id == "paper"
-    assert load_evidence("textile-array").curve("force-8mm").y == (2.1,)
-    assert load_evidence("textile-array").curve("force-8mm").x == (230,)
-    assert load_evidence("pneudots").curve("largest-force").y == (36.1,)
-
-
 def test_a_wheel_holds_the_files() -> None:
     builder = pytest.importorskip("hatchling.builders.wheel").WheelBuilder(str(ROOT))
     packed = {included.distribution_path for included in builder.recurse_included_files()}
-    assert {f"sbafab/validation/{name}.toml" for name in evidence_ids()} <= packed
+    assert "sbafab/validation/paper.toml" in packed
     tables = ("validation/quantities", "validation/paper_table", "models/priors", "models/models")
     assert {f"sbafab/{name}.csv" for name in (*tables, "models/paper_counterparts")} <= packed
     assert "sbafab/validation/paper_table.md.jinja" in packed

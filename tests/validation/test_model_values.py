@@ -15,7 +15,7 @@ from sbafab.lab.evidence import from_lab_records
 from sbafab.lab.store import Lab
 from sbafab.models.figures import Factors
 from sbafab.models.stack import Stack
-from sbafab.validation.comparison import ComparedPoint, compare, table_lines
+from sbafab.validation.comparison import ComparedPoint, compare
 from sbafab.validation.evidence import (
     QUANTITIES,
     Evidence,
@@ -208,8 +208,8 @@ def test_intervals_are_held_against_the_measured_values() -> None:
         for each in without.points
     ]
     assert [point.within for point in points] == [False, True]
-    lines = list(table_lines([without._replace(points=points)]))
-    assert [line.split()[-1] for line in lines[2:]] == ["no", "yes"]
+    assert [point.texts("mm")[-1] for point in points] == ["no", "yes"]
+    assert points[0].texts("mm")[:4] == ("0.4 mm", "0.731 mm", "+83%", "0.45 to 0.6")
 
 
 def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
@@ -240,12 +240,31 @@ def test_a_lab_sees_its_table_beside_the_model(
     assert not (tmp_path / "reproduction").exists()
 
 
-def test_a_source_that_ships_says_what_could_not_be_had(
-    capsys: pytest.CaptureFixture[str],
+def test_a_source_says_what_could_not_be_had_and_what_no_model_gives(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code, out, _ = run(["reproduce", "textile-array"], capsys)
+    path = tmp_path / "array.toml"
+    path.write_text(
+        """schema = "sbafab/evidence@1"
+citation = "an array of textile pouches"
+missing = ["Only the abstract could be read."]
+[[curves]]
+id = "force"
+quantity = "force_n"
+place = "abstract"
+x_name = "pressure_kpa"
+x = [230]
+y = [2.1]
+error = { source = "none stated" }
+comparable = false
+reason = "It is no film that stretches."
+"""
+    )
+    code, out, _ = run(["reproduce", str(path)], capsys)
     assert code == 0
     assert "230 kPa" in out
+    assert "No design describes the actuator." in out
+    assert "Not comparable: It is no film" in out
     assert "Not had: Only the abstract" in out
     assert "0 of 1 values" in out
 

@@ -1,4 +1,9 @@
-"""A stack as rigid plates on springs (MJCF), linearised about its pose at given pressures."""
+"""A stack as rigid plates on springs (MJCF), linearised about its pose at given pressures.
+
+A level tilts by half, rises, and tilts by the other half: hinges about x and y, a slide along z,
+hinges about y and x. The orders mirror each other, so that the twists of both halves cancel, and
+plates stand as in ``stack_loads.plate_chain`` up to the third order of a level's tilt.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +15,7 @@ import numpy as np
 from sbafab.errors import DesignError
 from sbafab.models.derivatives import Linearised, linearised_poses
 from sbafab.models.film_elements import Array
-from sbafab.models.joint_chain import JOINTS, axis_of, disc_inertia, joint_values, plate_mass
-from sbafab.models.stack import Pose, Stack
+from sbafab.models.stack import GRAVITY, Pose, Stack
 from sbafab.models.stack_loads import plate_chain
 from sbafab.simulators.simulator import model_file
 
@@ -28,6 +32,10 @@ MASS = 1e-5
 """Default mass of a plate in kg, if a density is not known."""
 MIRROR = 100.0
 """Stiffness that keeps both halves of a tilt equal, as a multiple of the tilt's."""
+JOINTS = ("tilt_x", "tilt_y", "rise", "tilt_y_upper", "tilt_x_upper")
+"""Joints of a level from its lower plate up; the name of each begins with its level's."""
+AXES = dict(zip(JOINTS, ("1 0 0", "0 1 0", "0 0 1", "0 1 0", "1 0 0"), strict=True))
+"""Axis of each joint in the frame below it."""
 FREEDOMS: tuple[tuple[str, ...], ...] = (
     ("rise",),
     ("tilt_x", "tilt_x_upper"),
@@ -53,8 +61,10 @@ def chain_text(name: str, stack: Stack, pressures: Sequence[float]) -> str:
             "hold it; give other --pressures"
         )
     span = valid_range(stack, pose, at)
-    mass = plate_mass(stack) or MASS
-    across, along = disc_inertia(mass / 2, stack.outline, stack.pitch)
+    mass = MASS if stack.weight is None else stack.weight / GRAVITY / 1000
+    # Moments of inertia of half a plate, a disc, about a diameter and about its axis.
+    across = mass * (3 * stack.outline**2 + stack.pitch**2) / 24
+    along = mass * stack.outline**2 / 4
     center = np.array(pose.pressures)[:, None]
     ends = np.clip(center + np.array([-span, span]), 0.0, stack.most_pressure) - center
     return model_file(
@@ -70,8 +80,7 @@ def chain_text(name: str, stack: Stack, pressures: Sequence[float]) -> str:
         mass=mass,
         weighs=stack.weight is not None,
         inertia=(across, across, along),
-        joint_names=JOINTS,
-        axis_of=axis_of,
+        axes=AXES,
         tendons=[*_springs(at), *_chambers(at)],
         ranges=ends,
         places=joint_values(at.at[0]).round(12),
@@ -97,6 +106,12 @@ def valid_range(stack: Stack, pose: Pose, at: Linearised) -> float:
         if (exact.is_met & (away <= LINEAR_SHARE * ACCURACY * length_of(pose))).all():
             return span
     return 0.0
+
+
+def joint_values(freedoms: Array) -> Array:
+    """Return the values (levels, 5) of JOINTS, mm and rad, by rise and tilt (levels, 3)."""
+    rise, x, y = np.asarray(freedoms, dtype=float).T
+    return np.stack([x / 2, y / 2, rise, y / 2, x / 2], axis=-1)
 
 
 def length_of(pose: Pose) -> float:
