@@ -1,11 +1,7 @@
-"""``sbafab check``: rules on a design or on an output folder, once or after every change."""
+"""``sbafab check``: rules on a design or on an output folder."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from contextlib import suppress
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +11,7 @@ from sbafab.api import checks as api
 from sbafab.api.designs import design_of, either_of
 from sbafab.cli import options as opt
 from sbafab.cli import show
-from sbafab.cli.exit import print_error
-from sbafab.errors import DesignError, SbafabError
+from sbafab.errors import DesignError
 
 YIELD_RULE = "registration-yield"
 DEFAULT_KIT = "paper"
@@ -39,9 +34,8 @@ DEFAULT_KIT = "paper"
     opt.file_path(exists=True, dir_okay=False),
 )
 @opt.option("-v --verbose", "All findings, with places and reasons.", bool)
-@opt.option("--watch", "Check again whenever a file of the design changes.", bool)
 @opt.json_option
-def check(source: str, watch: bool, as_json: bool, **options: Any) -> None:
+def check(source: str, as_json: bool, **options: Any) -> None:
     """Run the rules on a design or on an output folder.
 
     Nothing is written. FOLDER was written by sbafab generate; the files on disk are checked.
@@ -51,18 +45,11 @@ def check(source: str, watch: bool, as_json: bool, **options: Any) -> None:
         raise DesignError(
             "--set, --waive and --target-yield go with a design; leave them out to check a folder"
         )
-    if watch and as_json:
-        raise click.UsageError("--watch and --json exclude each other; leave one out")
-
-    def run() -> bool:
-        """Check and print the outcome; return True if a rule failed."""
-        if is_folder:
-            return _check_folder(Path(source), options["nets"], options["verbose"], as_json)
-        return _check_design(source, as_json, **options)
-
-    if watch:
-        watch_source(run, Path(source))
-    elif run():
+    if is_folder:
+        failed = _check_folder(Path(source), options["nets"], options["verbose"], as_json)
+    else:
+        failed = _check_design(source, as_json, **options)
+    if failed:
         show.end_failed()
 
 
@@ -160,46 +147,3 @@ def _print_outcome(name: str, groups: show.Groups, verbose: bool, change: str) -
         return False
     show.failed(name, findings, "It must not be cut", change)
     return True
-
-
-# Checking again after every change of a file, until Ctrl-C.
-
-
-WATCHED_SUFFIXES = (".toml", ".dxf", ".svg")
-"""Files of a design: its own, a kit, drawings, the designs of an assembly."""
-POLL_SECONDS = 0.4
-"""Polling works on every file system; notifications of changes do not."""
-
-FileStates = dict[Path, tuple[int, int]]
-
-
-def watch_source(action: Callable[[], object], source: Path, polls: int | None = None) -> None:
-    """Call ``action`` now and after every change in the folder of ``source``.
-
-    Errors of the design are printed. ``polls`` limits the number of polls (None: no limit).
-    """
-    previous: FileStates | None = None
-    while polls is None or polls > 0:
-        current = file_states(source)
-        if current != previous:
-            previous = current
-            click.echo(f"{datetime.now():%H:%M:%S}  watching {source}; Ctrl-C stops")
-            try:
-                action()
-            except SbafabError as error:
-                print_error(str(error))
-        polls = None if polls is None else polls - 1
-        time.sleep(POLL_SECONDS)
-
-
-def file_states(source: Path) -> FileStates:
-    """Return time, ns, and size, bytes, of every file that the source may consist of."""
-    states: FileStates = {}
-    is_folder = source.is_dir()
-    for path in source.rglob("*") if is_folder else source.parent.glob("*"):
-        # A file that an editor is replacing is there again at the next poll.
-        with suppress(OSError):
-            if path.is_file() if is_folder else path.suffix.lower() in WATCHED_SUFFIXES:
-                state = path.stat()
-                states[path] = state.st_mtime_ns, state.st_size
-    return states

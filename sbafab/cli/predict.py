@@ -127,8 +127,7 @@ def predict(
             details = "" if verbose else " Details: -v"
             show.verdict(
                 f"{design.name} predicted: {len(prediction.figures)} figures with models and "
-                f"validity. Written to {run.folder}: predict.json, predict/.{details}",
-                run.folder,
+                f"validity. Written to {run.folder}: predict.json, predict/.{details}"
             )
     if run.beside:
         print_error(f"{run.beside}; the prediction was put into {run.folder}")

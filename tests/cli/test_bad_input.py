@@ -197,7 +197,6 @@ def test_no_command_shows_the_help(run: Run) -> None:
     [
         ("check nosuch --json", "input", 2),
         ("check --json", "usage", 2),
-        ("check 1dof-5mm --watch --json", "usage", 2),
         ("new 1dof-5mm --json", "usage", 2),
         ("generate 1dof-5mm --json --bogus", "usage", 2),
         ("cut radial-15mm --json --set sheets.tpe.width=40", "too-large", 1),

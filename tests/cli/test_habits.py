@@ -1,4 +1,4 @@
-"""What a newcomer meets: a screenful, errors for programs, hints, completion, watching."""
+"""What a newcomer meets: a screenful, errors for programs, hints, completion."""
 
 from __future__ import annotations
 
@@ -11,13 +11,11 @@ from pathlib import Path
 import pytest
 from click.shell_completion import ShellComplete
 
-import sbafab
 from sbafab.actuators import records
 from sbafab.api.explained import design_keys
 from sbafab.assemblies.checks import CHECKS
 from sbafab.assemblies.records import Assembly
 from sbafab.cli import app
-from sbafab.cli.check import file_states, watch_source
 from sbafab.cli.show import limit_text
 from sbafab.design.files import key_paths, rule_names
 from sbafab.models.figures import FLAGS
@@ -168,21 +166,6 @@ def test_a_shell_gets_its_script() -> None:
     assert "compdef" in script.stdout
 
 
-def test_watching_looks_again_at_what_changed_only(tmp_path: Path) -> None:
-    design = tmp_path / "mine.toml"
-    design.write_text("a = 1\n")
-    assert list(file_states(design)) == [design]
-    seen: list[str] = []
-
-    def once() -> None:
-        seen.append(design.read_text())
-        if len(seen) == 1:
-            design.write_text("a = 22\n")
-
-    watch_source(once, design, polls=3)
-    assert seen == ["a = 1\n", "a = 22\n"]
-
-
 def test_known_keys_are_those_that_a_file_may_hold(tmp_path: Path, run: Run) -> None:
     kit = tmp_path / "mine.toml"
     kit.write_text('schema = "sbafab/kit@1"\nname = "mine"\nversion = "1"\nfoo = "bar"\n')
@@ -206,46 +189,3 @@ def test_mesh_formats_are_called_as_they_are_written() -> None:
     ]
     assert named
     assert set(named) == {version}
-
-
-QUICK = ["--set", "stack.balloons=2", "--set", "rules.yield_builds=100"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "written"),
-    [
-        (["generate", "1dof-5mm", *QUICK], "out/1dof-5mm"),
-        (["nest", "1dof-5mm", "1dof-10mm", *QUICK], "out/job"),
-        (["predict", "pouch"], "out/pouch"),
-        (["simulate", "1dof-5mm", "--with", "sofa", "--export", *QUICK], "out/1dof-5mm/sofa"),
-        (["find", "1dof-5mm", "--max", "mass=1", "--tries", "4"], "found.toml"),
-        (["import", "out/1dof-5mm/laminate.json", "--to", "again.toml"], "again.toml"),
-        (["compare", "pouch", "pouch", "-o", "cmp"], "cmp/compare"),
-        (["picture", "pouch"], "pouch-flat.png"),
-        (["check", "1dof-5mm", *QUICK], ""),
-    ],
-)
-def test_quiet_prints_the_folder_alone(arguments: list[str], written: str, run: Run) -> None:
-    if arguments[0] == "import":
-        sbafab.generate("1dof-5mm", *QUICK[1::2])
-    code, out, err = run(*arguments, "-q")
-    assert (code, out, err) == (0, f"{written}\n" if written else "", "")
-    assert Path(written).exists()
-
-
-def test_quiet_prints_errors_and_results_for_programs(tmp_path: Path, run: Run) -> None:
-    narrow = [*QUICK, "--set", "bond.width=0.7"]
-    code, out, err = run("check", "1dof-5mm", *narrow, "-q")
-    assert (code, out) == (1, "")
-    assert err.startswith("sbafab: 1dof-5mm failed: bond-width")
-    assert err.count("\n") == 1
-    code, out, err = run("generate", "1dof-5mm", *narrow, "-q", "-o", str(tmp_path))
-    assert (code, out) == (1, f"{tmp_path / '1dof-5mm'}\n")
-    assert err.startswith("sbafab: 1dof-5mm failed: bond-width")
-    code, out, err = run("check", "1dof-5mm", *narrow, "-q", "--json")
-    assert (code, err) == (1, "")
-    assert not json.loads(out)["summary"]["holds"]
-    code, out, err = run("map", "1dof-5mm", "--points", "2", "-q")
-    assert (code, err) == (0, "")
-    assert out.startswith("balloon,pressure_kpa")
-    assert run("check", "nosuch", "-q")[0] == 2
