@@ -82,8 +82,12 @@ class CommandTable(UserDict[str, Any]):
     def __getitem__(self, name: str) -> click.Command:
         command: click.Command | None = self.data[name]
         if command is None:
+            # Its module loads what commands print, and so the rules.
+            from sbafab.cli.show import add_verbosity
+
             module = import_module(f"sbafab.cli.{HOMES.get(name, name)}")
             command = self.data[name] = getattr(module, BUILTIN.get(name, name))
+            add_verbosity(command)
         return command
 
 

@@ -58,7 +58,8 @@ def reproduce(source: str | None, calibration: str | None, out: Path, as_json: b
     count = sum(row.predicted is not None for row in table.rows)
     show.verdict(
         f"\nPaper reproduced: {count} of {len(table.rows)} values predicted; {table.summary}. "
-        f"Written to {folder}: reproduction.md, reproduction.json, charts"
+        f"Written to {folder}: reproduction.md, reproduction.json, charts",
+        folder,
     )
 
 
@@ -162,7 +163,7 @@ def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) ->
         if held_out.points
         else "one test alone, so that none could be left out"
     )
-    show.verdict(f"\n{name} calibrated: {judged}. Written to {path}")
+    show.verdict(f"\n{name} calibrated: {judged}. Written to {path}", path)
 
 
 def _check_name(name: str) -> None:

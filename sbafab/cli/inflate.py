@@ -73,10 +73,10 @@ def map_(
     else:
         text = api.map_text(design.name, actuator, form, points)
     if to is None:
-        click.echo(text.removesuffix("\n"))
+        show.result(text.removesuffix("\n"))
         return
     to.write_text(text, encoding="utf-8", newline="\n")
-    show.verdict(f"{design.name} mapped up to {pressure:g} kPa. Written to {to}")
+    show.verdict(f"{design.name} mapped up to {pressure:g} kPa. Written to {to}", to)
 
 
 def _listed(pressures: str | None, chambers: int) -> tuple[float, ...]:
@@ -167,7 +167,7 @@ def picture(
         *("pressures", "volumes", "elevation", "azimuth"),
     )
     api.write_flat_picture(api.build(loaded), path, picture.width, picture.height)
-    show.verdict(f"{loaded.name} drawn flat, since {api.WHY}. Written to {path}")
+    show.verdict(f"{loaded.name} drawn flat, since {api.WHY}. Written to {path}", path)
 
 
 def _refuse_unused(suffix: str) -> None:
@@ -200,5 +200,6 @@ def _draw_inflated(design: api.Design, picture: api.PictureRequest, path: Path) 
     volumes = ", ".join(f"{volume:.0f}" for volume in pose.volumes)
     show.verdict(
         f"{design.name} drawn: {each} kPa, {volumes} ul, tip {pose.height:.2f} mm high, "
-        f"bent {pose.bend:.1f} degrees. Written to {path}"
+        f"bent {pose.bend:.1f} degrees. Written to {path}",
+        path,
     )

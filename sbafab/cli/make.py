@@ -210,7 +210,7 @@ def _print_run(run: Run) -> None:
         show.findings(groups)
     name, change = run.folder.name, "design" if is_design else "designs" if is_job else "assembly"
     if not run.failed:
-        show.passed(name, groups, "" if is_job else f"sbafab check {run.folder}")
+        show.passed(name, groups, "" if is_job else f"sbafab check {run.folder}", run.folder)
         return
     consequence = "No cut files were written"
     if is_job:
@@ -218,6 +218,7 @@ def _print_run(run: Run) -> None:
     elif run.kept:
         show.line(f"{run.folder} {UNCHANGED}")
     show.failed(name, run.findings, consequence, change)
+    show.written(None if run.kept else run.folder)
 
 
 def _order_facts(run: Run) -> Facts:
@@ -447,7 +448,7 @@ def _printed_warnings() -> Iterator[None]:
 
 def _print_result(design: Design, result: runs.Result | None, folder: Path) -> None:
     if result is None:
-        show.verdict(f"{design.name} exported. Written to {folder}")
+        show.verdict(f"{design.name} exported. Written to {folder}", folder)
         return
     width = max(len(label) for label, _, _ in result.rows)
     for label, value, unit in result.rows:
@@ -461,4 +462,4 @@ def _print_result(design: Design, result: runs.Result | None, folder: Path) -> N
             f"{factors.pocket_loss:.2g} mm)"
         )
     outcome = "simulated" if result.stopped is None else "failed: the simulation stopped early"
-    show.verdict(f"{design.name} {outcome}. Written to {folder}")
+    show.verdict(f"{design.name} {outcome}. Written to {folder}", folder)

@@ -326,3 +326,4 @@ def _print_inspection(inspection: api.Inspection, paths: list[Path]) -> None:
     sound = len(inspection.pieces) - len(inspection.amiss)
     verdict = f"{sheet.name}: {sound} of {len(inspection.pieces)} pieces as drawn"
     (show.failure if inspection.failed else show.verdict)(verdict)
+    show.written(paths[0].parent)

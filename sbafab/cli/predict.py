@@ -127,7 +127,8 @@ def predict(
             details = "" if verbose else " Details: -v"
             show.verdict(
                 f"{design.name} predicted: {len(prediction.figures)} figures with models and "
-                f"validity. Written to {run.folder}: predict.json, predict/.{details}"
+                f"validity. Written to {run.folder}: predict.json, predict/.{details}",
+                run.folder,
             )
     if run.beside:
         print_error(f"{run.beside}; the prediction was put into {run.folder}")

@@ -84,7 +84,7 @@ def find(source: str | None, **options: Any) -> None:
     target = opt.design_file(options["to"], options["out"], FOUND)
     api.refuse_existing(target)
     if any(_counts_tabs(request) for request in requests.values()):
-        click.echo(f"note: {TABS_HINT}", err=True)
+        show.note(TABS_HINT)
     with show.progress(options["as_json"]) as progress:
         origin, result = _best_result(requests, progress)
     if result.holds:
@@ -198,7 +198,9 @@ def _print_found(result: api.FoundDesign, origin: str, target: Path) -> None:
     every = "the requirement" if len(rows) == 1 else f"all {len(rows)} requirements"
     median = " in the median" if is_median and result.request.sure is None else ""
     command = f"sbafab generate {shlex.quote(str(target))}"
-    show.verdict(f"{target} meets {every if rows else 'all rules'}{median}. Next: {command}")
+    show.verdict(
+        f"{target} meets {every if rows else 'all rules'}{median}. Next: {command}", target
+    )
 
 
 def _binding_limits(result: api.FoundDesign) -> Iterator[str]:
@@ -346,7 +348,8 @@ def sweep(
     count = show.several(swept.designs, "design")
     show.verdict(
         f"{design.name} swept: {count}, {', '.join(counts)}. Written to {swept.folder}: "
-        f"{', '.join(swept.files)}"
+        f"{', '.join(swept.files)}",
+        swept.folder,
     )
 
 
@@ -392,7 +395,8 @@ def compare(
     keys, rules, figures = map(show.several, counts, ("key", "rule", "figure"))
     show.verdict(
         f"{first} and {second} differ in {keys}, {rules} and {figures}. Written to {folder}: "
-        f"{api.comparing.PAGE}"
+        f"{api.comparing.PAGE}",
+        folder,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import io
 import json
 import os
 import shutil
@@ -10,14 +11,15 @@ import sys
 import textwrap
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from sbafab import catalogue, plugins
 from sbafab.api.files import Finding, counted, decisive
-from sbafab.cli.exit import RULE_FAILED
+from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.runtime import Progress, ignore_progress
 
 if TYPE_CHECKING:
@@ -138,7 +140,7 @@ COLOURS = {"pass": "green", "fail": "bold red", "waived": "yellow", "warn": "yel
 
 def document(value: object) -> None:
     """Print a value as indented JSON."""
-    click.echo(json.dumps(value, indent=1, ensure_ascii=False))
+    result(json.dumps(value, indent=1, ensure_ascii=False))
 
 
 def several(number: int, noun: str, plural: str = "") -> str:
@@ -197,20 +199,36 @@ def remedies(group: Sequence[Finding]) -> None:
         wrapped(sentence, colour)
 
 
-def verdict(sentence: str) -> None:
-    """Print the last line of a command that is done."""
+def verdict(sentence: str, path: Path | None = None) -> None:
+    """Print the last line of a command that is done; with -q only the ``path`` written."""
     line(sentence, "bold")
+    written(path)
+
+
+def written(path: Path | None) -> None:
+    """With -q: print the folder or file that a command wrote, if any."""
+    if is_requested(QUIET) and path is not None:
+        result(path)
 
 
 def failure(sentence: str) -> None:
-    """Print the last line of a command that failed."""
-    wrapped(sentence, "bold red")
+    """Print the last line of a command that failed; with -q on standard error."""
+    if is_requested(QUIET):
+        print_error(sentence.replace(NO_BREAK, " "))
+    else:
+        wrapped(sentence, "bold red")
 
 
-def passed(name: str, groups: Groups, details: str = "") -> None:
+def note(words: str) -> None:
+    """Print a note on standard error, unless -q is given."""
+    if not is_requested(QUIET):
+        click.echo(f"note: {words}", err=True)
+
+
+def passed(name: str, groups: Groups, details: str = "", path: Path | None = None) -> None:
     """Print the verdict of a design or assembly that passed; ``details``: the command for more."""
     more = f" Details: {details}" if details else ""
-    verdict(f"{name} passed: {counted(*groups.values())}.{more}")
+    verdict(f"{name} passed: {counted(*groups.values())}.{more}", path)
 
 
 def failed(name: str, group: Iterable[Finding], consequence: str, change: str) -> None:
@@ -266,29 +284,84 @@ def short_figure(value: float | None, unit: str) -> str:
 # elapsed and, once there is a rate, the rate and the time left.
 
 
+QUIET, VERBOSE = "sbafab.quiet", "sbafab.verbose"
+RESULTS = "sbafab.results"
+"""The stream for results while -q discards the rest."""
 FIRST_LINE_SECONDS = 5.0
 """Before the first plain line, so that quick commands leave no lines in a log."""
 LINE_SECONDS = 10.0
 """Between two plain lines."""
+VERBOSE_LINE_SECONDS = 1.0
 SHOWN_AFTER_SECONDS = 1.0
 """Before the line appears on a terminal."""
 RATE_AFTER_SECONDS = 1.0
 """Duration of a stage before its rate is used."""
 
 
+def add_verbosity(command: click.Command) -> None:
+    """Add the option -v to a command, unless it has one of that name, and -q to one that writes
+    files or checks them.
+    """
+    taken = {name for option in command.params for name in option.opts}
+    if "-v" not in taken:
+        _add_flag(command, "-v", VERBOSE, "Print the progress of every stage as lines.")
+    if taken & {"-o", "--to"} or command.name == "check":
+        _add_flag(command, "-q", QUIET, "Print errors only, and the folder or file written.")
+        command.callback = _quietly(command.callback)
+
+
+def _add_flag(command: click.Command, short: str, key: str, words: str) -> None:
+    """Add a flag that ``is_requested`` knows."""
+
+    def set_key(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+        ctx.meta[key] = ctx.meta.get(key, False) or value
+
+    names = [short, f"--{key.rpartition('.')[2]}"]
+    command.params.append(
+        click.Option(names, is_flag=True, expose_value=False, callback=set_key, help=words)
+    )
+
+
+def _quietly(callback: Callable[..., Any] | None) -> Callable[..., Any]:
+    """Return a callback that with -q prints nothing but by ``result``."""
+    assert callback is not None
+
+    @functools.wraps(callback)
+    def call(*args: Any, **parameters: Any) -> Any:
+        if not is_requested(QUIET):
+            return callback(*args, **parameters)
+        click.get_current_context().meta[RESULTS] = sys.stdout
+        with redirect_stdout(io.StringIO()):
+            return callback(*args, **parameters)
+
+    return call
+
+
+def result(value: object) -> None:
+    """Print a line on standard output, with -q too."""
+    context = click.get_current_context(silent=True)
+    click.echo(value, file=context.meta.get(RESULTS) if context else None)
+
+
+def is_requested(key: str) -> bool:
+    """Return True if the running command has the option -q (``QUIET``) or -v (``VERBOSE``)."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(key, False))
+
+
 @contextmanager
 def progress(quiet: bool) -> Iterator[Progress]:
-    """Show the progress of the block on standard error, unless ``quiet``.
+    """Show the progress of the block on standard error, as ``quiet``, -q and -v require.
 
     On a terminal a live line; elsewhere plain lines, the first after some seconds.
     """
-    if quiet:
+    if quiet or is_requested(QUIET):
         yield ignore_progress
-    elif sys.stderr.isatty():
+    elif sys.stderr.isatty() and not is_requested(VERBOSE):
         with live_line() as report:
             yield report
     else:
-        yield plain_lines()
+        yield plain_lines(is_requested(VERBOSE))
 
 
 class Stages:
@@ -299,12 +372,14 @@ class Stages:
         self._start = self._stage_start = clock()
         self._current = ("starting", 0, 0)
 
-    def report(self, stage: str, done: int, total: int) -> None:
-        """Record progress; a stage begins with another total, or with less done."""
+    def report(self, stage: str, done: int, total: int) -> bool:
+        """Record progress; return True if a stage begins: another total, or less done."""
         _, previous, previous_total = self._current
-        if total != previous_total or done < previous:
+        begins = total != previous_total or done < previous
+        if begins:
             self._stage_start = self._clock()
         self._current = (stage, done, total)
+        return begins
 
     @property
     def elapsed(self) -> float:
@@ -349,6 +424,9 @@ def live_line() -> Iterator[Progress]:
         spinner.update(text=Text(stages.text))
         return spinner if stages.elapsed >= SHOWN_AFTER_SECONDS else Text("")
 
+    def report(stage: str, done: int, total: int) -> None:
+        stages.report(stage, done, total)
+
     # Four times a second, so that the clock runs between reports; the command prints as it likes.
     with Live(
         get_renderable=renderable,
@@ -358,21 +436,24 @@ def live_line() -> Iterator[Progress]:
         redirect_stdout=False,
         redirect_stderr=False,
     ):
-        yield stages.report
+        yield report
 
 
 def plain_lines(
-    write: Callable[[str], object] | None = None, clock: Callable[[], float] = time.monotonic
+    verbose: bool,
+    write: Callable[[str], object] | None = None,
+    clock: Callable[[], float] = time.monotonic,
 ) -> Progress:
-    """Return a progress that writes a line at intervals."""
+    """Return a progress that writes a line at intervals; ``verbose``: also at every stage."""
     stages = Stages(clock)
     write = write or functools.partial(click.echo, err=True)
-    last = clock() + FIRST_LINE_SECONDS - LINE_SECONDS
+    interval = VERBOSE_LINE_SECONDS if verbose else LINE_SECONDS
+    last = clock() + (0.0 if verbose else FIRST_LINE_SECONDS - LINE_SECONDS)
 
     def report(stage: str, done: int, total: int) -> None:
         nonlocal last
-        stages.report(stage, done, total)
-        if clock() - last >= LINE_SECONDS:
+        begins = stages.report(stage, done, total)
+        if (verbose and begins) or clock() - last >= interval:
             last = clock()
             write(f"sbafab: {stages.text}")
 

@@ -91,7 +91,8 @@ def import_(source: Path, out: Path, to: Path | None, as_json: bool) -> None:
     """Write a design of drawn layers from other files.
 
     SOURCE is a folder of drawings with a table layers.csv, an output folder, a laminate.json, a
-    ParchMint circuit (JSON), or a laminate of foldable_robotics. What is not carried over is named.
+    ParchMint circuit (JSON), or a laminate of foldable_robotics or popupCAD. What is not carried
+    over is named.
     """
     import_to = plugins.load("sbafab.importing.sources:import_to")
     name, remarks, written = import_to(source, to and opt.design_file(to, out, ""), out)
@@ -101,10 +102,11 @@ def import_(source: Path, out: Path, to: Path | None, as_json: bool) -> None:
         show.document({**document, "patterns": patterns, "remarks": list(remarks)})
         return
     for remark in remarks:
-        click.echo(f"note: {remark}", err=True)
+        show.note(remark)
     show.verdict(
         f"{written.file} written: {layers} layers in {patterns} patterns, from {name}. Next: "
-        f"sbafab generate {shlex.quote(str(written.file))}"
+        f"sbafab generate {shlex.quote(str(written.file))}",
+        written.file,
     )
 
 

@@ -312,31 +312,22 @@ def _hint(missing: Path) -> str:
     return hint(missing, names, f"the templates are {', '.join(names)}")
 
 
-def read_bytes(path: Path, most: int) -> bytes:
-    """Return the content of a file. Raises DesignError if it cannot be read, or is too large."""
-    try:
-        with path.open("rb") as opened:
-            content = opened.read(most + 1)
-        size = len(content) if len(content) <= most else path.stat().st_size
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise DesignError(f"{path} cannot be read: {reason}; check its path") from None
-    if size > most:
-        raise DesignError(f"{path} has {size:,} bytes, where at most {most:,} are allowed")
-    return content
-
-
-def read_text(path: Path, most: int = MOST_BYTES) -> str:
-    """Return the text of a file in UTF-8. Raises DesignError."""
-    try:
-        return read_bytes(path, most).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise DesignError(f"{path} is not a text file in UTF-8; save it as UTF-8") from None
-
-
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the tables of a design file. Raises DesignError if it cannot be read."""
-    return toml_tables(read_text(path), path)
+    try:
+        with path.open("rb") as opened:
+            content = opened.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            size = path.stat().st_size
+            raise DesignError(
+                f"{path} has {size:,} bytes; a design file has at most {MOST_BYTES:,}"
+            )
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise DesignError(f"{path} is not a text file in UTF-8; save it as UTF-8") from None
+    except OSError as error:
+        raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
+    return toml_tables(text, path)
 
 
 def toml_tables(text: str, path: str | Path) -> dict[str, Any]:

@@ -15,19 +15,25 @@ from pydantic import Field
 from sbafab.actuators.drawn import DRAWN
 from sbafab.actuators.shapes import Coordinate
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.design.files import checked, name_of, read_text, shown
+from sbafab.design.files import checked, name_of, shown
 from sbafab.design.outline import read_drawing
 from sbafab.design.records import without_none
 from sbafab.design.toml_table import Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
-from sbafab.geometry.region import Region, polygon, union
+from sbafab.geometry.region import Region, union
+from sbafab.importing.popupcad import SUFFIX, cad_layer
 from sbafab.importing.records import (
     LAYERS,
     UNNAMED,
     Imported,
     json_of,
     key_name,
+    layer_index,
+    read_text,
+    read_yaml,
+    refuse_without_table,
+    region_of,
 )
 from sbafab.laminate.laminate import Role
 from sbafab.spreadsheet import table_rows
@@ -67,18 +73,20 @@ class ChamberEntry(Section):
 def import_table(folder: Path) -> Imported:
     """Return the design for a folder of DXF or SVG files and its tables. Raises DesignError.
 
-    A drawing may also be a layer of foldable_robotics polygons, by its number. A ``kit.toml``
-    beside the tables gives films, press, laser and limits.
+    A drawing may also be a layer of foldable_robotics polygons, by its number, or of a popupCAD
+    design, by "OPERATION/NUMBER". A ``kit.toml`` beside the tables gives films, press, laser and
+    limits.
     """
     shapes: dict[str, dict[str, Any]] = {}
     names: dict[tuple[str, str | None], str] = {}
     drawings: dict[str, bytes] = {}
-    layers = []
+    layers, remarks = [], []
     for place, row in read_table(folder / LAYERS, LayerEntry):
         drawing = row.file, row.layer
         if drawing not in names:
             names[drawing] = key_name(drawing[1] or Path(drawing[0]).stem, shapes, "layer-")
-            name, content = _drawing(folder, row, place)
+            name, content, read_as = _drawing(folder, row, place)
+            remarks += read_as
             if drawings.setdefault(name, content) != content:
                 raise DesignError(f"{place}: two files are named {name}; rename one of them")
             is_part = drawing[1] is not None and name == Path(drawing[0]).name
@@ -105,8 +113,8 @@ def import_table(folder: Path) -> Imported:
         for path in folder.iterdir()
         if path.suffix.lower() in DRAWINGS and path.name not in drawings
     )
-    remarks = (f"{name}: {LAYERS} does not name it, so it is not imported" for name in unused)
-    return Imported(tables, drawings, tuple(remarks))
+    remarks += [f"{name}: {LAYERS} does not name it, so it is not imported" for name in unused]
+    return Imported(tables, drawings, tuple(dict.fromkeys(remarks)))
 
 
 def read_table(path: Path, record: type[AnyRow]) -> Iterator[tuple[str, AnyRow]]:
@@ -123,21 +131,25 @@ def read_table(path: Path, record: type[AnyRow]) -> Iterator[tuple[str, AnyRow]]
         yield place, checked(record, filled, {}, f"{place}: ", "table")
 
 
-def _drawing(folder: Path, row: LayerEntry, place: str) -> tuple[str, bytes]:
-    """The name and content of a row's only drawing."""
+def _drawing(folder: Path, row: LayerEntry, place: str) -> tuple[str, bytes, list[str]]:
+    """The name and content of a row's only drawing, and remarks on it."""
     path, layer = folder / row.file, row.layer or ""
-    if path.suffix.lower() not in (*DRAWINGS, *SUFFIXES):
+    suffix = path.suffix.lower()
+    if suffix not in (*DRAWINGS, *SUFFIXES, SUFFIX):
         raise DesignError(
-            f"{place}: file = {shown(row.file)} is no DXF or SVG, and no JSON or YAML of polygons"
+            f"{place}: file = {shown(row.file)} is no DXF or SVG, no JSON or YAML of polygons, and "
+            "no popupCAD design"
         )
     try:
-        if path.suffix.lower() in DRAWINGS:
+        if suffix in DRAWINGS:
             read_drawing(path, row.layer)
-            return path.name, path.read_bytes()
-        region = polygon_layer(path, layer)
+            return path.name, path.read_bytes(), []
+        is_cad = suffix == SUFFIX
+        region, remarks = cad_layer(path, layer) if is_cad else (polygon_layer(path, layer), [])
     except DesignError as error:
         raise DesignError(f"{place}: {error}") from None
-    return f"{path.stem}-{name_of(layer)}.dxf", dxf_text(region.contours, {}).encode()
+    name = f"{path.stem}-{name_of(layer)}.dxf"
+    return name, dxf_text(region.contours, {}).encode(), remarks
 
 
 def _chambers(path: Path) -> list[dict[str, Any]]:
@@ -178,11 +190,7 @@ def polygon_layer(path: Path, layer: str) -> Region:
     Raises DesignError with the file, the layer and the unreadable geometry.
     """
     layers = _geometries(path, read_text(path, MOST_OF_POLYGONS))
-    if not layer.isdecimal() or not 1 <= int(layer) <= len(layers):
-        raise DesignError(
-            f"{path} has no layer {shown(layer)}; its layers are 1 to {len(layers)}, bottom to top"
-        )
-    geoms = layers[int(layer) - 1]
+    geoms = layers[layer_index(path, layer, len(layers))]
     region = union(p for i, geom in enumerate(geoms, 1) for p in _parts(path, layer, i, geom))
     if region.is_empty:
         raise DesignError(f"{path}, layer {layer} holds no polygon; leave its row out")
@@ -192,18 +200,13 @@ def polygon_layer(path: Path, layer: str) -> Region:
 def refuse_polygons(path: Path) -> NoReturn:
     """Refuse a laminate of polygons that is imported without a table of its layers."""
     count = len(_geometries(path, read_text(path, MOST_OF_POLYGONS)))
-    raise DesignError(
-        f"{path} holds {count} layers of polygons and not what they are for; write {LAYERS} beside "
-        f'it, with a row "{path.name},ROLE,NUMBER" a layer under "file,role,layer", and import the '
-        "folder"
-    )
+    refuse_without_table(path, f"{count} layers of polygons", "NUMBER")
 
 
 @lru_cache(maxsize=4)
 def _geometries(path: Path, text: str) -> list[list[str]]:
     """Return the geometries of every layer, as text. Raises DesignError."""
-    is_json = path.suffix.lower() == ".json"
-    document = json_of(path, text) if is_json else _yaml_of(path, text)
+    document = _document(path, text)
     rows = document.get("layers") if isinstance(document, dict) else None
     if not isinstance(rows, list) or not rows:
         raise DesignError(f"{path} has no list of layers; export the laminate again")
@@ -216,26 +219,18 @@ def _geometries(path: Path, text: str) -> list[list[str]]:
     return layers
 
 
-def _yaml_of(path: Path, text: str) -> Any:
-    """Return the content of a YAML file; objects of foldable_robotics are read as plain ones, and
-    no others are created. Raises DesignError, also if the extra is not installed.
-    """
-    try:
-        import yaml
-    except ImportError:
-        raise DesignError(
-            f'{path} is YAML, which takes PyYAML to read; pip install "sbafab[yaml]"'
-        ) from None
+def _document(path: Path, text: str) -> Any:
+    if path.suffix.lower() == ".json":
+        return json_of(path, text)
+    return read_yaml(path, text, "plain values", _plain_loader)
+
+
+def _plain_loader(yaml: Any) -> Any:
+    """Objects of foldable_robotics are read as plain ones; no others are created."""
     loader: Any = type("Loader", (yaml.SafeLoader,), {})
     for tag in LAMINATE_TAGS:
         loader.add_constructor(tag, lambda made, node: made.construct_mapping(node, deep=True))
-    try:
-        return yaml.load(text, loader)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        line = " ".join(str(error).split())
-        raise DesignError(
-            f"{path} is not valid YAML of plain values: {line}; save it again"
-        ) from None
+    return loader
 
 
 def _parts(path: Path, layer: str, number: int, text: str) -> Iterator[Region]:
@@ -258,8 +253,4 @@ def _parts(path: Path, layer: str, number: int, text: str) -> Iterator[Region]:
                 "polygons; make it one, or leave it out"
             )
         if not piece.is_empty:
-            outer, *holes = (
-                polygon([(float(x), float(y)) for x, y, *_ in ring.coords[:-1]])
-                for ring in (piece.exterior, *piece.interiors)
-            )
-            yield outer - union(holes)
+            yield region_of(piece)

@@ -7,15 +7,20 @@ import json
 import re
 import shutil
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from sbafab.actuators import build, load_design
+from sbafab.design.files import shown
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
+from sbafab.geometry.region import Region, polygon, union
 from sbafab.laminate.laminate import Laminate
+
+if TYPE_CHECKING:
+    import shapely
 
 LAYERS = "layers.csv"
 """The table of layers in a folder of drawings."""
@@ -92,6 +97,19 @@ def named(remark: str, places: list[str]) -> list[str]:
     return remarks
 
 
+def read_text(path: Path, most_bytes: int) -> str:
+    """Return the text of a UTF-8 file. Raises DesignError if it is none, or too large."""
+    try:
+        size = path.stat().st_size
+        text = path.read_text(encoding="utf-8-sig") if size <= most_bytes else ""
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is not text in UTF-8"
+        raise DesignError(f"{path} cannot be read: {reason}; check the file") from None
+    if size > most_bytes:
+        raise DesignError(f"{path} has {size:,} bytes, where at most {most_bytes:,} are allowed")
+    return text
+
+
 def json_of(path: Path, text: str) -> Any:
     """Return the content of a JSON file's text. Raises DesignError with the place at fault."""
     try:
@@ -103,6 +121,50 @@ def json_of(path: Path, text: str) -> Any:
     except ValueError:
         where = "a number in it is too long"
     raise DesignError(f"{path} is not valid JSON: {where}; correct it, or save it again")
+
+
+def read_yaml(path: Path, text: str, what: str, loader_of: Callable[[Any], Any]) -> Any:
+    """Return the content of YAML by the loader that is made of the module.
+
+    Raises DesignError if it is not ``what``, or the extra is not installed.
+    """
+    try:
+        import yaml
+    except ImportError:
+        raise DesignError(
+            f'{path} is YAML, which takes PyYAML to read; pip install "sbafab[yaml]"'
+        ) from None
+    try:
+        return yaml.load(text, loader_of(yaml))
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        line = " ".join(str(error).split())
+        raise DesignError(f"{path} is not valid YAML for {what}: {line}; save it again") from None
+
+
+def layer_index(path: Path | str, number: str, count: int) -> int:
+    """Return the index of a layer that a table names by its number. Raises DesignError."""
+    if not number.isdecimal() or not 1 <= int(number) <= count:
+        raise DesignError(
+            f"{path} has no layer {shown(number)}; its layers are 1 to {count}, bottom to top"
+        )
+    return int(number) - 1
+
+
+def refuse_without_table(path: Path, layers: str, layer: str, more: str = "") -> NoReturn:
+    """Refuse layers that are imported without a table of them."""
+    raise DesignError(
+        f"{path} holds {layers} and not what they are for; write {LAYERS} beside it, with a row "
+        f'"{path.name},ROLE,{layer}" a layer under "file,role,layer", and import the folder{more}'
+    )
+
+
+def region_of(drawn: shapely.Polygon) -> Region:
+    """Return a polygon of shapely as a region."""
+    outer, *holes = (
+        polygon([(float(x), float(y)) for x, y, *_ in ring.coords[:-1]])
+        for ring in (drawn.exterior, *drawn.interiors)
+    )
+    return outer - union(holes)
 
 
 # Out: all or nothing, never over an existing file.

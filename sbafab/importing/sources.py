@@ -8,17 +8,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sbafab import plugins
-from sbafab.design.files import read_text
 from sbafab.design.laminate_file import SCHEMA
 from sbafab.errors import DesignError
 from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
 from sbafab.importing.layer_table import MOST_OF_POLYGONS, import_table, refuse_polygons
 from sbafab.importing.parchmint import import_parchmint
+from sbafab.importing.popupcad import SUFFIX, refuse_alone
 from sbafab.importing.records import (
     LAYERS,
     Imported,
     Written,
     json_of,
+    read_text,
     write_imported,
 )
 
@@ -86,6 +87,7 @@ _OWN = (
         _is_file(".yaml", ".yml", mark='"geoms"'),
         refuse_polygons,
     ),
+    SourceFormat("a popupCAD design, with a table of its layers", _is_file(SUFFIX), refuse_alone),
 )
 
 

@@ -1,4 +1,4 @@
-"""What a newcomer meets: a screenful, errors for programs, hints, completion."""
+"""What a newcomer meets: a screenful, errors for programs, hints, completion, quiet."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from click.shell_completion import ShellComplete
 
+import sbafab
 from sbafab.actuators import records
 from sbafab.api.explained import design_keys
 from sbafab.assemblies.checks import CHECKS
@@ -189,3 +190,46 @@ def test_mesh_formats_are_called_as_they_are_written() -> None:
     ]
     assert named
     assert set(named) == {version}
+
+
+QUICK = ["--set", "stack.balloons=2", "--set", "rules.yield_builds=100"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "written"),
+    [
+        (["generate", "1dof-5mm", *QUICK], "out/1dof-5mm"),
+        (["nest", "1dof-5mm", "1dof-10mm", *QUICK], "out/job"),
+        (["predict", "pouch"], "out/pouch"),
+        (["simulate", "1dof-5mm", "--with", "sofa", "--export", *QUICK], "out/1dof-5mm/sofa"),
+        (["find", "1dof-5mm", "--max", "mass=1", "--tries", "4"], "found.toml"),
+        (["import", "out/1dof-5mm/laminate.json", "--to", "again.toml"], "again.toml"),
+        (["compare", "pouch", "pouch", "-o", "cmp"], "cmp/compare"),
+        (["picture", "pouch"], "pouch-flat.png"),
+        (["check", "1dof-5mm", *QUICK], ""),
+    ],
+)
+def test_quiet_prints_the_folder_alone(arguments: list[str], written: str, run: Run) -> None:
+    if arguments[0] == "import":
+        sbafab.generate("1dof-5mm", *QUICK[1::2])
+    code, out, err = run(*arguments, "-q")
+    assert (code, out, err) == (0, f"{written}\n" if written else "", "")
+    assert Path(written).exists()
+
+
+def test_quiet_prints_errors_and_results_for_programs(tmp_path: Path, run: Run) -> None:
+    narrow = [*QUICK, "--set", "bond.width=0.7"]
+    code, out, err = run("check", "1dof-5mm", *narrow, "-q")
+    assert (code, out) == (1, "")
+    assert err.startswith("sbafab: 1dof-5mm failed: bond-width")
+    assert err.count("\n") == 1
+    code, out, err = run("generate", "1dof-5mm", *narrow, "-q", "-o", str(tmp_path))
+    assert (code, out) == (1, f"{tmp_path / '1dof-5mm'}\n")
+    assert err.startswith("sbafab: 1dof-5mm failed: bond-width")
+    code, out, err = run("check", "1dof-5mm", *narrow, "-q", "--json")
+    assert (code, err) == (1, "")
+    assert not json.loads(out)["summary"]["holds"]
+    code, out, err = run("map", "1dof-5mm", "--points", "2", "-q")
+    assert (code, err) == (0, "")
+    assert out.startswith("balloon,pressure_kpa")
+    assert run("check", "nosuch", "-q")[0] == 2

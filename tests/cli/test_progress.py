@@ -1,4 +1,4 @@
-"""What long work says of itself: time elapsed, time left, and silence where it is quick."""
+"""What long work says of itself: time elapsed, time left, and silence where it is quick or -q."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def text(stage: str, done: int, total: int, before: float, in_stage: float) -> s
     stages.report(stage, 0, total + 1)
     stages.report(stage, 0, total)
     clock.now += in_stage
-    stages.report(stage, done, total)
+    assert not stages.report(stage, done, total)
     return stages.text
 
 
@@ -41,20 +41,36 @@ def test_time_left_is_that_of_the_pace_so_far() -> None:
 def test_a_stage_begins_where_less_is_done_or_the_total_is_another() -> None:
     clock = Clock()
     stages = Stages(clock)
-    stages.report("bond-width", 0, 16)
+    assert stages.report("bond-width", 0, 16)
     clock.now += 4
-    stages.report("mask-overhang", 1, 16)
+    assert not stages.report("mask-overhang", 1, 16)
     assert stages.text.endswith("15 per minute, 4 s elapsed, about 1 min 00 s left")
-    stages.report("sheets", 0, 3)
+    assert stages.report("sheets", 0, 3)
     assert stages.text == "sheets: 0 of 3, 4 s elapsed"
 
 
-def test_plain_lines_come_now_and_then() -> None:
+def test_plain_lines_come_now_and_then_and_verbose_ones_at_every_stage() -> None:
+    for verbose, wanted in ((False, [5, 15, 25]), (True, [0, *range(1, 10), *range(10, 30)])):
+        clock = Clock()
+        lines: list[str] = []
+        at: list[float] = []
+
+        def put(
+            text: str, lines: list[str] = lines, at: list[float] = at, c: Clock = clock
+        ) -> None:
+            lines.append(text)
+            at.append(c.now - 100)
+
+        tell = plain_lines(verbose, put, clock)
+        for second in range(30):
+            clock.now = 100.0 + second
+            stage, done = divmod(second, 10)
+            tell(f"stage {stage}", done, 10 + stage)
+        assert [round(when) for when in at] == wanted
+        assert all(line.startswith("sbafab: stage") for line in lines)
+    quick: list[str] = []
     clock = Clock()
-    times: list[float] = []
-    tell = plain_lines(lambda text: times.append(clock.now - 100), clock)
-    for second in range(30):
-        clock.now = 100.0 + second
-        stage, done = divmod(second, 10)
-        tell(f"stage {stage}", done, 10 + stage)
-    assert [round(time) for time in times] == [5, 15, 25]
+    tell = plain_lines(False, quick.append, clock)
+    tell("quick", 0, 2)
+    tell("quick", 1, 2)
+    assert quick == []

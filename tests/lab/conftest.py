@@ -69,6 +69,6 @@ def lobed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def cut(out: Path, template: str, *options: str) -> Path:
     with pytest.raises(SystemExit) as stop:
-        main(["cut", template, "-o", str(out), *options])
+        main(["cut", template, "-o", str(out), "-q", *options])
     assert stop.value.code == 0
     return out / template

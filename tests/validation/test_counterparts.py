@@ -293,7 +293,7 @@ def test_find_prints_and_writes_them(tmp_path: Path) -> None:
         assert f"(the paper measured {measured}" in after[: after.index("least mass")]
         assert f"# {quantity}: the paper measured {measured}" in text
     (tmp_path / "tip.toml").unlink()
-    told = json.loads(CliRunner().invoke(app, [*asked, "--json"]).stdout)
+    told = json.loads(CliRunner().invoke(app, [*asked, "--json", "-q"]).stdout)
     assert set(told["measured"]) == {"stroke@10kPa", "bend@10kPa", "force@4mm@50kPa", "height"}
 
 
