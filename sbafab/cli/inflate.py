@@ -24,7 +24,7 @@ MODEL_PRESSURE = 10.0
 @opt.set_option
 @opt.option(
     "--to FILE",
-    "Write FILE.csv, FILE.py or FILE.xml (MuJoCo).  [default: CSV on standard output]",
+    "Write FILE.csv or FILE.xml (MuJoCo).  [default: CSV on standard output]",
     opt.file_path(dir_okay=False),
 )
 @opt.option("--pressure P", "Highest pressure of the map.", opt.PRESSURE, default="110 kPa")
@@ -55,9 +55,8 @@ def map_(
     of the stack about its pose at the given pressures.
     """
     form = "csv" if to is None else to.suffix.removeprefix(".")
-    formats = (*api.FORMATS, MUJOCO)
-    if form not in formats:
-        raise DesignError(f"{to} must end with .{', .'.join(formats)}, which sets the format")
+    if form not in ("csv", MUJOCO):
+        raise DesignError(f"{to} must end with .csv or .{MUJOCO}, which sets the format")
     if form != MUJOCO:
         opt.refuse_options(
             "is for a MuJoCo model; give --to FILE.xml, or leave it out", "pressures"
@@ -71,7 +70,7 @@ def map_(
     if form == MUJOCO:
         text = api.chain_text(design.name, actuator, _listed(pressures, actuator.chambers))
     else:
-        text = api.map_text(design.name, actuator, form, points)
+        text = api.map_text(actuator.maps, points)
     if to is None:
         show.result(text.removesuffix("\n"))
         return

@@ -99,12 +99,12 @@ predict brace -o x | --out is for written files
 predict brace --pressure 5 --pressure 6 | an assembly is predicted at one pressure
 predict radial-15mm --modulus 3 | --modulus is for elastic balloons, round pockets
 predict {OVAL} --volume 5 | --volume is for pockets that are round or oblong
-map 1dof-5mm --to a.py --pressures 5 | is for a MuJoCo model
+map 1dof-5mm --to a.csv --pressures 5 | is for a MuJoCo model
 map 1dof-5mm --to a.xml --pressures 5,5 | has 2 of 1 pressures
 map 1dof-5mm --to a.xml --pressures x | must be a pressure such as
 map 1dof-5mm --to a.xml --pressures 200 | give 0 to 110 kPa
 map radial-15mm | no round pockets
-map 1dof-5mm --to map.txt | must end with .csv, .py, .xml
+map 1dof-5mm --to map.txt | must end with .csv or .xml
 map 1dof-5mm --pressure 400 | 400 kPa is past the estimated burst pressure, 367 kPa
 map 1dof-5mm --pressure 0 | give more than 0 kPa
 map 1dof-5mm --pocket-loss 2 | a pocket loss of 2 mm leaves 0.5

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
-import runpy
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import sbafab
-from sbafab.models.balloon_map import BalloonMap, map_range
+from sbafab.models.balloon_map import BalloonMap
 from tests.cli.conftest import Run
 from tests.site.formats import hold
 
@@ -35,56 +31,6 @@ def test_csv_holds_force_and_volume(balloon: BalloonMap, run: Run) -> None:
         force = float(balloon.force(p, h))
         assert float(row["force_mn"]) == pytest.approx(force, rel=1e-4, abs=1e-4)
         assert float(row["volume_ul"]) == pytest.approx(float(balloon.volume(p, h)), rel=1e-4)
-
-
-def test_python_file_needs_nothing_and_says_the_same(
-    balloon: BalloonMap, tmp_path: Path, run: Run
-) -> None:
-    file = tmp_path / "balloons.py"
-    assert run("map", "1dof-5mm", "--to", str(file))[0] == 0
-    program = (
-        "import balloons as b\n"
-        "print(b.force(7.0, 0.6), b.volume(7.0, 0.6), b.area(7.0, 0.6), b.stiffness(7.0, 0.6))\n"
-        "print((b.volume(7.0, 0.601) - b.volume(7.0, 0.599)) / 0.002)"
-    )
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-I",
-            "-c",
-            f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n{program}",
-        ],
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    force, volume, area, _, slope = map(float, done.stdout.split())
-    assert force == pytest.approx(float(balloon.force(7.0, 0.6)), rel=1e-6)
-    assert volume == pytest.approx(float(balloon.volume(7.0, 0.6)), rel=1e-6)
-    assert area == pytest.approx(slope, rel=1e-4)
-
-
-def test_python_file_takes_arrays(balloon: BalloonMap, tmp_path: Path, run: Run) -> None:
-    file = tmp_path / "balloons.py"
-    assert run("map", "1dof-5mm", "--to", str(file))[0] == 0
-    functions = runpy.run_path(str(file))
-    p = np.linspace(0.0, balloon.most_pressure, 7)[:, None]
-    h = np.linspace(0.0, balloon.most_height, 9)
-    for name in ("force", "volume", "potential"):
-        with pytest.warns(UserWarning, match="more than 3 % off"):
-            values = functions[name](p, h)
-        assert values == pytest.approx(getattr(balloon, name)(p, h), rel=1e-6, abs=1e-5)
-        # Both ways of counting agree, down to a number of numpy's.
-        with pytest.warns(UserWarning, match="more than 3 % off"):
-            each = [[functions[name](float(x), float(y)) for y in h] for x in p[:, 0]]
-        assert values == pytest.approx(np.array(each), rel=1e-12, abs=1e-12)
-        assert functions[name](p[3, 0], h[2]) == pytest.approx(each[3][2], rel=1e-12)
-    covered = map_range(balloon)
-    for x in np.linspace(0.3, 0.9 * balloon.most_pressure, 5).tolist():
-        for y in np.linspace(0.1, 0.9 * balloon.most_height, 5).tolist():
-            assert functions["holds"](x, y) == bool(covered.holds(x, y))
-    with pytest.raises(ValueError, match="outside the map"):
-        functions["force"](np.array([1.0, 1e4]), 0.5)
 
 
 def test_models_of_robots_are_files_of_xml(tmp_path: Path, run: Run) -> None:

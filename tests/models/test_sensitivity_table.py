@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 import sbafab
 from sbafab.cli import app
+from sbafab.errors import DesignError
 from sbafab.models.sensitivities import KEYS, sensitivity_table
 from tests.site.formats import hold
 
@@ -35,6 +36,31 @@ def test_a_stiffer_film_rises_and_bends_less(rows: dict[str, tuple[float, float 
     assert stroke == pytest.approx(math.log(rises[1] / rises[0]) / by_ratio, abs=0.03)
     assert bend == pytest.approx(math.log(bends[1] / bends[0]) / by_ratio, abs=0.03)
     assert stroke < 0
+
+
+def test_films_so_much_stiffer_under_as_much_more_pressure_rise_and_bend_as_before(
+    rows: dict[str, tuple[float, float | None]],
+) -> None:
+    """Film energies are in proportion to the modulus: Euler's theorem of homogeneous functions."""
+    for pressures, change, measure in (
+        ((10.0,) * 3, rows["films.tpe.modulus"][0], lambda pose: pose.height - 15 * pose.pitch),
+        ((10.0, 0.0, 0.0), rows["films.tpe.modulus"][1], lambda pose: pose.bend),
+    ):
+        whole = sbafab.stack("3dof-15mm")
+        ends = [
+            measure(whole.pose([ratio * each for each in pressures])) for ratio in (0.999, 1.001)
+        ]
+        by_pressure = (ends[1] - ends[0]) / 0.002 / measure(whole.pose(pressures))
+        assert change == pytest.approx(-by_pressure, rel=5e-3)
+
+
+def test_wider_pockets_raise_the_stroke_and_a_taper_has_no_one_diameter(
+    rows: dict[str, tuple[float, float | None]],
+) -> None:
+    assert rows["chamber.diameter"][0] > 1
+    taper = sbafab.load("1dof-5mm", "chamber.diameter=[6, 5.5, 5, 5, 5, 5]")
+    with pytest.raises(DesignError, match=r"chamber.diameter is not a number above 0"):
+        sensitivity_table(taper, 10.0)
 
 
 def test_an_actuator_of_one_chamber_has_no_bend() -> None:
