@@ -156,7 +156,7 @@ def mesh(
     h: float = MeshSettings.h,
     element: Element = MeshSettings.element,
     symmetry: Symmetry = MeshSettings.symmetry,
-    fill_ul: float | Mapping[str, float] | None = MeshSettings.fill_ul,
+    fill_ul: float | None = MeshSettings.fill_ul,
     gaps: bool = MeshSettings.gaps,
     wrapped: bool = MeshSettings.wrapped,
     progress: Progress | None = None,

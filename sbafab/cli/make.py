@@ -117,9 +117,9 @@ def press(design: Design, **settings: Any) -> None:
     default=MeshSettings.symmetry,
 )
 @opt.option(
-    "--fill fill_ul...",
-    "Air volume of each balloon, or of each of a chamber, e.g. 5ul.  [default: flat]",
-    opt.OfChamber(opt.VOLUME, all_chambers=True),
+    "--fill fill_ul",
+    "Air volume of each balloon, e.g. 5ul.  [default: flat]",
+    opt.VOLUME,
 )
 @opt.option("--gaps", "Keep films a mask thickness apart.", bool)
 @opt.option("--flat", "Do not wrap designs for a tube.", bool)
@@ -132,18 +132,14 @@ def mesh(
     design: Design,
     formats: tuple[str, ...],
     flat: bool,
-    fill_ul: dict[str, float],
     **more: Any,
 ) -> None:
     """Write meshes: solid, cavities, volume and shell.
 
     Volume and shell meshes need the extra "mesh": pip install "sbafab[mesh]".
     """
-    if "" in fill_ul and len(fill_ul) > 1:
-        raise click.UsageError("--fill takes one volume for all, or one for each chamber")
-    fill = fill_ul.get("", fill_ul) if fill_ul else None
     formats = formats or runs.conforming_endings()
-    _run(runs.mesh, design, formats=formats, wrapped=not flat, fill_ul=fill, **more)
+    _run(runs.mesh, design, formats=formats, wrapped=not flat, **more)
 
 
 @click.command()
@@ -332,7 +328,7 @@ def _mesh_facts(run: Run) -> Facts:
         )
     for note in conforming.volume.notes:
         yield "", note
-    if conforming.fill is not None:
+    if conforming.settings.fill_ul is not None:
         yield "", "solid.* and cavity_<chamber>.stl are flat; skin.* is filled"
 
 

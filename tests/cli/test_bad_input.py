@@ -60,8 +60,7 @@ press 1dof-5mm --set press.temperature_c=110 | temperature
 mesh 1dof-5mm --h 5 | h
 mesh 1dof-5mm --h 0 | must be a length above 0 mm
 mesh 1dof-5mm --fill 30 | ul
-mesh 1dof-5mm --fill nosuch=3 | nosuch
-mesh 1dof-5mm --fill 3 --fill chamber1=3 | one volume for all, or one for each chamber
+mesh 1dof-5mm --fill chamber1=3 | chamber1
 mesh 3dof-15mm --symmetry quarter | quarter
 nest 1dof-5mm 1dof-5mm | 1dof-5mm
 nest 1dof-5mm --name a/b | a/b

@@ -129,7 +129,7 @@ def test_inp_keeps_nodes_elements_and_sets(written: Written, name: str) -> None:
     found = [[int(cell) - 1, sides[side]] for cell, side in pairs]
     assert found == mesh.face_sets["cavity_A"].tolist()
     lines = (folder / f"{name}.inp").read_text().splitlines()
-    assert "A 2 ul. A start shape, not an equilibrium" in lines[2]
+    assert "2 ul of air a balloon. A start shape, not an equilibrium" in lines[2]
     longest = max(len(line.split(",")) for line in lines)
     assert longest <= 16
 

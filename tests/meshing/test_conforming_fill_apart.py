@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from itertools import combinations
 
 import manifold3d
@@ -11,10 +10,11 @@ import pytest
 
 from sbafab.api import build
 from sbafab.errors import DesignError, OutputError
-from sbafab.meshing.conforming.fill import filled
-from sbafab.meshing.conforming.layup import MeshSettings, check_apart, crossing, flat, layup
+from sbafab.meshing.conforming.fill import filled, pockets
+from sbafab.meshing.conforming.layup import Layup, MeshSettings, check_apart, flat, layup
 from sbafab.meshing.conforming.mesh import FACES, Mesh
-from sbafab.meshing.conforming.meshes import conforming_meshes, skin
+from sbafab.meshing.conforming.meshes import conforming_meshes, skin, volume_mesh
+from sbafab.meshing.surface import Floats
 
 SETTINGS = MeshSettings(h=0.75)
 
@@ -37,43 +37,50 @@ def films(mesh: Mesh) -> list[manifold3d.Manifold]:
     return found
 
 
-def test_unlike_fills_that_would_cross_are_refused_with_the_least_that_does_not() -> None:
+def heights(stack: Layup, ul: float) -> Floats:
+    return filled(stack, {chamber.name: ul for chamber in stack.laminate.chambers}, pockets(stack))
+
+
+def test_filled_films_do_not_cross() -> None:
     laminate = build("3dof-15mm", "stack.balloons=2")
-    stack = layup(laminate, SETTINGS)
-    crossing = r"would pass through each other by 0\.3\d mm"
-    with pytest.raises(DesignError, match=crossing) as refused:
-        filled(stack, {"chamber1": 10.0})
-    least = re.findall(r"([\d.]+) ul in (chamber\d)", str(refused.value))
-    fills = {"chamber1": 10.0, **{name: float(ul) for ul, name in least}}
-    assert set(fills) == {"chamber1", "chamber2", "chamber3"}
-    mesh = conforming_meshes(laminate, MeshSettings(h=0.75, fill_ul=fills)).volume
+    mesh = conforming_meshes(laminate, MeshSettings(h=0.75, fill_ul=8.0)).volume
     # Chords of the corner nodes overlap a little; films are 6 mm3 and more.
     assert max((a ^ b).volume() for a, b in combinations(films(mesh), 2)) < 0.01
-    # A little less than what the message asks for crosses.
-    short = {name: ul if name == "chamber1" else ul - 0.5 for name, ul in fills.items()}
-    with pytest.raises(DesignError, match="would pass through each other"):
-        filled(stack, short)
 
 
 def test_films_that_cross_are_found_before_a_mesh_is_written() -> None:
     stack = layup(build("3dof-15mm", "stack.balloons=2"), SETTINGS)
-    forms = filled(stack, 5.0)[1]
-    check_apart(stack, forms)
+    lifted = heights(stack, 5.0)
+    check_apart(stack, lifted)
     check_apart(stack, flat(stack))
     # The upper balloon set down by 0.3 mm lies in the lower one.
-    sunk = [form._replace(base=form.base - [0, 0, 0.3 * (k > 1)]) for k, form in enumerate(forms)]
-    with pytest.raises(OutputError, match=r"films 3 and 5 would pass through each other by 0\.30"):
-        check_apart(stack, sunk)
+    sunk = lifted - np.array([0, 0, 0.3, 0.3])[:, None]
+    with pytest.raises(OutputError, match=r"film 5 would pass through one below it by 0\.30"):
+        volume_mesh(stack, sunk)
 
 
 def test_a_film_that_pierces_one_far_from_it_is_found() -> None:
     stack = layup(build("1dof-5mm", "stack.balloons=2"), SETTINGS)
-    forms = filled(stack, 3.0)[1]
-    # The cap turned upside down through the base, the two films between them out of the way.
-    x, y, _ = forms[3].base.T
-    tilted = forms[3]._replace(base=np.column_stack([x, y, 2 * x]))
-    above = [form._replace(base=form.base + np.array([0, 0, 40.0])) for form in forms[1:3]]
-    assert crossing(stack, [forms[0], *above, tilted]) is not None
+    pierced = heights(stack, 3.0)
+    # The cap falls through the base beside its axis, past the two films between them.
+    pierced[1:3] -= 40.0
+    pierced[3] = np.where(stack.plane.points[:, 0] > 1.0, -1.0, 2.0)
+    with pytest.raises(OutputError, match="film 3 would pass through one below it by 40"):
+        check_apart(stack, pierced)
+    pierced[1:3] = [[0.1], [0.2]]
+    with pytest.raises(OutputError, match="film 7 would pass through one below it by 1"):
+        check_apart(stack, pierced)
+
+
+def test_chambers_of_unlike_pockets_are_not_filled() -> None:
+    stack = layup(build("3dof-15mm", "stack.balloons=2"), SETTINGS)
+    unlike = [
+        pocket._replace(meshed=1.2) if pocket.chamber == "chamber2" else pocket
+        for pocket in pockets(stack)
+    ]
+    fills = {chamber.name: 3.0 for chamber in stack.laminate.chambers}
+    with pytest.raises(DesignError, match=r"lifts the chambers 0\.\d+ mm apart"):
+        filled(stack, fills, unlike)
 
 
 def test_what_a_film_loses_in_thickness_is_said() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,9 @@ import trimesh
 from scipy.optimize import minimize_scalar
 
 from sbafab.api import build, predict
-from sbafab.errors import DesignError
+from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.layup import MeshSettings, flat, layup, round_tube
+from sbafab.meshing.conforming.layup import MeshSettings, flat, formed, layup
 from sbafab.meshing.conforming.meshes import conforming_meshes, write_conforming
 from sbafab.meshing.formats import write_meshes
 
@@ -101,17 +102,17 @@ def test_an_oblong_balloon_holds_as_much_as_predict_says(radial: Laminate) -> No
 
 
 def test_balloons_that_meet_or_lie_in_their_sheet_are_refused() -> None:
-    laminate = build("radial-15mm", "chamber.count=2", "tube.outer_diameter=8.2")
-    stack = layup(laminate, MeshSettings(h=0.75))
-    forms = flat(stack)
-    wide = [
-        form._replace(base=form.base * [1.0 + 0.3 * (k > 0), 1, 1]) for k, form in enumerate(forms)
-    ]
+    stack = layup(
+        build("radial-15mm", "chamber.count=2", "tube.outer_diameter=8.2"), MeshSettings(h=0.75)
+    )
+    heights = flat(stack)
+    points = stack.plane.points * np.array([1.3, 1.0])
+    wide = replace(stack, plane=stack.plane._replace(points=points))
     with pytest.raises(DesignError, match=r"filled balloons meet round the tube of 8\.2 mm"):
-        round_tube(stack, wide)
-    sunk = [form._replace(base=form.base - [0, 0, 0.1 * (k > 0)]) for k, form in enumerate(forms)]
-    with pytest.raises(DesignError, match=r"film 3 would pass through its sheet by 0\.100 mm"):
-        round_tube(stack, sunk)
+        formed(wide, heights)
+    above = np.arange(len(heights))[:, None] > 0
+    with pytest.raises(OutputError, match=r"film 3 would pass through one below it by 0\.10 mm"):
+        formed(stack, heights - 0.1 * above)
 
 
 def test_flat_is_flat() -> None:

@@ -59,7 +59,7 @@ def test_a_simulator_that_is_missing(tmp_path: Path, name: str) -> None:
         (["--with", "calculix", "--pressure", "6 inches"], "must be a pressure"),
         (["--with", "calculix", "--chamber", "chamber1"], "must be NAME=PRESSURE"),
         (["--with", "calculix", "--chamber", "left=3"], "names chamber left, which is not there"),
-        (["--with", "calculix", "--scene", "frames"], "scene is for sofa"),
+        (["--with", "calculix", "--scene", "volume"], "scene is for sofa"),
         (["--with", "calculix", "--h", "3"], "h = 3"),
         (["--with", "sofa", "--h", "0.3"], "h is for calculix"),
         (["--with", "sofa", "--volume", "chamber1=8"], "--volume is for --scene volume"),

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
-from itertools import pairwise
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from functools import cache
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -15,13 +14,9 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.edges import Bounds, Point, unit
 from sbafab.geometry.region import Region, disc, polygon, rectangle
 from sbafab.laminate.laminate import Chamber, Interface, Laminate, Layer
-from sbafab.meshing.conforming.mesh import TRIANGLE_PARTS
 from sbafab.meshing.conforming.plane import Plane, triangulation
 from sbafab.meshing.solid import TubeWrap, body_bond, cavity_slabs, parted, tube_wrap
 from sbafab.meshing.surface import Flags, Floats, Ints
-
-if TYPE_CHECKING:
-    from shapely import STRtree
 
 Element = Literal["wedge", "tet"]
 Symmetry = Literal["full", "half", "quarter", "sector"]
@@ -32,8 +27,8 @@ class MeshSettings:
     """Settings of the conforming meshes.
 
     ``h`` is the side of the triangles in mm. ``symmetry``: half of the actuator, the quarter of a
-    1-DoF one away from its inlet, or one lobe's sector. ``fill_ul`` is the air per pocket in ul,
-    for all balloons or by chamber name; None is the flat shape. ``gaps`` keeps the films a mask's
+    1-DoF one away from its inlet, or one lobe's sector. ``fill_ul`` is the air in every balloon in
+    ul; None is the flat shape. ``gaps`` keeps the films a mask's
     thickness apart, with bonds of that thickness; without it films lie on each other, and the
     height is the sum of the TPE films. ``wrapped``: a laminate made for a tube is wrapped round it,
     with the tube's axis along z; otherwise it lies flat.
@@ -42,7 +37,7 @@ class MeshSettings:
     h: float = 0.35
     element: Element = "wedge"
     symmetry: Symmetry = "full"
-    fill_ul: float | Mapping[str, float] | None = None
+    fill_ul: float | None = None
     gaps: bool = False
     wrapped: bool = True
 
@@ -371,7 +366,7 @@ def _check_apart(plane: Plane, ply: Ply) -> None:
         )
 
 
-# The positions of the films: flat, or lifted off each other by air.
+# The positions of the films: heights over the plane, then round a tube.
 
 
 class FormedFilm(NamedTuple):
@@ -390,12 +385,29 @@ class FormedFilm(NamedTuple):
         return points
 
 
-def flat(stack: Layup) -> list[FormedFilm]:
-    """Every film flat, at its height in the stack."""
-    points = stack.plane.points
-    up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(points), 3))
-    levels = (np.full(len(points), ply.z) for ply in stack.plies)
-    return [FormedFilm(np.column_stack([points, z]), up) for z in levels]
+def flat(stack: Layup) -> Floats:
+    """Heights (plies, plane nodes) in mm of the lower faces of all films, flat."""
+    levels = np.array([ply.z for ply in stack.plies])
+    return np.repeat(levels[:, None], len(stack.plane.points), axis=1)
+
+
+TOUCHING = 0.002
+"""mm of apparent overlap allowed between films: the error of chords on curved films."""
+
+
+def check_apart(stack: Layup, heights: Floats) -> None:
+    """Raises OutputError if films at these heights pass through each other."""
+    top = np.full(heights.shape[1], -math.inf)
+    for ply, height in zip(stack.plies, heights, strict=True):
+        nodes = stack.nodes(ply.cells)
+        depth = top[nodes] - height[nodes]
+        if depth.max() > TOUCHING:
+            x, y = stack.plane.points[nodes[depth.argmax()]]
+            raise OutputError(
+                f"film {ply.layer.index} would pass through one below it by {depth.max():.2f} mm "
+                f"at x {x:.3f}, y {y:.3f}; ask for less fill"
+            )
+        top[nodes] = height[nodes] + (ply.thickness if stack.is_thick else 0.0)
 
 
 def bodies(stack: Layup) -> tuple[Ints, Ints]:
@@ -424,232 +436,95 @@ def bodies(stack: Layup) -> tuple[Ints, Ints]:
 
 
 OVERLAP = 1e-3
-"""mm of apparent overlap allowed into the sheet, or past the middle between two balloons."""
+"""mm of apparent overlap allowed past the middle between two balloons."""
 
 LAID = 12
 """A film leaves the tube beside its bond to the sheet with this power of its depth."""
 
 
-def round_tube(stack: Layup, forms: Sequence[FormedFilm]) -> list[FormedFilm]:
-    """The films in their wrapped position if the laminate is on a tube; otherwise unchanged.
+def formed(stack: Layup, heights: Floats | None = None) -> list[FormedFilm]:
+    """The films at these heights, by default flat, wrapped if the laminate is on a tube.
 
-    Raises DesignError if filled balloons meet round the tube.
+    Raises OutputError if films cross, DesignError if filled balloons meet round the tube.
     """
+    heights = flat(stack) if heights is None else heights
+    check_apart(stack, heights)
     wrap = tube_wrap(stack.laminate) if stack.settings.wrapped else None
-    if wrap is None:
-        return list(forms)
-    tube = _Tube(stack, wrap, forms)
-    return [tube.film(k, form) for k, form in enumerate(forms)]
+    if wrap is not None:
+        return list(_round_tube(stack, wrap, heights))
+    up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (heights.shape[1], 3))
+    return [FormedFilm(np.column_stack([stack.plane.points, z]), up) for z in heights]
 
 
-class _Tube:
-    """The bodies on the sheet of a layup, as masks of the plane's nodes; and for each node the x
-    at which its body is fixed, and the body's share of the tube's curvature.
+def _round_tube(stack: Layup, wrap: TubeWrap, heights: Floats) -> Iterator[FormedFilm]:
+    """Yield the films in their wrapped positions. Raises DesignError if balloons meet.
+
+    A film that is bent less than the tube stays outside of its sheet.
     """
-
-    def __init__(self, stack: Layup, wrap: TubeWrap, forms: Sequence[FormedFilm]) -> None:
-        self.stack, self.wrap, self.sheet_radius = stack, wrap, wrap.radius
-        of_node, of_centre = bodies(stack)
-        top = forms[-1].base[:, 2] + stack.plies[-1].thickness
-        x = np.array(stack.centres)[:, 0]
-        self.bodies: list[Flags] = []
-        self.middle, self.share = np.zeros(len(of_node)), np.ones(len(of_node))
-        for label in np.unique(of_centre).tolist():
-            nodes, fixed_at = of_node == label, x[of_centre == label]
-            self.bodies.append(nodes)
-            self.middle[nodes] = fixed_at.mean()
-            # One body of several stacks, joined by a manifold, goes all round.
-            if len(fixed_at) == 1:
-                height = max(float(top[nodes].max()), 1e-9)
-                self.share[nodes] = min(1.0, stack.laminate.thickness / height)
-
-    def film(self, k: int, form: FormedFilm) -> FormedFilm:
-        """Return a film in its place. Raises DesignError if it runs into others."""
-        ply, x = self.stack.plies[k], form.base[:, 0]
-        if ply.is_sheet:
-            lift = np.outer(self.wrap.raised(x), (0.0, 0.0, 1.0))
-            thickness = ply.thickness if self.stack.is_thick else 0.0
-            self.sheet_radius = self.wrap.radius + ply.z + thickness
-            level = form._replace(base=form.base + lift)
-            return self._placed(ply, level, np.zeros_like(x), np.ones_like(x), np.zeros_like(x))
+    x = stack.plane.points[:, 0]
+    of_node, of_centre = bodies(stack)
+    masks = [of_node == body for body in np.unique(of_centre)]
+    top = heights[-1] + stack.plies[-1].thickness
+    # For each node the x at which its body is fixed, and the body's share of the tube's curvature.
+    middle, share = np.zeros_like(x), np.ones_like(x)
+    for nodes, body in zip(masks, np.unique(of_centre), strict=True):
+        fixed_at = np.array(stack.centres)[of_centre == body, 0]
+        middle[nodes] = fixed_at.mean()
+        # One body of several stacks, joined by a manifold, goes all round.
+        if len(fixed_at) == 1:
+            height = max(float(top[nodes].max()), 1e-9)
+            share[nodes] = min(1.0, stack.laminate.thickness / height)
+    for k, (ply, z) in enumerate(zip(stack.plies, heights, strict=True)):
         laid = np.zeros_like(x)
-        if self.stack.plies[k - 1].is_sheet:
-            z = form.base[:, 2]
-            for nodes in self.bodies:
-                low, high = z[nodes].min(), z[nodes].max()
-                if high - low > OVERLAP:
-                    laid[nodes] = ((high - z[nodes]) / (high - low)) ** LAID
-        placed = self._placed(ply, form, self.middle, self.share, laid)
-        self._check_room(ply, placed)
-        return placed
-
-    def _placed(
-        self, ply: Ply, form: FormedFilm, middle: Floats, share: Floats, laid: Floats
-    ) -> FormedFilm:
-        """The film wrapped, and drawn down to the tube by the share ``laid``."""
-        wrap, plane = self.wrap, self.stack.plane
-        x, _, z = form.base.T
-        base, lean = wrap.placed(form.base, middle, share), wrap.lean(x, middle, share)
-        up = np.column_stack([np.cos(lean), np.sin(lean), np.zeros(len(lean))])
-        down = laid * ((wrap.placed(form.base, middle) - base) * up).sum(axis=1)
-        # Points farther out than the sheet's middle are stretched round the tube.
-        bend = share / wrap.radius
-        height = z + (ply.thickness / 2 if self.stack.is_thick else 0.0)
-        longer = (1 + bend * height) / (1 + bend * wrap.neutral) - 1 + bend * down
-        # Only the mid-side nodes carry weight in a second-order triangle.
-        growth = longer[plane.triangles[ply.cells, 3:]].mean(axis=1)
-        mean = float(np.average(growth, weights=plane.areas()[ply.cells]))
-        return FormedFilm(base + down[:, None] * up, up, mean)
-
-    def _check_room(self, ply: Ply, form: FormedFilm) -> None:
-        """Raises DesignError if a film reaches past the middle between two, or into the sheet."""
-        wrap, room = self.wrap, math.pi / len(self.bodies)
-        nodes = self.stack.nodes(ply.cells)
-        x, y, _ = form.base[nodes].T
-        around = np.arctan2(y, x) - self.middle[nodes] / (wrap.radius + wrap.neutral)
-        aside = float(np.abs(np.angle(np.exp(1j * around))).max())
-        if (aside - room) * wrap.radius > OVERLAP:
-            raise DesignError(
-                f"filled balloons meet round the tube of {2 * wrap.radius:g} mm: film "
-                f"{ply.layer.index} reaches {math.degrees(aside):.1f} degrees round it "
-                f"where each has {math.degrees(room):.1f}; ask for less fill"
-            )
-        depth = self.sheet_radius - float(np.hypot(x, y).min())
-        if depth > OVERLAP:
-            raise DesignError(
-                f"film {ply.layer.index} would pass through its sheet by {depth:.3f} mm; "
-                "ask for another fill"
-            )
+        if ply.is_sheet:
+            yield _wrapped(stack, wrap, ply, z + wrap.raised(x), laid, laid + 1.0, laid)
+            continue
+        for nodes in masks if stack.plies[k - 1].is_sheet else ():
+            low, high = z[nodes].min(), z[nodes].max()
+            if high - low > OVERLAP:
+                laid[nodes] = ((high - z[nodes]) / (high - low)) ** LAID
+        film = _wrapped(stack, wrap, ply, z, middle, share, laid)
+        there = stack.nodes(ply.cells)
+        around = middle[there] / (wrap.radius + wrap.neutral)
+        _check_room(wrap, ply, film.base[there], around, len(masks))
+        yield film
 
 
-# Films of a mesh that pass through each other.
-#
-# Each film is a surface over the plane, seen along its own upright. A film must lie above the one
-# below it wherever both exist. For films farther apart in the stack, two neighbouring nodes of one
-# must not lie on opposite sides of the other.
+def _wrapped(
+    stack: Layup,
+    wrap: TubeWrap,
+    ply: Ply,
+    z: Floats,
+    middle: Floats,
+    share: Floats,
+    laid: Floats,
+) -> FormedFilm:
+    """A film at heights z wrapped, and drawn down to the tube by the share ``laid``."""
+    flat_base = np.column_stack([stack.plane.points, z])
+    x = flat_base[:, 0]
+    base, lean = wrap.placed(flat_base, middle, share), wrap.lean(x, middle, share)
+    up = np.column_stack([np.cos(lean), np.sin(lean), np.zeros(len(lean))])
+    down = laid * ((wrap.placed(flat_base, middle) - base) * up).sum(axis=1)
+    # Points farther out than the sheet's middle are stretched round the tube.
+    bend = share / wrap.radius
+    height = z + (ply.thickness / 2 if stack.is_thick else 0.0)
+    longer = (1 + bend * height) / (1 + bend * wrap.neutral) - 1 + bend * down
+    # Only the mid-side nodes carry weight in a second-order triangle.
+    growth = longer[stack.plane.triangles[ply.cells, 3:]].mean(axis=1)
+    mean = float(np.average(growth, weights=stack.plane.areas()[ply.cells]))
+    return FormedFilm(base + down[:, None] * up, up, mean)
 
 
-TOUCHING = 0.002
-"""mm of apparent overlap allowed between films: the error of chords on curved films."""
-
-
-FilmOverlap = tuple[float, int, int, Point]
-"""Depth in mm, the two films by their index in the layup, and the place of the deepest overlap on
-the flat laminate, in mm.
-"""
-
-
-def check_apart(stack: Layup, forms: Sequence[FormedFilm]) -> None:
-    """Raises OutputError if films of a mesh cross; ``forms`` are not wrapped round a tube."""
-    if (deepest := crossing(stack, forms)) is not None:
-        raise OutputError(f"{deepest}; ask for a more even fill")
-
-
-def crossing(stack: Layup, forms: Sequence[FormedFilm]) -> str | None:
-    """Return a clause on the deepest crossing of two films; None if all are apart or touch."""
-    films = [_Film(stack, k, form) for k, form in enumerate(forms)]
-    plane = _Plane(stack)
-    overlaps = [each for pair in pairwise(films) for each in _between(plane, *pair)]
-    # Films farther apart matter only if neighbours are in order.
-    if not overlaps:
-        far = ((lower, upper) for k, lower in enumerate(films) for upper in films[k + 2 :])
-        overlaps = [each for pair in far for each in _between(plane, *pair)]
-    if not overlaps:
-        return None
-    depth, *numbers, (x, y) = max(overlaps)
-    lower, upper = (stack.plies[k].layer.index for k in numbers)
-    return (
-        f"films {lower} and {upper} would pass through each other by {depth:.2f} mm at "
-        f"x {x:.3f}, y {y:.3f}"
-    )
-
-
-class _Film:
-    """A film's faces, in space and in its own frame."""
-
-    def __init__(self, stack: Layup, k: int, form: FormedFilm) -> None:
-        ply = stack.plies[k]
-        self.number, self.cells = k, ply.cells
-        self.nodes = stack.nodes(ply.cells)
-        self.bottom = form.base[self.nodes]
-        self.top = form.at(ply.thickness if stack.is_thick else 0.0)[self.nodes]
-        up = form.up[self.nodes[0]]
-        flat = np.column_stack([stack.plane.points[self.nodes], np.ones(len(self.nodes))])
-        level = self.bottom - np.outer(self.bottom @ up, up)
-        ways, self.shift = np.split(np.linalg.lstsq(flat, level, rcond=None)[0], [2])
-        self.axes = np.vstack([ways, up])
-
-    def in_frame(self, points: Floats) -> Floats:
-        """Points (n, 3) in this film's frame: x and y of the flat laminate, and height."""
-        inside: Floats = (points - self.shift) @ self.axes.T
-        return inside
-
-
-class _Plane:
-    """The triangulation that all films are surfaces over."""
-
-    def __init__(self, stack: Layup) -> None:
-        self.points = stack.plane.points
-        triangles = stack.plane.triangles
-        self.parts = np.concatenate([triangles[:, list(part)] for part in TRIANGLE_PARTS])
-        self.cells = np.tile(np.arange(len(triangles)), len(TRIANGLE_PARTS))
-
-    @cached_property
-    def tree(self) -> STRtree:
-        from shapely import STRtree, linearrings, polygons
-
-        return STRtree(polygons(linearrings(self.points[self.parts])))
-
-    def _spread(self, film: _Film, values: Floats) -> Floats:
-        """Values of a film's nodes at all nodes of the plane; NaN beside the film."""
-        everywhere = np.full(len(self.points), np.nan)
-        everywhere[film.nodes] = values
-        return everywhere
-
-    def over(self, film: _Film, face: Floats, points: Floats) -> Floats:
-        """Height of points (n, 3), in a film's frame, over a face of it; NaN beside the film."""
-        from shapely import points as shapely_points
-
-        places, parts = self.tree.query(shapely_points(points[:, :2]), predicate="intersects")
-        part = np.full(len(points), -1, dtype=np.int64)
-        # On an edge, the first of the triangles that share it.
-        part[places[::-1]] = parts[::-1]
-        there = np.flatnonzero(part >= 0)
-        there = there[film.cells[self.cells[part[there]]]]
-        corners = self.parts[part[there]]
-        a, b, c = self.points[corners].transpose(1, 2, 0)
-        (ux, uy), (vx, vy), (x, y) = b - a, c - a, points[there, :2].T - a
-        twice = ux * vy - uy * vx
-        s, t = (x * vy - y * vx) / twice, (ux * y - uy * x) / twice
-        h = self._spread(film, film.in_frame(face)[:, 2])[corners]
-        gaps = np.full(len(points), np.nan)
-        gaps[there] = points[there, 2] - (h[:, 0] * (1 - s - t) + h[:, 1] * s + h[:, 2] * t)
-        return gaps
-
-    def pierced(self, film: _Film, gap: Floats) -> Flags:
-        """Return a mask of a film's nodes with a neighbour on the other side of the other film."""
-        ends = self.parts[:, [[0, 1], [1, 2], [2, 0]]]
-        sides = self._spread(film, gap)[ends]
-        pierced = np.zeros(len(self.points), dtype=bool)
-        pierced[ends[(sides.min(axis=2) < -TOUCHING) & (sides.max(axis=2) > TOUCHING)]] = True
-        return pierced[film.nodes]
-
-
-def _between(plane: _Plane, lower: _Film, upper: _Film) -> list[FilmOverlap]:
-    """The deepest overlap of two films at the nodes of either; empty if they are apart."""
-    faces = [[film.in_frame(face) for face in (lower.top, upper.bottom)] for film in (lower, upper)]
-    if any(high[:, 2].min() >= low[:, 2].max() - TOUCHING for low, high in faces):
-        return []
-    overlaps: list[FilmOverlap] = []
-    for film, gap in (
-        (upper, plane.over(lower, lower.top, faces[0][1])),
-        (lower, -plane.over(upper, upper.bottom, faces[1][0])),
-    ):
-        depth = -gap
-        if upper.number > lower.number + 1:
-            depth = np.where(plane.pierced(film, gap), np.abs(gap), np.nan)
-        if (depth > TOUCHING).any():
-            deepest = int(np.nanargmax(depth))
-            x, y = plane.points[film.nodes[deepest]].tolist()
-            overlaps.append((float(depth[deepest]), lower.number, upper.number, (x, y)))
-    return overlaps
+def _check_room(wrap: TubeWrap, ply: Ply, points: Floats, around: Floats, bodies: int) -> None:
+    """Raises DesignError if a film reaches past the middle between two bodies, which are fixed at
+    angles ``around`` the tube.
+    """
+    x, y, _ = points.T
+    room = math.pi / bodies
+    aside = float(np.abs(np.angle(np.exp(1j * (np.arctan2(y, x) - around)))).max())
+    if (aside - room) * wrap.radius > OVERLAP:
+        raise DesignError(
+            f"filled balloons meet round the tube of {2 * wrap.radius:g} mm: film "
+            f"{ply.layer.index} reaches {math.degrees(aside):.1f} degrees round it "
+            f"where each has {math.degrees(room):.1f}; ask for less fill"
+        )

@@ -5,7 +5,8 @@ Bonded faces share their nodes. Each mesh is checked: elements, skin, volumes an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
@@ -16,17 +17,15 @@ import numpy as np
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.fill import Fill, filled, formed, pockets
+from sbafab.meshing.conforming.fill import filled, pockets
 from sbafab.meshing.conforming.layup import (
     FormedFilm,
     Layup,
     MeshedVoid,
     MeshSettings,
     Symmetry,
-    check_apart,
-    flat,
+    formed,
     layup,
-    round_tube,
 )
 from sbafab.meshing.conforming.mesh import (
     CORNERS,
@@ -54,13 +53,14 @@ class Sweep:
     Films that lie on each other share the nodes of a bond, its edge included; if gaps are kept,
     prisms join them. Films of a thin layup are triangles; bonded ones share one.
 
-    ``lower``, ``middle`` and ``upper`` (plies, plane nodes) number the nodes of each film over
-    the plane's, -1 if absent; ``joints`` the nodes halfway up the bond under each film.
+    ``forms`` are the films at ``heights`` over the plane, by default flat. ``lower``, ``middle``
+    and ``upper`` (plies, plane nodes) number the nodes of each film over the plane's, -1 if absent;
+    ``joints`` the nodes halfway up the bond under each film.
     ``cell_of`` and ``joint_of`` (plies, triangles) number the cells of films and bonds.
     """
 
-    def __init__(self, stack: Layup, forms: Sequence[FormedFilm]) -> None:
-        self.stack = stack
+    def __init__(self, stack: Layup, heights: Floats | None = None) -> None:
+        self.stack, self.forms = stack, formed(stack, heights)
         plies = len(stack.plies)
         nodes, cells = (plies, len(stack.plane.points)), (plies, len(stack.plane.triangles))
         self.lower, self.middle, self.upper, self.joints = np.full((4, *nodes), -1)
@@ -69,7 +69,7 @@ class Sweep:
         self._cells: list[Ints] = []
         self._counts = [0, 0]
         for k in range(plies):
-            self._add(k, forms[k], forms[k - 1])
+            self._add(k, self.forms[k], self.forms[k - 1])
 
     @cached_property
     def beyond(self) -> Ints:
@@ -349,14 +349,13 @@ def thin(stack: Layup) -> Layup:
     return replace(stack, plies=plies, is_thick=False)
 
 
-def shell_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
-    """The mid-surfaces of a thin layup, with their sets and cavities.
+def shell_mesh(stack: Layup, heights: Floats | None = None) -> Mesh:
+    """The mid-surfaces of a thin layup at ``heights``, by default flat, with sets and cavities.
 
     Bonded films share one triangle, which carries the sum of their thicknesses. Cavities exclude
     the neck rings, which have the same air on both sides. Raises OutputError if a check fails.
     """
-    check_apart(stack, forms)
-    swept = Sweep(stack, round_tube(stack, forms))
+    swept = Sweep(stack, heights)
     films, thickness = {}, np.zeros(len(swept.cells))
     for ply, numbers in zip(stack.plies, swept.cell_of, strict=True):
         films[ply.name] = np.sort(numbers[numbers >= 0])
@@ -381,11 +380,12 @@ def _one_sided(faces: Ints) -> Ints:
 # The volume mesh with its sets and cavities, checked.
 
 
-def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
-    """The volume mesh with its sets and cavities. Raises OutputError if a check fails."""
-    check_apart(stack, forms)
-    forms = round_tube(stack, forms)
-    swept = Sweep(stack, forms)
+def volume_mesh(stack: Layup, heights: Floats | None = None) -> Mesh:
+    """The volume mesh of films at ``heights``, by default flat, with its sets and cavities.
+
+    Raises OutputError if a check fails.
+    """
+    swept = Sweep(stack, heights)
     prisms = swept.cells
     is_tet = stack.settings.element == "tet"
     if is_tet:
@@ -397,7 +397,7 @@ def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
         return faces_of_tetrahedra(prisms, cells, faces) if is_tet else faces
 
     cell_sets, expected, materials = {}, {}, {}
-    for k, (ply, form) in enumerate(zip(stack.plies, forms, strict=True)):
+    for k, (ply, form) in enumerate(zip(stack.plies, swept.forms, strict=True)):
         films = [each.layer.film for each in stack.plies[max(k - 1, 0) : k + 1]]
         # A bond takes the lower film's material if that melts.
         bond = ([film for film in films if not film.stays_solid] or films)[0]
@@ -443,8 +443,9 @@ WRAPPED = (
     "filled balloons straighten."
 )
 FILLED = (
-    "Filled with air, a balloon: {}. A start shape, not an equilibrium: films over the pockets are "
-    "{:.1%} larger than flat, {:.1%} at the steepest place, and as much thinner: {:.4f} mm there."
+    "Filled with {:g} ul of air a balloon. A start shape, not an equilibrium: films over the "
+    "pockets are {:.1%} larger than flat, {:.1%} at the steepest place, and as much thinner: "
+    "{:.4f} mm there."
 )
 REST = "Films are free of stress when flat: the point field rest of the .vtu holds those places."
 HEIGHT_OF_SHELL = "Mid-surfaces: films have no height of their own, and lie in one plane when flat."
@@ -456,15 +457,14 @@ class ConformingMeshes:
     """Volume and shell mesh of one triangulation.
 
     ``flat_shell`` is the shell before it was filled (the same one without fill): its rest
-    position. ``fill`` holds the air in ul per balloon by chamber, if asked for. Without
-    gaps all mid-surfaces of a flat shell lie at z = 0, and the volume is as high as its TPE films.
+    position. Without gaps all mid-surfaces of a flat shell lie at z = 0, and the volume is as high
+    as its TPE films.
     """
 
     settings: MeshSettings
     volume: Mesh
     shell: Mesh
     flat_shell: Mesh
-    fill: Fill | None
 
     @cached_property
     def statistics(self) -> dict[str, dict[str, Any]]:
@@ -488,15 +488,14 @@ def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) 
     settings = settings or MeshSettings()
     stack = layup(laminate, settings)
     sheet = thin(stack)
-    as_cut = replace(sheet, settings=replace(settings, wrapped=False))
-    flat_shell = shell_mesh(as_cut, flat(sheet))
-    fill = None if settings.fill_ul is None else filled(stack, settings.fill_ul)[0]
-    volume = _filled(stack, fill, volume_mesh)
-    shell = _filled(sheet, fill, shell_mesh)
-    notes = tuple(_notes(laminate, settings, fill, thinning(shell, flat_shell)))
-    volume = _noted(volume, Sweep(stack, flat(stack)).points, (HEIGHTS[settings.gaps], *notes))
+    unwrapped = replace(settings, wrapped=False)
+    flat_shell = shell_mesh(replace(sheet, settings=unwrapped))
+    volume, shell = _filled(stack, volume_mesh), _filled(sheet, shell_mesh)
+    notes = tuple(_notes(laminate, settings, thinning(shell, flat_shell)))
+    rest = Sweep(replace(stack, settings=unwrapped)).points
+    volume = _noted(volume, rest, (HEIGHTS[settings.gaps], *notes))
     shell = _noted(shell, flat_shell.points, (HEIGHT_OF_SHELL, *notes))
-    return ConformingMeshes(settings, volume, shell, flat_shell, fill)
+    return ConformingMeshes(settings, volume, shell, flat_shell)
 
 
 def _noted(mesh: Mesh, rest: Floats, notes: tuple[str, ...]) -> Mesh:
@@ -504,41 +503,40 @@ def _noted(mesh: Mesh, rest: Floats, notes: tuple[str, ...]) -> Mesh:
     return replace(mesh, notes=notes, rest=None if is_at_rest else rest)
 
 
-def _filled(
-    stack: Layup, fill: Fill | None, make: Callable[[Layup, Sequence[FormedFilm]], Mesh]
-) -> Mesh:
-    """The mesh whose balloons hold a fill, round a tube as well as flat."""
+def _filled(stack: Layup, make: Callable[[Layup, Floats | None], Mesh]) -> Mesh:
+    """The mesh whose balloons hold the fill, round a tube as well as flat."""
+    fill, laminate = stack.settings.fill_ul, stack.laminate
     if fill is None:
-        return make(stack, flat(stack))
+        return make(stack, None)
+    if not 0 <= fill < math.inf:
+        raise DesignError(f"fill = {fill:g} ul must be 0 ul or more")
     all_pockets = pockets(stack)
-    mesh = make(stack, formed(stack, fill, all_pockets))
-    if stack.laminate.tube is None or not stack.settings.wrapped or stack.sector is not None:
+    amounts = {chamber.name: fill for chamber in laminate.chambers}
+    mesh = make(stack, filled(stack, amounts, all_pockets))
+    if not fill or laminate.tube is None or not stack.settings.wrapped or stack.sector is not None:
         return mesh
     # Balloons bent round the tube hold a little more than flat ones.
-    amounts, sizes = dict(fill), stack.plane.areas()
+    sizes = stack.plane.areas()
     for _ in range(ROUNDS):
-        for chamber in stack.laminate.chambers:
-            name = chamber.name
-            if fill[name]:
-                films = stack.voids[name].in_films.items() if stack.is_thick else ()
-                bores = sum(sizes[cells].sum() * stack.plies[k].thickness for k, cells in films)
-                balloons = stack.laminate.balloons * len(chamber.centres)
-                volume = (mesh.cavity(name)[0].volume - bores) / balloons
-                amounts[name] *= fill[name] / volume
-        mesh = make(stack, formed(stack, amounts, all_pockets))
+        for chamber in laminate.chambers:
+            films = stack.voids[chamber.name].in_films.items() if stack.is_thick else ()
+            bores = sum(sizes[cells].sum() * stack.plies[k].thickness for k, cells in films)
+            balloons = laminate.balloons * len(chamber.centres)
+            volume = (mesh.cavity(chamber.name)[0].volume - bores) / balloons
+            amounts[chamber.name] *= fill / volume
+        mesh = make(stack, filled(stack, amounts, all_pockets))
     return mesh
 
 
 def _notes(
-    laminate: Laminate, settings: MeshSettings, fill: Fill | None, thin_films: tuple[float, ...]
+    laminate: Laminate, settings: MeshSettings, thin_films: tuple[float, ...]
 ) -> Iterator[str]:
     if settings.symmetry in PARTS:
         yield PARTS[settings.symmetry]
     if laminate.tube is not None and settings.wrapped:
         yield WRAPPED.format(laminate.tube)
-    if fill is not None:
-        amounts = ", ".join(f"{name} {ul:g} ul" for name, ul in fill.items())
-        yield FILLED.format(amounts, *thin_films)
+    if settings.fill_ul is not None:
+        yield FILLED.format(settings.fill_ul, *thin_films)
         yield REST
 
 
@@ -567,7 +565,7 @@ def write_conforming(
 
 def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path], None]]]:
     """Every possible file, with the function that writes it to a path."""
-    fill = max(meshes.fill.values()) if meshes.fill is not None else 0.0
+    fill = meshes.settings.fill_ul or 0.0
 
     def file(stem: str, row: MeshFormat, volume: float, count: int, **facts: Any) -> MeshFile:
         name = f"mesh/{stem}.{row.ending}"
@@ -581,8 +579,7 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
                 yield listed, partial(row.elements, mesh)
     mesh = meshes.volume
     # Films that lie on each other enclose nothing: the surface would have no inside.
-    is_open = {name: ul > 0 or meshes.settings.gaps for name, ul in (meshes.fill or {}).items()}
-    air = [chamber for chamber in mesh.cavities if is_open.get(chamber, meshes.settings.gaps)]
+    air = mesh.cavities if fill > 0 or meshes.settings.gaps else ()
     surfaces = {chamber: mesh.cavity(chamber)[0] for chamber in air}
     skins = [mesh.surface(mesh.flat_triangles(skin(mesh)))[0]] if air else []
     for chamber, surface in [*((None, each) for each in skins), *surfaces.items()]:

@@ -19,7 +19,6 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import (
     MeshSettings,
     Symmetry,
-    flat,
     images,
     layup,
     meshed_shares,
@@ -376,8 +375,7 @@ DATED = re.compile(rb"(?m)^(    1U(?:DATE|TIME|HOST|USER|DIR)).*$")
 
 def deck_mesh(laminate: Laminate, settings: MeshSettings) -> Mesh:
     """The flat volume mesh for a deck. Raises DesignError, OutputError as meshing does."""
-    stack = layup(laminate, settings)
-    return volume_mesh(stack, flat(stack))
+    return volume_mesh(layup(laminate, settings))
 
 
 def simulate(
