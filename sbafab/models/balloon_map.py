@@ -13,10 +13,9 @@ Lengths mm, pressures kPa, volumes ul, forces mN, energies uJ.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +23,6 @@ from numpy.typing import ArrayLike, NDArray
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes, distinct
 from sbafab.models.film_elements import Array
-from sbafab.models.least_energy import eliminated, solved
 from sbafab.models.rim_correction import compressed_shapes, free_shapes
 from sbafab.runtime import one_blas_thread
 
@@ -59,9 +57,9 @@ VOLUME_WEIGHT = 0.6
 """Weight of volumes beside forces."""
 LOW_HEIGHT = 0.2
 """Height in mm below which volume errors are weighted absolutely, above relatively."""
-PRESSURE_PARTS, HEIGHT_PARTS = 4, 1
-"""Parts of each piece, by pressure and height, on which volumes must rise with pressure and forces
-fall with height. A polynomial with positive Bernstein coefficients on a part is positive on it.
+PRESSURE_PARTS = 4
+"""Parts of each piece by pressure on which volumes must rise with pressure and forces fall with
+height. A polynomial with positive Bernstein coefficients on a part is positive on it.
 """
 LOW_PARTS = np.array([0.005, 0.02])
 """Additional part boundaries near the flat state, as shares of the map's height."""
@@ -69,42 +67,42 @@ HELD_MARGIN = 0.01
 """Share by which volumes may exceed the largest one computed at a pressure."""
 LEAST_CHECK = 0.005
 """Share of the map's height by which limits are scaled below it."""
-MARGIN = 5e-5
-"""Share by which the limits are met, far above floating-point rounding of sums."""
+MARGIN, MET = 5e-5, 1e-8
+"""Share by which the limits are met, far above floating-point rounding of sums; and by how much of
+a limit's length one may be missed."""
+MOST_CHANGES = 4000
+"""Changes of the limits that hold the coefficients after which no map is taken to fit."""
 MOST_STRETCH = 0.15
 """Share by which films may stretch; a single modulus is unlikely to hold beyond it."""
 
 
-_POWERS = range(DEGREE + 1)
 POWERS = np.arange(DEGREE + 1.0)
-BASIS = np.zeros((3, DEGREE + 1, DEGREE + 1))
-"""Weights of a piece's coefficients by powers of the place in it, from 0 to 1: of the value of a
-uniform B-spline (in truncated powers), its first and second derivative.
-"""
-BASIS[0] = [
+PIECES = np.array(
     [
-        sum(
-            (-1) ** i
-            * math.comb(DEGREE + 1, i)
-            * math.comb(DEGREE, k)
-            * (DEGREE - j - i) ** (DEGREE - k)
-            for i in range(DEGREE + 1 - j)
-        )
-        / math.factorial(DEGREE)
-        for k in _POWERS
+        [1, -5, 10, -10, 5, -1],
+        [26, -50, 20, 20, -20, 5],
+        [66, 0, -60, 0, 30, -10],
+        [26, 50, 20, -20, -20, 10],
+        [1, 5, 10, 10, 5, -5],
+        [0, 0, 0, 0, 0, 1],
     ]
-    for j in _POWERS
-]
+) / math.factorial(DEGREE)
+"""Weights of a piece's coefficients by powers of the place in it, from 0 to 1, of a uniform
+B-spline.
+"""
+BASIS = np.zeros((3, *PIECES.shape))
+"""The same of its value, its first and its second derivative."""
+BASIS[0] = PIECES
 for _order in (1, 2):
     BASIS[_order, :, :-1] = BASIS[_order - 1, :, 1:] * POWERS[1:]
-PIECES = BASIS[0]
+EVEN = np.linspace(0, 1, DEGREE + 1)
 BERNSTEIN = np.linalg.inv(
     [
-        [math.comb(DEGREE, k) * u**k * (1 - u) ** (DEGREE - k) for k in _POWERS]
-        for u in np.linspace(0, 1, DEGREE + 1)
+        [math.comb(DEGREE, k) * u**k * (1 - u) ** (DEGREE - k) for k in range(DEGREE + 1)]
+        for u in EVEN
     ]
 )
-"""Matrix from values at evenly spaced places from 0 to 1 to Bernstein coefficients."""
+"""Matrix from values at the places EVEN to Bernstein coefficients."""
 WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
 """The coefficients of each piece by height."""
 PIECES_IN_ALL = HEIGHT_SPANS + 2
@@ -112,22 +110,6 @@ PIECES_IN_ALL = HEIGHT_SPANS + 2
 BELOW = np.array([[1.0, -1.0, 1.0], [0.0, 1.0, -2.0], [0.0, 0.0, 1.0]])
 ABOVE = np.stack([POWERS**0, POWERS, POWERS * (POWERS - 1) / 2])
 """First three powers of a piece about a point one piece before its own first three, and after."""
-
-
-def _near_pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Return the pairs (first, second) of ``count`` coefficients that share a piece of the spline,
-    and, for each element of a matrix by products of coefficients (pressure x height, twice), its
-    place in a matrix by pairs (pressure, height); one place past the end stands for no pair.
-    """
-    first, second = np.nonzero(np.triu(np.tri(count, k=DEGREE)))
-    pair = np.full((count, count), len(first))
-    pair[first, second] = pair[second, first] = np.arange(len(first))
-    size = count**2
-    places = pair[:, None, :, None] * (len(first) + 1) + pair[None, :, None, :]
-    return first, second, places.reshape(size, size)
-
-
-*PAIRS, PAIR_OF = _near_pairs(HEIGHT_SPANS + DEGREE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +132,31 @@ class BalloonMap:
         Energies are proportional to the modulus at equal pressure over modulus:
         W(ratio E; p, h) = ratio W(E; p / ratio, h). The map reaches ``ratio`` times the pressure.
         """
-        return self if ratio == 1 else _stiffened(self, ratio)
+        if ratio == 1:
+            return self
+        return BalloonMap(
+            self.balloon.stiffened(ratio),
+            ratio * self.most_pressure,
+            self.most_height,
+            ratio * self.coefficients,
+            ratio * self.scale_pressure,
+            self.drawn,
+        )
+
+    @property
+    def drawn(self) -> BalloonMap:
+        """The map that this one was stiffened from, or itself."""
+        return self.base or self
+
+    @property
+    def ratio(self) -> float:
+        """Pressures of this map by those at which ``drawn`` has the same heights."""
+        return self.scale_pressure / self.drawn.scale_pressure
+
+    def pressures(self, shares: Array) -> Array:
+        """Return pressures in kPa from 0 to the most, even in the spline's coordinate."""
+        most = math.asinh(self.most_pressure / self.scale_pressure)
+        return np.minimum(self.scale_pressure * np.sinh(shares * most), self.most_pressure)
 
     @cached_property
     def spans(self) -> float:
@@ -233,15 +239,14 @@ class BalloonMap:
 
     def rises(self, pressure: ArrayLike) -> Array:
         """Return an interpolated free height, to start a search from."""
-        return np.interp(
-            np.arcsinh(np.asarray(pressure, float) / self.scale_pressure), *self._rises
-        )
+        x = np.arcsinh(np.asarray(pressure, float) / self.scale_pressure)
+        return np.interp(x, *self.drawn._rises)
 
     @cached_property
     def _rises(self) -> tuple[Array, Array]:
-        x = np.linspace(0, math.asinh(self.most_pressure / self.scale_pressure), RISE_POINTS)
-        pressures = np.minimum(self.scale_pressure * np.sinh(x), self.most_pressure)
-        return x, self.free_height(pressures)
+        shares = np.linspace(0, 1, RISE_POINTS)
+        x = shares * math.asinh(self.most_pressure / self.scale_pressure)
+        return x, self.free_height(self.pressures(shares))
 
 
 def refuse_outside(pressures: Array, most_pressure: float) -> None:
@@ -255,19 +260,6 @@ def refuse_outside(pressures: Array, most_pressure: float) -> None:
     raise DesignError(
         f"a pressure of {float(worst):g} kPa is outside the balloon's map; give 0 to "
         f"{most_pressure:g} kPa"
-    )
-
-
-@lru_cache(maxsize=64)
-def _stiffened(original: BalloonMap, ratio: float) -> BalloonMap:
-    """Return ``original.stiffened(ratio)``, cached so that it keeps its range."""
-    return BalloonMap(
-        original.balloon.stiffened(ratio),
-        ratio * original.most_pressure,
-        original.most_height,
-        ratio * original.coefficients,
-        ratio * original.scale_pressure,
-        original.base or original,
     )
 
 
@@ -319,7 +311,9 @@ def horner(
 def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     """The map of a balloon from 0 to a pressure in kPa, to somewhat above its free height."""
     scale = SCALE_STRAIN * balloon.membrane_stiffness / balloon.pocket
-    p = scale * np.sinh(_spread(PRESSURE_POINTS) * math.asinh(most_pressure / scale))
+    blank = np.zeros((PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE))
+    frame = BalloonMap(balloon, most_pressure, math.inf, blank, scale)
+    p = frame.pressures(_spread(PRESSURE_POINTS))
     rises = np.linspace(most_pressure / RISES, most_pressure, RISES)
     free = free_shapes(balloon, np.concatenate([rises, p[1:]]))
     rising, free = free.rows(slice(RISES)), free.rows(slice(RISES, None))
@@ -331,8 +325,7 @@ def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     h = least + (top - least) * (even + even**2) / 2
     pressures, heights = (grid.ravel() for grid in np.meshgrid(p, h))
     shapes = compressed_shapes(balloon, pressures, heights, tied=True)
-    blank = np.zeros((PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE))
-    frame = BalloonMap(balloon, most_pressure, top, blank, scale)
+    frame = replace(frame, most_height=top)
     return replace(frame, coefficients=_fitted(frame, shapes, heights, free))
 
 
@@ -344,10 +337,11 @@ def _spread(count: int) -> Array:
 
 def _fitted(frame: BalloonMap, shapes: Shapes, h: Array, free: Shapes) -> Array:
     """Return the coefficients of the potential: least squares of W, the force and the volume of
-    balloons between plates at heights ``h``, and of ``free`` ones.
+    balloons between plates at heights ``h``, and of ``free`` ones, within the limits.
 
     ``inflate`` fixes the wrinkles' stress while it seeks equilibrium, so its forces and volumes are
-    not exactly slopes of one potential. Heights and bends depend on the forces.
+    not exactly slopes of one potential. Heights and bends depend on the forces. Raises DesignError
+    if no coefficients are within the limits.
     """
     top, p = frame.most_height, shapes.pressure
     area = shapes.r[:, -1].max() ** 2 * math.pi
@@ -357,34 +351,33 @@ def _fitted(frame: BalloonMap, shapes: Shapes, h: Array, free: Shapes) -> Array:
     stands, at, held = free.height[inside], free.pressure[inside], free.volume[inside]
     lift = FREE_WEIGHT / (area * (at + LOW_PRESSURE))
     roomy = FREE_WEIGHT * VOLUME_WEIGHT / (area * np.minimum(stands + LOW_HEIGHT, top))
-    lowest = h == h.min()
-    flat = FLAT_WEIGHT * room[lowest]
-    matrix, right_side = (
-        np.concatenate(each)
-        for each in zip(
-            (
-                _rows(frame, p, h, 0, 0) * push[:, None] / top,
-                (shapes.energy - p * shapes.volume) * push / top,
-            ),
-            (_rows(frame, p, h, 0, 1) * push[:, None], shapes.force * push),
-            (_rows(frame, p, h, 1, 0) * room[:, None], shapes.volume * room),
-            # A balloon pressed flat has no volume, a free one carries no force.
-            (_rows(frame, p[lowest], 0 * p[lowest], 1, 0) * flat[:, None], 0 * flat),
-            (_rows(frame, at, stands, 0, 1) * lift[:, None], 0 * lift),
-            (_rows(frame, at, stands, 1, 0) * roomy[:, None], held * roomy),
-            strict=True,
-        )
+    low = h == h.min()
+    # Places, orders of the derivatives by pressure and height, weights and values. A balloon
+    # pressed flat has no volume, a free one carries no force.
+    fitted = (
+        (p, h, 0, 0, push / top, shapes.energy - p * shapes.volume),
+        (p, h, 0, 1, push, shapes.force),
+        (p, h, 1, 0, room, shapes.volume),
+        (p[low], 0 * p[low], 1, 0, FLAT_WEIGHT * room[low], 0 * p[low]),
+        (at, stands, 0, 1, lift, 0 * at),
+        (at, stands, 1, 0, roomy, held),
     )
+    matrix = np.concatenate([_rows(frame, *each) * weight[:, None] for *each, weight, _ in fitted])
+    right_side = np.concatenate([weight * values for *_, weight, values in fitted])
+    # With columns scaled to equal length the normal equations are well-conditioned (2e6; 1e17
+    # without scaling), and need no orthogonal factorisation.
+    units = 1 / np.sqrt((matrix * matrix).sum(0))
+    matrix *= units
+    normal = matrix.T @ matrix
     most = shapes.volume.reshape(HEIGHT_POINTS, -1).max(0)
-    best = _admissible(
-        matrix, right_side, _limits(frame, area, np.append(0.0, free.pressure), most)
-    )
+    limits = MapLimits(units, *_limits(frame, area, np.append(0.0, free.pressure), most))
+    best = nearest_admissible(np.linalg.solve(normal, matrix.T @ right_side), normal, limits)
     if best is None:
         raise DesignError(
             f"no smooth map of a balloon fits up to {frame.most_pressure:g} kPa; ask for less "
             "pressure"
         )
-    return np.asarray(best.reshape(frame.coefficients.shape))
+    return np.asarray((units * best).reshape(frame.coefficients.shape))
 
 
 def _rows(frame: BalloonMap, p: Array, h: Array, by_p: int, by_h: int) -> Array:
@@ -393,127 +386,91 @@ def _rows(frame: BalloonMap, p: Array, h: Array, by_p: int, by_h: int) -> Array:
     """
     x, rate = frame.scaled(p)
     y = np.minimum(h * frame.spans, HEIGHT_SPANS * (1 - 1e-12))
-    sides = []
-    for place, order, count in zip((x, y), (by_p, by_h), frame.coefficients.shape, strict=True):
-        first = place.astype(np.int_)
-        weights = (place - first)[:, None] ** POWERS @ BASIS[order].T
-        side = np.zeros((len(place), count))
-        np.put_along_axis(side, first[:, None] + WINDOWS[0], weights, 1)
-        sides.append(side)
-    if by_p:
-        sides[0] *= -rate[:, None]
-    if by_h:
-        sides[1] *= -frame.spans
-    return np.asarray((sides[0][:, :, None] * sides[1][:, None]).reshape(len(p), -1))
+    across = _weights(x, by_p, PRESSURE_SPANS) * (-rate[:, None] if by_p else 1.0)
+    along = _weights(y, by_h, HEIGHT_SPANS) * (-frame.spans if by_h else 1.0)
+    return np.asarray((across[:, :, None] * along[:, None]).reshape(len(p), -1))
 
 
-LimitKinds = tuple[tuple[Array, Array, Array], ...]
-"""Of each kind of limit the matrices by pressure and by height (Bernstein coefficients,
-coefficients), and a constant for each row by pressure, added to the result.
+def _weights(places: Array, order: int, spans: int, first: Array | None = None) -> Array:
+    """Return the weights of a spline's coefficients for its value, or a derivative, at places in
+    pieces: (..., coefficients). ``first`` are the pieces that places on their ends belong to.
+    """
+    piece = (places if first is None else first + 0 * places).astype(np.int_)
+    weights = np.zeros((*places.shape, spans + DEGREE))
+    windows = piece[..., None] + np.arange(DEGREE + 1)
+    values = (places - piece)[..., None] ** POWERS @ BASIS[order].T
+    np.put_along_axis(weights, windows, values, -1)
+    return weights
+
+
+MapLimit = tuple[Array, Array, Array]
+"""Matrices by pressure and by height (Bernstein coefficients, coefficients), and a constant for
+each row by pressure, added to the result.
 """
 
 
 class MapLimits:
     """Functions of a spline's coefficients ``units * x`` that must be above 0, with MARGIN as
-    target.
-
-    Limits are ``rows @ x >= least``. A row is the product of one by pressure and one by height, of
-    six coefficients each, over the length ``size`` of its gradient g, sqrt(g @ metric @ g). All
-    products with ``rows``, (values, coefficients), are computed from these.
+    target: the products of the rows by pressure and by height of each kind, over their lengths.
     """
 
-    def __init__(self, kinds: LimitKinds, units: Array, metric: Array) -> None:
-        self.units, self.unit_products = units, units[:, None] * units
-        self.sides = [(across, along) for across, along, _ in kinds]
-        # Products of near coefficients, of each kind's rows: (rows, pairs), twice.
-        first, second = PAIRS
-        self.pairs = [
-            (a[:, first] * a[:, second], b[:, first] * b[:, second]) for a, b in self.sides
+    def __init__(self, units: Array, *kinds: MapLimit) -> None:
+        self.units = units.reshape(PRESSURE_SPANS + DEGREE, -1)
+        self.kinds = [
+            (a, b, constant[:, None] - MARGIN, np.sqrt(a**2 @ self.units**2 @ (b**2).T))
+            for a, b, constant in kinds
         ]
-        count = len(first) + 1
-        near = np.bincount(PAIR_OF.ravel(), (self.unit_products * metric).ravel(), count**2)
-        near = near.reshape(count, count)[:-1, :-1]
-        self.size = self._row_by_row([np.sqrt(a @ near @ b.T) for a, b in self.pairs])
-        rooms = [np.broadcast_to(room[:, None], (len(a), len(b))) for a, b, room in kinds]
-        self.least = (MARGIN - self._row_by_row(rooms)) / self.size
 
-    def times(self, x: Array) -> Array:
-        """Return ``rows @ x``."""
-        grid = (self.units * x).reshape(PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE)
-        return self._row_by_row([a @ grid @ b.T for a, b in self.sides]) / self.size
-
-    def transposed(self, factors: Array) -> Array:
-        """Return ``factors @ rows``."""
-        parts = zip(self.sides, self._grids(factors / self.size), strict=True)
-        total = sum(a.T @ grid @ b for (a, b), grid in parts)
-        return np.asarray(np.ravel(total) * self.units)
-
-    def normal_matrix(self, weights: Array) -> Array:
-        """Return ``rows.T @ diag(weights) @ rows``."""
-        pairs = np.zeros((len(PAIRS[0]) + 1,) * 2)
-        grids = self._grids(weights / self.size**2)
-        for (a, b), grid in zip(self.pairs, grids, strict=True):
-            pairs[:-1, :-1] += a.T @ (grid @ b)
-        matrix = pairs.take(PAIR_OF)
-        matrix *= self.unit_products
-        return np.asarray(matrix)
-
-    @staticmethod
-    def _row_by_row(grids: Sequence[Array]) -> Array:
-        return np.concatenate([grid.ravel() for grid in grids])
-
-    def _grids(self, values: Array) -> Iterator[Array]:
-        """Yield each kind's values: (by pressure, by height)."""
-        start = 0
-        for a, b in self.sides:
-            end = start + len(a) * len(b)
-            yield values[start:end].reshape(len(a), len(b))
-            start = end
+    def worst(self, x: Array) -> tuple[float, Array]:
+        """Return by how much the limit that is missed most is exceeded, and its slopes by x."""
+        grid, worst, slopes = self.units * x.reshape(self.units.shape), math.inf, self.units
+        for a, b, constant, size in self.kinds:
+            room = a @ grid @ b.T
+            room += constant
+            room /= size
+            i, j = divmod(int(room.argmin()), len(b))
+            if room[i, j] < worst:
+                worst = float(room[i, j])
+                slopes = self.units * np.outer(a[i], b[j]) / size[i, j]
+        return worst, slopes.ravel()
 
 
-def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> LimitKinds:
-    """Return the limits on W. Volumes rise with pressure, are above 0 without
-    pressure, and at the end of each piece at most the largest volume ``held`` at the next of
-    ``pressures`` at any height, as shares of area times height. Forces fall with height, as shares
-    of pressure times area.
+def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> Iterator[MapLimit]:
+    """Yield the limits on W. Volumes rise with pressure, are above 0 without pressure, and at the
+    end of each piece at most the largest volume ``held`` at the next of ``pressures`` at any
+    height, as shares of area times height. Forces fall with height, as shares of pressure times
+    area.
 
     The limits apply to Bernstein coefficients, so that they also hold between places.
     """
     top, scale_pressure = frame.most_height, frame.scale_pressure
     each = PRESSURE_SPANS / math.asinh(frame.most_pressure / scale_pressure)
     x = np.linspace(0, PRESSURE_SPANS, PRESSURE_SPANS * PRESSURE_PARTS + 1)
-    even = np.linspace(0, 1, HEIGHT_SPANS * HEIGHT_PARTS + 1)
-    y = HEIGHT_SPANS * np.sort(np.concatenate([even, LOW_PARTS]))
-    value, slope, curve = (_parts(x, order, PRESSURE_SPANS + DEGREE) for order in (0, 1, 2))
-    slope, curve = each * slope, each**2 * curve
+    y = np.sort(np.concatenate([np.arange(HEIGHT_SPANS + 1.0), HEIGHT_SPANS * LOW_PARTS]))
+    value, slope, curve = (each**order * _parts(x, order, PRESSURE_SPANS) for order in (0, 1, 2))
     # With p = p0 sinh s the volume is -W_s / (p0 cosh s). It rises if tanh(s) W_s - W_ss > 0.
     # W_s < 0, and tangents of tanh lie above it: the tangent at a part's middle replaces it.
-    low, high = x[:-1] / each, x[1:] / each
+    low, high = x[:-1, None] / each, x[1:, None] / each
     middle = (low + high) / 2
-    bend = (high - low) / 2 / np.cosh(middle) ** 2
-    tangent = np.tanh(middle) + np.stack([-bend, bend])
-    scale = (scale_pressure * np.cosh(middle))[:, None, None]
-    rises = (_times_line(slope, tangent) - curve) / (scale * area * top)
-    falls = value * HEIGHT_SPANS**2 / top
-    falls /= (area * (scale_pressure * np.sinh(middle) + LOW_PRESSURE))[:, None, None]
-    share = np.maximum(y[1:] / HEIGHT_SPANS, LEAST_CHECK)[:, None, None]
-    by_height, bent = (_parts(y, order, HEIGHT_SPANS + DEGREE) for order in (0, 2))
-    by_height /= share
-    along, none = _joined(by_height), -slope[0, :1] / (scale_pressure * area * top)
-    every = rises.reshape(-1, rises.shape[-1])
+    tangent = np.tanh(middle) + (high - low) * (EVEN - 0.5) / np.cosh(middle) ** 2
+    scale = scale_pressure * np.cosh(middle[..., None]) * area * top
+    rises = BERNSTEIN @ ((tangent[..., None] * slope - curve) / scale)
+    falls = BERNSTEIN @ value * HEIGHT_SPANS**2 / top
+    falls /= area * (scale_pressure * np.sinh(middle[..., None]) + LOW_PRESSURE)
+    share = np.maximum(y[1:, None, None] / HEIGHT_SPANS, LEAST_CHECK)
+    by_height, bent = (BERNSTEIN @ _parts(y, order, HEIGHT_SPANS) for order in (0, 2))
+    plain, along = _joined(by_height), _joined(by_height / share)
     # Volumes rise with pressure, so in a piece they are bounded by the value at its end.
     ends = slice(PRESSURE_PARTS - 1, None, PRESSURE_PARTS)
-    at = scale_pressure * np.sinh(high[ends])
+    at = scale_pressure * np.sinh(high[ends, 0])
     content = slope[ends, -1] / (np.hypot(at, scale_pressure) * area * top)[:, None]
     next_one = np.minimum(np.searchsorted(pressures, at * (1 - 1e-9)), len(pressures) - 1)
     most = (1 + HELD_MARGIN) * np.maximum.accumulate(held)[next_one] / (area * top)
-    plain = _joined(_parts(y, 0, HEIGHT_SPANS + DEGREE))
-    return (
-        (every, along, np.zeros(len(every))),
-        (_joined(falls), _joined(bent), np.zeros(len(falls) * DEGREE + 1)),
-        (none, along, np.zeros(1)),
-        (content, plain, most),
-    )
+    every, none = rises.reshape(-1, rises.shape[-1]), -slope[0, :1] / (scale_pressure * area * top)
+    yield every, along, np.zeros(len(every))
+    yield _joined(falls), _joined(bent), np.zeros(len(falls) * DEGREE + 1)
+    yield none, along, np.zeros(1)
+    yield content, plain, most
 
 
 def _joined(parts: Array) -> Array:
@@ -521,41 +478,56 @@ def _joined(parts: Array) -> Array:
     return np.concatenate([parts[:, :-1].reshape(-1, parts.shape[-1]), parts[-1, -1:]])
 
 
-def _parts(ends: Array, order: int, count: int) -> Array:
-    """Return the Bernstein coefficients, all of degree DEGREE, of a spline or a derivative on the
-    parts between ``ends`` (in pieces): the matrix (parts, DEGREE + 1, count) to its coefficients.
+def _parts(ends: Array, order: int, spans: int) -> Array:
+    """Return the values at EVEN places of a spline or a derivative on the parts between ``ends``
+    (in pieces): the matrix (parts, DEGREE + 1, coefficients) to its coefficients.
     """
-    low, wide = ends[:-1], np.diff(ends)
-    first = (low + wide / 2).astype(np.int_)
-    places = (low - first)[:, None] + wide[:, None] * np.linspace(0, 1, DEGREE + 1)
-    weights = BERNSTEIN @ (places[..., None] ** POWERS) @ BASIS[order].T
-    matrices = np.zeros((len(low), DEGREE + 1, count))
-    columns = first[:, None, None] + np.arange(DEGREE + 1)
-    np.put_along_axis(matrices, np.broadcast_to(columns, weights.shape), weights, -1)
-    return matrices
+    low, wide = ends[:-1, None], np.diff(ends)[:, None]
+    return _weights(low + wide * EVEN, order, spans, first=low + wide / 2)
 
 
-def _times_line(parts: Array, line: Array) -> Array:
-    """Return Bernstein coefficients (parts, DEGREE + 1, count) of polynomials below DEGREE, times
-    lines (2, parts) given at either end of the part.
+def nearest_admissible(point: Array, metric: Array, limits: MapLimits) -> Array | None:
+    """Return the x within the limits that is nearest to ``point`` (n,), by the squared distance
+    d @ ``metric`` @ d; None if no such x is found.
+
+    Dual active set (Goldfarb and Idnani, Math. Programming 27 (1983) 1): the limit that is missed
+    most joins those that hold x, ``rows`` of the metric's root, which push x by ``pushes``; those
+    whose push would change its sign are let go.
     """
-    places = np.linspace(0, 1, DEGREE + 1)
-    line_values = line[0][:, None] * (1 - places) + line[1][:, None] * places
-    values = np.linalg.inv(BERNSTEIN) @ parts
-    return np.asarray(BERNSTEIN @ (line_values[..., None] * values))
-
-
-def _admissible(matrix: Array, right_side: Array, kinds: LimitKinds) -> Array | None:
-    """Return the least-squares coefficients within the limits; None if none exist."""
-    # With columns scaled to equal length the normal equations are well-conditioned (2e6; 1e17
-    # without scaling), and need no orthogonal factorisation.
-    units = 1 / np.sqrt((matrix * matrix).sum(0))
-    columns = matrix * units
-    normal = columns.T @ columns
-    free = np.linalg.solve(normal, columns.T @ right_side)
-    limits = MapLimits(kinds, units, np.linalg.inv(normal))
-    best = nearest_admissible(free, normal, limits)
-    return None if best is None else np.asarray(units * best)
+    root = np.linalg.inv(np.linalg.cholesky(metric))
+    x, rows, pushes, gram = point, np.zeros((0, len(point))), np.zeros(0), np.zeros((0, 0))
+    lack = 0.0
+    for _ in range(MOST_CHANGES):
+        if not lack:
+            room, slopes = limits.worst(x)
+            if room > -MET:
+                return x
+            added, own, lack = root @ slopes, 0.0, -room
+            near, square = rows @ added, float(added @ added)
+        change = np.linalg.solve(gram, near)
+        way = added - change @ rows
+        fall = float(way @ added)
+        is_free = fall > 1e-10 * square
+        shares = np.divide(pushes, change, out=np.full(len(rows), math.inf), where=change > 0)
+        first = float(shares.min(initial=math.inf))
+        share = min(first, lack / fall) if is_free else first
+        if math.isinf(share):
+            return None
+        pushes, own = pushes - share * change, own + share
+        x = x + share * is_free * (way @ root)
+        if share < first:
+            rows, pushes, lack = np.vstack([rows, added]), np.append(pushes, own), 0.0
+            gram = np.block([[gram, near[:, None]], [near, square]])
+        else:
+            stays = shares > first
+            rows, pushes, near, gram = (
+                rows[stays],
+                pushes[stays],
+                near[stays],
+                gram[stays][:, stays],
+            )
+            lack -= share * is_free * fall
+    return None
 
 
 def stretch(kind: Balloon, shape: Shapes) -> Array:
@@ -565,159 +537,36 @@ def stretch(kind: Balloon, shape: Shapes) -> Array:
     return np.asarray(lengths.sum(-1) / (kind.pocket - kind.neck) - 1)
 
 
-# Projection onto linear limits: a convex quadratic program.
-
-
-QP_STEPS = 80
-CLOSE, SMALL = 1e-7, 1e-10
-"""Tolerance of the residual; tolerance of a violation, and of slack times its multiplier."""
-BLOCK = 3
-"""Pressures whose coefficients are eliminated together."""
-STEP_SHARE = 0.99
-"""Maximum step as a share of the distance to the next limit."""
-
-
-def nearest_admissible(point: Array, metric: Array, limits: MapLimits) -> Array | None:
-    """Return the x within the limits that is nearest to ``point`` (n,), by the squared distance
-    d @ ``metric`` @ d; None if no such x is found.
-
-    Mehrotra's predictor and corrector (Nocedal and Wright, Numerical Optimization, Sec. 16.6).
-    """
-    x, least = point.copy(), limits.least
-    room = limits.times(x) - least
-    begin = max(1e-2 * float(np.abs(room).max(initial=0.0)), 1e-4)
-    slack, push = np.maximum(room, begin), np.full(len(least), begin)
-    for _ in range(QP_STEPS):
-        off = metric @ (x - point) - limits.transposed(push)
-        gap = limits.times(x) - slack - least
-        mean = float(slack @ push) / len(least)
-        if np.abs(off).max() < CLOSE and max(np.abs(gap).max(), mean) < SMALL:
-            return x
-        ratio = push / slack
-        matrix = limits.normal_matrix(ratio)
-        matrix += metric
-        width = HEIGHT_SPANS + DEGREE
-        parts = eliminated(matrix, BLOCK * width, DEGREE * width)
-        even = ratio * gap
-
-        def step(pull: Array) -> tuple[Array, Array, Array]:
-            ahead = solved(parts, -limits.transposed(pull + even) - off)  # noqa: B023
-            slacker = limits.times(ahead) + gap  # noqa: B023
-            return ahead, slacker, -pull - ratio * slacker  # noqa: B023
-
-        _, slacker, harder = step(push)
-        to = _share(slack, slacker), _share(push, harder)
-        remainder = (slack + to[0] * slacker) @ (push + to[1] * harder) / len(least)
-        aim = (remainder / mean) ** 3 * mean
-        ahead, slacker, harder = step(push + (slacker * harder - aim) / slack)
-        share = min(1.0, STEP_SHARE * min(_share(slack, slacker), _share(push, harder)))
-        x, slack, push = x + share * ahead, slack + share * slacker, push + share * harder
-    return None
-
-
-def _share(values: Array, by: Array) -> float:
-    """Return the share of a step after which the first of positive values is 0; inf if none."""
-    fall = -float((by / values).min())
-    return 1 / fall if fall > 0 else math.inf
-
-
 # Valid range of a map: within 3 % of balloons computed between its support points.
 
 
-MOST_ERROR, CELL_ERROR = 0.03, 0.02
-"""Allowed relative error of a map, and the stricter limit where a cell is checked, since errors
-between these places may be larger: free heights jump where another wave begins.
-"""
+MOST_ERROR = 0.03
+"""Allowed relative error of a map."""
 FLAT = 1e-3
 """Height in mm that represents 0."""
-PRESSURE_CHECKS, HEIGHT_CHECKS = 37, 25
-"""Balloons computed by pressure and by height."""
 PLACE_DIGITS = 6
 """Decimals to which places in kPa and mm are distinguished."""
 
 
-class MapRange(NamedTuple):
-    """Cells of a map between ``pressures`` (n) and ``heights`` (m), and which of them hold:
-    ``within`` (n - 1, m - 1), true where the map does at all four corners and in the middle.
-    """
-
-    pressures: Array
-    heights: Array
-    within: NDArray[np.bool_]
-
-    def holds(self, pressure: ArrayLike, height: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether the map holds at pressures and heights inside it."""
-        cells = []
-        for ends, places in ((self.pressures, pressure), (self.heights, height)):
-            cell = np.searchsorted(ends, places, side="right") - 1
-            cells.append(np.clip(cell, 0, len(ends) - 2))
-        return np.asarray(self.within[cells[0], cells[1]])
-
-
-@lru_cache(maxsize=64)
-def map_range(made: BalloonMap) -> MapRange:
-    """Return where a map is within CELL_ERROR of balloons between plates, as far as checked, by the
-    map that it was stiffened from: heights are equal at equal pressure over modulus.
-    """
-    base, ratio = _base(made)
-    pressures, heights, corners = _checked(base, 0.0)
-    rows = corners[:-1] & corners[1:]
-    middles = _checked(base, 0.5)[2][:-1, :-1]
-    return MapRange(ratio * pressures, heights, rows[:, :-1] & rows[:, 1:] & middles)
-
-
-def _base(stiffened_map: BalloonMap) -> tuple[BalloonMap, float]:
-    """Return the map that one was stiffened from, and the ratio of their moduli."""
-    base = stiffened_map.base or stiffened_map
-    return base, stiffened_map.scale_pressure / base.scale_pressure
-
-
-def _checked(base: BalloonMap, offset: float) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return the pressures and the heights of the checks, ``offset`` cells further, and where the
-    map is within CELL_ERROR there: (pressures, heights).
-    """
-    x, y = (
-        np.minimum((np.arange(count) + offset) / (count - 1), 1.0)
-        for count in (PRESSURE_CHECKS, HEIGHT_CHECKS)
-    )
-    pressures = base.scale_pressure * np.sinh(
-        x * math.asinh(base.most_pressure / base.scale_pressure)
-    )
-    pressures = np.minimum(pressures, base.most_pressure)
-    heights = base.most_height * (y + y**2) / 2
-    p, h = np.meshgrid(pressures, np.maximum(heights, FLAT), indexing="ij")
-    near = relative_errors(base, p.ravel(), h.ravel()) <= CELL_ERROR
-    return pressures, heights, near.reshape(p.shape)
-
-
-def relative_errors(checked_map: BalloonMap, pressure: Array, height: Array) -> Array:
-    """Return the larger relative error of a map in force and volume, against balloons between
-    plates computed at its places (n,), heights above 0. Raises DesignError if one has no
-    equilibrium.
-
-    Forces are compared as shares of pressure (and 0.1 kPa) times pocket, and the force; volumes as
-    shares of the volume and of what a pocket holds at the least height computed.
-    """
-    exact = compressed_shapes(checked_map.balloon, pressure, height, tied=True)
-    area = math.pi * checked_map.balloon.pocket**2
-    push = area * (pressure + LOW_PRESSURE) + np.abs(exact.force)
-    room = exact.volume + area * LEAST_HEIGHT
-    force = np.abs(checked_map.force(pressure, height) - exact.force) / push
-    return np.maximum(force, np.abs(checked_map.volume(pressure, height) - exact.volume) / room)
-
-
 def holds_at(made: BalloonMap, pressure: Array, height: Array) -> NDArray[np.bool_]:
     """Return where a map is within MOST_ERROR of the balloons computed at places (n,); not where
-    one lies outside the map.
+    one lies outside the map. Raises DesignError if one has no equilibrium.
 
-    Suction counts as no pressure, and heights below FLAT as FLAT. The balloons belong to the map
-    that this one was stiffened from. Raises DesignError if one has no equilibrium.
+    Forces are compared as shares of pressure (and 0.1 kPa) times pocket, and the force; volumes as
+    shares of the volume and of what a pocket holds at the least height computed. Suction counts as
+    no pressure, and heights below FLAT as FLAT. The balloons are ``drawn``'s.
     """
-    base, ratio = _base(made)
-    places = np.stack([np.maximum(pressure / ratio, 0.0), np.maximum(height, FLAT)], -1)
+    base = made.drawn
+    places = np.stack([np.maximum(pressure / made.ratio, 0.0), np.maximum(height, FLAT)], -1)
     unique, back = distinct(places.round(PLACE_DIGITS))
-    p, h = np.minimum(unique[:, 0], base.most_pressure), unique[:, 1]
-    holds, inside = np.zeros(len(h), bool), h <= base.most_height
+    holds, inside = np.zeros(len(unique), bool), unique[:, 1] <= base.most_height
     if inside.any():
-        holds[inside] = relative_errors(base, p[inside], h[inside]) <= MOST_ERROR
+        p, h = np.minimum(unique[inside, 0], base.most_pressure), unique[inside, 1]
+        exact = compressed_shapes(base.balloon, p, h, tied=True)
+        area = math.pi * base.balloon.pocket**2
+        push = area * (p + LOW_PRESSURE) + np.abs(exact.force)
+        room = exact.volume + area * LEAST_HEIGHT
+        force = np.abs(base.force(p, h) - exact.force) / push
+        volume = np.abs(base.volume(p, h) - exact.volume) / room
+        holds[inside] = np.maximum(force, volume) <= MOST_ERROR
     return holds[back]

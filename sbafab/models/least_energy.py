@@ -161,44 +161,6 @@ def solve_whole(band: Array, right_side: Array) -> Array | None:
         return None
 
 
-class Eliminated(NamedTuple):
-    """A block of unknowns, and those ``after`` it that it is coupled to: of a matrix L L^T, the
-    ``inverse`` of its part of L, and its rows ``across`` of L^T.
-    """
-
-    here: slice
-    after: slice
-    inverse: Array
-    across: Array
-
-
-def eliminated(rows: Array, block: int, reach: int) -> list[Eliminated]:
-    """Return the blocks of a positive definite matrix (n, n), which is overwritten, eliminated in
-    turn; unknowns are coupled to no more than ``reach`` ones after their block.
-
-    Raises LinAlgError if it is not positive definite.
-    """
-    parts = []
-    for end in range(block, len(rows) + block, block):
-        here, after = slice(end - block, end), slice(end, end + reach)
-        inverse = np.linalg.inv(np.linalg.cholesky(rows[here, here]))
-        across = inverse @ rows[here, after]
-        rows[after, after] -= across.T @ across
-        parts.append(Eliminated(here, after, inverse, across))
-    return parts
-
-
-def solved(parts: list[Eliminated], right_side: Array) -> Array:
-    """Return the solution of A x = ``right_side`` (n,) by the blocks of A."""
-    x = right_side.copy()
-    for here, after, inverse, across in parts:
-        x[here] = inverse @ x[here]
-        x[after] -= across.T @ x[here]
-    for here, after, inverse, across in reversed(parts):
-        x[here] = inverse.T @ (x[here] - across @ x[after])
-    return x
-
-
 class Packing(NamedTuple):
     """Index map to a band (size, width) of unknowns: the sums from ``starts`` of the ``source``
     entries times their ``weight`` go ``into`` its elements.

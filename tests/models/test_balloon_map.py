@@ -22,7 +22,6 @@ from sbafab.models.balloon_map import (
     balloon_map,
     holds_at,
     horner,
-    map_range,
 )
 from sbafab.models.elastic import OUTSIDE
 from sbafab.models.rim_correction import compressed_shapes, free_shapes
@@ -187,26 +186,6 @@ def test_a_thick_film_on_a_small_pocket_has_a_map_to_the_highest_pressure(neck: 
     assert made.free_height(p) == pytest.approx(free, rel=0.03)
 
 
-@pytest.mark.parametrize(("diameter", "film"), few(((5, 0.038), (12, 0.02), (25, 0.2)), 1, names=2))
-def test_a_range_tells_where_a_map_is_within_three_percent(diameter: float, film: float) -> None:
-    """At places between its checks; far above the free height at low pressure it is not."""
-    balloon = Balloon(diameter / 2, neck=1.27, bore=0.52, thickness=film)
-    made = balloon_map(balloon, 33.0)
-    covered = map_range(made)
-    draw = np.random.default_rng(1)
-    p = 0.05 * (33.0 / 0.05) ** draw.random(300)
-    h = made.most_height * draw.random(300) ** 1.5
-    here = covered.holds(p, h)
-    assert 0.5 < here.mean() < 1
-    p, h = p[here], h[here]
-    exact = compressed_shapes(balloon, p, h, tied=True)
-    area = math.pi * balloon.pocket**2
-    force = np.abs(made.force(p, h) - exact.force) / (area * (p + 0.1) + np.abs(exact.force))
-    assert force.max() < MOST_ERROR
-    missed = np.abs(made.volume(p, h) - exact.volume) / (exact.volume + 0.01 * area)
-    assert missed.max() < MOST_ERROR
-
-
 def test_a_pose_tells_whether_maps_hold_for_it() -> None:
     three = sbafab.stack("3dof-15mm")
     pose = three.pose((10.0, 5.0, 8.0))
@@ -218,19 +197,23 @@ def test_a_pose_tells_whether_maps_hold_for_it() -> None:
     assert three.hold([]) == []
 
 
-def test_a_map_holds_at_places_where_it_is_within_three_percent() -> None:
-    """Of a stiffer film too, whose balloons stand as high at as many times the pressure."""
-    made = balloon_map(SIZES["d = 5"], 110.0)
-    p = np.array([0.0, 0.01, 0.1, 1.0, 10.0, 100.0])[:, None]
-    h = np.array([0.02, 0.2, 0.5, 0.8, 0.9, 0.98]) * made.most_height
-    p, h = (grid.ravel() for grid in np.broadcast_arrays(p, h))
+@pytest.mark.parametrize(("diameter", "film"), few(((5, 0.038), (12, 0.02), (25, 0.2)), 1, names=2))
+def test_a_map_holds_at_places_where_it_is_within_three_percent(
+    diameter: float, film: float
+) -> None:
+    """Of a stiffer film too, whose balloons stand as high at as many times the pressure; far above
+    the free height at low pressure it does not.
+    """
+    made = balloon_map(Balloon(diameter / 2, neck=1.27, bore=0.52, thickness=film), 33.0)
+    draw = np.random.default_rng(1)
+    p = np.append(0.05 * (33.0 / 0.05) ** draw.random(200), 0.0)
+    h = np.append(made.most_height * draw.random(200) ** 1.5, 0.5 * made.most_height)
     exact = compressed_shapes(made.balloon, p, h, tied=True)
     area = math.pi * made.balloon.pocket**2
     force = np.abs(made.force(p, h) - exact.force) / (area * (p + 0.1) + np.abs(exact.force))
     missed = np.abs(made.volume(p, h) - exact.volume) / (exact.volume + 0.01 * area)
     near = np.maximum(force, missed) < MOST_ERROR
-    assert near.any()
-    assert not near.all()
+    assert 0.5 < near.mean() < 1
     assert (holds_at(made, p, h) == near).all()
     assert (holds_at(made.stiffened(3.0), 3 * p, h) == near).all()
 
