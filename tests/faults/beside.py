@@ -16,7 +16,7 @@ from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from tests.faults.record import Fault, Kind
+from tests.faults.record import Fault, Kind, edited, of_text
 from tests.faults.specimen import Specimen
 
 RULE, CLAIMS = "as-designed", "manifest-claims"
@@ -25,38 +25,23 @@ SOLID, GLB, MODEL = "mesh/solid.stl", "mesh/solid.glb", "mesh/solid.3mf"
 
 
 def changed(name: str, file: str, change: Callable[[bytes], bytes], rule: str = RULE) -> Fault:
-    """A file with other contents, and its hash put right."""
-
-    def put(specimen: Specimen) -> None:
-        path = specimen.doctor.folder / file
-        data = path.read_bytes()
-        path.write_bytes(change(data))
-        assert path.read_bytes() != data
-        specimen.doctor.rehash()
-
-    return Fault(name, rule, put, beside=True)
+    return edited(name, rule, lambda s: s.doctor.folder / file, change, beside=True)
 
 
 def replaced(name: str, file: str, pattern: str, new: str) -> Fault:
     """A text in which the first match stands otherwise."""
-
-    def change(data: bytes) -> bytes:
-        text, count = re.subn(pattern, new, data.decode(), count=1)
-        assert count
-        return text.encode()
-
-    return changed(name, file, change)
+    return changed(name, file, of_text(lambda text: re.sub(pattern, new, text, count=1)))
 
 
 def told(name: str, file: str, change: Callable[[Any], object], rule: str = RULE) -> Fault:
     """A JSON file of which one value is another."""
 
-    def edit(data: bytes) -> bytes:
-        document = json.loads(data)
+    def edit(text: str) -> str:
+        document = json.loads(text)
         change(document)
-        return json.dumps(document).encode()
+        return json.dumps(document)
 
-    return changed(name, file, edit, rule)
+    return changed(name, file, of_text(edit), rule)
 
 
 def lost(name: str, file: str) -> Fault:
@@ -82,7 +67,6 @@ def plate(name: str, change: Callable[[Region], Region]) -> Fault:
         notes = [[edges[0].start, *(e.end for e in edges)] for _, edges in found.strokes[2:]]
         text = dxf_text(cutting_sequence(region), found.properties, notes=notes)
         path.write_text(text, newline="\n")
-        specimen.doctor.rehash()
 
     return Fault(name, RULE, put, no_pins, beside=True)
 
@@ -97,17 +81,13 @@ def flipped(region: Region) -> Region:
     return region.mapped(lambda p: (low + high - p[0], p[1]), 1.0, True)
 
 
-def engraved(specimen: Specimen) -> None:
+def engraved(text: str) -> str:
     """A stroke more in the waste of a sheet, at its lower edge."""
-    path = specimen.doctor.folder / "sheets/TPE_1.dxf"
-    text = path.read_text()
     stroke = (
         "  0\nLWPOLYLINE\n  5\nFFF1\n330\n17\n100\nAcDbEntity\n  8\n"
         f"{ENGRAVE}\n100\nAcDbPolyline\n 90\n2\n 70\n0\n 10\n1.0\n 20\n1.0\n 10\n2.0\n 20\n1.5\n"
     )
-    head, start, tail = text.partition("  2\nENTITIES\n")
-    path.write_text(head + start + stroke + tail, newline="\n")
-    specimen.doctor.rehash()
+    return text.replace("  2\nENTITIES\n", f"  2\nENTITIES\n{stroke}", 1)
 
 
 def painted(data: bytes) -> bytes:
@@ -163,7 +143,7 @@ KIND = Kind(
         replaced(
             "power set in a LightBurn project", PROJECT, r'maxPower Value="0', 'maxPower Value="9'
         ),
-        Fault("stray engraving in the waste", RULE, engraved, beside=True),
+        changed("stray engraving in the waste", "sheets/TPE_1.dxf", of_text(engraved)),
         told("parts placed otherwise", "sheets/nest.json", lambda d: d["nests"]["TPE"].reverse()),
         plate("pin plate turned over", flipped),
         plate("pin plate of another size", lambda region: region.moved(1.0, 0.0)),

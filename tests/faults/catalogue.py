@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 
@@ -80,10 +81,9 @@ def caught_by(fault: Fault, template: str, goods: Goods, folder: Path) -> tuple[
         return reason
     shutil.copytree(good.doctor.folder, folder)
     fault.put(Specimen(Doctor(folder), good.clean))
-    if fault.beside:
-        with unabridged():
-            rules = failing(folder)
-    else:
+    if fault.hashes:
+        Doctor(folder).rehash()
+    with unabridged() if fault.beside else nullcontext():
         rules = failing(folder)
     shutil.rmtree(folder)
     return rules

@@ -27,7 +27,6 @@ def chorded(name: str, rule: str, pick: Pick, draw: Callable[[Region], Region]) 
         found = read_profile(path)
         told = {**found.properties, "CURVES": f"chords within {ERROR:g} mm"}
         path.write_text(dxf_text(cutting_sequence(found.region), told), newline="\n")
-        specimen.doctor.rehash()
 
     return Fault(name, rule, put)
 

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-from tests.faults.record import Fault, Kind, no_lumen
+from tests.faults.record import Fault, Kind, edited, no_lumen, of_text, told
 from tests.faults.specimen import Specimen, mask, separator, wall
 
 Claims = dict[str, Any]
-
-
-def told(name: str, change: Callable[[Claims], object]) -> Fault:
-    """A manifest changed by hand; every file as it was written."""
-    return Fault(f"wrong {name}", "manifest-claims", lambda s: s.doctor.set_manifest(change))
 
 
 def of_wall(name: str, **wrong: object) -> Fault:
@@ -65,23 +59,22 @@ def file_hash(specimen: Specimen) -> None:
     )
 
 
-def limit_unsaid(specimen: Specimen) -> None:
-    """A wall's file without its property LIMITS, and nothing else changed."""
-    path = specimen.doctor.path(wall(specimen.clean).index)
-    head, name, tail = path.read_text().partition("$CUSTOMPROPERTYTAG\n  1\nLIMITS\n")
+def limit_unsaid(text: str) -> str:
+    """A file without its property LIMITS, and nothing else changed."""
+    head, name, tail = text.partition("$CUSTOMPROPERTYTAG\n  1\nLIMITS\n")
     assert name
     value = tail.index("  9\n", tail.index("$CUSTOMPROPERTY\n"))
-    path.write_text(head.removesuffix("  9\n") + tail[value:], newline="\n")
-    specimen.doctor.rehash()
+    return head.removesuffix("  9\n") + tail[value:]
 
 
+LOWERED = ("rules.bond_width=0.7",)
 KIND = Kind(
     "Manifests",
     "The cut files are as they were written; in the first row one is missing as well.",
     (
         Fault("mask left out of the stack", "manifest-claims", layer_lost),
         Fault("wrong order of layers", "manifest-claims", order),
-        Fault("wrong hash of a file", "manifest-claims", file_hash),
+        Fault("wrong hash of a file", "manifest-claims", file_hash, hashes=False),
         of_wall("thickness", thickness=0.05),
         of_wall("role", role="cap"),
         of_wall("height", z=0.5),
@@ -90,35 +83,35 @@ KIND = Kind(
         of_wall("number of pieces", pieces=9),
         of_wall("list of bores", bores=[]),
         of_wall("pattern", pattern="P01"),
-        told("bond area", lambda m: m["interfaces"][0].update(bond_area=1.0)),
-        told("contact area", lambda m: m["interfaces"][0].update(contact_area=1.0)),
-        told("kind of interface", lambda m: m["interfaces"][1].update(kind="bond")),
-        told("place of a bore", lambda m: m["bores"][0].update(x=m["bores"][0]["x"] + 0.002)),
-        told("width of an inlet", lambda m: m["inlets"][0].update(width=1.7)),
-        told("diameter of a pin", lambda m: m["registration"]["pins"][0].update(diameter=1.1)),
-        told("size", lambda m: m["sizes"].update(width=9.0)),
-        told("number of films", lambda m: m["films"][0].update(layers=2)),
-        told("kerf", lambda m: m["kerf"]["TPE"].update(state="compensated", width=0.1)),
-        told("design", lambda m: m.update(design_sha256="0" * 64)),
-        told("waiver", lambda m: m.update(waived=["sealing"])),
-        told("lowered limit", lambda m: m.update(lowered_limits=["bond_width 0.3 (paper 0.75)"])),
-        Fault(
-            "lowered limit that the manifest does not name",
-            "manifest-claims",
-            lambda s: s.doctor.set_manifest(lambda m: m.update(lowered_limits=[])),
-            settings=("rules.bond_width=0.7",),
+        told("wrong bond area", lambda m: m["interfaces"][0].update(bond_area=1.0)),
+        told("wrong contact area", lambda m: m["interfaces"][0].update(contact_area=1.0)),
+        told("wrong kind of interface", lambda m: m["interfaces"][1].update(kind="bond")),
+        told("wrong place of a bore", lambda m: m["bores"][0].update(x=m["bores"][0]["x"] + 0.002)),
+        told("wrong width of an inlet", lambda m: m["inlets"][0].update(width=1.7)),
+        told(
+            "wrong diameter of a pin", lambda m: m["registration"]["pins"][0].update(diameter=1.1)
         ),
-        Fault(
+        told("wrong size", lambda m: m["sizes"].update(width=9.0)),
+        told("wrong number of films", lambda m: m["films"][0].update(layers=2)),
+        told("wrong kerf", lambda m: m["kerf"]["TPE"].update(state="compensated", width=0.1)),
+        told("wrong design", lambda m: m.update(design_sha256="0" * 64)),
+        told("wrong waiver", lambda m: m.update(waived=["sealing"])),
+        told(
+            "wrong lowered limit",
+            lambda m: m.update(lowered_limits=["bond_width 0.3 (paper 0.75)"]),
+        ),
+        told(
+            "lowered limit that the manifest does not name",
+            lambda m: m.update(lowered_limits=[]),
+            settings=LOWERED,
+        ),
+        edited(
             "lowered limit that a file does not name",
             "manifest-claims",
-            limit_unsaid,
-            settings=("rules.bond_width=0.7",),
+            lambda s: s.doctor.path(wall(s.clean).index),
+            of_text(limit_unsaid),
+            settings=LOWERED,
         ),
-        Fault(
-            "wrong lumen",
-            "manifest-claims",
-            lambda s: s.doctor.set_manifest(lambda m: m.update(lumen=3.0)),
-            no_lumen,
-        ),
+        told("wrong lumen", lambda m: m.update(lumen=3.0), why_not=no_lumen),
     ),
 )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable
-from pathlib import Path
 
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
@@ -14,34 +13,22 @@ from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line, meeting_points
 from sbafab.geometry.region import Region, disc
+from tests.faults import record
 from tests.faults.holes import bore
-from tests.faults.record import Fault, Kind
-from tests.faults.specimen import Pick, Specimen, mask, separator, tabbed_wall, wall
+from tests.faults.record import Fault, Kind, of_text
+from tests.faults.specimen import Change, Pick, Specimen, mask, separator, tabbed_wall, wall
 
 CLAIMS = "manifest-claims"
 POLYLINE = "AcDbPolyline\n"
 
 
-def broken(name: str, change: Callable[[Path], object], rule: str = "file-integrity") -> Fault:
-    """A fault in the file of the lowest wall, with its hash put right."""
-
-    def put(specimen: Specimen) -> None:
-        change(specimen.doctor.path(tabbed_wall(specimen.clean).index))
-        specimen.doctor.rehash()
-
-    return Fault(name, rule, put)
+def broken(name: str, change: Callable[[bytes], bytes], rule: str = "file-integrity") -> Fault:
+    """A fault in the file of the lowest wall."""
+    return record.edited(name, rule, lambda s: s.doctor.path(tabbed_wall(s.clean).index), change)
 
 
 def edited(name: str, change: Callable[[str], str]) -> Fault:
-    """The same, as an edit that must change the text."""
-
-    def rewrite(path: Path) -> None:
-        text = path.read_text()
-        changed = change(text)
-        assert changed != text
-        path.write_text(changed, newline="\n")
-
-    return broken(name, rewrite)
+    return broken(name, of_text(change))
 
 
 def inches(text: str) -> str:
@@ -126,18 +113,18 @@ def on_entity(group: str) -> Callable[[str], str]:
     return change
 
 
-def redone(change: Callable[[Region], Region]) -> Callable[[Path], None]:
-    def rewrite(path: Path) -> None:
-        found = read_profile(path)
-        path.write_text(dxf_text(cutting_sequence(change(found.region)), found.properties))
+def redone(change: Callable[[Region], Region]) -> Callable[[bytes], bytes]:
+    def rewrite(text: str) -> str:
+        found = read_profile(text)
+        return dxf_text(cutting_sequence(change(found.region)), found.properties)
 
-    return rewrite
+    return of_text(rewrite)
 
 
-def as_chords(path: Path) -> None:
-    found = read_profile(path)
+def as_chords(text: str) -> str:
+    found = read_profile(text)
     drawn = in_chords(found.region, "separator-mask", 0.005)
-    path.write_text(dxf_text(cutting_sequence(drawn), found.properties, "chords"))
+    return dxf_text(cutting_sequence(drawn), found.properties, "chords")
 
 
 def crossing_itself(region: Region) -> Region:
@@ -161,13 +148,11 @@ def swapped(name: str, rule: str, first: Pick, second: Pick, tell: bool) -> Faul
         if tell:
             specimen.redraw([one], lambda region, _: other.profile)
             specimen.redraw([other], lambda region, _: one.profile)
-            specimen.doctor.rehash()
             return
         paths = [specimen.doctor.path(layer.index) for layer in (one, other)]
         texts = [path.read_text() for path in paths]
         for path, text in zip(paths, reversed(texts), strict=True):
             path.write_text(text, newline="\n")
-        specimen.doctor.rehash()
 
     return Fault(name, rule, put)
 
@@ -190,17 +175,13 @@ def unhashed(specimen: Specimen) -> None:
     specimen.doctor.redraw(wall(specimen.clean).index, lambda region: region.moved(0.15, 0.0))
 
 
-def undrilled_plate(specimen: Specimen) -> None:
-    manifest = specimen.doctor.manifest
-    path = specimen.doctor.folder / manifest["fixture"]
-    redone(lambda region: region | disc(bore(specimen.clean), 0.8))(path)
-    specimen.doctor.rehash()
+def plate(name: str, change: Change) -> Fault:
+    def put(specimen: Specimen) -> None:
+        path = specimen.doctor.folder / specimen.doctor.manifest["fixture"]
+        rewrite = redone(lambda region: change(region, specimen.clean))
+        path.write_bytes(rewrite(path.read_bytes()))
 
-
-def shifted_plate(specimen: Specimen) -> None:
-    path = specimen.doctor.folder / specimen.doctor.manifest["fixture"]
-    redone(lambda region: region.moved(0.15, 0.0))(path)
-    specimen.doctor.rehash()
+    return Fault(name, "as-designed", put)
 
 
 KIND = Kind(
@@ -215,9 +196,9 @@ KIND = Kind(
             "two walls swapped, claims too", "registration-nominal", tabbed_wall, wall, tell=True
         ),
         Fault("file missing", "file-integrity", missing),
-        broken("file empty", lambda path: path.write_text("")),
-        broken("file truncated", lambda path: path.write_text(path.read_text()[:12_000])),
-        broken("file not DXF", lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0")),
+        broken("file empty", lambda data: b""),
+        broken("file truncated", lambda data: data[:12_000]),
+        broken("file not DXF", lambda data: b"\x89PNG\r\n\x1a\n\0\0"),
         edited("inch header", inches),
         edited("imperial header", imperial),
         edited("contour open", opened),
@@ -227,7 +208,7 @@ KIND = Kind(
         edited("contour on a layer that is not cut", on_layer("REFERENCE")),
         edited("contour on layer 0", on_layer("0")),
         edited("contour off the plane", raised),
-        broken("contours as chords", as_chords, "as-designed"),
+        broken("contours as chords", of_text(as_chords), "as-designed"),
         *(
             edited(f"stray line on {layer} through the part", with_stroke(layer))
             for layer in ("CUT_SHEET", "ENGRAVE", "REFERENCE")
@@ -243,9 +224,9 @@ KIND = Kind(
         edited("contour of another colour", on_entity(" 62\n5")),
         edited("contour of another true colour", on_entity("420\n255")),
         edited("contour in paper space", on_entity(" 67\n1")),
-        Fault("file changed after it was written", CLAIMS, unhashed),
+        Fault("file changed after it was written", CLAIMS, unhashed, hashes=False),
         Fault("a cut file too many", CLAIMS, spare),
-        Fault("pin plate without a hole", "as-designed", undrilled_plate),
-        Fault("pin plate's holes shifted 0.15", "as-designed", shifted_plate),
+        plate("pin plate without a hole", lambda region, own: region | disc(bore(own), 0.8)),
+        plate("pin plate's holes shifted 0.15", lambda region, _: region.moved(0.15, 0.0)),
     ),
 )

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.laminate.laminate import Laminate, Pin, Role
-from tests.faults.record import Fault, Kind, no_lumen, redrawn
-from tests.faults.specimen import Change, Pick, Specimen, base, cap, mask, separator, wall
+from tests.faults.record import Kind, no_lumen, redrawn
+from tests.faults.specimen import Change, Picks, base, cap, mask, separator, wall
 
 CLEAR = "channel-clear"
 NOMINAL = "registration-nominal"
@@ -72,7 +72,7 @@ def first_pin(region: Region, laminate: Laminate) -> Pin:
     )
 
 
-def tooling_hole(name: str, pick: Pick, by: float | None) -> Fault:
+def tooling_hole(by: float | None) -> Change:
     """A layer's first tooling hole closed, or moved."""
 
     def change(region: Region, laminate: Laminate) -> Region:
@@ -80,26 +80,11 @@ def tooling_hole(name: str, pick: Pick, by: float | None) -> Fault:
         closed = region | disc(pin.centre, pin.diameter / 2 + 0.1)
         return closed if by is None else closed - disc(aside(pin.centre, by), pin.diameter / 2)
 
-    def put(specimen: Specimen) -> None:
-        specimen.redraw([pick(specimen.clean)], change)
-        specimen.doctor.rehash()
-
-    return Fault(name, NOMINAL, put, settings=EARS)
+    return change
 
 
-def all_without_hole(name: str, *roles: Role) -> Fault:
-    """The first tooling hole closed in every layer of the roles; the plate has its pin."""
-
-    def change(region: Region, laminate: Laminate) -> Region:
-        pin = first_pin(region, laminate)
-        return region | disc(pin.centre, pin.diameter / 2 + 0.1)
-
-    def put(specimen: Specimen) -> None:
-        layers = [layer for layer in specimen.clean.layers if layer.role in roles]
-        specimen.redraw(layers, change)
-        specimen.doctor.rehash()
-
-    return Fault(name, "pin-holes", put, settings=EARS)
+def of_roles(*roles: Role) -> Picks:
+    return lambda laminate: [layer for layer in laminate.layers if layer.role in roles]
 
 
 KIND = Kind(
@@ -141,12 +126,16 @@ EARS_KIND = Kind(
     "Tooling holes",
     'Put into the output with `registration.method = "ears"`, of 4 balloons: what most layers of a '
     "role have is taken for meant.",
-    (
-        tooling_hole("tooling hole missing in a wall", wall, None),
-        tooling_hole("tooling hole moved by 0.15 in a wall", wall, 0.15),
-        tooling_hole("tooling hole missing in a separator", separator, None),
-        tooling_hole("tooling hole moved by 0.15 in a separator", separator, 0.15),
-        all_without_hole("tooling hole missing in all films", "base", "wall", "cap"),
-        all_without_hole("tooling hole missing in all separators", "separator-mask"),
+    tuple(
+        redrawn(f"tooling hole {name}", rule, pick, tooling_hole(by), settings=EARS)
+        for name, rule, pick, by in (
+            ("missing in a wall", NOMINAL, wall, None),
+            ("moved by 0.15 in a wall", NOMINAL, wall, 0.15),
+            ("missing in a separator", NOMINAL, separator, None),
+            ("moved by 0.15 in a separator", NOMINAL, separator, 0.15),
+            # The plate has its pin.
+            ("missing in all films", "pin-holes", of_roles("base", "wall", "cap"), None),
+            ("missing in all separators", "pin-holes", of_roles("separator-mask"), None),
+        )
     ),
 )

@@ -8,8 +8,8 @@ from sbafab.cutting.dxf_write import seam_text
 from sbafab.cutting.layer_files import read_seam, seam_path
 from sbafab.geometry.edges import Edge, Line, Point
 from sbafab.geometry.region import Region, strip
-from sbafab.laminate.laminate import Laminate
-from tests.faults.record import Fault, Kind
+from sbafab.laminate.laminate import Laminate, Layer
+from tests.faults.record import Fault, Kind, redrawn
 from tests.faults.specimen import Specimen
 
 TEMPLATE = "folded"
@@ -25,7 +25,6 @@ def seamed(name: str, rule: str, change: Callable[[Chain], Chain], beside: bool 
         path = specimen.doctor.folder / seam_path(specimen.clean.seams[0])
         (chain,), properties = read_seam(path)
         path.write_text(seam_text((change(chain),), properties), newline="\n")
-        specimen.doctor.rehash()
 
     return Fault(name, rule, put, beside=beside, templates=(TEMPLATE,))
 
@@ -38,7 +37,6 @@ def narrowed(specimen: Specimen) -> None:
     width = NARROW * seam.width
     text = seam_text((chain,), {**properties, "TOOL_WIDTH": f"{width:g}"})
     path.write_text(text, newline="\n")
-    specimen.doctor.rehash()
 
 
 NARROW = 0.3
@@ -57,15 +55,13 @@ def cut_short(chain: Chain) -> Chain:
     return chain[:-1]
 
 
-def slit(specimen: Specimen) -> None:
+def folded(laminate: Laminate) -> Layer:
+    return laminate.layer(laminate.folds[0].lower)
+
+
+def slit(region: Region, laminate: Laminate) -> Region:
     """The film cut through along its fold: a slit of 0.2 mm between its halves."""
-    fold = specimen.clean.folds[0]
-
-    def apart(region: Region, _: Laminate) -> Region:
-        return region - strip(*fold.line, 0.2)
-
-    specimen.redraw([specimen.clean.layer(fold.lower)], apart)
-    specimen.doctor.rehash()
+    return region - strip(*laminate.folds[0].line, 0.2)
 
 
 KIND = Kind(
@@ -76,6 +72,6 @@ KIND = Kind(
         seamed("seam's path shifted", DESIGNED, shifted, beside=True),
         seamed("seam's path cut short", "sealing", cut_short),
         Fault("seam too narrow", "bond-width", narrowed, templates=(TEMPLATE,)),
-        Fault("film slit along its fold", "sealing", slit, templates=(TEMPLATE,)),
+        redrawn("film slit along its fold", "sealing", folded, slit, templates=(TEMPLATE,)),
     ),
 )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from sbafab.geometry.offset import grow, shrink
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate import Laminate, Layer
 from tests.faults.record import Fault, Kind, redrawn
 from tests.faults.specimen import (
-    Specimen,
+    Change,
     base,
     cap,
     inlet_mask,
@@ -36,28 +38,25 @@ def flipped(region: Region, laminate: Laminate) -> Region:
     return over if apart > 1e-6 else over.turned(180.0)
 
 
-def scaled_by(factor: float) -> Fault:
-    """Every layer drawn at a wrong scale, with only the hashes put right."""
+def every(laminate: Laminate) -> Sequence[Layer]:
+    return laminate.layers
 
-    def put(specimen: Specimen) -> None:
-        specimen.redraw(specimen.clean.layers, lambda region, _: region.scaled(factor))
-        specimen.doctor.rehash()
 
-    return Fault(f"every layer scaled by {factor:g}", "as-designed", put)
+def scaled(factor: float) -> Change:
+    return lambda region, _: region.scaled(factor)
 
 
 def kerf(name: str, rule: str, times: int) -> Fault:
     """The film's cut paths as if the kerf were applied so many times (-1: the wrong way)."""
+    off = (times - 1) * KERF / 2
 
-    def put(specimen: Specimen) -> None:
-        off = (times - 1) * KERF / 2
-        films = [layer for layer in specimen.clean.layers if not layer.is_mask]
-        specimen.redraw(
-            films, lambda region, _: grow(region, off) if off > 0 else shrink(region, -off)
-        )
-        specimen.doctor.rehash()
+    def films(laminate: Laminate) -> list[Layer]:
+        return [layer for layer in laminate.layers if not layer.is_mask]
 
-    return Fault(name, rule, put, settings=(f"laser.kerf_tpe={KERF}",))
+    def change(region: Region, _: Laminate) -> Region:
+        return grow(region, off) if off > 0 else shrink(region, -off)
+
+    return redrawn(name, rule, films, change, settings=(f"laser.kerf_tpe={KERF}",))
 
 
 KIND = Kind(
@@ -82,12 +81,14 @@ KIND = Kind(
         redrawn("base flipped", NOMINAL, base, flipped),
         redrawn("chamber mask with strip flipped", "tube-fit", inlet_mask, flipped),
         redrawn("separator flipped", "mask-overhang", separator, flipped),
-        redrawn("wall scaled by 25.4", "press-fit", tabbed_wall, lambda r, _: r.scaled(25.4)),
-        redrawn("wall scaled by 1.002", NOMINAL, tabbed_wall, lambda r, _: r.scaled(1.002)),
-        redrawn("chamber mask scaled by 25.4", "sealing", mask, lambda r, _: r.scaled(25.4)),
-        redrawn("chamber mask scaled by 1.002", "bond-width", mask, lambda r, _: r.scaled(1.002)),
-        scaled_by(25.4),
-        scaled_by(1.002),
+        redrawn("wall scaled by 25.4", "press-fit", tabbed_wall, scaled(25.4)),
+        redrawn("wall scaled by 1.002", NOMINAL, tabbed_wall, scaled(1.002)),
+        redrawn("chamber mask scaled by 25.4", "sealing", mask, scaled(25.4)),
+        redrawn("chamber mask scaled by 1.002", "bond-width", mask, scaled(1.002)),
+        *(
+            redrawn(f"every layer scaled by {factor:g}", "as-designed", every, scaled(factor))
+            for factor in (25.4, 1.002)
+        ),
         kerf("kerf applied twice", "mask-overhang", 2),
         kerf("kerf with the wrong sign", "bond-width", -1),
     ),

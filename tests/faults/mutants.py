@@ -1,4 +1,7 @@
-"""Faults at random: one change in one file of a written folder, by the number of a draw."""
+"""Faults at random: one change in one file of a written folder, by the number of a draw.
+
+Each changes what is cut, pressed or read, so that each must be caught.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +14,18 @@ from random import Random
 from typing import Any
 from zipfile import ZipFile
 
+import numpy as np
+from PIL import Image
+
 from sbafab.meshing.formats import write_zip
 
 Change = Callable[[bytes, Random], bytes]
+Edit = Callable[[str, Random], str]
 NUMBER = re.compile(r"(?<![\w.#-])-?\d+(?:\.\d+)?(?![\w.])")
 WORD = re.compile(r"[A-Za-z]{3,}")
-LAYERS = ("ENGRAVE", "CUT_INNER", "CUT_OUTER", "CUT_SHEET", "REFERENCE", "0")
-HEADER_END = "  0\nENDSEC\n"
+PROPERTY = re.compile(r"(?<=\$CUSTOMPROPERTY\n  1\n).+(?=\n)")
+CUT = ("CUT_INNER", "CUT_OUTER")
+LAYERS = (*CUT, "ENGRAVE", "CUT_SHEET", "REFERENCE", "0")
 
 
 def changed_number(text: str, draw: Random) -> str:
@@ -26,21 +34,28 @@ def changed_number(text: str, draw: Random) -> str:
     off = draw.choice(
         [value + 0.01, value - 0.1, value + 1, 2 * value + 1, -value - 0.5, 10 * value + 3]
     )
-    return f"{off:.6f}" if "." in text else str(round(off) if round(off) != value else int(off) + 1)
+    return (
+        f"{off:.6f}"
+        if "." in text
+        else str(round(off) if round(off) != value else round(value) + 1)
+    )
 
 
-def _replaced(pattern: re.Pattern[str], new: Callable[[str, Random], str]) -> Change:
-    def change(data: bytes, draw: Random) -> bytes:
-        text = data.decode("utf-8")
-        match = draw.choice([*pattern.finditer(text)])
-        return (text[: match.start()] + new(match[0], draw) + text[match.end() :]).encode()
-
-    return change
-
-
-def _other_word(word: str, draw: Random) -> str:
+def other_letter(word: str, draw: Random) -> str:
     n = draw.randrange(len(word))
-    return word[:n] + draw.choice([c for c in "aeioxk" if c != word[n]]) + word[n + 1 :]
+    return word[:n] + draw.choice([c for c in "aeioxk7" if c != word[n]]) + word[n + 1 :]
+
+
+def of_text(edit: Edit) -> Change:
+    return lambda data, draw: edit(data.decode("utf-8"), draw).encode()
+
+
+def replaced(pattern: re.Pattern[str], new: Edit) -> Change:
+    def change(text: str, draw: Random) -> str:
+        match = draw.choice([*pattern.finditer(text)])
+        return text[: match.start()] + new(match[0], draw) + text[match.end() :]
+
+    return of_text(change)
 
 
 def without_a_line(data: bytes, draw: Random) -> bytes:
@@ -57,19 +72,13 @@ def cut_short(data: bytes, draw: Random) -> bytes:
     return data[: draw.randrange(len(data) // 4, len(data) - 8)]
 
 
-def flipped_byte(data: bytes, draw: Random) -> bytes:
-    n = draw.randrange(len(data))
-    return data[:n] + bytes([data[n] ^ (1 << draw.randrange(8))]) + data[n + 1 :]
-
-
 def json_leaf(data: bytes, draw: Random) -> bytes:
-    """A value changed, an entry lost, doubled or out of turn."""
+    """A value changed or lost."""
     document = json.loads(data)
     spots: list[tuple[Any, Any]] = []
 
     def walk(node: Any) -> None:
-        keys = node if isinstance(node, dict) else range(len(node))
-        for key in keys:
+        for key in node if isinstance(node, dict) else range(len(node)):
             spots.append((node, key))
             if isinstance(node[key], dict | list):
                 walk(node[key])
@@ -77,65 +86,68 @@ def json_leaf(data: bytes, draw: Random) -> bytes:
     walk(document)
     node, key = draw.choice(spots)
     value = node[key]
-    if isinstance(value, bool) or value is None:
-        node[key] = draw.choice([1, "x", not value])
-    elif isinstance(value, int | float):
+    if isinstance(value, str) and value:
+        node[key] = other_letter(value, draw)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
         node[key] = draw.choice([value + 1, value * 1.01 + 0.01, -value - 1, None])
-    elif isinstance(value, str):
-        node[key] = _other_word(value, draw) if value else "x"
-    elif isinstance(value, list) and len(value) > 1 and draw.random() < 0.5:
-        value.insert(0, value.pop())
     elif isinstance(value, list) and value:
         draw.choice([value.pop, lambda: value.append(value[0])])()
-    else:
+    elif isinstance(node, dict) and draw.random() < 0.5:
         del node[key]
+    else:
+        node[key] = "x"
     return json.dumps(document).encode()
 
 
-def _pairs(text: str) -> tuple[str, list[str], str]:
-    """The text before the entities, the entities, and what follows."""
-    start = text.index("  2\nENTITIES\n") + len("  2\nENTITIES\n")
-    end = text.index(HEADER_END, start)
-    body = text[start:end]
-    return text[:start], ["  0\n" + part for part in body.split("  0\n") if part], text[end:]
+# Drawings.
 
 
-def _entities(change: Callable[[list[str], Random], object]) -> Change:
-    def edit(data: bytes, draw: Random) -> bytes:
-        head, entities, tail = _pairs(data.decode())
-        change(entities, draw)
-        return (head + "".join(entities) + tail).encode()
+def on_entities(change: Callable[[list[str], int, Random], object]) -> Change:
+    """A change of the entities, told the place of one that is cut."""
 
-    return edit
+    def edit(text: str, draw: Random) -> str:
+        head, mark, rest = text.partition("  2\nENTITIES\n")
+        body, end, tail = rest.partition("  0\nENDSEC\n")
+        entities = ["  0\n" + part for part in body.split("  0\n") if part]
+        of_cuts = [n for n, text in enumerate(entities) if layer_of(text) in CUT]
+        change(entities, draw.choice(of_cuts or [*range(len(entities))]), draw)
+        return head + mark + "".join(entities) + end + tail
+
+    return of_text(edit)
 
 
-def _entity_number(entities: list[str], draw: Random) -> None:
-    n = draw.randrange(len(entities))
+def layer_of(entity: str) -> str:
+    match = re.search(r"  8\n(\w+)\n", entity)
+    assert match is not None
+    return match[1]
+
+
+def entity_number(entities: list[str], n: int, draw: Random) -> None:
     groups = [*re.finditer(r"\n ((?:10|20|11|21|40|42|50|51|30|70))\n(-?[\d.]+)\n", entities[n])]
     group = draw.choice(groups)
-    new = changed_number(group[2], draw)
-    entities[n] = entities[n][: group.start(2)] + new + entities[n][group.end(2) :]
+    start, end = group.span(2)
+    # A bulge a little off leaves a short edge where it was.
+    new = f"{float(group[2]) + 0.5}" if group[1] == "42" else changed_number(group[2], draw)
+    entities[n] = entities[n][:start] + new + entities[n][end:]
 
 
-def _entity_with(*groups: str) -> Callable[[list[str], Random], None]:
-    def add(entities: list[str], draw: Random) -> None:
-        n = draw.randrange(len(entities))
-        head, layer, rest = entities[n].partition("  8\n")
-        name, _, rest = rest.partition("\n")
-        entities[n] = f"{head}{layer}{name}\n{draw.choice(groups)}{rest}"
+def entity_with(*groups: str) -> Callable[[list[str], int, Random], None]:
+    """An attribute of its own, unlike its layer's."""
+
+    def add(entities: list[str], n: int, draw: Random) -> None:
+        layer = f"  8\n{layer_of(entities[n])}\n"
+        entities[n] = entities[n].replace(layer, layer + draw.choice(groups), 1)
 
     return add
 
 
-def _entity_layer(entities: list[str], draw: Random) -> None:
-    n = draw.randrange(len(entities))
-    match = re.search(r"  8\n(\w+)\n", entities[n])
-    assert match is not None
-    other = draw.choice([layer for layer in LAYERS if layer != match[1]])
-    entities[n] = entities[n].replace(match[0], f"  8\n{other}\n")
+def entity_layer(entities: list[str], n: int, draw: Random) -> None:
+    own = layer_of(entities[n])
+    other = draw.choice([layer for layer in LAYERS if layer != own])
+    entities[n] = entities[n].replace(f"  8\n{own}\n", f"  8\n{other}\n")
 
 
-def _stray_line(entities: list[str], draw: Random) -> None:
+def stray_line(entities: list[str], n: int, draw: Random) -> None:
     x, y, u, v = (draw.uniform(-12, 40) for _ in range(4))
     line = (
         "  0\nLINE\n  5\nFFF1\n330\n17\n100\nAcDbEntity\n"
@@ -145,48 +157,30 @@ def _stray_line(entities: list[str], draw: Random) -> None:
     entities.insert(draw.randrange(len(entities) + 1), line)
 
 
-def _entity_twice(entities: list[str], draw: Random) -> None:
-    n = draw.randrange(len(entities))
+def entity_twice(entities: list[str], n: int, draw: Random) -> None:
     entities.insert(n, re.sub(r"\n  5\n\w+\n", "\n  5\nFFF2\n", entities[n]))
 
 
-def _mirrored(entities: list[str], draw: Random) -> None:
-    """All of it, as if seen from below: x the other way round, bulges too."""
-    for n, entity in enumerate(entities):
-        flip = lambda m: f"{m[1]}{-float(m[2])}\n"  # noqa: E731
-        entities[n] = re.sub(r"(\n (?:10|11|42)\n)(-?[\d.]+)\n", flip, entity)
-
-
-def layer_table(data: bytes, draw: Random) -> bytes:
-    """A layer off, frozen, not plotted, of another colour or linetype."""
-    text = data.decode()
-    name = draw.choice(LAYERS[:5])
+def layer_table(text: str, draw: Random) -> str:
+    """A layer that is cut off, frozen, not plotted, of another colour or linetype."""
+    used = [layer for layer in CUT if f"  8\n{layer}\n" in text.partition("  2\nENTITIES\n")[2]]
+    name = draw.choice(used or ["REFERENCE"])
     match = re.search(rf"AcDbLayerTableRecord\n  2\n{name}\n 70\n0\n 62\n(\d+)\n  6\n(\w+)\n", text)
     assert match is not None
-    flags, colour, line, plot = "0", match[1], match[2], ""
-    which = draw.randrange(5)
-    if which == 0:
-        colour = f"-{colour}"
-    elif which == 1:
-        flags = "1"
-    elif which == 2:
-        plot = "290\n0\n"
-    elif which == 3:
-        colour = str(int(colour) % 7 + 1)
-    else:
-        line = "DASHED"
-    record = f"AcDbLayerTableRecord\n  2\n{name}\n 70\n{flags}\n 62\n{colour}\n  6\n{line}\n{plot}"
+    old, colour = match[0], match[1]
+    new = draw.choice(
+        [
+            old.replace(f" 62\n{colour}", f" 62\n-{colour}"),
+            old.replace(" 70\n0", " 70\n1"),
+            f"{old}290\n0\n",
+            old.replace(f" 62\n{colour}", f" 62\n{int(colour) % 7 + 1}"),
+            old.replace(f"  6\n{match[2]}", "  6\nDASHED"),
+        ]
+    )
     rest = text[match.end() :]
-    if plot:
+    if new.endswith("290\n0\n"):
         rest = re.sub(r"^((?:(?!  0\n).*\n)*?)290\n\d\n", r"\1", rest, count=1)
-    return (text[: match.start()] + record + rest).encode()
-
-
-def custom_property(data: bytes, draw: Random) -> bytes:
-    text = data.decode()
-    match = draw.choice([*re.finditer(r"\$CUSTOMPROPERTY\n  1\n(.+)\n", text)])
-    n = draw.randrange(match.start(1), match.end(1))
-    return (text[:n] + draw.choice("7kQ") + text[n + 1 :]).encode()
+    return text[: match.start()] + new + rest
 
 
 def units(data: bytes, draw: Random) -> bytes:
@@ -194,9 +188,10 @@ def units(data: bytes, draw: Random) -> bytes:
     return re.sub(rf"(\${name}\n 70\n){good}\n".encode(), rb"\g<1>0\n", data)
 
 
-def painted(data: bytes, draw: Random) -> bytes:
-    from PIL import Image
+# Pictures and meshes.
 
+
+def painted(data: bytes, draw: Random) -> bytes:
     image = Image.open(BytesIO(data)).convert("RGB")
     x, y = draw.randrange(image.width - 60), draw.randrange(image.height - 60)
     image.paste((200, 30, 30), (x, y, x + 60, y + 60))
@@ -207,8 +202,6 @@ def painted(data: bytes, draw: Random) -> bytes:
 
 def stl_triangle(data: bytes, draw: Random) -> bytes:
     """A triangle lost, doubled, turned over, or with a corner elsewhere."""
-    import numpy as np
-
     kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
     rows = np.frombuffer(data[84:], kind).copy()
     n, which = draw.randrange(len(rows)), draw.randrange(5)
@@ -237,45 +230,31 @@ def zipped_number(data: bytes, draw: Random) -> bytes:
     return out.getvalue()
 
 
-number = _replaced(NUMBER, changed_number)
-word = _replaced(WORD, _other_word)
-TEXT = (number, number, number, word, without_a_line, cut_short, emptied)
+number, word = replaced(NUMBER, changed_number), replaced(WORD, other_letter)
+BROKEN = (cut_short, emptied)
+TEXT = (number, number, number, word, without_a_line, *BROKEN)
 DRAWING = (
-    *(_entities(_entity_number),) * 4,
-    *(_entities(_stray_line),) * 3,
-    *(layer_table,) * 3,
-    *(
-        _entities(change)
-        for change in (
-            _entity_layer,
-            _entity_twice,
-            _mirrored,
-            lambda entities, draw: entities.pop(draw.randrange(len(entities))),
-            lambda entities, draw: entities.append(entities.pop(0)),
-            _entity_with(" 62\n3\n", " 62\n1\n", " 62\n5\n"),
-            _entity_with(" 60\n1\n"),
-            _entity_with("  6\nDASHED\n", "  6\nHIDDEN\n"),
-            _entity_with("420\n65280\n"),
-            _entity_with(" 67\n1\n"),
-            _entity_with(" 39\n2.0\n"),
-            _entity_with("370\n50\n"),
-        )
-    ),
-    custom_property,
+    *(on_entities(entity_number),) * 4,
+    *(on_entities(stray_line),) * 3,
+    *(of_text(layer_table),) * 3,
+    on_entities(entity_layer),
+    on_entities(entity_twice),
+    on_entities(lambda entities, n, draw: entities.pop(n)),
+    on_entities(entity_with(" 62\n3\n", " 62\n4\n", " 62\n6\n", "420\n65280\n")),
+    on_entities(entity_with(" 60\n1\n", " 67\n1\n")),
+    on_entities(entity_with("  6\nDASHED\n", "  6\nHIDDEN\n")),
+    replaced(PROPERTY, other_letter),
     units,
-    number,
-    without_a_line,
-    cut_short,
-    emptied,
+    *BROKEN,
 )
 CHANGES: dict[str, tuple[Change, ...]] = {
     ".dxf": DRAWING,
-    ".json": (json_leaf, json_leaf, json_leaf, number, without_a_line, cut_short, emptied),
+    ".json": (json_leaf, json_leaf, json_leaf, number, without_a_line, *BROKEN),
     **dict.fromkeys((".csv", ".svg", ".html", ".toml", ".lbrn2"), TEXT),
-    ".png": (painted, painted, flipped_byte, cut_short, emptied),
-    ".stl": (stl_triangle, stl_triangle, stl_triangle, cut_short, emptied),
-    ".3mf": (zipped_number, zipped_number, cut_short, emptied),
-    ".glb": (flipped_byte, flipped_byte, cut_short, emptied),
+    ".png": (painted, painted, *BROKEN),
+    ".stl": (stl_triangle, stl_triangle, stl_triangle, *BROKEN),
+    ".3mf": (zipped_number, zipped_number, *BROKEN),
+    ".glb": BROKEN,
 }
 WEIGHTS = {".dxf": 12, ".json": 6, ".csv": 2, ".html": 2, ".toml": 2, ".svg": 2}
 """Of the kinds of files, what is cut and pressed is drawn most often."""
@@ -288,6 +267,5 @@ def mutated(folder: Path, number: int) -> tuple[str, bytes]:
     kinds = sorted({path.suffix for path in paths})
     kind = draw.choices(kinds, [WEIGHTS.get(kind, 1) for kind in kinds])[0]
     path = draw.choice([path for path in paths if path.suffix == kind])
-    data = path.read_bytes()
     change = draw.choice(CHANGES[kind])
-    return path.relative_to(folder).as_posix(), change(data, draw)
+    return path.relative_to(folder).as_posix(), change(path.read_bytes(), draw)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
-from sbafab.laminate.laminate import Laminate
-from tests.faults.specimen import Change, Pick, Specimen
+from sbafab.laminate.laminate import Laminate, Layer
+from tests.faults.specimen import Change, Pick, Picks, Specimen
 
 Put = Callable[[Specimen], None]
 PAPER = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm")
@@ -20,7 +22,7 @@ class Fault:
     """A kind of fault. ``settings`` are those of the good folder that it is put into.
 
     ``beside``: all that a run writes is in the folder, not the cut files alone. It is put into its
-    ``templates`` alone.
+    ``templates`` alone, and the ``hashes`` of files are put right afterwards.
     """
 
     name: str
@@ -30,6 +32,7 @@ class Fault:
     settings: tuple[str, ...] = ()
     beside: bool = False
     templates: tuple[str, ...] = PAPER
+    hashes: bool = True
 
 
 @dataclass(frozen=True)
@@ -41,30 +44,58 @@ class Kind:
     faults: tuple[Fault, ...]
 
 
-def redrawn(name: str, rule: str, pick: Pick, change: Change, *conditions: WhyNot) -> Fault:
-    """A fault in one layer's profile, with its hash put right.
+def redrawn(
+    name: str, rule: str, pick: Pick | Picks, change: Change, *conditions: WhyNot, **more: Any
+) -> Fault:
+    """A fault in the profile of one layer or several.
 
     It does not apply where a condition says so, or where the profile comes out as it was.
     """
 
+    def layers(laminate: Laminate) -> Sequence[Layer]:
+        found = pick(laminate)
+        return [found] if isinstance(found, Layer) else found
+
     def put(specimen: Specimen) -> None:
-        specimen.redraw([pick(specimen.clean)], change)
-        specimen.doctor.rehash()
+        specimen.redraw(layers(specimen.clean), change)
 
     def why_not(laminate: Laminate) -> str:
-        said = first_reason(laminate, conditions)
+        said = next((said for why_not in conditions if (said := why_not(laminate))), "")
         if said:
             return said
-        profile = pick(laminate).profile
+        profile = layers(laminate)[0].profile
         changed = change(profile, laminate)
         apart = (profile | changed).area - (profile & changed).area
         return "it looks the same" if apart < 1e-6 else ""
 
-    return Fault(name, rule, put, why_not)
+    return Fault(name, rule, put, why_not, **more)
 
 
-def first_reason(laminate: Laminate, conditions: Sequence[WhyNot]) -> str:
-    return next((said for why_not in conditions if (said := why_not(laminate))), "")
+def edited(
+    name: str,
+    rule: str,
+    file: Callable[[Specimen], Path],
+    change: Callable[[bytes], bytes],
+    **more: Any,
+) -> Fault:
+    """A file with other contents."""
+
+    def put(specimen: Specimen) -> None:
+        data = file(specimen).read_bytes()
+        changed = change(data)
+        assert changed != data
+        file(specimen).write_bytes(changed)
+
+    return Fault(name, rule, put, **more)
+
+
+def of_text(change: Callable[[str], str]) -> Callable[[bytes], bytes]:
+    return lambda data: change(data.decode("utf-8")).encode()
+
+
+def told(name: str, change: Callable[[dict[str, Any]], object], **more: Any) -> Fault:
+    """A manifest changed by hand; every file as it was written."""
+    return Fault(name, "manifest-claims", lambda s: s.doctor.set_manifest(change), **more)
 
 
 def one_chamber(laminate: Laminate) -> str:

@@ -24,6 +24,7 @@ from tests.folders.doctoring import Doctor
 
 Change = Callable[[Region, Laminate], Region]
 Pick = Callable[[Laminate], Layer]
+Picks = Callable[[Laminate], Sequence[Layer]]
 
 LEFT_OUT = (registration_worst_case.NAME, registration_yield.NAME)
 """Rules that foresee errors on the bench: no fault is theirs, and they take most of the time."""

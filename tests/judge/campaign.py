@@ -30,7 +30,6 @@ from tests.judge.pockets import judge_pockets
 from tests.judge.pressing import judge_press
 from tests.judge.reading import UnreadableError
 from tests.judge.sheets import judge_sheets
-from tests.judge.traveller import judge_traveller
 from tests.judge.using import Ended, sbafab
 from tests.judge.voids import judge_voids
 
@@ -236,7 +235,6 @@ JUDGES: dict[str, Callable[[Folder], Iterator[str]]] = {
     "pins": judge_pins,
     "press": judge_press,
     "claims": judge_claims,
-    "traveller": judge_traveller,
 }
 
 

@@ -1,9 +1,8 @@
-"""What manifest and traveller say of sizes and areas, against the files."""
+"""What the manifest says of sizes and areas, against the files."""
 
 from __future__ import annotations
 
 import hashlib
-import html
 import re
 from collections.abc import Iterator
 
@@ -17,15 +16,7 @@ from tests.judge.folder import Folder, asked_kerf, pieces
 SHARE = 1e-4
 SIZE = 0.002
 """mm by which a stated size may differ."""
-ROUNDED = 0.00051
-"""mm by which a size on the page, to a thousandth, may differ from the manifest's."""
 LIMITS = re.compile(r"\bLIMITS\s+9\s+\$CUSTOMPROPERTY\s+1\s+([^\n]*)")
-SAID = {
-    "outline_diameter": re.compile(r"Diameter round the axis, without [a-z ]+?\s+([\d.]+)\s*mm"),
-    "overall_diameter": re.compile(r"Diameter round the axis, with [a-z ]+?\s+([\d.]+)\s*mm"),
-    "width": re.compile(r"Overall width, with [a-z ]+?\s+([\d.]+)\s*mm"),
-    "length": re.compile(r"Overall length, with [a-z ]+?\s+([\d.]+)\s*mm"),
-}
 
 
 def judge_claims(folder: Folder) -> Iterator[str]:
@@ -117,12 +108,3 @@ def _sizes(folder: Folder) -> Iterator[str]:
     for name, value in measured.items():
         if abs(stated.get(name, value) - value) > slack * (1 + (name == "overall_diameter")):
             yield f"the {name} is {value:.3f}, stated {stated[name]:.3f}"
-    page = folder.path / "traveller.html"
-    if page.is_file():
-        text = re.sub(r"<[^>]*>", " ", html.unescape(page.read_text(encoding="utf-8")))
-        for name, pattern in SAID.items():
-            told = [float(found) for found in pattern.findall(text)]
-            if (name == "outline_diameter" and name in stated and not told) or any(
-                abs(value - stated.get(name, -1.0)) > ROUNDED for value in told
-            ):
-                yield f"the traveller says {name} {told}, not {stated}"

@@ -124,6 +124,10 @@ def star(rng: Random, least: float, most: float) -> Drawing:
     for i in range(2 * tips):
         r, angle = (outer if i % 2 else inner), start + math.pi * i / tips
         corners.append((round(r * math.cos(angle), 4), round(r * math.sin(angle), 4)))
+    return _straight(rng, corners)
+
+
+def _straight(rng: Random, corners: list[Point]) -> Drawing:
     if rng.random() < 0.5:
         path = "M" + " L".join(_n(*corner) for corner in corners) + " Z"
         return _svg(rng, path, corners)
@@ -220,10 +224,7 @@ def corner_piece(rng: Random, least: float, most: float) -> Drawing:
     turn = rng.choice([0.0, math.pi / 2, math.pi, rng.uniform(0, 6.28)])
     c, s = math.cos(turn), math.sin(turn)
     corners = [(round(c * x - s * y, 5), round(s * x + c * y, 5)) for x, y in corners]
-    if rng.random() < 0.5:
-        path = "M" + " L".join(_n(*corner) for corner in corners) + " Z"
-        return _svg(rng, path, corners)
-    return _dxf(lambda space: space.add_lwpolyline(corners, close=True), corners)
+    return _straight(rng, corners)
 
 
 KINDS = (blob, blob, slot, star, spline, bulges, ellipse, corner_piece)

@@ -23,7 +23,7 @@ from shapely.geometry.base import BaseGeometry
 from tests.judge.bonds import narrow_places
 from tests.judge.folder import Disagreement, pieces
 from tests.judge.reading import read
-from tests.judge.voids import OUTSIDE, Graph
+from tests.judge.voids import OUTSIDE, Graph, Void, joined, plane_round
 
 CHORDS = 48
 """Chords a quarter turn of a tool."""
@@ -233,60 +233,42 @@ def narrow_bonds(stack: Stack, limit: float = 0.75) -> list[str]:
 
 def leaks(stack: Stack) -> list[str]:
     """Chambers that lose air, reach one another, or have no inlet."""
-    low_x, low_y, high_x, high_y = shapely.union_all(stack.profiles).bounds
-    plane = shapely.box(low_x - 5, low_y - 5, high_x + 5, high_y + 5)
+    plane = plane_round(stack.profiles)
     plugs = {chamber["name"]: _plug(chamber) for chamber in stack.asked["chambers"]}
     walls = shapely.union_all([*plugs.values()])
-    graph = Graph()
-    gaps: dict[int, list[tuple[tuple[object, ...], Polygon]]] = {}
+    voids: dict[int, list[Void]] = {}
     for gap in stack.gaps:
         shut = gap.bond.union(walls) if gap.is_chamber else gap.bond
         if gap.fold is not None:
             shut = shut.union(gap.fold.buffer(WALL, cap_style="square"))
-        gaps[gap.number] = [
-            (("gap", gap.number, n), part)
-            for n, part in enumerate(pieces(plane.difference(shut), THINNEST))
-        ]
-    corner = Point(plane.exterior.coords[0]).buffer(1.0)
-    for number, film in enumerate(stack.films, start=1):
-        for n, opening in enumerate(pieces(plane.difference(film.profile), THINNEST)):
-            node = ("opening", film.index, n)
-            if number in (1, len(stack.films)) or opening.intersects(corner):
-                graph.join(node, OUTSIDE)
-            for gap_node, part in (*gaps.get(number - 1, []), *gaps.get(number, [])):
-                if any(pieces(part.intersection(opening), THINNEST)):
-                    graph.join(node, gap_node)
-    return list(_leaks(stack, graph, gaps, plugs))
+        parts = pieces(plane.difference(shut), THINNEST)
+        voids[gap.number] = [Void(("gap", gap.number, n), part) for n, part in enumerate(parts)]
+    graph = joined([film.profile for film in stack.films], voids, plane)
+    return list(_leaks(stack, graph, voids, plugs))
 
 
 def _leaks(
-    stack: Stack,
-    graph: Graph,
-    gaps: dict[int, list[tuple[tuple[object, ...], Polygon]]],
-    plugs: dict[str, BaseGeometry],
+    stack: Stack, graph: Graph, voids: dict[int, list[Void]], plugs: dict[str, BaseGeometry]
 ) -> Iterator[str]:
     levels = [gap.number for gap in stack.gaps if gap.is_chamber]
-    pockets: dict[str, list[tuple[tuple[object, ...], Polygon]]] = {}
+    pockets: dict[str, list[Void]] = {}
     for chamber in stack.asked["chambers"]:
         centre = Point(chamber["centres"][0])
         for balloon in chamber.get("balloons", range(1, len(levels) + 1)):
-            holding = [
-                (node, part)
-                for node, part in gaps[levels[balloon - 1]]
-                if Polygon(part.exterior).contains(centre)
-            ]
+            own = voids[levels[balloon - 1]]
+            holding = [void for void in own if Polygon(void.region.exterior).contains(centre)]
             if holding:
-                innermost = min(holding, key=lambda pair: Polygon(pair[1].exterior).area)
+                innermost = min(holding, key=lambda void: Polygon(void.region.exterior).area)
                 pockets.setdefault(chamber["name"], []).append(innermost)
     for name, own in pockets.items():
-        reached = graph.reached(own[0][0])
+        reached = graph.reached(own[0].node)
         if OUTSIDE in reached:
             yield f"{name} leaks"
-        if any(node not in reached for node, _ in own):
+        if any(void.node not in reached for void in own):
             yield f"{name} has a pocket that its inlet does not reach"
-        if any(node in reached for other in pockets if other != name for node, _ in pockets[other]):
+        if any(void.node in reached for key in pockets.keys() - {name} for void in pockets[key]):
             yield f"{name} reaches another chamber"
-        if all(part.distance(plugs[name]) > 2 * WALL for _, part in own):
+        if all(void.region.distance(plugs[name]) > 2 * WALL for void in own):
             yield f"{name} has no inlet"
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import shapely
@@ -26,12 +26,12 @@ OUTSIDE = ("outside",)
 Node = tuple[object, ...]
 
 
-class Gap(NamedTuple):
+class Void(NamedTuple):
     """A connected piece of what is open between two films, and its node in the graph."""
 
     node: Node
     region: Polygon
-    is_pocket: bool
+    is_pocket: bool = False
 
 
 class Graph:
@@ -55,17 +55,15 @@ class Graph:
 
 def judge_voids(folder: Folder) -> Iterator[str]:
     """From every inlet its own chamber's pockets are reached, and nothing else."""
-    low_x, low_y, high_x, high_y = shapely.union_all([f.profile for f in folder.films]).bounds
-    plane = box(low_x - 5, low_y - 5, high_x + 5, high_y + 5)
+    films = [film.profile for film in folder.films]
+    plane = plane_round(films)
     bottom = next((i for i in folder.interfaces if i.is_chamber), None)
     if bottom is None:
         yield "no interface has a chamber mask"
         return
     mouths, plugs = _mouths(bottom)
-    graph = Graph()
     gaps = {i.number: _gaps(i, plane, plugs if i is bottom else None) for i in folder.interfaces}
-    _join_openings(folder, plane, gaps, graph)
-    yield from _said(folder, graph, gaps, mouths, bottom)
+    yield from _said(folder, joined(films, gaps, plane), gaps, mouths, bottom)
 
 
 def _mouths(bottom: Interface) -> tuple[list[tuple[BaseGeometry, float]], BaseGeometry]:
@@ -83,7 +81,7 @@ def _mouths(bottom: Interface) -> tuple[list[tuple[BaseGeometry, float]], BaseGe
     return mouths, plugs
 
 
-def _gaps(interface: Interface, plane: Polygon, plugs: BaseGeometry | None) -> list[Gap]:
+def _gaps(interface: Interface, plane: Polygon, plugs: BaseGeometry | None) -> list[Void]:
     gap = plane.difference(bond_of(interface))
     if plugs is not None and not plugs.is_empty:
         gap = gap.difference(plugs)
@@ -93,32 +91,40 @@ def _gaps(interface: Interface, plane: Polygon, plugs: BaseGeometry | None) -> l
     for number, part in enumerate(pieces(gap, THINNEST)):
         open_part = part.intersection(masks).intersection(contact)
         is_pocket = interface.is_chamber and any(pieces(open_part, 0.1))
-        found.append(Gap(("gap", interface.number, number), part, is_pocket))
+        found.append(Void(("gap", interface.number, number), part, is_pocket))
     return found
 
 
-def _join_openings(
-    folder: Folder, plane: Polygon, gaps: dict[int, list[Gap]], graph: Graph
-) -> None:
-    """Every opening of a film joins the gaps below and above it; the outside lies round all."""
-    films = folder.films
+def joined(
+    films: Sequence[BaseGeometry], voids: Mapping[int, Sequence[Void]], plane: Polygon
+) -> Graph:
+    """Every opening of a film joins the voids below and above it; the outside lies round all.
+
+    Films and the gaps above them count from 1 at the bottom.
+    """
+    graph = Graph()
     corner = shapely.Point(plane.exterior.coords[0]).buffer(1.0)
     for number, film in enumerate(films, start=1):
-        below = gaps.get(number - 1, [])
-        above = gaps.get(number, [])
-        for part_number, opening in enumerate(pieces(plane.difference(film.profile), THINNEST)):
-            node = ("opening", film.index, part_number)
+        beside = *voids.get(number - 1, ()), *voids.get(number, ())
+        for place_number, opening in enumerate(pieces(plane.difference(film), THINNEST)):
+            node = ("opening", number, place_number)
             if number in (1, len(films)) or opening.intersects(corner):
                 graph.join(node, OUTSIDE)
-            for gap in (*below, *above):
-                if any(pieces(gap.region.intersection(opening), THINNEST)):
-                    graph.join(node, gap.node)
+            for void in beside:
+                if any(pieces(void.region.intersection(opening), THINNEST)):
+                    graph.join(node, void.node)
+    return graph
+
+
+def plane_round(regions: Sequence[BaseGeometry]) -> Polygon:
+    low_x, low_y, high_x, high_y = shapely.union_all(regions).bounds
+    return box(low_x - 5, low_y - 5, high_x + 5, high_y + 5)
 
 
 def _said(
     folder: Folder,
     graph: Graph,
-    gaps: dict[int, list[Gap]],
+    gaps: dict[int, list[Void]],
     mouths: list[tuple[BaseGeometry, float]],
     bottom: Interface,
 ) -> Iterator[str]:
@@ -152,7 +158,7 @@ def _said(
 
 
 def _from_inlet(
-    reached: set[Node], at: str, pockets: dict[Node, Gap], wanted: dict[int, int]
+    reached: set[Node], at: str, pockets: dict[Node, Void], wanted: dict[int, int]
 ) -> Iterator[str]:
     """What an inlet reaches: as many pockets as wanted at every interface, and no way out."""
     if OUTSIDE in reached:
@@ -167,7 +173,7 @@ def _from_inlet(
             )
 
 
-def _pockets(graph: Graph, pockets: dict[Node, Gap], fed: dict[Node, list[str]]) -> Iterator[str]:
+def _pockets(graph: Graph, pockets: dict[Node, Void], fed: dict[Node, list[str]]) -> Iterator[str]:
     for node, gap in pockets.items():
         if len(fed[node]) == 1:
             continue

@@ -22,8 +22,6 @@ from sbafab.actuators import load_design
 from sbafab.cli import main
 from sbafab.errors import DesignError
 from sbafab.folders.build import make_build
-from sbafab.folders.check import check_folder
-from sbafab.folders.run import RunRequest, generate
 from tests.properties.designs import Draft, lobed, mm, one_dof, radial, valid
 
 ASKED = int(os.environ.get("SBAFAB_EXAMPLES", "0"))
@@ -81,17 +79,6 @@ def test_valid_lobed_designs_break_no_rule(draft: Draft) -> None:
 @given(radial())
 def test_valid_radial_designs_break_no_rule(draft: Draft) -> None:
     assert failures(draft) == []
-
-
-@share(2, 1)
-@given(valid())
-def test_valid_designs_break_no_rule_as_they_lie_on_disk(draft: Draft) -> None:
-    with TemporaryDirectory() as name:
-        run = generate(
-            RunRequest(load_design(draft.write(Path(name))), Path(name) / "out", ("cut",))
-        )
-        findings = check_folder(run.folder)
-    assert [finding.message for finding in findings if finding.verdict == "fail"] == []
 
 
 def strip(draft: Draft) -> float:

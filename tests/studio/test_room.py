@@ -25,7 +25,7 @@ from sbafab.studio.jobs import edited
 from tests.quick import few
 from tests.studio.browsing import served
 
-PARALLEL = 96
+PARALLEL = 48
 """Requests at once, more than a studio takes."""
 SMALL = edited(api.template("1dof-5mm"), [("stack.balloons", "1"), ("rules.yield_builds", "100")])
 SLOW = edited(
