@@ -73,15 +73,8 @@ class Sheet(NamedTuple):
         return unary_union(self.pieces)
 
 
-class Motion(NamedTuple):
-    """Shift and turn about the origin of every build, to first order: mm and radians."""
-
-    x: Floats
-    y: Floats
-    turn: Floats
-
-    def plus(self, other: Motion) -> Motion:
-        return Motion(self.x + other.x, self.y + other.y, self.turn + other.turn)
+Motion = Floats
+"""Shift along x and y and turn about the origin of every build, to first order: mm and radians."""
 
 
 class Rows(NamedTuple):
@@ -164,15 +157,14 @@ def _sheets(document: dict[str, Any]) -> dict[int, Sheet]:
 def _sheet(index: int, is_film: bool, contours: list[list[list[Any]]]) -> Sheet:
     outlines = [_corners(contour) for contour in contours]
     areas = [Polygon(outline) for outline in outlines]
-    signed = [_signed_area(outline) for outline in outlines]
-    outer = [number for number, area in enumerate(signed) if area > 0]
+    is_outer = [area.exterior.is_ccw for area in areas]
     pieces: list[BaseGeometry] = []
     piece_of: dict[int, int] = {}
-    for place, number in enumerate(outer):
+    for place, number in enumerate(np.flatnonzero(is_outer).tolist()):
         holes = [
             other
-            for other, area in enumerate(signed)
-            if area < 0 and areas[number].contains(areas[other].representative_point())
+            for other, area in enumerate(areas)
+            if not is_outer[other] and areas[number].contains(area.representative_point())
         ]
         pieces.append(Polygon(outlines[number], [outlines[other] for other in holes]))
         piece_of |= dict.fromkeys((number, *holes), place)
@@ -183,63 +175,52 @@ def _sheet(index: int, is_film: bool, contours: list[list[list[Any]]]) -> Sheet:
     return Sheet(index, is_film, pieces, rings)
 
 
-def _signed_area(outline: Sequence[tuple[float, float]]) -> float:
-    x, y = np.array(outline).T
-    return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) / 2
+def _at(edge: list[Any], shares: Floats) -> Floats:
+    """Places along an edge: x, y and the normal out of the region, which lies to its left."""
+    x1, y1, x2, y2 = edge[:4]
+    if len(edge) == 4:
+        length = math.dist((x1, y1), (x2, y2))
+        normal = [(y2 - y1) / length, (x1 - x2) / length]
+        return np.array([[x1 + s * (x2 - x1), y1 + s * (y2 - y1), *normal] for s in shares])
+    cx, cy, radius, left = edge[4:]
+    angles = math.atan2(y1 - cy, x1 - cx) + _sweep(edge) * shares
+    out = np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.hstack([(cx, cy) + radius * out, out if left else -out])
 
 
-def _sweep(edge: list[Any]) -> tuple[float, float]:
-    """Start angle and signed angle of an arc."""
+def _sweep(edge: list[Any]) -> float:
+    """Signed angle of an arc; 0 of a line."""
+    if len(edge) == 4:
+        return 0.0
     x1, y1, x2, y2, cx, cy, _, left = edge
-    begin, end = math.atan2(y1 - cy, x1 - cx), math.atan2(y2 - cy, x2 - cx)
-    turn = (end - begin) % math.tau
+    turn = (math.atan2(y2 - cy, x2 - cx) - math.atan2(y1 - cy, x1 - cx)) % math.tau
     if left:
-        return begin, turn or math.tau
-    return begin, turn - math.tau if turn else -math.tau
+        return turn or math.tau
+    return turn - math.tau if turn else -math.tau
 
 
-def _corners(contour: list[list[Any]]) -> list[tuple[float, float]]:
-    points = []
-    for edge in contour:
-        if len(edge) == 4:
-            points.append((edge[0], edge[1]))
-            continue
-        begin, sweep = _sweep(edge)
-        cx, cy, radius = edge[4:7]
-        count = max(1, math.ceil(abs(sweep) / CHORD))
-        for step in range(count):
-            angle = begin + sweep * step / count
-            points.append((cx + radius * math.cos(angle), cy + radius * math.sin(angle)))
-    return points
+def _corners(contour: list[list[Any]]) -> Floats:
+    """The beginnings of its edges, and of the chords of its arcs."""
+    counts = [max(1, math.ceil(abs(_sweep(edge)) / CHORD)) for edge in contour]
+    found = [_at(edge, np.arange(n) / n) for edge, n in zip(contour, counts, strict=True)]
+    return np.concatenate(found)[:, :2]
+
+
+def _samples(edge: list[Any]) -> Floats:
+    if len(edge) == 4:
+        count = max(1, math.ceil(math.dist(edge[:2], edge[2:]) / SPACING))
+    else:
+        count = max(1, math.ceil(abs(_sweep(edge)) * max(edge[6] / SPACING, 1 / STEP)))
+    return _at(edge, (np.arange(count) + 0.5) / count)
 
 
 def _ring(layer: int, number: int, piece: int, is_film: bool, contour: list[list[Any]]) -> Ring:
-    # The region lies to the left of its edges, holes included.
-    points: list[tuple[float, float]] = []
-    normals: list[tuple[float, float]] = []
-    for edge in contour:
-        x1, y1, x2, y2 = edge[:4]
-        if len(edge) == 4:
-            length = math.dist((x1, y1), (x2, y2))
-            count = max(1, math.ceil(length / SPACING))
-            for step in range(count):
-                share = (step + 0.5) / count
-                points.append((x1 + share * (x2 - x1), y1 + share * (y2 - y1)))
-                normals.append(((y2 - y1) / length, -(x2 - x1) / length))
-            continue
-        begin, sweep = _sweep(edge)
-        cx, cy, radius, left = edge[4:]
-        count = max(1, math.ceil(abs(sweep) * max(radius / SPACING, 1 / STEP)))
-        for step in range(count):
-            angle = begin + sweep * (step + 0.5) / count
-            c, s = math.cos(angle), math.sin(angle)
-            points.append((cx + radius * c, cy + radius * s))
-            normals.append((c, s) if left else (-c, -s))
-    corners = np.array(_corners(contour))
+    places = np.concatenate([_samples(edge) for edge in contour])
+    corners = _corners(contour)
     chords = np.hstack([corners, np.roll(corners, -1, axis=0)])
     circles = {tuple(np.round(edge[4:7], 6)) if len(edge) > 4 else None for edge in contour}
     circle = circles.pop() if len(circles) == 1 else None
-    return Ring(layer, number, piece, is_film, np.array(points), np.array(normals), chords, circle)
+    return Ring(layer, number, piece, is_film, places[:, :2], places[:, 2:], chords, circle)
 
 
 # Where bonds and overhangs are narrow.
@@ -417,7 +398,7 @@ def _keeps(
     first, second = (motions[ring.layer, ring.piece] for ring in rows.rings)
     # An edge that faces itself counts twice.
     cut = rows.signs[0] * cuts[names[0]] + rows.signs[1] * cuts[names[1]]
-    moves = np.stack([second.x - first.x, second.y - first.y, second.turn, first.turn])
+    moves = np.stack([*(second - first)[:2], second[2], first[2]])
     most = np.abs(moves).max(axis=1)
     near = rows.room < np.abs(cut).max() + np.abs(rows.factors) @ most
     left = rows.factors[near] @ moves + rows.room[near][:, None]
@@ -434,7 +415,7 @@ def _motions(
     count: int,
 ) -> dict[Part, Motion]:
     """Return how each piece of each layer lies off its place once all steps are done."""
-    still = Motion(np.zeros(count), np.zeros(count), np.zeros(count))
+    still = np.zeros((3, count))
     motions = {
         (index, piece): still
         for index, sheet in sheets.items()
@@ -451,9 +432,9 @@ def _motions(
                 continue
             own = _body_motion(body, sheets, play, errors, dice, count)
             if under is not None:
-                own = own.plus(motions[under])
+                own = own + motions[under]
             for part in body:
-                motions[part] = motions[part].plus(own)
+                motions[part] = motions[part] + own
         bodies = [body for body in bodies if body[0][0] not in layers]
         bodies += _joined(present, sheets)
     return motions
@@ -523,7 +504,7 @@ def _body_motion(
     radius = reach * np.sqrt(dice.random(count))
     angle = dice.uniform(0, math.tau, count)
     turn = dice.uniform(-most_turn, most_turn, count)
-    return Motion(radius * np.cos(angle) + turn * cy, radius * np.sin(angle) - turn * cx, turn)
+    return np.stack([radius * np.cos(angle) + turn * cy, radius * np.sin(angle) - turn * cx, turn])
 
 
 def _joined(present: Sequence[list[Part]], sheets: dict[int, Sheet]) -> list[list[Part]]:
