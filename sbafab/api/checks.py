@@ -10,7 +10,7 @@ from pydantic import Field
 
 from sbafab.api.designs import Source, build, command, either_of, load
 from sbafab.assemblies.records import Assembly
-from sbafab.design.files import Change, template_names
+from sbafab.design.files import Change, changed_keys, template_names
 from sbafab.design.identity import cited
 from sbafab.design.records import Design
 from sbafab.documents import Document
@@ -29,7 +29,7 @@ from sbafab.rules.finding import Finding, Findings
 from sbafab.rules.measures import Measures
 from sbafab.rules.nets import connectivity, netlist_findings
 from sbafab.runtime import Progress
-from sbafab.search.advice import advise
+from sbafab.search.advice import reach_yield
 
 PAIR = Field(min_length=2, max_length=2)
 

@@ -16,9 +16,9 @@ from sbafab.models.pneumatics import MOST_PRESSURE
 from sbafab.runtime import Progress, ignore_progress
 from sbafab.search import compare as comparing
 from sbafab.search.advice import YieldDesign
+from sbafab.search.advice import reach_yield as run_reach_yield
 from sbafab.search.compare import DesignComparison, YieldEntry, load_compared, write_page
 from sbafab.search.compare import compare as run_compare
-from sbafab.search.compare import reach_yield as run_reach_yield
 from sbafab.search.find import (
     FoundDesign,
     find_document,

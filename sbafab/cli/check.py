@@ -24,8 +24,8 @@ DEFAULT_KIT = "paper"
 @opt.waive_option("Accept the failure of this rule; cut files would state it. Repeatable.")
 @opt.option(
     "--target-yield",
-    "Fail if fewer random builds are good than this share, e.g. 0.99, and advise the smallest bond "
-    "and overhang that reach it.",
+    "Fail if fewer random builds are good than this share, e.g. 0.99, and say what `sbafab "
+    "generate` would change for it with the same option.",
     opt.PartialShare("SHARE"),
 )
 @opt.option(
@@ -81,7 +81,8 @@ def _check_design(
     with show.progress(as_json) as progress:
         if target_yield is not None:
             with_target = (*assignments, f"rules.target_yield={target_yield}")
-            advice = api.advise(design_of(name, with_target), target_yield, progress)
+            fixed = frozenset(api.changed_keys(assignments))
+            advice = api.reach_yield(design_of(name, with_target), target_yield, fixed, progress)
             source = design_of(name, with_target, waivers)
         order = api.make_order(source, progress=progress)
     if not order.failed:

@@ -409,7 +409,7 @@ def changed_for_yield(
     """
     with show.progress(as_json) as progress:
         fixed = frozenset(api.changed_keys(click.get_current_context().params["assignments"]))
-        reached = api.comparing.reach_yield(design, target, fixed, progress)
+        reached = api.run_reach_yield(design, target, fixed, progress)
     if reached.design is None:
         end("yield", reached.sentence, RULE_FAILED, as_json)
 
@@ -421,10 +421,10 @@ def changed_for_yield(
         show.wrapped(reached.sentence)
         show.line("")
 
-    return reached.design, {"yield": api.comparing.yield_document(reached)}, print_changes
+    return reached.design, {"yield": api.YieldEntry.of(reached)}, print_changes
 
 
 def _print_figures(comparison: api.comparing.DesignComparison, names: Sequence[str]) -> None:
     """Print the main figures of both designs, below the names of the columns."""
-    main = api.comparing.figure_rows(pair for pair in comparison.figures if pair.is_main)
+    main = api.comparing.figure_rows(pair for pair in comparison.figures if pair.main)
     show.table("Figures, in parentheses the 90 % interval", names, main)

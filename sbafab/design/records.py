@@ -6,6 +6,7 @@ says so. Lengths are mm.
 
 from __future__ import annotations
 
+import functools
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -266,7 +267,7 @@ class Design(Section):
             Free("bond.width", bond, bond + 0.5, 0.05, asked="yield"),
             Free("mask.overhang", reach, reach + 0.5, 0.05, asked="yield"),
             *(
-                Free.of_words(f"registration.{key}", words, asked="yield")
+                Free.of_choices(f"registration.{key}", words, asked="yield")
                 for key, words in REGISTRATIONS.items()
             ),
         )
@@ -421,7 +422,8 @@ class Form:
 
 @dataclass(frozen=True)
 class Free:
-    """A key that a search may change: from ``low`` to ``high`` in steps, or one of ``choices``.
+    """A key that a search or sweep changes: from ``low`` to ``high`` in steps, or one of
+    ``choices``. With a ``step`` of 0 it may be any number between.
 
     ``asked``: free only if a requirement names this quantity. ``widens``: the ends are where a
     search begins, and may move.
@@ -433,14 +435,31 @@ class Free:
     step: float
     asked: str = ""
     widens: bool = False
-    choices: tuple[str, ...] = ()
-    """Words allowed for the key, if it is not a number; its steps then count them from 0."""
+    choices: tuple[Any, ...] = ()
+    """Words or other values of the key; its steps then count them from 0."""
 
     @classmethod
-    def of_words(cls, key: str, choices: Iterable[str], asked: str = "") -> Free:
-        """Return a key that takes one of some words."""
-        words = tuple(choices)
-        return cls(key, 0, len(words) - 1, 1, asked, choices=words)
+    def of_choices(cls, key: str, choices: Iterable[Any], asked: str = "") -> Free:
+        """Return a key that takes one of some values."""
+        values = tuple(choices)
+        return cls(key, 0, len(values) - 1, 1, asked, choices=values)
+
+    def at(self, number: int) -> Any:
+        """Return the value after a number of steps: whole if ``low`` and ``step`` are.
+
+        Beyond its range a choice stays the last one.
+        """
+        if self.choices:
+            return self.choices[min(max(number, 0), len(self.choices) - 1)]
+        value = round(self.low + number * self.step, 9)
+        return int(value) if self.low == int(self.low) and self.step == int(self.step) else value
+
+    @functools.cached_property
+    def values(self) -> tuple[Any, ...]:
+        """Every value, in order; without a step both ends."""
+        if not self.step:
+            return self.low, self.high
+        return tuple(map(self.at, range(round((self.high - self.low) / self.step) + 1)))
 
 
 def degrees_of_freedom(stacks: int) -> str:

@@ -50,11 +50,11 @@ class Summary(Document):
 
 
 class AdviceEntry(Document):
-    """The least bond and overhang, mm, that reach a yield, and the share that they give."""
+    """What reaches a yield, as in ``message``; bond and overhang then, mm, and the share."""
 
     target_yield: PlainNumber = attribute("target")
-    bond_width: float | None = attribute("bond")
-    mask_overhang: float | None = attribute("overhang")
+    bond_width: float | None = attribute("design.bond.width")
+    mask_overhang: float | None = attribute("design.mask.overhang")
     measured: float | None = attribute("share.value")
     interval: tuple[float, float] | None = attribute("share.interval")
     message: str = attribute("sentence")

@@ -1,6 +1,5 @@
 """Changes of a design that reach a yield: bond, overhang, order of stacking, plate, registration.
 
-``advise`` says the least bond and overhang, ``reach_yield`` changes a design as little as it needs.
 Every trial is built and counted like the design itself; the result is counted again with another
 seed, so that it does not rest on the draws it was chosen by.
 """
@@ -10,7 +9,8 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, get_args
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, get_args
 
 from sbafab.actuators import build
 from sbafab.design.records import REGISTRATIONS, Design
@@ -20,6 +20,9 @@ from sbafab.rules.deck import run_deck
 from sbafab.rules.registration_yield import SEED, Share, simulate
 from sbafab.runtime import Progress, ignore_progress
 from sbafab.search.vary import KeyDifference
+
+if TYPE_CHECKING:
+    from sbafab.search.compare import DesignComparison, FigurePair
 
 STEP = 0.01
 """mm: bond and overhang are advised in whole steps."""
@@ -36,11 +39,6 @@ PLATE, PIN_ERROR = "registration.plate_made_by", "registration.pin_error"
 TARGET = "rules.target_yield"
 WORST_CASE, PIN_FIT = "registration-worst-case", "pin-fit"
 """Other rules that may be mended: by more steps, by a better plate."""
-OTHERWISE = {
-    "channel-pin": 'registration.method = "ears" pins every film',
-    "ears": "smaller registration.hand_turn and registration.hand_placement do",
-}
-"""The remedy if bond and overhang reach no yield, by registration method."""
 
 
 def _good(share: Share) -> str:
@@ -52,75 +50,14 @@ def _good(share: Share) -> str:
 
 
 @dataclass(frozen=True)
-class Advice:
-    """The least ``bond`` and ``overhang`` (mm) that reach ``target``, and the share of good builds
-    that another seed gives them; None if none reaches it.
-
-    A design whose bonds and overhangs are drawn takes neither: its share is counted as drawn.
-    """
-
-    target: float
-    method: str
-    bond: float | None = None
-    overhang: float | None = None
-    share: Share | None = None
-
-    @property
-    def sentence(self) -> str:
-        if self.share is None:
-            remedy = OTHERWISE.get(self.method, OTHERWISE["ears"])
-            return (
-                f"No bond and overhang up to {MOST_STEPS * STEP:g} mm above the rules' limits "
-                f"reach a yield of {self.target:.4g} with registration.method = "
-                f'"{self.method}": {remedy}.'
-            )
-        if self.bond is not None:
-            return (
-                f"A yield of {self.target:.4g} needs bond.width = {self.bond:.2f} and "
-                f"mask.overhang = {self.overhang:.2f} at least; built so, by another seed "
-                f"{_good(self.share)}."
-            )
-        is_reached = self.share.interval[0] >= self.target
-        reached = "reaches" if is_reached else "does not reach"
-        mend = (
-            " Its layers are drawn, so no key makes bonds and overhangs wider: draw them wider "
-            "where registration-worst-case finds the least, or place and cut more exactly "
-            "(registration.plate_made_by, registration.hand_placement, registration.seam_error)."
-        )
-        text = f"As drawn it {reached} a yield of {self.target:.4g}: {_good(self.share)}."
-        return text if is_reached else text + mend
-
-
-def advise(design: Design, target: float, progress: Progress = ignore_progress) -> Advice:
-    """Return the smallest bond and overhang, from the rules' limits on, whose interval of 95 % lies
-    at or above ``target``.
-    """
-    method = design.registration.method
-    if not design.uses(BOND):
-        return Advice(target, method, share=simulate(build(design), design, CHECK_SEED).whole)
-    start = {BOND: design.rules.bond_width, OVERHANG: design.rules.mask_overhang}
-    trials = _Trials(design, start, target, progress)
-    least = _smallest(trials, MOST_STEPS)
-    if least is None:
-        return Advice(target, method)
-    lengths = trials.lengths(least)
-    share = trials.share(least, CHECK_SEED)
-    return Advice(target, method, lengths[BOND], lengths[OVERHANG], share)
-
-
-# A design changed as little as a yield needs.
-
-
-@dataclass(frozen=True)
 class YieldDesign:
     """A design for a yield: ``design`` is ``given`` with the ``changes``, None if no change reaches
     the share ``target``, and the given one if that suffices.
 
     ``changes`` are keys with their old and new value. ``share`` is counted on the changed design by
-    another seed, or on the given one if that is enough; ``best`` and ``best_changes`` are the best
-    that was reached where nothing is enough. ``fixed``: keys that were not changed although a
-    change might have helped. ``comparison``, a ``DesignComparison``, has the figures of both, if
-    one was changed.
+    another seed, or on the given one if that is enough; None if that fails other rules. If no
+    change is enough, both are of the best that was reached. ``fixed``: keys that were not changed
+    although a change might have helped.
     """
 
     target: float
@@ -128,38 +65,42 @@ class YieldDesign:
     design: Design | None
     changes: tuple[KeyDifference, ...] = ()
     share: Share | None = None
-    best: Share | None = None
-    best_changes: tuple[KeyDifference, ...] = ()
     fixed: tuple[str, ...] = ()
-    comparison: Any = field(default=None, repr=False)
+
+    @cached_property
+    def comparison(self) -> DesignComparison | None:
+        """Keys, rules and figures of both designs, if one was changed."""
+        if self.design is None or not self.changes:
+            return None
+        # A check asks for none, and loads no model.
+        from sbafab.search.compare import DESIGNS, compare
+
+        return compare(self.given, self.design, DESIGNS)
+
+    @property
+    def figures(self) -> list[FigurePair]:
+        """The main figures of both designs, if one was changed."""
+        return [pair for pair in self.comparison.figures if pair.main] if self.comparison else []
 
     @property
     def sentence(self) -> str:
         """The changes and the yield they reach, or why no change reaches the target."""
-        if self.design is None:
-            return self._too_high()
-        if self.share is None:
+        if self.design is not None and self.share is None:
             return f"{self.given.name} fails other rules, so that nothing was changed for its yield"
-        if not self.changes:
-            return f"Nothing to change for a yield of {self.target:.4g}: {_good(self.share)}"
-        changes = _format(self.changes)
-        return f"Changed for a yield of {self.target:.4g}: {changes}; {_good(self.share)}"
-
-    def _too_high(self) -> str:
+        changes = ", ".join(f"{change.key} = {change.values[1]}" for change in self.changes)
+        if self.design is not None and self.share is not None:
+            needs = f"needs {changes or 'no change'}"
+            return f"A yield of {self.target:.4g} {needs}: {_good(self.share)}"
         reached = "no change that was tried can be built and passes the other rules"
-        if self.best is not None:
-            by = f"with {_format(self.best_changes)}" if self.best_changes else "as it is"
-            reached = f"at best, {by}, {_good(self.best)}"
+        if self.share is not None:
+            by = f"with {changes}" if changes else "as it is"
+            reached = f"at best, {by}, {_good(self.share)}"
         free = f", or do not --set {', '.join(self.fixed)}" if self.fixed else ""
         return (
             f"{self.given.name} does not reach a yield of {self.target:.4g}, and nothing was "
             f"written: {reached}; ask for less, cut or place more exactly "
             f"(registration.cutting_error, registration.hand_placement){free}"
         )
-
-
-def _format(changes: Iterable[KeyDifference]) -> str:
-    return ", ".join(f"{change.key} = {change.values[1]}" for change in changes)
 
 
 def _value_of(design: Design, key: str) -> Any:
@@ -209,9 +150,8 @@ def reach_yield(
             changed = targeted.with_({change.key: change.values[1] for change in changes})
             share = trials.share(least, CHECK_SEED)
             return YieldDesign(target, design, changed, changes, share)
-    best, best_changes = _best(targeted, tried.values())
     useful = tuple(key for key in (BOND, OVERHANG, METHOD, SEQUENCE, PLATE) if key in fixed)
-    return YieldDesign(target, design, None, best=best, best_changes=best_changes, fixed=useful)
+    return YieldDesign(target, design, None, *_best(targeted, tried.values()), useful)
 
 
 def _changes(design: Design, values: Mapping[str, Any]) -> tuple[KeyDifference, ...]:
@@ -242,9 +182,9 @@ def _ways(design: Design, fixed: Collection[str]) -> Iterator[tuple[dict[str, st
 
 def _best(
     design: Design, tried: Iterable[_Trials]
-) -> tuple[Share | None, tuple[KeyDifference, ...]]:
-    """Return the best share that passes the other rules, with its changes; of equal ones the
-    first.
+) -> tuple[tuple[KeyDifference, ...], Share | None]:
+    """Return the changes of the best share that passes the other rules, and the share; of equal
+    ones the first.
     """
     every = (
         (share, trials, steps)
@@ -255,8 +195,8 @@ def _best(
     for share, trials, steps in sorted(every, key=lambda each: -each[0].value)[:MOST_CHECKED]:
         if not trials.broken(steps):
             words = {key: _value_of(trials.design, key) for key in (METHOD, SEQUENCE, PLATE)}
-            return share, _changes(design, {**trials.lengths(steps), **words})
-    return None, ()
+            return _changes(design, {**trials.lengths(steps), **words}), share
+    return (), None
 
 
 # Bond and overhang by steps, each tried once.

@@ -8,38 +8,36 @@ import base64
 import csv
 import json
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import AliasPath, Field
+from pydantic.json_schema import SkipJsonSchema
 
 from sbafab.actuators import load_design, records
 from sbafab.design.files import Change, override, shown
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, validated
-from sbafab.documents import Document, PlainNumber, attribute
+from sbafab.documents import Document, PlainNumber, Short, attribute
 from sbafab.errors import DesignError
 from sbafab.folders.build import Build, make_build
 from sbafab.folders.swap import replace_text, writing
 from sbafab.laminate.burst import refuse_beyond_burst
 from sbafab.models.actuator import model_form
 from sbafab.models.balloons import has_balloons
-from sbafab.models.calibration import Ends, factors_of
-from sbafab.models.figures import Figure, PredictionRequest
+from sbafab.models.calibration import factors_of
+from sbafab.models.figures import PredictionRequest
 from sbafab.models.pneumatics import usual_pressures
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import MOST_PRESSURE, stack
 from sbafab.reports.solid_pictures import WHY, PictureRequest, pictures_at_one_scale, solid_png
 from sbafab.runtime import Progress, ignore_progress
-from sbafab.search import advice
-from sbafab.search.advice import YieldDesign
 from sbafab.search.sweep_report import CSV, JOURNAL, PageSection, page_html
-from sbafab.search.trials import RuleMargin, margins
+from sbafab.search.trials import margin, worst_findings
 from sbafab.search.vary import NOTHING, KeyDifference, format_value, key_values
 from sbafab.version import GENERATOR
 
@@ -63,20 +61,21 @@ DIGITS = 4
 SIZE = 640, 512
 """Width of a picture, pixels."""
 _ROW = re.compile(r"(.+\.csv):(\d+)")
+Pair = tuple[Any, Any]
+"""Findings or figures of both designs, None of one that has none."""
+ShortOrNone = Short | None
+ShortEnds = tuple[Short, Short]
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
 class ComparedDesign:
-    """One of the two designs: ``source`` is the argument, ``rules`` the worst margin of each,
-    ``figures`` the figures to design with, and the stack's stiffness as in ``find``.
-    """
+    """One of the two designs: ``source`` is the argument, ``failed`` are the rules that fail."""
 
     source: str
     checked: Build
-    rules: Mapping[str, RuleMargin]
-    figures: tuple[Figure, ...]
+    failed: list[str]
 
     @property
     def design(self) -> Design:
@@ -88,49 +87,38 @@ class ComparedDesign:
         """Hash of the design."""
         return design_sha256(self.design)
 
-    @property
-    def failed(self) -> list[str]:
-        """Names of the rules that fail."""
-        return [rule.rule for rule in self.rules.values() if rule.verdict == "fail"]
+
+NumberOrNone = float | None
+TextOrNone = str | None
 
 
-@dataclass(frozen=True)
-class RuleDifference:
+class RuleDifference(Document):
     """A rule whose verdict or margin differs, or its measured value if it has no limit; None if a
     design has no such finding.
     """
 
     rule: str
-    margins: tuple[RuleMargin | None, RuleMargin | None]
+    unit: str
+    verdicts: tuple[TextOrNone, TextOrNone]
+    margins: tuple[NumberOrNone, NumberOrNone]
+    """distance to the limit"""
+    measured: tuple[NumberOrNone, NumberOrNone]
 
 
-@dataclass(frozen=True)
-class FigurePair:
+class FigurePair(Document):
     """A figure of both designs; None if a design lacks it."""
 
-    quantity: Quantity
-    at: Conditions
-    figures: tuple[Figure | None, Figure | None]
-
-    @property
-    def name(self) -> str:
-        """Quantity and conditions as text."""
-        return self.quantity.named(self.at)
-
-    @property
-    def unit(self) -> str:
-        """The unit of both."""
-        return self.quantity.unit
-
-    @property
-    def is_main(self) -> bool:
-        """True for the most important figures."""
-        return _is_main(self.quantity, self.at)
-
-    @property
-    def differs(self) -> bool:
-        """True if the values differ in the first DIGITS digits, or one is missing."""
-        return len({figure and f"{figure.value:.{DIGITS}g}" for figure in self.figures}) > 1
+    quantity: Annotated[Quantity, SkipJsonSchema(), Field(exclude=True)]
+    name: str
+    unit: str
+    main: bool
+    """true if the command prints it"""
+    differs: bool
+    """true if the values differ in the first four digits, or one is missing"""
+    values: tuple[ShortOrNone, ShortOrNone]
+    intervals: tuple[ShortEnds | None, ShortEnds | None]
+    """90 % intervals, if a calibration says so"""
+    models: tuple[TextOrNone, TextOrNone]
 
 
 @dataclass(frozen=True)
@@ -152,13 +140,7 @@ class DesignComparison:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of ``compare --json``."""
-        return CompareDocument.of(
-            self, rules=[*map(_rule_entry, self.rules)], figures=[*map(_figure_entry, self.figures)]
-        )
-
-
-NumberOrNone = float | None
-TextOrNone = str | None
+        return CompareDocument.of(self)
 
 
 class DesignEntry(Document):
@@ -171,56 +153,14 @@ class DesignEntry(Document):
     failed: list[str]
 
 
-class RuleEntry(Document):
-    """A rule of both designs."""
-
-    rule: str
-    unit: str
-    verdicts: tuple[TextOrNone, TextOrNone]
-    margins: tuple[NumberOrNone, NumberOrNone]
-    """distance to the limit"""
-    measured: tuple[NumberOrNone, NumberOrNone]
-
-
-class FigureEntry(Document):
-    """A figure of both designs."""
-
-    name: str
-    unit: str
-    main: bool = attribute("is_main")
-    """true if the command prints it"""
-    differs: bool
-    values: tuple[NumberOrNone, NumberOrNone]
-    intervals: tuple[Ends | None, Ends | None]
-    """90 % intervals, if a calibration says so"""
-    models: tuple[TextOrNone, TextOrNone]
-
-
 class CompareDocument(Document, schema="sbafab/compare@1"):
     """The content of ``compare --json``."""
 
     designs: tuple[DesignEntry, DesignEntry]
     keys: list[KeyDifference]
-    rules: list[RuleEntry]
-    figures: list[FigureEntry]
+    rules: list[RuleDifference]
+    figures: list[FigurePair]
     folder: str = ""
-
-
-def _rule_entry(row: RuleDifference) -> RuleEntry:
-    either = row.margins[0] or row.margins[1]
-    columns = {"verdicts": "verdict", "margins": "margin", "measured": "measured"}
-    return RuleEntry.read(row, unit=either and either.unit, **_both(row.margins, columns))
-
-
-def _figure_entry(pair: FigurePair) -> FigureEntry:
-    each = [figure and SimpleNamespace(**figure.as_dict()) for figure in pair.figures]
-    columns = {"values": "value", "intervals": "interval", "models": "model"}
-    return FigureEntry.read(pair, **_both(each, columns))
-
-
-def _both(pair: Sequence[Any], columns: Mapping[str, str]) -> dict[str, list[Any]]:
-    """Return columns with an attribute of both, None of one that is not there."""
-    return {key: [each and getattr(each, name) for each in pair] for key, name in columns.items()}
 
 
 def load_compared(source: str | Path, changes: Iterable[Change] = ()) -> Design:
@@ -281,28 +221,24 @@ def compare(
     each = []
     for number, (design, source) in enumerate(zip((first, second), sources, strict=True)):
         progress(f"predicting {design.name}", number, 2)
-        each_build = make_build(design)
+        made = make_build(design)
         pressures = tuple(pressures_kpa or usual_pressures(design.form)[:1])
-        figures = tuple(
-            figure
-            for figure in predict(
-                design,
-                PredictionRequest(pressures, flow_ml_min),
-                each_build.laminate,
-                curves=False,
-            ).figures
+        request = PredictionRequest(pressures, flow_ml_min)
+        figures = {
+            (figure.quantity, figure.at): figure
+            for figure in predict(design, request, made.laminate, curves=False).figures
             if not figure.other or (figure.interval and _is_main(figure.quantity, figure.at))
-        )
-        each.append(ComparedDesign(source, each_build, margins(each_build.findings), figures))
-    a, b = each
-    keys = _paired(key_values(a.design), key_values(b.design))
-    rules = _paired(a.rules, b.rules)
-    pairs = _paired(*({(f.quantity, f.at): f for f in compared.figures} for compared in each))
+        }
+        rules = worst_findings(made.findings)
+        failed = [name for name, rule in rules.items() if rule.verdict == "fail"]
+        each.append((ComparedDesign(source, made, failed), key_values(design), rules, figures))
+    designs, keys, both_rules, both_figures = zip(*each, strict=True)
+    differences = [_rule(name, pair) for name, pair in _paired(*both_rules)]
     return DesignComparison(
-        (a, b),
-        tuple(KeyDifference(k, two) for k, two in keys if k != "name" and two[0] != two[1]),
-        tuple(RuleDifference(k, two) for k, two in rules if _judged(two[0]) != _judged(two[1])),
-        tuple(FigurePair(*figure, two) for figure, two in pairs),
+        designs,
+        tuple(KeyDifference(k, two) for k, two in _paired(*keys) if k != "name" and _differ(two)),
+        tuple(rule for rule in differences if _differ(rule.verdicts) or _differ(_judged(rule))),
+        tuple(_figure(of, at, pair) for (of, at), pair in _paired(*both_figures)),
         tuple(pressures_kpa or usual_pressures(first.form)[:1]),
     )
 
@@ -314,11 +250,40 @@ def _paired(
     return [(key, (a.get(key), b.get(key))) for key in dict.fromkeys([*a, *b])]
 
 
-def _judged(margin: RuleMargin | None) -> tuple[str, float | None] | None:
-    if margin is None:
-        return None
-    # A yield without a limit still differs by its value.
-    return margin.verdict, margin.measured if margin.margin is None else margin.margin
+def _differ(pair: Sequence[object]) -> bool:
+    return pair[0] != pair[1]
+
+
+def _rule(name: str, pair: Pair) -> RuleDifference:
+    return RuleDifference.read(
+        None,
+        rule=name,
+        unit=next(finding.unit for finding in pair if finding),
+        verdicts=[finding and finding.verdict for finding in pair],
+        margins=[finding and margin(finding) for finding in pair],
+        measured=[finding and finding.measured for finding in pair],
+    )
+
+
+def _judged(rule: RuleDifference) -> list[float | None]:
+    """Return both margins; a yield without a limit still differs by its value."""
+    pairs = zip(rule.margins, rule.measured, strict=True)
+    return [value if left is None else left for left, value in pairs]
+
+
+def _figure(quantity: Quantity, at: Conditions, pair: Pair) -> FigurePair:
+    digits = [figure and f"{figure.value:.{DIGITS}g}" for figure in pair]
+    return FigurePair.read(
+        None,
+        quantity=quantity,
+        name=quantity.named(at),
+        unit=quantity.unit,
+        main=_is_main(quantity, at),
+        differs=_differ(digits),
+        values=[figure and figure.value for figure in pair],
+        intervals=[figure and figure.interval for figure in pair],
+        models=[figure and figure.model.title for figure in pair],
+    )
 
 
 def _is_main(quantity: Quantity, at: Conditions) -> bool:
@@ -338,26 +303,27 @@ def key_rows(keys: Iterable[KeyDifference]) -> ComparedRows:
 
 def rule_rows(rules: Iterable[RuleDifference]) -> ComparedRows:
     """Return rules with both verdicts and margins, or measured values if there is no limit."""
-    return [(row.rule, *map(_margin_text, row.margins)) for row in rules]
+    rows: ComparedRows = []
+    for rule in rules:
+        cells = []
+        for verdict, left, value in zip(rule.verdicts, rule.margins, _judged(rule), strict=True):
+            word = "" if left is None else "margin "
+            text = "" if value is None else f", {word}{value:.3g} {rule.unit}"
+            cells.append(NOTHING if verdict is None else f"{verdict}{text}".rstrip())
+        rows.append((rule.rule, *cells))
+    return rows
 
 
 def figure_rows(pairs: Iterable[FigurePair]) -> ComparedRows:
     """Return figures with both values and 90 % intervals."""
-    return [(f"{pair.name}, {pair.unit}", *map(_figure_text, pair.figures)) for pair in pairs]
-
-
-def _margin_text(margin: RuleMargin | None) -> str:
-    if margin is None:
-        return NOTHING
-    value, word = (margin.measured, "") if margin.margin is None else (margin.margin, "margin ")
-    text = "" if value is None else f", {word}{value:.3g} {margin.unit}"
-    return f"{margin.verdict}{text}".rstrip()
-
-
-def _figure_text(figure: Figure | None) -> str:
-    if figure is None:
-        return NOTHING
-    return f"{figure.value:.4g}" + (f" ({figure.range})" if figure.range else "")
+    rows: ComparedRows = []
+    for pair in pairs:
+        cells = []
+        for value, interval in zip(pair.values, pair.intervals, strict=True):
+            ends = f" ({interval[0]:.3g} to {interval[1]:.3g})" if interval else ""
+            cells.append(NOTHING if value is None else f"{value:.4g}{ends}")
+        rows.append((f"{pair.name}, {pair.unit}", *cells))
+    return rows
 
 
 # The page.
@@ -380,7 +346,7 @@ def compare_html(comparison: DesignComparison) -> str:
     names, designs = comparison.names, comparison.designs
     head = ("", *names)
     keys, rules = key_rows(comparison.keys), rule_rows(comparison.rules)
-    pairs = sorted(comparison.figures, key=lambda pair: not pair.is_main)
+    pairs = sorted(comparison.figures, key=lambda pair: not pair.main)
     grey = [number for number, pair in enumerate(pairs) if not pair.differs]
     intervals = "In parentheses the 90 % interval of what would be measured; grey figures agree."
     verdicts = [
@@ -459,26 +425,4 @@ class YieldEntry(Document):
     measured: float | None = attribute("share.value")
     interval: tuple[float, float] | None = attribute("share.interval")
     message: str = attribute("sentence")
-    figures: list[FigureEntry]
-
-
-def yield_document(reached: YieldDesign) -> dict[str, Any]:
-    """Return the entry ``yield`` of ``generate --json``."""
-    pairs = reached.comparison.figures if reached.comparison is not None else ()
-    return YieldEntry.of(reached, figures=[_figure_entry(pair) for pair in pairs if pair.is_main])
-
-
-def reach_yield(
-    design: Design,
-    target: float,
-    fixed: Collection[str] = (),
-    progress: Progress = ignore_progress,
-) -> YieldDesign:
-    """Return the design that reaches a yield of ``target`` by few changes, and what they cost.
-
-    Keys in ``fixed`` do not change. Raises DesignError for a share that is not between 0 and 1.
-    """
-    reached = advice.reach_yield(design, target, fixed, progress)
-    if reached.design is None or not reached.changes:
-        return reached
-    return replace(reached, comparison=compare(design, reached.design, DESIGNS, progress=progress))
+    figures: list[FigurePair]

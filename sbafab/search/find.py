@@ -61,6 +61,7 @@ from sbafab.search.space import (
     searched,
 )
 from sbafab.search.sweep_report import front
+from sbafab.search.trials import margin_share
 from sbafab.search.vary import format_keys, key_values
 
 LEAST_TRIES = 4
@@ -130,7 +131,7 @@ class FoundDesign:
             Spare(rule.rule, rule.measured or 0.0, rule.unit, place_text(laminate, rule.where))
             for rule in (self.best.rules or {}).values()
             if laminate is not None and rule.verdict == "pass" and rule.rule in TIGHT
-            if rule.share is not None and abs(rule.share) < LITTLE
+            if (share := margin_share(rule)) is not None and abs(share) < LITTLE
         ]
 
     @property

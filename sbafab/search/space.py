@@ -23,12 +23,12 @@ from numpy.typing import ArrayLike
 from sbafab.actuators import build
 from sbafab.design.files import shown
 from sbafab.design.records import Design, Free
-from sbafab.design.units import millimetres
 from sbafab.errors import BeyondError, DesignError, GeometryError
 from sbafab.folders.build import Build, refuse_undoable
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.figures import Figure
 from sbafab.rules.deck import run_deck
+from sbafab.rules.finding import Finding
 from sbafab.runtime import Progress
 from sbafab.search.quantities import (
     CLOSE,
@@ -38,7 +38,7 @@ from sbafab.search.quantities import (
     measured,
     shown_value,
 )
-from sbafab.search.trials import RuleMargin, margins
+from sbafab.search.trials import margin_share, worst_findings
 from sbafab.search.vary import key_values, read_varied, refuse_unknown
 
 TRIES = 240
@@ -102,7 +102,7 @@ class Trial:
 
     values: Mapping[str, Any]
     figures: Mapping[str, float] = field(default_factory=dict)
-    rules: Mapping[str, RuleMargin] | None = None
+    rules: Mapping[str, Finding] | None = None
     missed: float = 0.0
     cost: float = 0.0
     mass: float = 0.0
@@ -145,13 +145,13 @@ class Trial:
 
 def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
     """Return the candidate with these values; without rules, only requirements count: quicker."""
-    rules: Mapping[str, RuleMargin] | None = None
+    rules: Mapping[str, Finding] | None = None
     try:
         design = request.design.with_(dict(values))
         laminate = build(design)
         if with_rules or any(quantity.name == "yield" for quantity in request.quantities):
             checked_build = Build(design, laminate, run_deck(laminate, design))
-            rules = margins(checked_build.findings)
+            rules = worst_findings(checked_build.findings)
             if not checked_build.failed:
                 refuse_undoable([checked_build])
         share = rules[YIELD].measured if rules and YIELD in rules else None
@@ -166,7 +166,7 @@ def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool 
     missed = [-min(0.0, row.margin(trial.judged(row)) + CLOSE) for row in request.requirements]
     # The share by which each failing rule misses its limit.
     failed = (rule for rule in (rules or {}).values() if rule.verdict == "fail")
-    missed += [max(1e-3, -(rule.share or 0.0)) for rule in failed]
+    missed += [max(1e-3, -(margin_share(rule) or 0.0)) for rule in failed]
     mass = 0.0  # a tie-breaker, without the density of a film
     with suppress(DesignError):
         mass = film_mass(laminate)
@@ -280,18 +280,13 @@ def _free_of(text: object) -> Free:
             f"free holds {shown(text)}; give texts KEY=LOW:HIGH:STEP, for example "
             '["chamber.diameter=3:12:0.1"]'
         )
-    stepped = read_varied(text, "--free")
-    if stepped.values and all(isinstance(value, str) for value in stepped.values):
-        return Free.of_words(stepped.key, stepped.values)
-    numbers = [value for value in stepped.values if isinstance(value, int | float)]
-    parts = text.partition("=")[2].split(":")
-    if len(parts) != 3 or len(numbers) != len(stepped.values):
+    free = read_varied(text, "--free")
+    if not free.step or not all(isinstance(value, str) for value in free.choices):
         raise DesignError(
             f"--free {shown(text)} is not KEY=LOW:HIGH:STEP; write for example "
             "--free chamber.diameter=3:12:0.1 or --free registration.method=channel-pin,ears"
         )
-    step = numbers[1] - numbers[0] if len(numbers) > 1 else millimetres(parts[2])
-    return Free(stepped.key, numbers[0], numbers[-1], round(step, 9))
+    return free
 
 
 # The candidates by the steps of their free keys, each evaluated once.
@@ -343,14 +338,12 @@ class SearchSpace:
         return {free.key: self._value(axis, point) for axis, free in enumerate(self.free)}
 
     def _value(self, axis: int, point: GridPoint) -> Any:
-        free, number = self.free[axis], self.number(axis, point)
-        if free.choices:
-            # Beyond its range a word stays the last one.
-            return free.choices[min(max(point[axis], 0), len(free.choices) - 1)]
+        free = self.free[axis]
         listed = numbers_of(self._keys.get(free.key))
         if listed:
+            number = self.number(axis, point)
             return [round(value * number / max(listed), 2) for value in listed]
-        return int(number) if free.low == int(free.low) and free.step == int(free.step) else number
+        return free.at(point[axis])
 
     def inside(self, steps: ArrayLike) -> GridPoint:
         """Return the point, or the nearest to it within the keys' ranges."""

@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 
 from sbafab.design.files import KIT, OUTLINE, kit_names
 from sbafab.design.identity import design_sha256
-from sbafab.design.records import Design, plain_tables
+from sbafab.design.records import Design, Free, plain_tables
 from sbafab.documents import Document, attribute
 from sbafab.errors import OutputError, Stopped
 from sbafab.folders.swap import MANIFEST, replace_text, writing
@@ -45,7 +45,7 @@ from sbafab.search.trials import (
     local_pool,
     run_jobs,
 )
-from sbafab.search.vary import Values, Varied, grid, latin_hypercube, refuse_unknown
+from sbafab.search.vary import Values, grid, latin_hypercube, refuse_unknown
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -66,7 +66,7 @@ class SweepRequest:
     """
 
     design: Design
-    varied: tuple[Varied, ...]
+    varied: tuple[Free, ...]
     samples: int | None = None
     seed: int = 0
     pressures_kpa: tuple[float, ...] = ()
@@ -253,7 +253,7 @@ def _contents(values: Values) -> dict[str, Any]:
     }
 
 
-def _from_here(varied: Varied) -> Varied:
+def _from_here(varied: Free) -> Free:
     """With paths of drawings and kits relative to the working directory, wherever they are read."""
     if varied.key not in (OUTLINE, KIT):
         return varied
@@ -261,7 +261,7 @@ def _from_here(varied: Varied) -> Varied:
         path if varied.key == KIT and path in kit_names() else str(Path(str(path)).absolute())
         for path in varied.values
     )
-    return Varied(varied.key, paths)
+    return Free.of_choices(varied.key, paths)
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from sbafab.design.files import rule_names
 from sbafab.design.identity import design_sha256
-from sbafab.design.records import Design
+from sbafab.design.records import Design, Free
 from sbafab.errors import OutputError
 from sbafab.folders.swap import replace_text
 from sbafab.markup import environment
@@ -28,7 +28,7 @@ from sbafab.models.paper import CALIBRATED_MODELS, counterpart
 from sbafab.models.quantity import ANYWHERE, Conditions, FigureKey, Quantity
 from sbafab.reports.charts import ChartBars, ChartCurve, ChartSpecks, Panel, chart_svg
 from sbafab.search.trials import SweepOutcome, SweepRow
-from sbafab.search.vary import Values, Varied, format_value
+from sbafab.search.vary import Values, format_value
 from sbafab.spreadsheet import csv_text
 from sbafab.version import GENERATOR
 
@@ -372,7 +372,7 @@ def page_html(
 
 
 def sweep_html(
-    design: Design, varied: Sequence[Varied], table: Table, limits: Iterable[str] = ()
+    design: Design, varied: Sequence[Free], table: Table, limits: Iterable[str] = ()
 ) -> str:
     """Return the whole page of a sweep, whose ``limits`` are told at its head."""
     keys = [swept.key for swept in varied]
@@ -436,8 +436,8 @@ def _trade_offs(
     yield PageSection("Pareto fronts", [line], head=head, rows=rows, note=note)
 
 
-def _values_text(swept: Varied) -> str:
-    if swept.is_continuous:
+def _values_text(swept: Free) -> str:
+    if not swept.step:
         return f"{swept.low:g} to {swept.high:g}"
     texts = [format_value(value) for value in swept.values]
     if len(texts) > 6:

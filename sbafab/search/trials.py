@@ -70,9 +70,9 @@ def measured(
         design = base.with_(dict(values))
         row |= {"keys": key_values(design), "sha256": design_sha256(design)}
         made_build = make_build(design)
-        worst = margins(made_build.findings)
+        worst = worst_findings(made_build.findings)
         row["rules"] = {
-            name: [rule.verdict, rule.margin, rule.measured, rule.limit, rule.unit]
+            name: [rule.verdict, margin(rule), rule.measured, rule.limit, rule.unit]
             for name, rule in worst.items()
         }
         shares = ([each.measured, *each.interval] for each in made_build.findings if each.interval)
@@ -125,37 +125,33 @@ def _one_line(error: Exception) -> str:
 ORDER: tuple[Verdict, ...] = ("fail", "waived", "warn", "pass")
 
 
-class RuleMargin(Finding):
-    """A rule's worst finding."""
-
-    @property
-    def margin(self) -> float | None:
-        """The margin of the value to its limit in its unit, below 0 if the rule fails; None if
-        nothing was measured, or without a limit.
-        """
-        if self.measured is None or self.limit is None:
-            return None
-        more = self.measured - self.limit
-        return round(-more if self.rule in AT_MOST else more, 6)
-
-    @property
-    def share(self) -> float | None:
-        """The margin as a share of the limit, unless that is 0."""
-        margin = self.margin
-        return margin / self.limit if margin is not None and self.limit else margin
-
-
-def margins(findings: Iterable[Finding]) -> dict[str, RuleMargin]:
-    """The worst of each rule, in the deck's order; findings waived by the rule itself are
-    ignored.
+def margin(finding: Finding) -> float | None:
+    """Return the margin of the value to its limit in its unit, below 0 if the rule fails; None if
+    nothing was measured, or without a limit.
     """
-    each: dict[str, list[RuleMargin]] = {}
+    if finding.measured is None or finding.limit is None:
+        return None
+    more = finding.measured - finding.limit
+    return round(-more if finding.rule in AT_MOST else more, 6)
+
+
+def margin_share(finding: Finding) -> float | None:
+    """Return the margin as a share of the limit, unless that is 0."""
+    left = margin(finding)
+    return left / finding.limit if left is not None and finding.limit else left
+
+
+def worst_findings(findings: Iterable[Finding]) -> dict[str, Finding]:
+    """Return the worst finding of each rule, in the deck's order; findings waived by the rule
+    itself are ignored.
+    """
+    each: dict[str, list[Finding]] = {}
     for finding in findings:
         if finding.verdict != "waived" or finding.by_user:
-            each.setdefault(finding.rule, []).append(RuleMargin(**vars(finding)))
+            each.setdefault(finding.rule, []).append(finding)
     return {
-        name: min(values, key=lambda rule: (ORDER.index(rule.verdict), rule.share or 0.0))
-        for name, values in each.items()
+        name: min(group, key=lambda one: (ORDER.index(one.verdict), margin_share(one) or 0.0))
+        for name, group in each.items()
     }
 
 

@@ -11,7 +11,7 @@ from decimal import Decimal
 from typing import Any
 
 from sbafab.design.files import as_in_a_file, override, shown
-from sbafab.design.records import Design, keys_of
+from sbafab.design.records import Design, Free, keys_of
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
 
@@ -23,20 +23,6 @@ NOTHING = "-"
 
 Values = Mapping[str, Any]
 """A value for each varied key, by dotted key."""
-
-
-@dataclass(frozen=True)
-class Varied:
-    """A key with its values; without values, all numbers from ``low`` to ``high``."""
-
-    key: str
-    values: tuple[Any, ...] = ()
-    low: float = 0.0
-    high: float = 0.0
-
-    @property
-    def is_continuous(self) -> bool:
-        return not self.values
 
 
 @dataclass(frozen=True)
@@ -66,7 +52,7 @@ def format_keys(values: Values) -> str:
     return ", ".join(f"{key} = {format_value(value)}" for key, value in values.items())
 
 
-def varied_keys(vary: Mapping[str, str | Iterable[Any]] | Sequence[str]) -> tuple[Varied, ...]:
+def varied_keys(vary: Mapping[str, str | Iterable[Any]] | Sequence[str]) -> tuple[Free, ...]:
     """Return the varied keys of texts such as ``"stack.balloons=3,6"``, or of values by key:
     several, one, or the text after the equals sign. Raises DesignError.
     """
@@ -78,60 +64,58 @@ def varied_keys(vary: Mapping[str, str | Iterable[Any]] | Sequence[str]) -> tupl
     )
 
 
-def _of_values(key: str, values: Iterable[Any]) -> Varied:
+def _of_values(key: str, values: Iterable[Any]) -> Free:
     is_one = isinstance(values, Mapping) or not isinstance(values, Iterable)
     table = as_in_a_file([values] if is_one else list(values))
     if not table:
         raise DesignError(f"vary has no value for {key}; give at least one")
-    return _varied(key, table, key, "vary")
+    return _listed(key, table, key, "vary")
 
 
-def read_varied(text: str, option: str = "--vary") -> Varied:
-    """``KEY=START:STOP:STEP``, ``KEY=START:STOP`` or ``KEY=a,b,c``. Raises DesignError."""
+def read_varied(text: str, option: str = "--vary") -> Free:
+    """``KEY=START:STOP:STEP``, ``KEY=START:STOP``, whose step is 0, or ``KEY=a,b,c``. Raises
+    DesignError.
+    """
     key, equals, values = text.partition("=")
     key = key.strip()
+    more = " or --vary stack.balloons=3,6,9" if option == "--vary" else ""
+    example = f"write for example {option} chamber.diameter=4:8:0.5{more}"
     if not equals or not key or not values.strip():
-        raise DesignError(f"{option} {shown(text)} is not KEY=VALUES; {_example(option)}")
+        raise DesignError(f"{option} {shown(text)} is not KEY=VALUES; {example}")
     if ":" in values:
-        return _range(key, values.split(":"), f"{option} {shown(text)}", _example(option))
+        return _range(key, values.split(":"), f"{option} {shown(text)}", example)
     # A list in brackets is one value; otherwise commas separate values.
     table = override({}, [f"values=[{values}]"])["values"]
     if not isinstance(table, list):
         table = [override({}, [f"value={value.strip()}"])["value"] for value in values.split(",")]
-    return _varied(key, table, text, option)
+    return _listed(key, table, text, option)
 
 
-def _example(option: str) -> str:
-    more = " or --vary stack.balloons=3,6,9" if option == "--vary" else ""
-    return f"write for example {option} chamber.diameter=4:8:0.5{more}"
-
-
-def _range(key: str, parts: Sequence[str], words: str, example: str) -> Varied:
+def _range(key: str, parts: Sequence[str], words: str, example: str) -> Free:
     try:
         # The number in mm if it has a unit.
-        start, stop, *step = (Decimal(repr(millimetres(part))) for part in parts)
+        start, stop, *steps = (Decimal(repr(millimetres(part))) for part in parts)
     except ValueError as error:
         raise DesignError(f"{words}: START, STOP and STEP {error}") from None
-    if len(step) > 1:
+    if len(steps) > 1:
         raise DesignError(f"{words} is not START:STOP:STEP; {example}")
     if stop < start:
         raise DesignError(f"{words} stops below its start; write the smaller number first")
-    if not step:
-        return Varied(key, (), float(start), float(stop))
-    by = step[0]
-    if by <= 0:
-        raise DesignError(f"{words}: STEP = {by} must be above 0")
-    count = int((stop - start) / by) + 1
+    if not steps:
+        return Free(key, float(start), float(stop), 0.0)
+    (step,) = steps
+    if step <= 0:
+        raise DesignError(f"{words}: STEP = {step} must be above 0")
+    count = int((stop - start) / step) + 1
     if count > MOST_VALUES:
         raise DesignError(
             f"{words} gives {count:,} values, and at most {MOST_VALUES:,} are allowed; make STEP "
             "larger"
         )
-    kind = int if start == int(start) and by == int(by) else float
-    return Varied(key, tuple(kind(start + number * by) for number in range(count)))
+    return Free(key, float(start), float(start + (count - 1) * step), float(step))
 
 
-def _varied(key: str, values: Sequence[Any], text: str, option: str) -> Varied:
+def _listed(key: str, values: Sequence[Any], text: str, option: str) -> Free:
     if any(isinstance(value, float) for value in values):
         values = [float(value) if type(value) is int else value for value in values]
     if len(values) > MOST_VALUES:
@@ -141,19 +125,19 @@ def _varied(key: str, values: Sequence[Any], text: str, option: str) -> Varied:
     for number, value in enumerate(values):
         if value in values[:number]:
             raise DesignError(f"{option} {shown(text)} names {shown(value)} twice; once is enough")
-    return Varied(key, tuple(values))
+    return Free.of_choices(key, values)
 
 
-def refuse_unknown(design: Design, varied: Sequence[Varied], option: str = "--vary") -> None:
+def refuse_unknown(design: Design, varied: Sequence[Free], option: str = "--vary") -> None:
     """Raises DesignError for a key unknown to the design, and for one varied twice."""
-    keys = [varied_key.key for varied_key in varied]
-    for varied_key in varied:
-        key, problems = varied_key.key, []
-        if keys.count(key) > 1:
-            raise DesignError(f"{option} {key} is given twice; put all its values into one")
-        for value in varied_key.values or (varied_key.low, varied_key.high):
+    keys = [free.key for free in varied]
+    for free in varied:
+        if keys.count(free.key) > 1:
+            raise DesignError(f"{option} {free.key} is given twice; put all its values into one")
+        problems = []
+        for value in free.values:
             try:
-                design.with_({key: value})
+                design.with_({free.key: value})
                 break
             except DesignError as error:
                 problems.append(error)
@@ -161,26 +145,26 @@ def refuse_unknown(design: Design, varied: Sequence[Varied], option: str = "--va
             raise problems[0]
 
 
-def grid(varied: Sequence[Varied]) -> Iterator[Values]:
+def grid(varied: Sequence[Free]) -> Iterator[Values]:
     """Every value of every key with every other's, the last key the fastest. Raises DesignError."""
-    for varied_key in varied:
-        if varied_key.is_continuous:
-            option = f"--vary {varied_key.key}={varied_key.low:g}:{varied_key.high:g}"
+    for free in varied:
+        if not free.step:
+            option = f"--vary {free.key}={free.low:g}:{free.high:g}"
             raise DesignError(
                 f"{option} has no step; add one, {option}:STEP, or draw from it with --samples N"
             )
-    count = math.prod(len(varied_key.values) for varied_key in varied)
+    count = math.prod(len(free.values) for free in varied)
     if count > MOST_DESIGNS:
         raise DesignError(
             f"the grid has {count:,} designs, and at most {MOST_DESIGNS:,} are allowed; take "
             "fewer values, or --samples N"
         )
-    names = [varied_key.key for varied_key in varied]
-    every = itertools.product(*(varied_key.values for varied_key in varied))
+    names = [free.key for free in varied]
+    every = itertools.product(*(free.values for free in varied))
     return (dict(zip(names, values, strict=True)) for values in every)
 
 
-def latin_hypercube(varied: Sequence[Varied], samples: int, seed: int) -> Iterator[Values]:
+def latin_hypercube(varied: Sequence[Free], samples: int, seed: int) -> Iterator[Values]:
     """``samples`` designs that divide each key's range into equal parts and use each part once.
 
     The same seed draws the same designs. Raises DesignError for more than are allowed.
@@ -189,17 +173,17 @@ def latin_hypercube(varied: Sequence[Varied], samples: int, seed: int) -> Iterat
         raise DesignError(f"--samples {samples:,} must be at most {MOST_DESIGNS:,}")
     dice = random.Random(seed)
     columns = []
-    for varied_key in varied:
+    for free in varied:
         order = list(range(samples))
         dice.shuffle(order)
-        columns.append([_at(varied_key, (place + dice.random()) / samples) for place in order])
-    names = [varied_key.key for varied_key in varied]
+        columns.append([_drawn(free, (place + dice.random()) / samples) for place in order])
+    names = [free.key for free in varied]
     # Few values give few combinations: each is used for one design.
     drawn = {repr(values): values for values in zip(*columns, strict=True)}
     return (dict(zip(names, values, strict=True)) for values in drawn.values())
 
 
-def _at(varied: Varied, share: float) -> Any:
-    if varied.is_continuous:
-        return round(varied.low + share * (varied.high - varied.low), DIGITS)
-    return varied.values[int(share * len(varied.values))]
+def _drawn(free: Free, share: float) -> Any:
+    if not free.step:
+        return round(free.low + share * (free.high - free.low), DIGITS)
+    return free.at(int(share * len(free.values)))

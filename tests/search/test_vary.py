@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 
 import sbafab
+from sbafab.design.records import Free
 from sbafab.errors import DesignError
 from sbafab.search.vary import (
-    Varied,
     grid,
     latin_hypercube,
     read_varied,
@@ -73,7 +73,7 @@ def test_values(text: str) -> None:
 def test_values_of_python_are_those_of_a_text(text: str) -> None:
     (found,) = varied_keys({"a": PYTHON[text]})
     (written,) = varied_keys([f"a={text}"])
-    assert found == written
+    assert found.values == written.values
     assert [type(one) for one in found.values] == [type(one) for one in written.values]
 
 
@@ -99,12 +99,15 @@ def test_unknown_keys_and_keys_without_any_good_value_are_refused() -> None:
 
 
 def test_a_grid_has_every_combination_once() -> None:
-    found = [tuple(v.values()) for v in grid([Varied("a", (1, 2, 3)), Varied("b", ("x", "y"))])]
+    found = [
+        tuple(v.values())
+        for v in grid([Free.of_choices("a", (1, 2, 3)), Free.of_choices("b", ("x", "y"))])
+    ]
     assert found == [(1, "x"), (1, "y"), (2, "x"), (2, "y"), (3, "x"), (3, "y")]
     with pytest.raises(DesignError, match="has no step"):
         grid([read_varied("a=1:2")])
     with pytest.raises(DesignError, match="at most 100,000"):
-        grid([Varied("a", tuple(range(1000))), Varied("b", tuple(range(1000)))])
+        grid([Free.of_choices(key, range(1000)) for key in "ab"])
 
 
 def test_a_latin_hypercube_takes_every_part_of_every_range_once() -> None:
@@ -116,4 +119,4 @@ def test_a_latin_hypercube_takes_every_part_of_every_range_once() -> None:
     assert Counter(row["b"] for row in drawn) == {1: 10, 2: 10, 3: 10, 4: 10}
     assert drawn == list(latin_hypercube(varied, 40, 7))
     assert drawn != list(latin_hypercube(varied, 40, 8))
-    assert len(list(latin_hypercube([Varied("b", (1, 2))], 40, 7))) == 2
+    assert len(list(latin_hypercube([Free.of_choices("b", (1, 2))], 40, 7))) == 2

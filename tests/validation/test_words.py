@@ -33,7 +33,7 @@ def _answers(folder: Path) -> dict[str, Any]:
         "chosen": [figure.key for figure in prediction.figures if not figure.other],
         "measured": [figure.key for figure in prediction.figures if figure.measured],
         "intervals": [figure.interval for figure in prediction.figures],
-        "main": [(pair.quantity, pair.differs) for pair in compared.figures if pair.is_main],
+        "main": [(pair.quantity, pair.differs) for pair in compared.figures if pair.main],
         "force": first and table.figures[first],
         "promised": {of: value for of, (value, _) in promised(design).predicted.items()},
         "found": found.best.figures if found.best else None,
