@@ -59,7 +59,7 @@ VACUUM = -6.0
 CHOICES = {
     "symmetry": ("full", "half", "quarter", "sector"),
     "procedure": ("dynamic", "static"),
-    "scene": ("shell", "volume"),
+    "scene": ("shell", "frames", "volume"),
 }
 """Allowed values of a request's settings, by name."""
 

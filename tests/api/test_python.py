@@ -210,7 +210,7 @@ def test_simulate_exports_a_deck_and_refuses_what_is_no_key(tmp_path: Path) -> N
     ("wish", "words"),
     [
         ({"simulator": "ccx"}, 'simulator = "ccx" must be one of calculix, sofa, mujoco'),
-        ({"simulator": "sofa", "scene": "film"}, 'scene = "film" must be one of shell, volume'),
+        ({"simulator": "sofa", "scene": "film"}, 'scene = "film" must be one of shell, frames'),
         ({"simulator": "calculix", "symmetry": "third"}, 'symmetry = "third" must be one of full'),
         ({"simulator": "calculix", "procedure": "slow"}, "must be one of dynamic, static"),
         ({"simulator": "calculix", "pressure": "6 kPa"}, "pressure = '6 kPa' must be a number"),

@@ -222,6 +222,12 @@ def test_a_run_that_takes_too_long_keeps_what_it_has_reached(
     assert "ran to 0.1 of 0.2 s: it was stopped after 0.02 minutes" in str(found.stopped)
 
 
+def test_each_scene_is_run_with_its_own_step(tmp_path: Path, stand_in: StandIn) -> None:
+    stand_in("runSofa", f"{GOOD}open('arguments', 'w').write(' '.join(sys.argv[1:]))")
+    ran(tmp_path, "frames")
+    assert (tmp_path / "sofa" / "arguments").read_text() == "-g batch -n 5 recorded.scn"
+
+
 def test_other_words_of_a_log_and_other_plugins_void_nothing() -> None:
     assert read_log("nanometre and banana\n", []) == (None, None)
     missing = '[ERROR] [PluginManager] Plugin not found: "SofaOpenGL"'

@@ -41,7 +41,7 @@ def ran(
     return run(built(*design), request, folder, ignore_progress)
 
 
-@pytest.mark.parametrize("scene", ["shell", "volume"])
+@pytest.mark.parametrize("scene", ["shell", "volume", "frames"])
 def test_a_lone_balloon_in_every_scene_it_has(tmp_path: Path, scene: str) -> None:
     done = ran(tmp_path, ("1dof-5mm", "stack.balloons=1"), 5.0, 3.0, scene)
     # One film held at its middle, the other free; the Mylar balloon is 2.29 mm high.
@@ -53,7 +53,7 @@ def test_a_lone_balloon_in_every_scene_it_has(tmp_path: Path, scene: str) -> Non
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("scene", "kpa", "seconds"),
-    [("shell", 10, 9.0), ("volume", 5, 4.0)],
+    [("shell", 10, 9.0), ("frames", 5, 4.0), ("volume", 5, 4.0)],
 )
 def test_three_chambers_stand_and_rise_in_every_scene(
     tmp_path: Path, scene: str, kpa: int, seconds: float
@@ -76,7 +76,7 @@ def test_it_bends_away_from_two_chambers_by_what_the_paper_measured(tmp_path: Pa
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scene", ["shell", "volume"])
+@pytest.mark.parametrize("scene", ["shell", "frames", "volume"])
 def test_one_chamber_along_x_bends_it_in_that_plane(tmp_path: Path, scene: str) -> None:
     volumes = {"chamber1": 80.0} if scene == "volume" else None
     done = ran(tmp_path, LOBED, {"chamber1": 5.0}, 3.0, scene, volumes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import xml.etree.ElementTree as ET
 from collections import Counter
 from functools import cache
@@ -22,7 +23,7 @@ from sbafab.simulators.sofa.run import (
 )
 
 FACTS = json.loads(Path(__file__).with_name("sofa_components.json").read_text(encoding="utf-8"))
-SCENES = ("actuator.scn", "actuator_volume.scn")
+SCENES = ("actuator.scn", "actuator_frames.scn", "actuator_volume.scn")
 NODE_FIELDS = {"name", "dt", "gravity"}
 CORE = "Sofa.Simulation.Core"
 
@@ -61,7 +62,8 @@ def node_count(path: list[ET.Element]) -> int:
     for node in reversed(path):
         state = node.find("MechanicalObject")
         if state is not None:
-            return len(state.attrib["position"].split()) // 3
+            size = 7 if state.attrib["template"] == "Rigid3d" else 3
+            return len(state.attrib["position"].split()) // size
     raise AssertionError("no MechanicalObject")
 
 
@@ -96,6 +98,10 @@ def test_indices_point_at_nodes(scene: ET.Element) -> None:
             count, indices = node_count(path), numbers(element.attrib[fields[element.tag]])
         elif element.tag == "SubsetMapping":
             count, indices = node_count(path[:-1]), numbers(element.attrib["indices"])
+        elif element.tag == "SkinningMapping":
+            count = node_count(path[:-1])
+            indices = [float(i) for i in re.findall(r"\d+", element.attrib["indices"])]
+            assert len(indices) == 2 * node_count(path)
         else:
             continue
         seen += 1
@@ -117,8 +123,9 @@ def test_the_shell_has_the_numbers_that_ran(folder: Path) -> None:
     assert every(scene, "SurfacePressureForceField", "useTangentStiffness") == [0, 0, 0]
     volume = parsed(folder / "actuator_volume.scn")
     assert every(volume, "SurfacePressureConstraint", "value") == [80, 80, 80]
-    for name in SCENES:
-        assert "ARTIFICIAL: mass" in (folder / name).read_text(encoding="utf-8").split("-->")[0]
+    frames = parsed(folder / "actuator_frames.scn")
+    assert frames.attrib["dt"] == "0.05"
+    assert every(frames, "TriangularFEMForceFieldOptim", "youngModulus") == [45.6, 91.2]
 
 
 @pytest.mark.parametrize("design", ["3dof-15mm", "1dof-10mm"])
@@ -139,12 +146,32 @@ def every_node(scene: ET.Element) -> np.ndarray:
     return np.array(numbers(places)).reshape(-1, 3)
 
 
+def test_skin_weights_are_linear_along_the_backbone(folder: Path) -> None:
+    scene = parsed(folder / "actuator_frames.scn")
+    film = next(node for node in scene.iter("Node") if node.attrib["name"] == "film")
+    states = [next(scene.iter("MechanicalObject")), film.find("MechanicalObject")]
+    frames, points = (
+        np.array(numbers(state.attrib["position"])).reshape(-1, size)
+        for state, size in zip(states, (7, 3), strict=True)
+        if state is not None
+    )
+    skin = next(scene.iter("SkinningMapping")).attrib
+    index = np.array([int(i) for i in re.findall(r"\d+", skin["indices"])]).reshape(-1, 2)
+    weight = np.array([float(w) for w in re.findall(r"[\d.e-]+", skin["weight"])]).reshape(-1, 2)
+    assert len(frames) == 9
+    assert weight.min() >= 0
+    # SkinningMapping reads the weights of a node up to the first that is 0.
+    assert (weight[:, 0] >= weight[:, 1]).all()
+    assert weight.sum(axis=1) == pytest.approx(1)
+    assert (weight * frames[index, 2]).sum(axis=1) == pytest.approx(points[:, 2], abs=1e-4)
+
+
 def test_files_of_one_chamber_are_the_same_twice(tmp_path: Path) -> None:
     for name in ("a", "b"):
         laminate = sbafab.build("1dof-5mm", "stack.balloons=2", "name=odd--name")
         export(laminate, SimulationRequest(3.0), tmp_path / name)
     first, second = (sorted((tmp_path / name).iterdir()) for name in ("a", "b"))
-    names = ["actuator.json", "actuator.scn", "actuator_volume.scn"]
+    names = ["actuator.json", "actuator.scn", "actuator_frames.scn", "actuator_volume.scn"]
     assert [path.name for path in first] == [*names, "scene.py"]
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
     # Two hyphens in a row would end the comment that holds the name.
@@ -261,6 +288,12 @@ def test_chambers_are_pressurised_apart() -> None:
     assert told["chamber1"]["pressureSpeed"] == "4"
     assert float(told["chamber3"]["pressureLowerBound"]) == pytest.approx(2.5, rel=1e-5)
     assert "pulseMode" not in told["chamber2"]
+
+
+def test_scenes_that_are_fitted_say_so(folder: Path) -> None:
+    said = {name: (folder / name).read_text(encoding="utf-8").split("-->")[0] for name in SCENES}
+    assert "Needs calibration" in said["actuator_frames.scn"]
+    assert "ARTIFICIAL: mass" in said["actuator.scn"]
 
 
 def test_volumes_that_cannot_be_are_refused(tmp_path: Path) -> None:

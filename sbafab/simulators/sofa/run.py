@@ -1,4 +1,4 @@
-"""SOFA: the films of an actuator, its scenes from templates, and a scene run with runSofa."""
+"""SOFA: the films of an actuator, its three scenes from templates, and a scene run with runSofa."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ from sbafab.simulators.simulator import (
 SECTORS = 12
 """Nodes per ring in scene A. From 8 to 12 the height grows by 6.6 %, from 12 to 16 by 2.2 %."""
 COARSE_SECTORS = 8
-"""Nodes per ring in scene C."""
+"""Nodes per ring in the other scenes."""
 
 
 def half_full(pocket: float, neck: float) -> Meridian:
@@ -195,7 +195,7 @@ def _marks(stack: Layup, mesh: Mesh, number: Ints) -> list[int]:
 # The files of scenes.
 
 
-SceneName = Literal["shell", "volume"]
+SceneName = Literal["shell", "frames", "volume"]
 TEMPLATES = Path(__file__).parent / "templates"
 DATA, PYTHON = "actuator.json", "scene.py"
 
@@ -209,6 +209,7 @@ PLUGINS = {
     "GenericConstraintSolver": "Sofa.Component.Constraint.Lagrangian.Solver",
     "LinearSolverConstraintCorrection": "Sofa.Component.Constraint.Lagrangian.Correction",
     "MechanicalObject": "Sofa.Component.StateContainer",
+    "SkinningMapping": "Sofa.Component.Mapping.Linear",
     "SparseLDLSolver": "Sofa.Component.LinearSolver.Direct",
     "SubsetMapping": "Sofa.Component.Mapping.Linear",
     "SurfacePressureConstraint": "SoftRobots",
@@ -223,9 +224,10 @@ PLUGINS = {
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A scene, and the values of the template of its name."""
+    """A scene: its time step ``dt`` in s, and the values of the template of its name."""
 
     name: SceneName
+    dt: float
     films: RecordedFilms
     values: Mapping[str, object]
 
@@ -236,7 +238,7 @@ class Scene:
     def text(self, record: bool = False) -> str:
         """The scene as a file, with a record of all nodes of its films if ``record``."""
         films = self.films
-        values = {"dt": DT, "ramp": RAMP, "period": PERIOD, "nodes_file": NODES_FILE}
+        values = {"dt": self.dt, "ramp": RAMP, "period": PERIOD, "nodes_file": NODES_FILE}
         values |= {"shell": films.shell, "pressures": films.pressures, "record": record}
         template = TEMPLATES / f"{self.name}.j2"
         name = films.laminate.name
@@ -293,6 +295,39 @@ def imposed_volumes(stack: RoundStack, volumes: Mapping[str, float] | None) -> d
     return {name: volumes.get(name, 0.0) for name in stack.chambers}
 
 
+# Scene B: nine frames on the backbone that carry the films.
+
+
+FRAMES = 9
+"""Reference frames on the backbone (paper, Sec. 3.2.2), if the stack has enough balloons: at most
+as many as levels, or a balloon would wave."""
+FRAMES_DT = 0.05
+SOFTENING = 0.12
+"""Share of the true modulus at which 5 kPa lift 15 balloons as high as in scene A."""
+
+
+def _framed(stack: RoundStack, shell: Shell) -> dict[str, object]:
+    count = min(FRAMES, stack.balloons + 1)
+    weights = [pair_of_frames(z, shell.height, count) for z in shell.position[:, 2].tolist()]
+    values = {"frames": count, "weights": weights, "poisson": stack.poisson}
+    return {**values, "membrane": stack.membrane, "share": SOFTENING}
+
+
+def pair_of_frames(
+    z: float, height: float, frames: int = FRAMES
+) -> tuple[tuple[int, int], tuple[float, float]]:
+    """The two frames next to a height and their weights, the nearer one first.
+
+    SkinningMapping reads a node's weights up to the first 0, so a 0 must come last.
+    """
+    place = z / height * (frames - 1)
+    below = min(frames - 2, max(0, math.floor(place)))
+    above = round(place - below, 6)
+    if above > 0.5:
+        return (below + 1, below), (above, round(1 - above, 6))
+    return (below, below + 1), (round(1 - above, 6), above)
+
+
 # The scenes of a design.
 
 
@@ -302,20 +337,26 @@ def scenes_of(
     """The scenes of a laminate by name, the default one first.
 
     ``pressures`` in kPa by chamber; ``volumes`` (scene C, above its start) in ul by chamber, 0 for
-    omitted ones, by default some 80 ul in each. Scene C requires round pockets of one film.
+    omitted ones, by default some 80 ul in each. Scenes B and C require round pockets of one film.
     Raises DesignError if a chamber is unknown, or if other pockets need a mesher that is not
     installed.
     """
     stack = None if why_not_round(laminate) else round_stack(laminate)
     shell = conforming_shell(laminate) if stack is None else round_shell(stack)
-    films = RecordedFilms(laminate, shell, shell.tip, pressures, pressures.values())
-    scenes = [Scene("shell", films, _mass(shell, max(pressures.values())))]
+
+    def films(shell: Shell) -> RecordedFilms:
+        return RecordedFilms(laminate, shell, shell.tip, pressures, pressures.values())
+
+    scenes = [Scene("shell", DT, films(shell), _mass(shell, max(pressures.values())))]
     if stack is not None:
+        # Nine frames cannot draw in a pocket's edge, so the start must not have it drawn in either.
+        framed = round_shell(stack, COARSE_SECTORS, nearly_flat)
+        scenes.append(Scene("frames", FRAMES_DT, films(framed), _framed(stack, framed)))
         imposed = imposed_volumes(stack, volumes)
         half = round_shell(stack, COARSE_SECTORS, half_full)
         by_volume = RecordedFilms(laminate, half, half.tip, {}, imposed.values())
         values = {"volumes": imposed, "usual": usual_volume(stack)}
-        scenes.append(Scene("volume", by_volume, {**values, **_mass(half, VOLUME_PRESSURE)}))
+        scenes.append(Scene("volume", DT, by_volume, {**values, **_mass(half, VOLUME_PRESSURE)}))
     return {scene.name: scene for scene in scenes}
 
 
@@ -390,7 +431,7 @@ def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: 
     missing, VoidError if the result is invalid.
     """
     if request.volumes and request.scene != "volume":
-        raise DesignError("--volume is for --scene volume; the other scene is told pressures")
+        raise DesignError("--volume is for --scene volume; the other scenes are told pressures")
     scenes = export(laminate, request, folder)
     scene = scenes.get(request.scene or "shell")
     if scene is None:
@@ -408,7 +449,7 @@ def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: 
     recorded.write_text(text, encoding="utf-8", newline="\n")
     seconds = SECONDS if request.seconds is None else request.seconds
     # Nodes are written at the beginning of a step: one more step writes the last.
-    steps = round(seconds / DT) + 1
+    steps = round(seconds / scene.dt) + 1
     plugins = NEEDED.findall(text)
     result = run_model(
         "sofa",
