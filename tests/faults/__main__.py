@@ -9,10 +9,9 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from tests.faults.catalogue import FAULTS, TEMPLATES, caught_by, cell, good_folders
+from tests.faults.catalogue import FAULTS, PAGE, TEMPLATES, caught_by, cell, good_folders, text
 from tests.faults.once import remembering
-from tests.faults.specimen import quick
-from tests.faults.table import PAGE, text
+from tests.faults.record import quick
 
 
 def main() -> int:

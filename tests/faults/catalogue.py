@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 
 from filelock import FileLock
 
+from docs.scripts.tables import FOLDER, Table, from_csv
 from sbafab.actuators import load_design
 from sbafab.design.identity import design_sha256
 from sbafab.errors import DesignError
@@ -17,8 +18,7 @@ from sbafab.folders.check import read_folder
 from sbafab.folders.differences import DESIGNED
 from sbafab.folders.run import RunRequest, generate
 from tests.faults import beside, chords, claims, files, holes, joints, layers, masks, sheets
-from tests.faults.record import PAPER, Fault, Kind
-from tests.faults.specimen import Specimen, failing, unabridged
+from tests.faults.record import PAPER, Fault, Kind, Specimen, failing, unabridged
 from tests.folders.doctoring import Doctor
 
 TEMPLATES = (*PAPER, joints.TEMPLATE)
@@ -96,3 +96,34 @@ def cell(fault: Fault, found: tuple[str, ...] | str) -> str:
     others = ", ".join(rule for rule in found if rule not in (fault.rule, DESIGNED))
     caught = "caught" if fault.rule in found else "MISSED"
     return f"{caught}; {others}" if others else caught
+
+
+# ``docs/measured/faults.csv``: what the checks find of every fault, and the cells read back.
+
+
+PAGE = FOLDER / "faults.csv"
+Cells = Mapping[tuple[str, str], str]
+"""By fault and template."""
+COLUMNS = ("section", "note", "fault", "rule", *TEMPLATES)
+
+
+def text(cells: Cells) -> str:
+    """Return the file for what was found."""
+    rows = [
+        [kind.title, kind.note, fault.name, f"`{fault.rule}`"]
+        + [cells[fault.name, template] for template in TEMPLATES]
+        for kind in KINDS
+        for fault in kind.faults
+    ]
+    return Table(COLUMNS, rows).csv
+
+
+def cells_of(page: str) -> Cells:
+    """Return the cells that the file holds."""
+    names = {fault.name for fault in FAULTS}
+    return {
+        (row[2], template): cell
+        for row in from_csv(page).rows
+        if row[2] in names
+        for template, cell in zip(TEMPLATES, row[4:], strict=True)
+    }

@@ -11,8 +11,7 @@ from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.region import Region, polygon
-from tests.faults.record import Fault, Kind
-from tests.faults.specimen import Pick, Specimen, mask, separator, wall
+from tests.faults.record import Fault, Kind, Pick, Specimen, mask, separator, wall
 
 ERROR = 0.05
 

@@ -7,13 +7,15 @@ from collections.abc import Sequence
 from sbafab.geometry.offset import grow, shrink
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
-from tests.faults.record import Fault, Kind, redrawn
-from tests.faults.specimen import (
+from tests.faults.record import (
     Change,
+    Fault,
+    Kind,
     base,
     cap,
     inlet_mask,
     mask,
+    redrawn,
     separator,
     tabbed_wall,
     wall,

@@ -7,12 +7,16 @@ from sbafab.geometry.offset import grow, shrink
 from sbafab.geometry.region import Region, disc, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate
 from tests.faults.holes import aside, bore, cut_in_two
-from tests.faults.record import Kind, no_lumen, no_sheet, one_chamber, redrawn
-from tests.faults.specimen import (
+from tests.faults.record import (
+    Kind,
     base,
     cap,
     inlet_mask,
     mask,
+    no_lumen,
+    no_sheet,
+    one_chamber,
+    redrawn,
     separator,
     sheet_mask,
     wall,

@@ -17,10 +17,18 @@ from sbafab.design.files import rule_names
 from sbafab.errors import DesignError
 from sbafab.folders.as_cut import CutPart
 from sbafab.folders.differences import CLAIMS, DESIGNED, INTEGRITY
-from tests.faults.catalogue import FAULTS, KINDS, TEMPLATES, Goods, caught_by, cell
-from tests.faults.record import PAPER, Fault
-from tests.faults.specimen import LEFT_OUT, failing, quick, unabridged
-from tests.faults.table import PAGE, cells_of, text
+from tests.faults.catalogue import (
+    FAULTS,
+    KINDS,
+    PAGE,
+    TEMPLATES,
+    Goods,
+    caught_by,
+    cell,
+    cells_of,
+    text,
+)
+from tests.faults.record import LEFT_OUT, PAPER, Fault, failing, quick, unabridged
 from tests.quick import few
 
 MOST, WIDER = "1dof-5mm", "1dof-10mm"

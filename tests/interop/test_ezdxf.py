@@ -6,24 +6,19 @@ import math
 import re
 from io import StringIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import ezdxf
 import pytest
 import shapely
 from ezdxf.document import Drawing
-from hypothesis import given, settings
 from pyogrio import raw
 
-from sbafab.actuators import build, load_design
 from sbafab.cutting.cut_settings import DxfProfile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.offset import fillet
 from sbafab.geometry.region import Region, disc, stadium, strip, union
-from tests.interop.judging import areas
-from tests.properties.designs import Draft, valid
 
 AXES = [(4.25 * math.cos(turn), 4.25 * math.sin(turn)) for turn in (0.5, 2.6, 4.7)]
 PROFILES: list[DxfProfile] = ["bulges", "arcs", "chords"]
@@ -175,13 +170,3 @@ def test_contours_enclose_the_area(name: str, profile: DxfProfile, tmp_path: Pat
         found += sign * sum(polygon.area for polygon in polygons.geoms)
     length = sum(contour.length for contour in region.contours)
     assert found == pytest.approx(area, abs=0.005 * length if profile == "chords" else 1e-4 * area)
-
-
-@settings(max_examples=8)
-@given(valid())
-def test_every_layer_of_a_random_design_has_its_area(draft: Draft) -> None:
-    with TemporaryDirectory() as name:
-        folder = Path(name)
-        laminate = build(load_design(draft.write(folder)))
-        for ours, theirs in areas(laminate, folder):
-            assert theirs == pytest.approx(ours, rel=1e-4)

@@ -335,32 +335,28 @@ def test_a_wrap_is_glued_with_what_its_design_names() -> None:
 
 
 @pytest.mark.parametrize(
-    ("template", "changes", "expected", "proved"),
+    ("template", "changes", "proved"),
     [
-        # 367 kPa with pockets of 5 mm in 0.038 (paper, Sec. 4): p r / 2 t is what the film bears.
-        ("1dof-5mm", (), 367.0, 150.0),
-        ("3dof-15mm", (), 367.0, 150.0),
-        ("1dof-10mm", (), 367.0 / 2, 110.0),
-        ("1dof-10mm", ("films.tpe.thickness=0.057",), 367.0 / 2 * 1.5, 150.0),
-        # A pocket 10 wide is a cylinder of radius 10 / pi, whose film bears p r / t.
-        ("radial-15mm", (), 367.0 * 2.5 / (2 * 10 / math.pi), 85.0),
-        ("1dof-5mm", ("acceptance.proof_pressure_kpa=120",), 367.0, 120.0),
-        ("1dof-5mm", ("films.tpe.product=TPU", "films.tpe.thickness=0.038"), None, None),
-        ("1dof-5mm", (*TPU, "acceptance.proof_pressure_kpa=60"), None, 60.0),
+        ("1dof-5mm", (), 150.0),
+        ("3dof-15mm", (), 150.0),
+        ("1dof-10mm", (), 110.0),
+        ("1dof-10mm", ("films.tpe.thickness=0.057",), 150.0),
+        ("radial-15mm", (), 85.0),
+        ("1dof-5mm", ("acceptance.proof_pressure_kpa=120",), 120.0),
+        ("1dof-5mm", ("films.tpe.product=TPU", "films.tpe.thickness=0.038"), None),
+        ("1dof-5mm", (*TPU, "acceptance.proof_pressure_kpa=60"), 60.0),
     ],
 )
 def test_proof_pressure_stays_well_below_the_burst(
-    template: str, changes: tuple[str, ...], expected: float | None, proved: float | None
+    template: str, changes: tuple[str, ...], proved: float | None
 ) -> None:
+    """What pockets burst at by the paper's, tests/rules/test_pressure_rating.py has."""
     work = work_of(template, *changes)
-    estimate = burst(work.laminate)
-    assert (estimate is None) == (expected is None)
-    if estimate is not None:
-        assert estimate.kpa == pytest.approx(expected, rel=1e-6)
-    found = proof(work)
+    estimate, found = burst(work.laminate), proof(work)
+    assert (estimate is None) == any("films.tpe.product" in change for change in changes)
     assert found.kilopascals == proved
-    if expected is not None and found.kilopascals is not None:
-        assert found.kilopascals <= 0.6 * expected
+    if estimate is not None and proved is not None:
+        assert proved <= 0.6 * estimate.kpa
     assert (found.paper_kpa, found.paper_error) == (367, 18)
 
 

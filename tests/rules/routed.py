@@ -11,7 +11,9 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import product
 from random import Random
+from typing import Any
 
 import numpy as np
 import shapely
@@ -308,10 +310,11 @@ class Planted:
 
 def planted(kind: str, seed: int) -> Planted:
     """Return random routes with a fault of this kind; the next seed where it has no place."""
+    places, plant = FAULTS[kind]
     while True:
-        fault = FAULTS[kind](routed(seed), Random(seed))
-        if fault is not None:
-            return fault
+        routes, random = routed(seed), Random(seed)
+        if found := places(routes):
+            return plant(routes, random, random.choice(found))
         seed += 100_000
 
 
@@ -325,31 +328,61 @@ def unjoined(routes: Routes) -> list[tuple[Place, Place]]:
     ]
 
 
-def cut(routes: Routes, random: Random) -> Planted | None:
-    if not routes.segments:
-        return None
-    a, b = random.choice(sorted(routes.segments))
+def crossings(routes: Routes) -> list[Place]:
+    """Places under another net's."""
+    nodes = routes.nodes
+    return [a for a in sorted(nodes) if nodes.get((a[0] + 1, *a[1:]), nodes[a]) != nodes[a]]
+
+
+def beside_others(routes: Routes) -> list[tuple[Place, Place]]:
+    nodes = routes.nodes
+    return [(a, b) for a, b in unjoined(routes) if b in nodes and nodes[a] != nodes[b]]
+
+
+def beside_nothing(routes: Routes) -> list[tuple[Place, Place]]:
+    """Places within a net, with those beside them that no net uses."""
+    ends = set(routes.ports.values())
+    return [(a, b) for a, b in unjoined(routes) if b not in routes.nodes and a not in ends]
+
+
+def unused(routes: Routes) -> list[Place]:
+    columns, rows = routes.size
+    grid = product(range(routes.interfaces), range(columns), range(rows))
+    return [place for place in grid if place not in routes.nodes and place[1]]
+
+
+def under_nothing(routes: Routes) -> list[Place]:
+    nodes = routes.nodes
+    below = [a for a in sorted(nodes) if a[0] + 1 < routes.interfaces and a[1]]
+    return [a for a in below if (a[0] + 1, *a[1:]) not in nodes]
+
+
+def mouths_and(routes: Routes, is_there: Callable[[Place, Place], bool]) -> list[tuple[str, Place]]:
+    """Ports with a mouth, and the places of other nets that are there."""
+    return [
+        (port, place)
+        for port in routes.mouths
+        for place, net in sorted(routes.nodes.items())
+        if is_there(place, routes.ports[port]) and net != routes.nodes[routes.ports[port]]
+    ]
+
+
+def cut(routes: Routes, random: Random, way: tuple[Place, Place]) -> Planted:
+    a, b = way
     ends = [between(xy(a), xy(b), 0.5 + s * random.uniform(0.08, 0.12)) for s in (-1, 1)]
     shape = strip(*ends, routes.width + 0.5)
     routes.less.append((a[0], shape))
     return Planted("open", (a[0] + 1,), shape, routes)
 
 
-def bridge(routes: Routes, random: Random) -> Planted | None:
-    nodes = routes.nodes
-    pairs = [(a, b) for a, b in unjoined(routes) if b in nodes and nodes[a] != nodes[b]]
-    if not pairs:
-        return None
-    a, b = random.choice(pairs)
+def bridge(routes: Routes, random: Random, way: tuple[Place, Place]) -> Planted:
+    a, b = way
     shape = strip(xy(a), xy(b), random.uniform(0.3, routes.width))
     routes.more.append((a[0], shape))
     return Planted("short", (a[0] + 1,), shape, routes)
 
 
-def missing_via(routes: Routes, random: Random) -> Planted | None:
-    if not routes.vias:
-        return None
-    via = random.choice(sorted(routes.vias))
+def missing_via(routes: Routes, _: Random, via: Place) -> Planted:
     # Its pads stay.
     pad = disc(xy(via), routes.pad / 2)
     routes.more += [(level, pad) for level in (via[0], via[0] + 1)]
@@ -357,47 +390,27 @@ def missing_via(routes: Routes, random: Random) -> Planted | None:
     return Planted("open", (via[0] + 1, via[0] + 2), pad, routes)
 
 
-def extra_via(routes: Routes, random: Random) -> Planted | None:
-    crossings = [
-        a
-        for a in sorted(routes.nodes)
-        if routes.nodes.get((a[0] + 1, *a[1:]), routes.nodes[a]) != routes.nodes[a]
-    ]
-    if not crossings:
-        return None
-    a = random.choice(crossings)
+def extra_via(routes: Routes, _: Random, a: Place) -> Planted:
     routes.holes.append((a[0] + 1, xy(a)))
     return Planted("short", (a[0] + 1, a[0] + 2), disc(xy(a), routes.hole / 2), routes)
 
 
-def stub(routes: Routes, random: Random) -> Planted | None:
-    ends = set(routes.ports.values())
-    pairs = [(a, b) for a, b in unjoined(routes) if b not in routes.nodes and a not in ends]
-    if not pairs:
-        return None
-    a, b = random.choice(pairs)
+def stub(routes: Routes, _: Random, way: tuple[Place, Place]) -> Planted:
+    a, b = way
     shape = strip(xy(a), xy(b), routes.width) | disc(xy(b), routes.width / 2)
     routes.more.append((a[0], shape))
     return Planted("dead-end", (a[0] + 1,), shape, routes)
 
 
-def leak(routes: Routes, random: Random) -> Planted | None:
-    last = routes.size[0] - 1
-    places_out = [place for place in sorted(routes.nodes) if place[1] == last]
-    if not places_out:
-        return None
-    a = random.choice(places_out)
-    edge = (last * PITCH + MARGIN, xy(a)[1])
+def leak(routes: Routes, _: Random, a: Place) -> Planted:
+    edge = ((routes.size[0] - 1) * PITCH + MARGIN, xy(a)[1])
     shape = strip(xy(a), (edge[0] + OVERHANG, edge[1]), routes.width)
     routes.more.append((a[0], shape))
     return Planted("leak", (a[0] + 1,), disc(edge, 0.1), routes)
 
 
-def wide_mouth(routes: Routes, random: Random) -> Planted | None:
+def wide_mouth(routes: Routes, random: Random, port: str) -> Planted:
     """An opening that goes on past the end of its mouth, or a mouth stated beside its opening."""
-    if not routes.mouths:
-        return None
-    port = random.choice(routes.mouths)
     level, y = routes.ports[port][0], xy(routes.ports[port])[1]
     side, more = random.choice((-1, 1)), random.uniform(0.15, 0.7)
     end = y + side * routes.width / 2
@@ -409,17 +422,9 @@ def wide_mouth(routes: Routes, random: Random) -> Planted | None:
     return Planted("leak", (level + 1,), disc((-MARGIN, end), more), routes)
 
 
-def shared_mouth(routes: Routes, random: Random) -> Planted | None:
+def shared_mouth(routes: Routes, _: Random, both: tuple[str, Place]) -> Planted:
     """A mouth stated so wide that the channel of another net opens into it, too."""
-    beside = [
-        (port, place)
-        for port in routes.mouths
-        for place, net in sorted(routes.nodes.items())
-        if place[:2] == (routes.ports[port][0], 0) and net != routes.nodes[routes.ports[port]]
-    ]
-    if not beside:
-        return None
-    port, place = random.choice(beside)
+    port, place = both
     own, y = xy(routes.ports[port])[1], xy(place)[1]
     routes.more.append((place[0], strip((-MARGIN - OVERHANG, y), xy(place), routes.width)))
     routes.stated[port] = (own + y) / 2, abs(own - y) + routes.width
@@ -427,17 +432,9 @@ def shared_mouth(routes: Routes, random: Random) -> Planted | None:
     return Planted("short", (place[0] + 1,), edge, routes)
 
 
-def foreign_balloon(routes: Routes, random: Random) -> Planted | None:
+def foreign_balloon(routes: Routes, _: Random, both: tuple[str, Place]) -> Planted:
     """A port with a mouth that is named in one more interface, where another net lies."""
-    over = [
-        (port, place)
-        for port in routes.mouths
-        for place, net in sorted(routes.nodes.items())
-        if place[1:] == routes.ports[port][1:] and net != routes.nodes[routes.ports[port]]
-    ]
-    if not over:
-        return None
-    port, place = random.choice(over)
+    port, place = both
     shape = strip((CENTRE - 0.5, xy(place)[1]), xy(place), routes.width)
     routes.more.append((place[0], shape))
     routes.named[port] = place[0]
@@ -445,49 +442,31 @@ def foreign_balloon(routes: Routes, random: Random) -> Planted | None:
     return Planted("short", (place[0] + 1,), near, routes)
 
 
-def stray(routes: Routes, random: Random) -> Planted | None:
-    columns, rows = routes.size
-    free = [
-        (level, x, y)
-        for level in range(routes.interfaces)
-        for x in range(columns)
-        for y in range(rows)
-        if (level, x, y) not in routes.nodes and x
-    ]
-    if not free:
-        return None
-    a = random.choice(free)
+def stray(routes: Routes, _: Random, a: Place) -> Planted:
     shape = disc(xy(a), routes.width)
     routes.more.append((a[0], shape))
     return Planted("stray", (a[0] + 1,), shape, routes)
 
 
-def blind_hole(routes: Routes, random: Random) -> Planted | None:
-    below = [
-        a
-        for a in sorted(routes.nodes)
-        if a[0] + 1 < routes.interfaces and (a[0] + 1, *a[1:]) not in routes.nodes and a[1]
-    ]
-    if not below:
-        return None
-    a = random.choice(below)
+def blind_hole(routes: Routes, _: Random, a: Place) -> Planted:
     routes.holes.append((a[0] + 1, xy(a)))
     return Planted("dead-end", (a[0] + 2,), disc(xy(a), routes.hole / 2), routes)
 
 
-FAULTS: Mapping[str, Callable[[Routes, Random], Planted | None]] = {
-    "cut": cut,
-    "bridge": bridge,
-    "missing-via": missing_via,
-    "extra-via": extra_via,
-    "stub": stub,
-    "leak": leak,
-    "wide-mouth": wide_mouth,
-    "shared-mouth": shared_mouth,
-    "foreign-balloon": foreign_balloon,
-    "stray": stray,
-    "blind-hole": blind_hole,
+FAULTS: Mapping[str, tuple[Callable[[Routes], list[Any]], Callable[..., Planted]]] = {
+    "cut": (lambda routes: sorted(routes.segments), cut),
+    "bridge": (beside_others, bridge),
+    "missing-via": (lambda routes: sorted(routes.vias), missing_via),
+    "extra-via": (crossings, extra_via),
+    "stub": (beside_nothing, stub),
+    "leak": (lambda r: [p for p in sorted(r.nodes) if p[1] == r.size[0] - 1], leak),
+    "wide-mouth": (lambda routes: routes.mouths, wide_mouth),
+    "shared-mouth": (lambda r: mouths_and(r, lambda p, own: p[:2] == (own[0], 0)), shared_mouth),
+    "foreign-balloon": (lambda r: mouths_and(r, lambda p, own: p[1:] == own[1:]), foreign_balloon),
+    "stray": (unused, stray),
+    "blind-hole": (under_nothing, blind_hole),
 }
+"""Where a fault may be, and how it is planted there."""
 
 
 def between(a: Point, b: Point, share: float) -> Point:

@@ -382,21 +382,6 @@ ROWS: dict[str, list[Row]] = {
         Row("fail no-hole", ANY, on_ear(5, "film1", lambda p: disc(p, 0.8)), (None, (5,))),
         Row("fail blocked-laid", ANY, on_ear(3, "strip1", beside_tab), (None, (3,))),
     ],
-    "pin-fit": [
-        # A hole of 0.94 at worst; pins of 0.6 and 0.99 to m6 are up to 0.608 and 0.998 thick.
-        Row(
-            "pass fit",
-            0.0,
-            of(("1dof-5mm", "bore.pin_diameter=0.6")),
-            settings=("registration.cutting_error=0.01", "registration.pin_error=0.02"),
-        ),
-        Row(
-            "pass fit",
-            0.998 / 0.94 - 1,
-            of(("1dof-5mm", "bore.pin_diameter=0.99")),
-            settings=("registration.cutting_error=0.01", "registration.pin_error=0.02"),
-        ),
-    ],
 }
 
 

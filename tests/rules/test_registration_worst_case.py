@@ -381,10 +381,11 @@ def test_cutting_and_pins_both_narrow_a_hole(good: Good) -> None:
     """
     limits = PAPER.with_("registration.cutting_error=0.01", "registration.pin_error=0.02")
     [loose] = pin_fit.check(Measures(good("1dof-5mm", "bore.pin_diameter=0.6"), limits))
-    assert loose.measured == 0.0
+    assert (loose.id, loose.verdict, loose.measured) == ("pin-fit.fit", "pass", 0.0)
     assert "(0.332 mm to spare at worst)" in loose.message
     assert "may come out 0.940 mm wide" in loose.message
     [tight] = pin_fit.check(Measures(good("1dof-5mm", "bore.pin_diameter=0.99"), limits))
+    assert (tight.id, tight.verdict) == ("pin-fit.fit", "pass")
     # Findings are rounded to the sixth digit.
     assert tight.measured == pytest.approx(0.998 / 0.94 - 1, abs=5e-7)
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
+import pytest
 from PIL import Image, ImageChops
 
 from sbafab import api
@@ -46,6 +47,13 @@ def chromium() -> str | None:
     if find_spec("playwright") is None:
         return None
     return next((path for path in CHROMIUM if Path(path).exists()), None)
+
+
+BROWSED = [
+    pytest.mark.long,
+    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
+]
+"""Marks of the tests that start a server, its workers and a browser."""
 
 
 @contextlib.contextmanager

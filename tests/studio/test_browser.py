@@ -14,20 +14,17 @@ import pytest
 
 from sbafab import api
 from tests.studio.browsing import (
+    BROWSED,
     DESIGN,
     FILE,
     PATIENCE,
     Watched,
-    chromium,
     colours,
     picture,
     share_changed,
 )
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
-]
+pytestmark = BROWSED
 
 
 # 1. The form and the text.

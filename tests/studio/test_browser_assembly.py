@@ -11,12 +11,9 @@ import pytest
 
 from sbafab import api
 from sbafab.assemblies.shapes import placed_surface
-from tests.studio.browsing import Watched, chromium, colours, picture, served, share_changed
+from tests.studio.browsing import BROWSED, Watched, colours, picture, served, share_changed
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
-]
+pytestmark = BROWSED
 BRACE = api.template("brace")
 
 

@@ -15,21 +15,18 @@ from PIL import Image
 from sbafab import api
 from tests.studio.asking import packed
 from tests.studio.browsing import (
+    BROWSED,
     DESIGN,
     FILE,
     PATIENCE,
     Watched,
-    chromium,
     colours,
     picture,
     served,
     share_changed,
 )
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
-]
+pytestmark = BROWSED
 
 CONE = api.template("1dof-5mm").replace('name = "1dof-5mm"', 'name = "cone"')
 

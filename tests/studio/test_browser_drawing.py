@@ -14,12 +14,9 @@ from typing import Any
 import pytest
 
 from sbafab import api
-from tests.studio.browsing import Watched, chromium, served
+from tests.studio.browsing import BROWSED, Watched, served
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
-]
+pytestmark = BROWSED
 POUCH = api.template("pouch")
 FILE = "pouch.toml"
 

@@ -12,12 +12,9 @@ from typing import Any
 import pytest
 
 from sbafab import api
-from tests.studio.browsing import Watched, chromium, colours, picture, served
+from tests.studio.browsing import BROWSED, Watched, colours, picture, served
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
-]
+pytestmark = BROWSED
 # Two nets, each from a pocket of the lower gap through a hole of the middle film into the upper.
 ROUTED = """
 name = "routed"

@@ -13,12 +13,9 @@ import pytest
 from PIL import Image
 
 from sbafab import api
-from tests.studio.browsing import Watched, chromium, picture, share_changed
+from tests.studio.browsing import BROWSED, Watched, picture, share_changed
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
-]
+pytestmark = BROWSED
 SOLID = "#view-solid .surface"
 STATIC = Path(api.__file__).parents[1] / "studio" / "static"
 

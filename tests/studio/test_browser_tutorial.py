@@ -5,12 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
-
 from sbafab import api
-from tests.studio.browsing import Watched, browser, chromium, served
+from tests.studio.browsing import BROWSED, Watched, browser, served
 
 PAGE = Path(__file__).parents[2] / "docs" / "learn" / "studio.md"
+pytestmark = BROWSED
 STEP = re.compile(r"Set \*\*([\w.]+)\*\* to `(\S+)`|(?:[Cc]lick|tick) \*\*([^*]+)\*\*")
 
 
@@ -27,8 +26,6 @@ def click(seen: Watched, name: str) -> None:
     found.first.click()
 
 
-@pytest.mark.long
-@pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed")
 def test_the_tutorial_works_as_written(tmp_path: Path) -> None:
     (tmp_path / "gripper.toml").write_text(api.template("3dof-15mm"), encoding="utf-8")
     steps = STEP.findall(PAGE.read_text(encoding="utf-8"))
