@@ -33,20 +33,16 @@ TERMS: Mapping[str, str] = {
     ),
     "press-factor": (
         "The thickness of films after the press over that before, of those that melt in it "
-        "(--press-factor of predict). The calibration gives 0.204 for the paper's film; any other "
-        "counts as bought until you measure the folded height and give the ratio."
+        "(press_factor of predict.json). The calibration gives 0.204 for the paper's film; any "
+        "other counts as bought until you calibrate on folded heights of it."
     ),
     "pocket-loss": (
         "By how many mm the radius of a pocket comes out smaller than drawn, since molten film "
-        "creeps under the mask (--pocket-loss of predict). The calibration gives it; yours takes "
-        "its place in the elastic models."
-    ),
-    "contact-factor": (
-        "The measured blocked force over that of Eqs. 1-4 (--contact-factor of predict), 1 unless "
-        "you give it. The elastic models take no notice of it."
+        "creeps under the mask (pocket_loss of predict.json). The calibration gives it; values "
+        "that you measured on an actuator narrow it."
     ),
 }
-"""Flags of figures, and options of predictions, each in two sentences."""
+"""Flags of figures, and factors of predictions, each in two sentences."""
 
 
 @dataclass(frozen=True)

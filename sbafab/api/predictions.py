@@ -59,11 +59,7 @@ def predict(
     pressures_kpa: float | Sequence[float] | None = None,
     flow_ml_min: float = PredictionRequest.flow_ml_min,
     volumes_ul: float | Sequence[float] = PredictionRequest.volumes_ul,
-    press_factor: float | None = None,
-    contact_factor: float | None = None,
-    pocket_loss: float | None = None,
-    modulus_mpa: float | None = None,
-    tip_load: float | None = None,
+    tip_load: float = 0.0,
     measured: Sequence[str] = (),
     serial: str | None = None,
     lab: str | Path = "lab.sqlite",
@@ -77,10 +73,9 @@ def predict(
     design that works under a vacuum), times at ``flow_ml_min`` into each chamber, strokes
     with ``volumes_ul`` in each balloon. ``quick`` leaves out the curves and the figures of the
     elastic stack, which take seconds; ``laminate`` is the design's, if already built.
-    The user's own ``press_factor`` and ``contact_factor`` (ratios), ``pocket_loss`` in mm and
-    ``modulus_mpa`` replace the calibration's; ``tip_load`` g stand on the free tip. Values that
-    were ``measured`` on an actuator, such as "stroke@10kPa=16.6mm", narrow the prediction to that
-    one, and so do the force and height that the records of a ``lab`` hold of a ``serial``.
+    ``tip_load`` g stand on the free tip. Values that were ``measured`` on an actuator, such as
+    "stroke@10kPa=16.6mm", narrow the prediction to that one, and so do the force and height that
+    the records of a ``lab`` hold of a ``serial``.
     ``tables`` override tables of the design, such as
     ``models={"calibration": "none"}``. Figures of calibrated models have a 90 % ``interval``.
     Raises DesignError if a request is outside every model's range. Models: the paper's Eqs. 1-4
@@ -92,13 +87,7 @@ def predict(
         usual if pressures_kpa is None else numbers("pressures_kpa", pressures_kpa),
         flow_ml_min,
         numbers("volumes_ul", volumes_ul),
-        overrides={
-            "press_factor": press_factor,
-            "contact_factor": contact_factor,
-            "pocket_loss": pocket_loss,
-            "modulus_mpa": modulus_mpa,
-            "tip_load": tip_load,
-        },
+        tip_load=tip_load,
         measured=tuple(
             map(read_measured, [*measured, *(_recorded(serial, lab) if serial else ())])
         ),
@@ -171,26 +160,17 @@ def stack(
     source: Source,
     *changes: Change,
     most_pressure: float = MOST_PRESSURE,
-    press_factor: float | None = None,
-    pocket_loss: float | None = None,
-    modulus_mpa: float | None = None,
     **tables: Any,
 ) -> Stack:
     """The actuator as plates joined by balloons, for poses in real time: ``stack.pose((5, 5, 0))``.
 
     ``most_pressure`` kPa is the largest pressure of any pose: for ``stack.pose((300, 300, 300))``
-    make it with ``most_pressure=300``. The user's own ``press_factor`` (a ratio), ``pocket_loss``
-    in mm and ``modulus_mpa`` replace the calibration's; ``tables`` override tables of the design.
-    Raises DesignError for pockets that are not round. Balloons lengthen and tilt but do not carry
-    shear (paper, Sec. 4.4).
+    make it with ``most_pressure=300``; ``tables`` override tables of the design. Balloons lengthen
+    and tilt but do not carry shear (paper, Sec. 4.4). Raises DesignError for pockets that are not
+    round.
     """
     design = load(source, *changes, **tables)
-    overrides = {
-        "press_factor": press_factor,
-        "pocket_loss": pocket_loss,
-        "modulus_mpa": modulus_mpa,
-    }
-    return stack_of(design, most_pressure=most_pressure, factors=factors_of(design, overrides))
+    return stack_of(design, most_pressure=most_pressure, factors=factors_of(design))
 
 
 def motion(

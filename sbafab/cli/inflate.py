@@ -39,7 +39,6 @@ MODEL_PRESSURE = 10.0
     "Pressures that the .xml file is for, one a chamber.  [default: 10 kPa in each]",
     metavar="P,P,...",
 )
-@opt.calibration_options
 def map_(
     source: str,
     assignments: tuple[str, ...],
@@ -47,7 +46,6 @@ def map_(
     pressure: float,
     points: int,
     pressures: str | None,
-    **factors: Any,
 ) -> None:
     """Map force and volume of the balloons.
 
@@ -66,7 +64,7 @@ def map_(
     design = api.load_design(source, assignments, ())
     api.refuse_pressure(pressure)
     api.refuse_beyond_burst(api.build(design), pressure)
-    actuator = api.stack(design, most_pressure=pressure, factors=api.factors_of(design, factors))
+    actuator = api.stack(design, most_pressure=pressure, factors=api.factors_of(design))
     if form == MUJOCO:
         text = api.chain_text(design.name, actuator, _listed(pressures, actuator.chambers))
     else:

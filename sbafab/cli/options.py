@@ -14,7 +14,6 @@ from click.shell_completion import CompletionItem
 from sbafab import plugins
 from sbafab.api.files import (
     KILOPASCALS,
-    MEGAPASCALS,
     MILLILITRES_PER_MINUTE,
     MILLIMETRES,
     in_first_unit,
@@ -72,7 +71,6 @@ MICROLITRES = {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}
 LENGTH = MeasuredQuantity("MM", "length", MILLIMETRES, '0.35 or "350 um"')
 POSITIVE_LENGTH = MeasuredQuantity("MM", "length", MILLIMETRES, '0.35 or "350 um"', positive=True)
 PRESSURE = MeasuredQuantity("P", "pressure", KILOPASCALS, '6, "6 kPa" or "60 mbar"')
-MODULUS = MeasuredQuantity("E", "modulus", MEGAPASCALS.units, '10 or "10 MPa"')
 VOLUME = MeasuredQuantity("V", "volume", MICROLITRES, '5, 5ul or "0.005 ml"')
 FLOW = MeasuredQuantity("Q", "flow", MILLILITRES_PER_MINUTE, '35, "35 ml/min" or "0.6 ml/s"')
 
@@ -215,23 +213,6 @@ def pressures_option(words: str, default: str) -> Decorator:
     """Return ``--pressure``, repeatable, whose help begins with ``words``."""
     words += f", kPa or with a unit. Repeatable.  [default: {default}]"
     return option("--pressure pressures_kpa", words, PRESSURE, multiple=True)
-
-
-def calibration_options(command: Command) -> Command:
-    """Add the calibration options of the elastic models (``models.figures.Factors``)."""
-    lost = option(
-        "--pocket-loss",
-        "Measured loss of pocket radius against the drawing, mm or with a unit; for elastic "
-        "models.  [default: the calibration's]",
-        LENGTH,
-    )
-    modulus = option(
-        "--modulus modulus_mpa",
-        "Measured Young's modulus of the pressed film, MPa or with a unit.  [default: the film's "
-        "times the calibration's ratio]",
-        MODULUS,
-    )
-    return lost(modulus(command))
 
 
 def flow_option(words: str) -> Decorator:

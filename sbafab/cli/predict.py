@@ -17,9 +17,9 @@ from sbafab.cli import show
 from sbafab.cli.exit import print_error
 from sbafab.errors import OutputError
 
-ELASTIC_OPTIONS = ("pocket_loss", "modulus_mpa", "tip_load", "measured", "serial", "sensitivity")
+ELASTIC_OPTIONS = ("tip_load", "measured", "serial", "sensitivity")
 """Options of the model of elastic balloons alone."""
-FORMULA_OPTIONS = ("flow_ml_min", "volumes_ul", "contact_factor")
+FORMULA_OPTIONS = ("flow_ml_min", "volumes_ul")
 """Options of formulas that need round or oblong pockets."""
 
 
@@ -36,21 +36,10 @@ FORMULA_OPTIONS = ("flow_ml_min", "volumes_ul", "contact_factor")
     opt.VOLUME,
 )
 @opt.option(
-    "--press-factor F",
-    "Measured thickness after the press over that before, of films that melt in it.  [default: the "
-    "calibration's]",
-    opt.FiniteFloat(),
-)
-@opt.option(
-    "--contact-factor F",
-    "Measured ratio of force to Eqs. 1-4.  [default: 1, off]",
-    opt.FiniteFloat(),
-)
-@opt.calibration_options
-@opt.option(
     "--tip-load tip_load G",
-    "Weight on the free tip, g; for elastic models.  [default: nothing]",
+    "Weight on the free tip, g; for elastic models.",
     opt.FiniteRange(min=0, max=1000),
+    default=0.0,
 )
 @opt.option(
     "--measured Q=V...",
@@ -168,7 +157,7 @@ def _refuse_for_assembly(assembly: api.Assembly, pressures: tuple[float, ...]) -
     reason = (
         f"is for one actuator, and {assembly.name} is an assembly; predict the part's own design"
     )
-    opt.refuse_options(reason, *FORMULA_OPTIONS, *ELASTIC_OPTIONS, "press_factor")
+    opt.refuse_options(reason, *FORMULA_OPTIONS, *ELASTIC_OPTIONS)
     reason = f"is for written files, and the prediction of {assembly.name} is only printed"
     opt.refuse_options(f"{reason}; leave it out", "out", "waivers")
     if len(pressures) > 1:

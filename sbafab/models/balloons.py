@@ -54,7 +54,7 @@ def balloons_of(
         of = f", {LEAST_RATIO:g} times the neck's {neck:.4g}" if least > LEAST_RADIUS else ""
         raise DesignError(
             f"the elastic balloon's pocket must be at least {least:.4g} mm in radius{of}, and "
-            f"{has}; make the chamber wider{' or give less loss' if loss else ''}"
+            f"{has}; make the chamber wider"
         )
     ring = design.bond.width + loss
     balloons = []
@@ -73,20 +73,10 @@ def _films(laminate: Laminate, factors: Factors | None) -> list[list[tuple[float
             f"modulus or Poisson's ratio of {unknown[0].product} is not known; give both, "
             f"{unknown[0].table}.modulus, in MPa, and {unknown[0].table}.poisson"
         )
-    measured = None if factors is None else factors.modulus_mpa
     ratio = 1.0 if factors is None else factors.modulus_ratio
-    if measured is not None and len(films) > 1:
-        raise DesignError(
-            "one modulus is given for unlike films; leave it out, and set films.<name>.modulus of "
-            "each instead"
-        )
     properties = {}
     for film in films:
         modulus, poisson = film.elastic or (0.0, 0.0)
-        properties[film] = (
-            film.thickness,
-            1000 * ratio * (modulus if measured is None else measured),
-            poisson,
-        )
+        properties[film] = film.thickness, 1000 * ratio * modulus, poisson
     row = [properties[layer.film] for layer in laminate.tpe_layers]
     return [row[i : i + 2] for i in range(0, len(row), 2)]

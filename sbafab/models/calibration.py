@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, reduce
 from pathlib import Path
 from statistics import NormalDist
@@ -489,16 +489,14 @@ class Reading(NamedTuple):
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """A calibration with the user's own values (``overrides``, by field of ``Factors``), which are
-    exact, in place of its values; for a ``laminate`` of a ``form``, by default like its evidence.
-    Nothing stands on the tip unless the user says so, or it ``is_probed`` as in the evidence.
+    """A calibration for a ``laminate`` of a ``form``, by default like its evidence, with exactly
+    ``tip_load`` g on the tip; None if a probe is on it, as in the evidence.
     """
 
     calibration: ModelCalibration
-    overrides: Mapping[str, float | None] = field(default_factory=dict)
     laminate: Laminate | None = None
     form: Form | None = None
-    is_probed: bool = False
+    tip_load: float | None = 0.0
 
     def farther(self, group: str) -> float:
         """Return the relative standard deviation assumed for a group of quantities, off what the
@@ -524,13 +522,13 @@ class Uncertainty:
     @cached_property
     def factors(self) -> Factors:
         """The factors at the median."""
-        return self._with_overrides(self.calibration.factors)
+        return self._with_tip(self.calibration.factors)
 
     def shifted(self) -> list[tuple[float, Factors]]:
-        """Return factors moved in one design unknown each; by 0 where the user gave it."""
+        """Return factors moved in one design unknown each; by 0 if it is known."""
         return [
-            (0.0 if name in self._given else change, self._with_overrides(factors))
-            for name, (change, factors) in zip(FIELDS, self.calibration.shifted(), strict=False)
+            (change if name != "tip_load" or self.tip_load is None else 0.0, self._with_tip(moved))
+            for name, (change, moved) in zip(FIELDS, self.calibration.shifted(), strict=False)
         ]
 
     @property
@@ -538,28 +536,14 @@ class Uncertainty:
         """The factors of ``shifted`` that differ from the median."""
         return [factors for change, factors in self.shifted() if change]
 
-    @cached_property
-    def _given(self) -> dict[str, Any]:
-        """The user's values by field, a modulus in place of its ratio included."""
-        given = given_factors(self.overrides)
-        if not self.is_probed:
-            given = {"tip_load": 0.0, **given}
-        return {"modulus_ratio": 1.0, **given} if "modulus_mpa" in given else given
-
-    def _with_overrides(self, factors: Factors) -> Factors:
+    def _with_tip(self, factors: Factors) -> Factors:
         label = self.calibration.name
         if self.calibration.joint is not None:
             label += " with values of this actuator"
-        if "press_factor" in self._given:
-            factors = replace(factors, press_film="")
-        named = [
-            f"{name.removesuffix('_mpa').replace('_', ' ')} {value:g}"
-            for name, value in self._given.items()
-            if name != "modulus_ratio" and (name, value) != ("tip_load", 0.0)
-        ]
-        if named:
-            label += f" but {', '.join(named)}"
-        return replace(factors, calibration=label, **self._given)
+        if self.tip_load is None:
+            return replace(factors, calibration=label)
+        label += f" but tip load {self.tip_load:g}" if self.tip_load else ""
+        return replace(factors, calibration=label, tip_load=self.tip_load)
 
     def interval_of(
         self,
@@ -610,8 +594,8 @@ class Uncertainty:
             for change, each in moved
         ]
         # The unknowns that change no design may be a term of the value, or all of it.
-        slope = 0.0 if not term or term in self._given else 1.0
-        slope *= self.calibration.values[term] / value if slope and term != "loss_share" else 1.0
+        is_delay = term and term != "loss_share"
+        slope = self.calibration.values[term] / value if is_delay else 1.0
         slopes += [slope if name == term else 0.0 for name in FIELDS[DESIGN_UNKNOWNS:]]
         return value, slopes, is_log
 
@@ -719,11 +703,6 @@ class Uncertainty:
         return replace(figure, interval=(low, figure.value), flags=flags)
 
 
-def given_factors(overrides: Mapping[str, float | None]) -> dict[str, Any]:
-    """Return the values that a user gave, by field of ``Factors``."""
-    return {name: value for name, value in overrides.items() if value is not None}
-
-
 def calibration_of(design: Design, laminate: Laminate | None = None) -> ModelCalibration | None:
     """Return the calibration of a design, adapted to the films of its laminate that bond. Raises
     DesignError if it is unknown.
@@ -739,23 +718,20 @@ def bonding_products(laminate: Laminate) -> list[str]:
 
 def uncertainty_of(
     design: Design,
-    overrides: Mapping[str, float | None] | None = None,
     laminate: Laminate | None = None,
     form: Form | None = None,
+    tip_load: float = 0.0,
 ) -> Uncertainty | None:
-    """Return the calibration of a design with the user's own values; None without one. Intervals
-    apply to its ``laminate``; ``form`` replaces the design's.
+    """Return the calibration of a design, with ``tip_load`` g on its tip; None without one.
+    Intervals apply to its ``laminate``; ``form`` replaces the design's.
     """
     calibration = calibration_of(design, laminate)
     if calibration is None:
         return None
-    return Uncertainty(calibration, overrides or {}, laminate, form or design.form)
+    return Uncertainty(calibration, laminate, form or design.form, tip_load)
 
 
-def factors_of(design: Design, overrides: Mapping[str, float | None] | None = None) -> Factors:
-    """Return the factors of a design's calibration, replaced by the user's values where given.
-
-    Raises DesignError if the calibration is unknown, or for values out of range.
-    """
-    uncertainty = uncertainty_of(design, overrides)
-    return uncertainty.factors if uncertainty else Factors(**given_factors(overrides or {}))
+def factors_of(design: Design) -> Factors:
+    """Return the factors of a design's calibration. Raises DesignError if it is unknown."""
+    uncertainty = uncertainty_of(design)
+    return uncertainty.factors if uncertainty else Factors()

@@ -73,16 +73,10 @@ LEAST_GAP = 0.02
 
 
 def calibrated(model: Model, factors: Factors) -> Model:
-    """Return a model with its calibration factors in its name, unless they are the defaults."""
-    if factors.calibration:
-        return replace(model, calibration=factors.calibration, trust=CALIBRATED_TRUST)
-    given = {
-        "press_factor": factors.press_factor if factors.press_factor != 1 else None,
-        "pocket_loss": factors.pocket_loss or None,
-        "modulus_mpa": factors.modulus_mpa,
-    }
-    named = tuple((factor, value) for factor, value in given.items() if value is not None)
-    return replace(model, factors=named)
+    """Return a model with the calibration of its factors, if they have one."""
+    if not factors.calibration:
+        return model
+    return replace(model, calibration=factors.calibration, trust=CALIBRATED_TRUST)
 
 
 # Actuators at several factors, inflated together. At equal pressure over modulus balloons have
@@ -374,7 +368,7 @@ def moved_stack(together: Stack, actuator: Actuator, moved: Factors) -> Stack | 
     ones.
     """
     factors = actuator.factors
-    if (moved.pocket_loss, moved.modulus_mpa) != (factors.pocket_loss, factors.modulus_mpa):
+    if moved.pocket_loss != factors.pocket_loss:
         return None
     ratio = moved.modulus_ratio / factors.modulus_ratio
     return replace(

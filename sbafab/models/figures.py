@@ -23,7 +23,6 @@ from sbafab.models import paper
 from sbafab.models.paper import Counterpart, CounterpartEntry
 from sbafab.models.quantity import (
     ANYWHERE,
-    FACTOR_WORDS,
     OF_STACK,
     Conditions,
     FigureKey,
@@ -55,24 +54,23 @@ FLAGS: Mapping[Flag, str] = {
 class Model:
     """Origin of a number: ``source`` is an equation or section, ``trust`` the model's validity.
 
-    ``factors`` are the user's measured ones, each in the unit of that field of ``Factors``;
-    ``calibration`` is the name of the model's calibration. ``by_disc``: a drawn pocket is replaced
-    by a disc.
+    ``press_factor`` is that of the films in it, ``calibration`` the name of the model's
+    calibration. ``by_disc``: a drawn pocket is replaced by a disc.
     """
 
     id: ModelId
     source: str
     trust: str
-    factors: tuple[tuple[str, float], ...] = ()
+    press_factor: float = 1.0
     calibration: str = ""
     by_disc: bool = False
 
     @property
     def name(self) -> str:
-        """The display name, with calibration or factors."""
+        """The display name, with calibration or press factor."""
         parts = [self.id.words]
         parts += [f"calibration {self.calibration}"] if self.calibration else []
-        parts += [FACTOR_WORDS[factor].format(value) for factor, value in self.factors]
+        parts += [f"press factor {self.press_factor:.3g}"] if self.press_factor != 1 else []
         parts += [BY_DISC] if self.by_disc else []
         return ", ".join(parts)
 
@@ -85,10 +83,6 @@ class Model:
         """Return the model with facts in the places of its source and validity."""
         source, trust = self.source.format(**facts), self.trust.format(**facts)
         return replace(self, source=source, trust=trust)
-
-    def times(self, factor: str, value: float) -> Model:
-        """Return the model with a factor (a field of ``Factors``), unless that is 1."""
-        return self if value == 1 else replace(self, factors=(*self.factors, (factor, value)))
 
 
 def _models() -> Iterator[tuple[str, Model]]:
@@ -264,22 +258,18 @@ FigureItem = Figure | LeftOut
 
 @dataclass(frozen=True)
 class Factors:
-    """Calibration factors from the user's own measurements; the defaults leave models unchanged.
+    """What a calibration says of an actuator; the defaults leave models unchanged.
 
     ``press_factor`` is the ratio of thickness after and before the press for films that melt in it,
-    for the product ``press_film`` (for all melting films if empty); ``contact_factor`` is the ratio
-    of the measured force to that from the paper's models. The elastic balloon uses ``pocket_loss``,
-    the loss of pocket radius in the press in mm, ``modulus_mpa``, the film's modulus if it differs
-    from the design's, and ``modulus_ratio``, the ratio of the pressed film's modulus to it.
-    ``water_delay`` and ``air_delay`` in s are the lag of pump and valve, ``loss_share`` the share
-    of the input work lost in inflating and deflating; 0 means unknown. ``tip_load`` in g is what
-    stands on the free tip.
+    for the product ``press_film`` (for all melting films if empty). The elastic balloon uses
+    ``pocket_loss``, the loss of pocket radius in the press in mm, and ``modulus_ratio``, the ratio
+    of the pressed film's modulus to the design's. ``water_delay`` and ``air_delay`` in s are the
+    lag of pump and valve, ``loss_share`` the share of the input work lost in inflating and
+    deflating; 0 means unknown. ``tip_load`` in g is what stands on the free tip.
     """
 
     press_factor: float = 1.0
-    contact_factor: float = 1.0
     pocket_loss: float = 0.0
-    modulus_mpa: float | None = None
     modulus_ratio: float = 1.0
     water_delay: float = 0.0
     air_delay: float = 0.0
@@ -287,20 +277,11 @@ class Factors:
     tip_load: float = 0.0
     press_film: str = ""
     calibration: str = ""
-    """Name of the calibration that the others come from, unless it is the user's own values."""
+    """Name of the calibration that the others come from."""
 
     def __post_init__(self) -> None:
-        limits = {"press_factor": 1.0, "contact_factor": 10.0, "modulus_ratio": 1000.0}
-        for field_name, most in limits.items():
-            value, name = getattr(self, field_name), field_name.replace("_", " ")
-            if not 0 < value <= most:
-                raise DesignError(f"{name} = {value:g} must be above 0 and at most {most:g}")
         if not 0 <= self.tip_load <= 1000:
             raise DesignError(f"tip load = {self.tip_load:g} g must be from 0 to 1000 g")
-        if not 0 <= self.pocket_loss <= 100:
-            raise DesignError(f"pocket loss = {self.pocket_loss:g} mm must be from 0 to 100 mm")
-        if self.modulus_mpa is not None and not 0.1 <= self.modulus_mpa <= 1e4:
-            raise DesignError(f"modulus = {self.modulus_mpa:g} MPa must be from 0.1 to 10000 MPa")
 
     def folded(self, laminate: Laminate) -> FoldedHeight:
         """Return the folded height of a laminate with these factors."""
@@ -327,17 +308,17 @@ class PredictionRequest:
     """Conditions of a prediction: gauge pressures in kPa, flow in ml/min into each chamber or all,
     volumes in ul a balloon, and factors.
 
-    Without ``calibration`` the factors come from the design's calibration, replaced by the user's
-    values (``overrides``, by field of ``Factors``) where given. Intervals hold a measurement with
-    this ``probability`` (a share). If one figure is ``wanted``, others are left out that cost time.
-    What was ``measured`` on an actuator narrows the prediction to that one.
+    Without ``calibration`` the factors come from the design's calibration, with ``tip_load`` g on
+    the free tip. Intervals hold a measurement with this ``probability`` (a share). If one figure is
+    ``wanted``, others are left out that cost time. What was ``measured`` on an actuator narrows the
+    prediction to that one.
     """
 
     pressures_kpa: tuple[float, ...] = USUAL_PRESSURES
     flow_ml_min: float = 35.0
     volumes_ul: tuple[float, ...] = ()
     calibration: Factors | None = None
-    overrides: Mapping[str, float | None] = field(default_factory=dict)
+    tip_load: float = 0.0
     wanted: tuple[Quantity, Conditions] | None = None
     probability: float = 0.9
     measured: tuple[MeasuredValue, ...] = ()
@@ -363,11 +344,6 @@ class PredictionRequest:
     def measured_texts(self) -> list[str]:
         """The measured values as they were given."""
         return [one.text for one in self.measured]
-
-    @property
-    def given_overrides(self) -> dict[str, float]:
-        """The overrides that have a value."""
-        return {name: value for name, value in self.overrides.items() if value is not None}
 
 
 @dataclass(frozen=True, repr=False)
@@ -627,21 +603,19 @@ ConditionsEntry = Annotated[
 
 
 class AskedEntry(Document):
-    """What a prediction was asked for: kPa, ml/min, ul, mm, MPa, s, and factors."""
+    """What a prediction was asked for: kPa, ml/min, ul, mm, s, g, and factors."""
 
     pressures_kpa: list[PlainNumber]
     flow_ml_min: PlainNumber
     volumes_ul: list[PlainNumber]
     press_factor: Rounded = attribute("factors.press_factor")
-    contact_factor: PlainNumber = attribute("factors.contact_factor")
     pocket_loss: Rounded = attribute("factors.pocket_loss")
-    modulus_mpa: PlainNumber | None = attribute("factors.modulus_mpa")
     modulus_ratio: Rounded = attribute("factors.modulus_ratio")
     water_delay: Rounded = attribute("factors.water_delay")
     air_delay: Rounded = attribute("factors.air_delay")
     loss_share: Rounded = attribute("factors.loss_share")
     calibration: str = attribute("factors.calibration")
-    overrides: dict[str, PlainNumber] = attribute("given_overrides")
+    tip_load: PlainNumber = attribute("factors.tip_load")
     measured: list[str] = attribute("measured_texts")
 
 

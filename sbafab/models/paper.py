@@ -134,8 +134,6 @@ class Counterpart:
     of_papers: bool
     at: Conditions
     at_least: Conditions
-    beside_factors: bool = False
-    """True beside a figure of a model with the user's factors."""
 
     def stands_beside(
         self, quantity: Quantity, at: Conditions, model: ModelId, is_parallel: bool
@@ -159,11 +157,10 @@ class Counterpart:
     @property
     def sentence(self) -> str:
         """The clause that stands in parentheses beside a figure."""
-        by = "this model without factors" if self.beside_factors else "this model"
         at = f" {self.where}" if self.where else ""
         return (
             f"the paper measured {self.measured} {self.state} on its {self.actuator}; "
-            f"{by} gives it {self.gave:.4g}{at}"
+            f"this model gives it {self.gave:.4g}{at}"
         )
 
     @property

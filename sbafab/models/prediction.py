@@ -135,15 +135,14 @@ def predict(
     form = discs and discs.form(design, discs.equal)
     before: tuple[Figure, ...] = ()
     if asked_request.calibration is None:
-        uncertainty = uncertainty_of(design, asked_request.overrides, flat, form)
+        uncertainty = uncertainty_of(design, flat, form, asked_request.tip_load)
         if asked_request.measured:
             before = predict(design, replace(asked_request, measured=()), flat, quick).figures
             uncertainty = _built(
                 uncertainty, Actuator(design, flat, Factors(), form), asked_request
             )
-        factors = (
-            uncertainty.factors if uncertainty else factors_of(design, asked_request.overrides)
-        )
+        plain = Factors(tip_load=asked_request.tip_load)
+        factors = uncertainty.factors if uncertainty else plain
         asked_request = replace(asked_request, calibration=factors)
     subject = Actuator(design, flat, asked_request.factors, form)
     _check_request(subject, asked_request)
@@ -271,10 +270,10 @@ def _check_request(actuator: Actuator, request: PredictionRequest) -> None:
 
 def _measured(figure: Figure, actuator: Actuator) -> paper.Counterpart | None:
     """Return the paper's measurement if the figure is far off; None for a folded height with a
-    factor.
+    press factor.
     """
     model, form = figure.model, actuator.form
-    if model.id is ModelId.FILMS and model.factors:
+    if model.id is ModelId.FILMS and model.press_factor != 1:
         return None
     is_papers, calibration = (
         is_the_papers_3dof(form, actuator.laminate),
@@ -285,8 +284,7 @@ def _measured(figure: Figure, actuator: Actuator) -> paper.Counterpart | None:
         # The nearest of the three heights at which forces were measured.
         share = at.share if at.rise is None else at.rise / actuator.reference_stroke
         at = at._replace(share=min(paper.HEIGHTS, key=lambda height: abs(height - (share or 0.0))))
-    row = counterpart(form, figure.quantity, at, model.id, calibration, is_papers)
-    return row and replace(row, beside_factors=bool(model.factors))
+    return counterpart(form, figure.quantity, at, model.id, calibration, is_papers)
 
 
 def _past_burst(laminate: Laminate, kpa: float) -> BeyondError | None:
@@ -455,7 +453,7 @@ def _sizes(actuator: Actuator) -> Iterator[Figure]:
         if name != "thickness":
             quantity = Quantity.of(name)
             model = models.get(quantity)
-            model = model.times("press_factor", factor) if model else GEOMETRY
+            model = replace(model, press_factor=factor) if model else GEOMETRY
             yield Figure(quantity, value, model)
 
 
@@ -469,7 +467,7 @@ def _folding(actuator: Actuator) -> Iterator[FigureItem]:
     factor = actuator.folded.factor if actuator.folded.molten else 1.0
     width = 2 * max(actuator.radii) + 2 * actuator.design.bond.width
     value = folded_diameter(width, actuator.thickness)
-    yield Figure(quantity, value, MODELS["folded-lobes"].times("press_factor", factor))
+    yield Figure(quantity, value, replace(MODELS["folded-lobes"], press_factor=factor))
 
 
 def _mass(laminate: Laminate) -> FigureItem:
@@ -560,15 +558,13 @@ def _pushes(
         if actuator.radii
         else "no film tension, no stretch, one balloon stack; not measured"
     )
-    contact = actuator.factors.contact_factor
     for each in actuator.pockets:
         model = Model(WORK_ON[each.model.id], "Sec. 4.3, F = p dv/dh", trust)
 
         def push(pressure: float, stroke: ArrayLike, each: ClosedForm = each) -> Array:
-            rate = each.push(stroke)
-            return np.asarray(actuator.form.pushing * contact * pressure * rate / 1000)
+            return np.asarray(actuator.form.pushing * pressure * each.push(stroke) / 1000)
 
-        yield model.times("contact_factor", contact), push
+        yield model, push
 
 
 def _each(actuator: Actuator) -> str:
@@ -626,9 +622,8 @@ def _power(actuator: Actuator, request: PredictionRequest, mass: FigureItem) -> 
         highest = max(request.pressures_kpa)
         _, push = next(_pushes(actuator, request))
         watts = form.stacks / form.pushing * float(push(highest, 0.0)) * stroke / 1000 / time
-        model = MODELS["power"].times("contact_factor", actuator.factors.contact_factor)
         at = Conditions(kpa=highest, flow=paper.AIR_FLOW)
-        yield Figure(Quantity.POWER_DENSITY, watts / (mass.value / 1000), model, at)
+        yield Figure(Quantity.POWER_DENSITY, watts / (mass.value / 1000), MODELS["power"], at)
 
 
 # Bending and stiffness of parallel chambers.

@@ -255,13 +255,6 @@ P_V = {ModelId.EQ_4: ModelId.P_V_EQ_4, ModelId.LENS_STROKE: ModelId.P_V_LENS}
 """Models derived from a pocket's volume: virtual work, time, largest work."""
 OF_STACK = (ModelId.ELASTIC_STACK, ModelId.STACK_IN_TIME, ModelId.STACK_SHUT)
 """Models of the elastic stack."""
-FACTOR_WORDS = {
-    "press_factor": "press factor {:.3g}",
-    "contact_factor": "contact factor {:g}",
-    "pocket_loss": "pocket loss {:g} mm",
-    "modulus_mpa": "E = {:g} MPa",
-}
-"""Factors that a user measured, by field of ``Factors``, in the name of a model."""
 
 
 class FigureKey(NamedTuple):

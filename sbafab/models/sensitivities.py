@@ -72,7 +72,7 @@ def _ends(
     design: Design, key: str, value: float, whole: Stack, pressure: float, factors: Factors
 ) -> tuple[float, list[Stack]]:
     """Return the step of a key, and the stacks with a step less and more of it."""
-    if key.endswith(".modulus") and _is_film_of_all(design, key, factors):
+    if key.endswith(".modulus") and _is_film_of_all(design, key):
         # Maps of softer films end at less pressure.
         sides = (-1, 1) if pressure * (1 + EXACT_SHARE) < whole.most_pressure else (0, 2)
         ratios = [1 + side * EXACT_SHARE for side in sides]
@@ -108,8 +108,7 @@ def _value(design: Design, key: str) -> int | float:
     return value
 
 
-def _is_film_of_all(design: Design, key: str, factors: Factors) -> bool:
+def _is_film_of_all(design: Design, key: str) -> bool:
     """Return True if a key is the modulus of all films that are bonded."""
     films = {layer.film for layer in build(design).layers if not layer.is_mask}
-    name = key.split(".")[1]
-    return films == {design.films.stock[name]} and factors.modulus_mpa is None
+    return films == {design.films.stock[key.split(".")[1]]}

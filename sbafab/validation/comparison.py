@@ -131,15 +131,15 @@ def _beside_models(curve: MeasuredCurve, calibration: ModelCalibration | None) -
 
 def uncertainty_for(curve: MeasuredCurve, calibration: ModelCalibration) -> Uncertainty:
     """Return a calibration as it holds for the actuator that was measured."""
-    is_probed = curve.setup.tip == "probed"
+    tip_load = None if curve.setup.tip == "probed" else 0.0
     if not curve.is_described:
-        return Uncertainty(calibration, is_probed=is_probed)
+        return Uncertainty(calibration, tip_load=tip_load)
     of = ModelledActuator(curve, Factors(**MIDDLES))
     try:
         films, form, laminate = bonding_products(of.laminate), of.design.form, of.laminate
     except DesignError:
-        return Uncertainty(calibration, is_probed=is_probed)
-    return Uncertainty(calibration.for_films(films), {}, laminate, form, is_probed)
+        return Uncertainty(calibration, tip_load=tip_load)
+    return Uncertainty(calibration.for_films(films), laminate, form, tip_load)
 
 
 def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends | None] | None:

@@ -43,7 +43,7 @@ def test_numbers_of_numpy_are_numbers(number: type[np.number[Any]]) -> None:
 
 
 def test_options_of_numpy_are_plain_numbers(tmp_path: Path) -> None:
-    options = {"flow_ml_min": np.float32(30), "volumes_ul": np.int64(5), "press_factor": 0.5}
+    options = {"flow_ml_min": np.float32(30), "volumes_ul": np.int64(5), "tip_load": 0.5}
     found = sbafab.predict("1dof-5mm", SMALL, quick=True, **options)  # type: ignore[arg-type]
     assert json.loads(json.dumps(found.as_dict()))["asked"]["flow_ml_min"] == 30
     wish = {"simulator": "sofa", "export": True, "pressure": np.float64(3.0)}
@@ -166,7 +166,7 @@ def test_one_pressure_is_a_number_or_a_list_and_no_text() -> None:
     [
         ("predict", "pressure_kpa", "pressures_kpa"),
         ("predict", "volume_ul", "volumes_ul"),
-        ("stack", "modulus", "modulus_mpa"),
+        ("stack", "pressure", "most_pressure"),
         ("mesh", "format", "formats"),
         ("simulate", "presure", "pressure"),
         ("find", "trials", "tries"),

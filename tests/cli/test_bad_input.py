@@ -87,16 +87,13 @@ predict 1dof-5mm --flow 0 | must be from 1e-06 to 1e+06 ml/min
 predict 1dof-5mm --flow inf | must be a flow such as
 predict 1dof-5mm --flow 1e999 | must be a finite flow
 predict 1dof-5mm --load 5 | --load is for an assembly, and 1dof-5mm is one actuator
-predict 1dof-5mm --press-factor 2 | at most 1
-predict 1dof-5mm --contact-factor -1 | must be above 0
 predict brace --flow 30 | --flow is for one actuator, and brace is an assembly
+predict brace --tip-load 3 | --tip-load is for one actuator
+predict radial-15mm --tip-load 3 | --tip-load is for elastic balloons, round pockets
 predict brace --volume 5 | --volume is for one actuator
-predict brace --modulus 3 | --modulus is for one actuator
-predict brace --press-factor 0.5 | --press-factor is for one actuator
 predict brace --waive seat | --waive is for written files
 predict brace -o x | --out is for written files
 predict brace --pressure 5 --pressure 6 | an assembly is predicted at one pressure
-predict radial-15mm --modulus 3 | --modulus is for elastic balloons, round pockets
 predict {OVAL} --volume 5 | --volume is for pockets that are round or oblong
 map 1dof-5mm --to a.csv --pressures 5 | is for a MuJoCo model
 map 1dof-5mm --to a.xml --pressures 5,5 | has 2 of 1 pressures
@@ -106,8 +103,6 @@ map radial-15mm | no round pockets
 map 1dof-5mm --to map.txt | must end with .csv or .xml
 map 1dof-5mm --pressure 400 | 400 kPa is past the estimated burst pressure, 367 kPa
 map 1dof-5mm --pressure 0 | give more than 0 kPa
-map 1dof-5mm --pocket-loss 2 | a pocket loss of 2 mm leaves 0.5
-map 1dof-5mm --modulus 0 | from 0.1 to 10000 MPa
 calibrate nosuch | neither evidence that ships
 calibrate --name paper | which stands for another one
 calibrate --name none | which stands for another one

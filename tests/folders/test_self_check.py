@@ -116,7 +116,7 @@ def as_designed(folder: Path) -> list[str]:
 
 def test_a_prediction_is_asked_for_again(tmp_path: Path) -> None:
     design = load_design("1dof-5mm", FEW)
-    wish = PredictionRequest(volumes_ul=(5.0,), calibration=Factors(0.9, 1.1, 0.1, 12.0))
+    wish = PredictionRequest(volumes_ul=(5.0,), calibration=Factors(0.9, 0.1, 1.2))
     generate(RunRequest(design, tmp_path, ("cut", "predict"), prediction=predict(design, wish)))
     doctor = Doctor(tmp_path / "1dof-5mm")
     assert as_designed(doctor.folder) == []

@@ -17,8 +17,8 @@ from sbafab.models.balloon import inflate
 from sbafab.models.balloons import balloons_of
 from sbafab.models.calibration import load_calibration
 from sbafab.models.closed_forms import eq_4, eqs_1_to_3, lens
-from sbafab.models.figures import Factors, Prediction
-from sbafab.models.prediction import FLAT_PLATES, workspace_relation
+from sbafab.models.figures import Factors, Prediction, PredictionRequest
+from sbafab.models.prediction import FLAT_PLATES, predict, workspace_relation
 from sbafab.models.quantity import Quantity
 from tests.quick import few
 
@@ -66,7 +66,8 @@ def test_the_tip_yields_as_the_derivatives_of_the_stack_say(three: Prediction) -
 def test_3dof_folds_to_9_9_and_pressed_to_8_6(three: Prediction) -> None:
     assert three.value("folded_diameter") == pytest.approx(9.9, abs=0.05)
     # Of 0.95 mm the 29 masks keep 0.725.
-    pressed = sbafab.predict("3dof-15mm", press_factor=(0.95 - 29 * 0.025) / (30 * 0.038))
+    factors = Factors(press_factor=(0.95 - 29 * 0.025) / (30 * 0.038))
+    pressed = predict(sbafab.load("3dof-15mm"), PredictionRequest(calibration=factors))
     assert pressed.value("folded_diameter") == pytest.approx(8.6, abs=0.05)
     assert pressed.value("folded_height") == pytest.approx(0.95)
 
@@ -87,7 +88,8 @@ def test_what_a_radial_design_reaches_is_its_deflated_diameter_and_its_stroke(
     press_factor: float,
 ) -> None:
     short = {"width": 9.5, "length": 9.5}
-    found = sbafab.predict("radial-15mm", chamber=short, press_factor=press_factor)
+    request = PredictionRequest(calibration=Factors(press_factor=press_factor))
+    found = predict(sbafab.load("radial-15mm", chamber=short), request)
     reached = found.value("deflated_diameter") + 2 * found.value("reference_stroke")
     assert found.value("reached_diameter") == pytest.approx(reached)
     # A pocket 8 wide as a cylinder: what it must not touch.
@@ -143,8 +145,7 @@ def test_strokes_at_a_volume_by_both_models_and_between_their_limits_by_one() ->
         ({"pressures_kpa": [1001.0]}, "give more than 0, at most 1000 kPa"),
         ({"pressures_kpa": [-20.0]}, "it is inflated, and a vacuum does nothing"),
         ({"flow_ml_min": 0.0}, "flow = 0 ml/min"),
-        ({"press_factor": 1.5}, "press factor = 1.5 must be above 0 and at most 1"),
-        ({"contact_factor": 0.0}, "contact factor = 0 must be above 0"),
+        ({"tip_load": 1e4}, "tip load = 10000 g must be from 0 to 1000 g"),
     ],
 )
 def test_what_is_out_of_range_says_the_range(asked: dict[str, object], said: str) -> None:
@@ -152,27 +153,20 @@ def test_what_is_out_of_range_says_the_range(asked: dict[str, object], said: str
         sbafab.predict("1dof-5mm", **asked)  # type: ignore[arg-type]
 
 
-def test_calibration_is_named_wherever_it_counts() -> None:
+def test_a_press_factor_is_named_wherever_it_counts() -> None:
     plain = sbafab.predict("3dof-15mm", "models.calibration=none")
-    found = sbafab.predict(
-        "3dof-15mm", "models.calibration=none", press_factor=0.5, contact_factor=2.0
+    request = PredictionRequest(calibration=Factors(press_factor=0.5))
+    found = predict(sbafab.load("3dof-15mm"), request)
+    # Its plates are thinner, so that it may bend farther or less far.
+    rest, others = (
+        [figure for figure in each.figures if not figure.model.name.startswith("elastic")]
+        for each in (plain, found)
     )
-    elastic = [one for one in found.figures if one.model.name.startswith("elastic")]
-    # Its plates are thinner, so that it may bend farther or less far, and it knows of no contact
-    # factor.
-    assert elastic
-    assert all(one.model.name.endswith(", press factor 0.5") for one in elastic)
-    rest = [one for one in plain.figures if not one.model.name.startswith("elastic")]
-    others = [one for one in found.figures if one not in elastic]
     for before, after in zip(rest, others, strict=True):
-        factor = {"N": "contact factor 2", "W/kg": "contact factor 2"}.get(before.unit)
-        if before.name in {"folded height", "folded diameter"}:
-            factor = "press factor 0.5"
-        assert (factor is None) or factor in after.model.name, after.name
-        if factor is None and before.group != "bending":
+        is_pressed = before.name in {"folded height", "folded diameter"}
+        assert after.model.name.endswith(", press factor 0.5") == is_pressed, after.name
+        if not is_pressed and before.group != "bending":
             assert after == before
-        if factor == "contact factor 2":
-            assert after.value == pytest.approx(2 * before.value)
     assert all("factor" not in figure.model.name for figure in plain.figures)
 
 
@@ -462,11 +456,9 @@ def test_the_stack_says_what_the_paper_measured_where_it_does(three: Prediction)
     assert height == pytest.approx(17.5, rel=0.05)
 
 
-def test_calibration_by_pocket_and_modulus_is_named() -> None:
-    found = sbafab.predict("1dof-5mm", "models.calibration=none", pocket_loss=0.3, modulus_mpa=20.0)
-    models = {figure.model.name for figure in found.figures if "elastic" in figure.model.name}
-    assert models
-    assert all("pocket loss 0.3 mm, E = 20 MPa" in name for name in models)
+def test_smaller_pockets_rise_less_and_the_reference_is_the_paper_s() -> None:
+    request = PredictionRequest(calibration=Factors(pocket_loss=0.3))
+    found = predict(sbafab.load("1dof-5mm"), request)
     plain = sbafab.predict("1dof-5mm", "models.calibration=none")
     assert found.value("free_stroke", kpa=10) < plain.value("free_stroke", kpa=10)
     assert found.value("reference_stroke") == plain.value("reference_stroke")

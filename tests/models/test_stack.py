@@ -13,8 +13,9 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.elastic import blocked_force, pose_bent_by
+from sbafab.models.figures import Factors
 from sbafab.models.rim_correction import free_shapes
-from sbafab.models.stack import Plate, Stack
+from sbafab.models.stack import Plate, Stack, stack
 from sbafab.models.stack_loads import WALL_RIM, energy
 
 LOADS: dict[str, dict[str, Any]] = {
@@ -50,7 +51,8 @@ def test_a_bend_that_no_pressure_gives_is_none(three: Stack) -> None:
 @pytest.mark.parametrize("angle", np.linspace(20.0, 120.0, 41).tolist())
 def test_every_bend_within_reach_is_found(angle: float) -> None:
     """Once 60 degrees were left out: the bracket closed before the bend was met."""
-    soft = sbafab.stack("3dof-15mm", pocket_loss=0.15, modulus_mpa=20.0)
+    factors = Factors(pocket_loss=0.15, modulus_ratio=2.0)
+    soft = stack(sbafab.load("3dof-15mm"), factors=factors)
     pose = pose_bent_by(soft, 1, angle)
     assert pose is not None
     assert pose.bend == pytest.approx(angle, abs=1e-6)
@@ -209,9 +211,6 @@ def test_frames_are_a_chain_of_plates(three: Stack) -> None:
 
 
 def test_calibration_makes_pockets_smaller_or_films_stiffer() -> None:
-    from sbafab.models.figures import Factors
-    from sbafab.models.stack import stack
-
     design = sbafab.load("1dof-5mm")
     smaller = stack(design, factors=Factors(pocket_loss=0.3))
     drawn = smaller.maps[0].balloon
@@ -274,9 +273,6 @@ def test_a_stack_that_slips_far_under_a_plate_has_a_pose(pressures: Any) -> None
 
 def test_a_pushed_column_buckles_the_sooner_the_longer_and_the_freer_it_is() -> None:
     """Flat, none does; at 25 % six balloons do where the tip may slide, ten where it may not."""
-    from sbafab.models.figures import Factors
-    from sbafab.models.stack import stack
-
     factors = Factors(press_factor=0.509, pocket_loss=0.28)
 
     def is_straight(balloons: int, share: float, sticks: bool) -> bool:

@@ -133,8 +133,3 @@ def test_a_stack_with_another_base_has_one_balloon_of_both_films() -> None:
     assert held.gaps[0, 0] < held.gaps[1, 0]
     pushes = [one.force(5.0, gap) for one, gap in zip(made.maps, held.gaps[:, 0], strict=True)]
     assert pushes[0] == pytest.approx(pushes[1], rel=0.01, abs=0.1)
-
-
-def test_one_modulus_for_unlike_films_is_refused() -> None:
-    found = sbafab.predict("1dof-5mm", TPU, modulus_mpa=12.0)
-    assert any("set films.<name>.modulus" in one.reason for one in found.left_out)

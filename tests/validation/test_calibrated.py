@@ -15,6 +15,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import balloon_map
 from sbafab.models.calibration import (
+    FIELDS,
     SHARED,
     UNKNOWNS,
     ModelCalibration,
@@ -108,16 +109,14 @@ def test_values_lie_within_the_intervals_of_the_unknowns(paper: ModelCalibration
         assert unknown.least <= low < paper.values[unknown.field] < high <= unknown.most
 
 
-def test_what_the_user_gives_is_exact(paper: ModelCalibration) -> None:
-    given = Uncertainty(paper, {"press_factor": 0.6, "pocket_loss": None})
-    assert given.factors.press_factor == 0.6
-    assert given.factors.pocket_loss == pytest.approx(paper.values["pocket_loss"])
-    changes = [change for change, _ in given.shifted()]
-    assert changes[2] == 0
-    assert min(map(abs, changes[:2])) > 0
-    # A modulus takes the place of film's modulus and ratio both.
-    stiff = Uncertainty(paper, {"modulus_mpa": 25.0})
-    assert (stiff.factors.modulus_ratio, stiff.shifted()[0][0]) == (1.0, 0.0)
+def test_a_known_weight_on_the_tip_is_exact(paper: ModelCalibration) -> None:
+    row = FIELDS.index("tip_load")
+    given, probed = Uncertainty(paper, tip_load=2.0), Uncertainty(paper, tip_load=None)
+    assert given.factors.tip_load == 2.0
+    assert probed.factors.tip_load == pytest.approx(paper.values["tip_load"])
+    assert given.factors.pocket_loss == probed.factors.pocket_loss
+    assert given.shifted()[row][0] == 0 != probed.shifted()[row][0]
+    assert min(abs(change) for change, _ in given.shifted()[:row]) > 0
 
 
 def test_another_film_has_the_priors_modulus_ratio(paper: ModelCalibration) -> None:
@@ -138,7 +137,7 @@ def test_none_leaves_the_film_as_bought() -> None:
 
 def test_an_interval_by_a_closed_form(paper: ModelCalibration) -> None:
     """A value in proportion to the modulus ratio has its variance and the discrepancy's."""
-    value, (low, high) = Uncertainty(paper, {}).interval_of(
+    value, (low, high) = Uncertainty(paper).interval_of(
         "force", lambda factors: 3 * factors.modulus_ratio
     )
     assert value == pytest.approx(3 * paper.values["modulus_ratio"])

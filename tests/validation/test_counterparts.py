@@ -21,7 +21,7 @@ from sbafab.cli import app
 from sbafab.models import paper
 from sbafab.models.calibration import load_calibration
 from sbafab.models.closed_forms import modulus
-from sbafab.models.figures import Figure, Prediction
+from sbafab.models.figures import Factors, Figure, Prediction, PredictionRequest
 from sbafab.models.paper import (
     CALIBRATED_MODELS,
     MISFIT,
@@ -30,6 +30,7 @@ from sbafab.models.paper import (
     counterparts,
 )
 from sbafab.models.pneumatics import seconds
+from sbafab.models.prediction import predict
 from sbafab.models.quantity import Conditions, FigureKey, Quantity
 from sbafab.studio.answers import stack_model
 from sbafab.studio.jobs import elastic
@@ -380,8 +381,9 @@ def test_columns_of_a_sweep_have_them() -> None:
         assert counterpart(form, *FigureKey.read(key)) is None, key
 
 
-def test_with_factors_the_clause_says_that_the_model_had_none() -> None:
-    found = sbafab.predict("3dof-15mm", UNCALIBRATED, press_factor=0.509, pocket_loss=0.28)
+def test_a_folded_height_with_a_factor_has_no_clause() -> None:
+    request = PredictionRequest(calibration=Factors(press_factor=0.9))
+    found = predict(sbafab.load("3dof-15mm"), request)
     told = {figure.name: figure for figure in found.figures}
     assert told["folded height"].measured is None
-    assert "this model without factors gives it 24.55" in told["free height at 10 kPa"].aside
+    assert "this model gives it 24.55" in told["free height at 10 kPa"].aside
