@@ -17,7 +17,7 @@ from sbafab.errors import DesignError
 from sbafab.folders.check import read_folder
 from sbafab.folders.differences import DESIGNED
 from sbafab.folders.run import RunRequest, generate
-from tests.faults import beside, chords, claims, files, holes, joints, layers, masks, sheets
+from tests.faults import beside, claims, files, holes, joints, layers, masks, sheets
 from tests.faults.record import PAPER, Fault, Kind, Specimen, failing, unabridged
 from tests.folders.doctoring import Doctor
 
@@ -28,7 +28,7 @@ KINDS: tuple[Kind, ...] = (
     holes.KIND,
     holes.EARS_KIND,
     masks.KIND,
-    chords.KIND,
+    masks.CHORDS_KIND,
     files.KIND,
     claims.KIND,
     sheets.KIND,

@@ -9,8 +9,6 @@ import os
 import random
 import shutil
 import signal
-import time
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import pytest
@@ -81,32 +79,6 @@ def test_killed_before_random_file_operations(runs: Runs, output: Output) -> Non
     last = output.held()
     assert last is not None
     assert runs.run(output.arguments(OTHER[last]), output.folder).code == 0
-    assert output.leftovers() == set()
-
-
-def test_killed_at_random_moments(runs: Runs, output: Output) -> None:
-    began = time.perf_counter()
-    assert runs.run(output.arguments("0.75"), output.folder).code == 0
-    lasts = time.perf_counter() - began
-    dice = random.Random(20)
-    codes = []
-    for number in range(KILLS):
-        before = output.held()
-        assert before is not None
-        pid = runs.start(output.arguments(OTHER[before]), output.folder)
-        time.sleep(lasts * (number + dice.random()) / KILLS)
-        with suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGKILL)
-        ended = runs.wait(pid)
-        codes.append(ended.code)
-        assert output.held() in (before, OTHER[before]), f"kill {number}"
-        if ended.code == 0:
-            assert output.held() == OTHER[before]
-    assert -signal.SIGKILL in codes
-    last = output.held()
-    assert last is not None
-    assert runs.run(output.arguments(OTHER[last]), output.folder).code == 0
-    assert output.held() == OTHER[last]
     assert output.leftovers() == set()
 
 

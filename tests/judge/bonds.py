@@ -1,4 +1,4 @@
-"""The least width of every bond, between edges that face each other."""
+"""Where films bond, and how wide; and where others face each other."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
-from shapely import LineString, Polygon
+from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from tests.judge.folder import Folder, Interface, asked_kerf, pieces, place
+from tests.judge.folder import Folder, Interface, Layer, asked_kerf, pieces, place
+from tests.judge.pins import play
 
 THINNEST = 0.004
 """mm: narrower bonds are what flattened arcs make of edges that coincide."""
@@ -140,3 +141,48 @@ def _along(
                 at = before + turn * i / math.ceil(-turn / FAN) + math.pi / 2
                 points.append(tuple(start))
                 normals.append((math.cos(at), math.sin(at)))
+
+
+# Films that face each other in the press with nothing between: they weld there.
+
+
+def judge_facing(folder: Folder) -> Iterator[str]:
+    """No two films but consecutive ones see each other, other than down a pinned bore."""
+    bores = shapely.union_all(
+        [Point(hole.x, hole.y).buffer(hole.radius + play(folder) + 0.003) for hole in folder.holes]
+    )
+    for below, above, seen in _sights(folder):
+        for part in pieces(seen.difference(bores), THINNEST):
+            yield (
+                f"films {below} and {above} face each other over {part.area:.4f} mm2 with "
+                f"nothing between, at {place(part)}"
+            )
+
+
+def _sights(folder: Folder) -> Iterator[tuple[int, int, BaseGeometry]]:
+    """Pairs of films that are not consecutive, and where one sees the other."""
+    layers = folder.layers
+    known: dict[tuple[int, ...], list[tuple[int, BaseGeometry]]] = {}
+    for start, lowest in enumerate(layers):
+        if lowest.is_mask:
+            continue
+        key = tuple(layer.shape for layer in layers[start:])
+        if key not in known:
+            known[key] = list(_seen_from(layers[start:]))
+        for ahead, seen in known[key]:
+            yield lowest.index, layers[start + ahead].index, seen
+
+
+def _seen_from(layers: tuple[Layer, ...]) -> Iterator[tuple[int, BaseGeometry]]:
+    open_sky: BaseGeometry = layers[0].profile
+    passed = 0
+    for ahead, layer in enumerate(layers[1:], start=1):
+        if not layer.is_mask:
+            passed += 1
+            if passed > 1:
+                seen = open_sky.intersection(layer.profile)
+                if not seen.is_empty:
+                    yield ahead, seen
+        open_sky = open_sky.difference(layer.profile)
+        if open_sky.is_empty:
+            return

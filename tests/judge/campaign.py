@@ -19,14 +19,12 @@ from types import FrameType
 
 from shapely import Polygon
 
-from tests.judge.bonds import judge_bonds
-from tests.judge.claims import judge_claims
+from tests.judge.bonds import judge_bonds, judge_facing
+from tests.judge.claims import judge_claims, judge_pockets
 from tests.judge.drafts import Draft, beside, draft
-from tests.judge.facing import judge_facing
 from tests.judge.folder import Disagreement, Folder, open_folder
 from tests.judge.overhangs import judge_overhangs
 from tests.judge.pins import judge_pins
-from tests.judge.pockets import judge_pockets
 from tests.judge.pressing import judge_press
 from tests.judge.reading import UnreadableError
 from tests.judge.sheets import judge_sheets

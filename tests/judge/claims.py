@@ -1,17 +1,19 @@
-"""What the manifest says of sizes and areas, against the files."""
+"""What the manifest says of sizes and areas, and what was drawn, against the files."""
 
 from __future__ import annotations
 
 import hashlib
+import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
+from shapely import Polygon, affinity
 from shapely.geometry.base import BaseGeometry
 
 from tests.judge.bonds import bond_of
-from tests.judge.folder import Folder, asked_kerf, pieces
+from tests.judge.folder import Folder, asked_kerf, closed_by, pieces, place
 
 SHARE = 1e-4
 SIZE = 0.002
@@ -108,3 +110,61 @@ def _sizes(folder: Folder) -> Iterator[str]:
     for name, value in measured.items():
         if abs(stated.get(name, value) - value) > slack * (1 + (name == "overall_diameter")):
             yield f"the {name} is {value:.3f}, stated {stated[name]:.3f}"
+
+
+# The pockets against what was drawn: same shape, same size, same side up.
+
+
+OFF = 0.003
+"""mm: the program's arcs stay within half a micrometre of a drawn curve."""
+
+
+def judge_pockets(folder: Folder, drawn: Sequence[Polygon]) -> Iterator[str]:
+    """``drawn`` holds the pocket of every balloon, round (0, 0), bottom to top."""
+    masks = [layer for layer in folder.layers if layer.role == "chamber-mask"]
+    off = OFF + folder.chord_error + folder.slack
+    kerf = asked_kerf(folder.asked, "ptfe")
+    for mask, pocket in zip(masks, drawn, strict=True):
+        for part in pieces(mask.profile):
+            filled = Polygon(part.exterior)
+            home = _axis(folder, part)
+            if home is None:
+                continue
+            turn = _turn(folder, home)
+            meant = affinity.translate(affinity.rotate(pocket, turn, origin=(0, 0)), *home)
+            missing = meant.buffer(-off).difference(filled)
+            cut = closed_by(meant, kerf).buffer(off)
+            more = filled.difference(cut) if mask is not masks[0] else Polygon()
+            for what, region in (("lacks", missing), ("has more by", more)):
+                if not region.is_empty:
+                    yield (
+                        f"mask {mask.index} {what} {region.area:.4f} mm2 of what was drawn, at "
+                        f"{place(region)}"
+                    )
+    if len(masks) != len(drawn):
+        yield f"{len(masks)} chamber masks for {len(drawn)} balloons"
+
+
+def _axis(folder: Folder, part: Polygon) -> tuple[float, float] | None:
+    """The axis of a pocket: the middle of its bore; without one known only for 1-DoF."""
+    if folder.asked["family"] == "1dof":
+        return 0.0, 0.0
+    bore = float(folder.wish("bore", "diameter", 1.04))
+    inlet_side = [
+        ring.centroid
+        for ring in map(Polygon, part.interiors)
+        if abs(2 * math.sqrt(ring.area / math.pi) - bore) < 0.02 + folder.chord_error
+        and any(
+            math.dist(ring.centroid.coords[0], (entry["x"], entry["y"])) < 0.01
+            for entry in folder.manifest["bores"]
+        )
+    ]
+    if len(inlet_side) != 1:
+        return None
+    return float(inlet_side[0].x), float(inlet_side[0].y)
+
+
+def _turn(folder: Folder, home: tuple[float, float]) -> float:
+    if folder.asked["family"] != "lobed":
+        return 0.0
+    return math.degrees(math.atan2(home[1], home[0]))
