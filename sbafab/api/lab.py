@@ -1,4 +1,4 @@
-"""Measurements of a lab: the kerf of its laser, results of its actuators."""
+"""Measurements of a lab: coupons, cut sheets, results of its actuators."""
 
 from __future__ import annotations
 
@@ -8,9 +8,21 @@ from typing import Any
 
 from sbafab.api.designs import Source, command
 from sbafab.design.files import Change
+from sbafab.design.films import FILM_NAME, is_kerf
 from sbafab.errors import DesignError
+from sbafab.folders.swap import replace_text
 from sbafab.lab import recording
-from sbafab.lab.coupon import Calibration, calibrated, read_measurements
+from sbafab.lab.coupon import (
+    RESOLUTIONS,
+    Calibration,
+    Estimate,
+    Measurement,
+    Value,
+    calibrated,
+    read_measurements,
+    write_coupon,
+)
+from sbafab.lab.inspection import Inspection, InspectionDocument, drawing, history, sizes_csv
 from sbafab.lab.records import (
     HistoryEntry,
     HistoryRow,
@@ -24,6 +36,7 @@ from sbafab.lab.records import (
 )
 from sbafab.lab.report import Report, ReportDocument, success_svg
 from sbafab.lab.report import report as report_of
+from sbafab.lab.scan import Reference, Scan, ScanPicture, read_cut_sheet, read_picture
 from sbafab.lab.store import Contents, Lab, store_photograph
 from sbafab.reports.traveller.record_sheet import RecordTable
 

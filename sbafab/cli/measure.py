@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from sbafab.api import measure as api
+from sbafab.api import lab as api
 from sbafab.cli import options as opt
 from sbafab.cli import show
 from sbafab.documents import Document, attribute

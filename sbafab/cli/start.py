@@ -71,7 +71,7 @@ def new(template: str | None, file: Path | None, as_json: bool) -> None:
 
 def _coupon(folder: Path) -> None:
     # Its drawing takes numpy, which no other file to start from does.
-    from sbafab.api.measure import write_coupon
+    from sbafab.api.lab import write_coupon
 
     drawing, picture, table = write_coupon(folder, GENERATOR)
     click.echo(f"Cut {drawing} (picture: {picture}) from each film with a kerf offset of 0.")
