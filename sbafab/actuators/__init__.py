@@ -23,7 +23,7 @@ from sbafab.design.files import (
     read_toml,
     with_changes,
 )
-from sbafab.design.outline import understood
+from sbafab.design.outline import described_outline
 from sbafab.design.records import Design, validated
 from sbafab.laminate.laminate import Laminate
 from sbafab.plugins import Plugins
@@ -96,7 +96,7 @@ def build(design: Design) -> Laminate:
     if design.drawing is None:
         return laminate
 
-    note = understood(design.drawing).description
+    _, note = described_outline(design.drawing)
     return replace(laminate, notes=(note, *laminate.notes))
 
 

@@ -20,29 +20,12 @@ from sbafab import catalogue, plugins
 from sbafab.design.toml_table import PATTERNS
 from sbafab.errors import DesignError, OutputError
 
-_SHEETS = (
-    "belongs to registered sheets, which were removed; delete it, and register the films by "
-    'registration.method = "ears" or "channel-pin"'
+REMOVED = (
+    *("panel", "registration.experimental", 'registration.method = "sheet"'),
+    *("order.shift_hours", "order.technicians", "order.presses", "order.base_plates"),
+    *("sheets.stock", "sheets.*.piece", "films.*.sheet.piece", "sheets.engine", "sheets.seconds"),
 )
-_PLAN = "was removed: batches are no longer planned by working day; delete it"
-_STOCK = "was removed: stock files are no longer kept; delete it"
-REMOVED: Mapping[str, str] = {
-    "panel": _SHEETS,
-    "registration.experimental": _SHEETS,
-    'registration.method = "sheet"': _SHEETS,
-    "order.shift_hours": "was removed; order.at_once says how many copies a press cycle takes",
-    "order.technicians": _PLAN,
-    "order.presses": _PLAN,
-    "order.base_plates": _PLAN,
-    "sheets.stock": "was removed; write the size of the film at hand as width and length of its "
-    "sheet",
-    "sheets.*.piece": _STOCK,
-    "films.*.sheet.piece": _STOCK,
-    "sheets.engine": "was removed, as parts are nested in one way; delete it",
-    "sheets.seconds": "was removed, as nesting takes no time limit; delete it",
-}
-"""Tables, keys ("*": any name) and values of earlier design files: the removed thing, and its
-replacement."""
+"""Tables, keys ("*": any name) and values of earlier design files."""
 
 
 KEY_UNITS = {"_kpa": "kPa", "minutes": "minutes", "seconds": "s", "hours": "h", "_speed": "mm/s"}
@@ -110,9 +93,8 @@ def sentence(
     field = (prefix + ".".join(where)).rstrip(".")
     value = first["input"] if isinstance(first["input"], str) else ""
     for name in (field, where[0] if where else "", f'{field} = "{value}"'):
-        for key, words in REMOVED.items():
-            if fnmatchcase(name, key):
-                return f"{name} {words}"
+        if any(fnmatchcase(name, key) for key in REMOVED):
+            return f"{name} was removed; delete it"
     count = len({tuple(problem["loc"][:2]) for problem in problems}) - 1
     more = f" (and {count} more problem{'s' if count > 1 else ''} like it)" if count > 0 else ""
     if first["type"] == "extra_forbidden":
@@ -312,22 +294,31 @@ def _hint(missing: Path) -> str:
     return hint(missing, names, f"the templates are {', '.join(names)}")
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Return the tables of a design file. Raises DesignError if it cannot be read."""
+def read_bytes(path: Path, most: int) -> bytes:
+    """Return the content of a file. Raises DesignError if it cannot be read, or is too large."""
     try:
         with path.open("rb") as opened:
-            content = opened.read(MOST_BYTES + 1)
-        if len(content) > MOST_BYTES:
-            size = path.stat().st_size
-            raise DesignError(
-                f"{path} has {size:,} bytes; a design file has at most {MOST_BYTES:,}"
-            )
-        text = content.decode("utf-8-sig")
+            content = opened.read(most + 1)
+        size = len(content) if len(content) <= most else path.stat().st_size
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise DesignError(f"{path} cannot be read: {reason}; check its path") from None
+    if size > most:
+        raise DesignError(f"{path} has {size:,} bytes, where at most {most:,} are allowed")
+    return content
+
+
+def read_text(path: Path, most: int = MOST_BYTES) -> str:
+    """Return the text of a file in UTF-8. Raises DesignError."""
+    try:
+        return read_bytes(path, most).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise DesignError(f"{path} is not a text file in UTF-8; save it as UTF-8") from None
-    except OSError as error:
-        raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
-    return toml_tables(text, path)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the tables of a design file. Raises DesignError if it cannot be read."""
+    return toml_tables(read_text(path), path)
 
 
 def toml_tables(text: str, path: str | Path) -> dict[str, Any]:

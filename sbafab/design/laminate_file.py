@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -286,9 +286,10 @@ def _faults(document: LaminateDocument) -> Iterator[str]:
     for i, seam in enumerate(document.seams):
         for j, chain in enumerate(seam.path):
             yield from _chain_faults(f"seams[{i}].path[{j}]", chain, is_closed=False)
+    for where, name, noun, known in _references(document):
+        if name not in known:
+            yield f"{where}: there is no {noun} {json.dumps(name)}"
     yield from _layer_faults(document)
-    yield from _reference_faults(document)
-    yield from _joint_faults(document)
 
 
 def _chain_faults(where: str, rows: Sequence[Any], is_closed: bool) -> Iterator[str]:
@@ -314,52 +315,46 @@ def _crossing(edges: Sequence[Edge]) -> Point | None:
     return None
 
 
+def _references(document: LaminateDocument) -> Iterator[tuple[str, Any, str, Collection[Any]]]:
+    """Yield the place of each name or index, itself, what it names, and all there are of that."""
+    chambers = [chamber.name for chamber in document.chambers]
+    ports = [*chambers, *(port.name for port in document.ports)]
+    films, shapes = range(len(document.films)), range(len(document.shapes))
+    for key in ("bores", "inlets"):
+        for i, row in enumerate(getattr(document, key)):
+            yield f"{key}[{i}].chamber", row.chamber, "chamber", chambers
+    yield "outline", document.outline, "shape", shapes
+    for i, layer in enumerate(document.layers):
+        yield f"layers[{i}].film", layer.film, "film", films
+        yield f"layers[{i}].shape", layer.shape, "shape", shapes
+    for i, net in enumerate(document.nets):
+        yield from ((f"nets[{i}].ports", name, "port or chamber", ports) for name in net.ports)
+
+
 def _layer_faults(document: LaminateDocument) -> Iterator[str]:
+    """Yield layers out of order, of another film than their role's or at another height, and joints
+    that are not between two of them.
+    """
     z = 0.0
     for i, layer in enumerate(document.layers):
-        where = f"layers[{i}]"
+        where, film = f"layers[{i}]", document.films[layer.film]
         if layer.index != i + 1:
             yield f"{where}.index: is {layer.index}; the layers count from 1 at the bottom"
-        if layer.film >= len(document.films):
-            yield f"{where}.film: there is no film {layer.film}"
-            return
-        film = document.films[layer.film]
         if layer.role.endswith("mask") != film.is_mask:
             yield f"{where}.role: a {layer.role} cannot be of {film.material}"
         if abs(layer.z - z) > JOINED:
             yield f"{where}.z: is {layer.z:g} mm; the films below it are {z:g} mm thick"
         z = layer.z + film.thickness
-
-
-def _reference_faults(document: LaminateDocument) -> Iterator[str]:
-    """Yield names and indices without a referent."""
-    chambers = {chamber.name for chamber in document.chambers}
-    for key in ("bores", "inlets"):
-        for i, row in enumerate(getattr(document, key)):
-            if row.chamber not in chambers:
-                yield f"{key}[{i}].chamber: there is no chamber {json.dumps(row.chamber)}"
-    used = {"outline": document.outline}
-    used |= {f"layers[{i}].shape": layer.shape for i, layer in enumerate(document.layers)}
-    for where, shape in used.items():
-        if shape >= len(document.shapes):
-            yield f"{where}: there is no shape {shape}"
-
-
-def _joint_faults(document: LaminateDocument) -> Iterator[str]:
-    """Yield joints that are not between two layers of the laminate, and nets of unknown ports."""
     count = len(document.layers)
-    pairs = [(f"seams[{i}]", row.below, row.above) for i, row in enumerate(document.seams)]
-    pairs += [(f"folds[{i}]", row.lower, row.upper) for i, row in enumerate(document.folds)]
-    pairs += [(f"ports[{i}]", row.below, row.above) for i, row in enumerate(document.ports)]
-    for where, below, above in pairs:
-        if not 1 <= below < above <= count:
-            yield f"{where}: lies between layers {below} and {above} of {count}"
+    for key, lower, upper in (
+        ("seams", "below", "above"),
+        ("folds", "lower", "upper"),
+        ("ports", "below", "above"),
+    ):
+        for i, row in enumerate(getattr(document, key)):
+            below, above = getattr(row, lower), getattr(row, upper)
+            if not 1 <= below < above <= count:
+                yield f"{key}[{i}]: lies between layers {below} and {above} of {count}"
     for i, fold in enumerate(document.folds):
         if fold.line[0] == fold.line[1]:
             yield f"folds[{i}].line: is not two points apart from each other"
-    names = [port.name for port in document.ports]
-    names += [chamber.name for chamber in document.chambers]
-    for i, net in enumerate(document.nets):
-        for name in net.ports:
-            if name not in names:
-                yield f"nets[{i}].ports: there is no port or chamber {json.dumps(name)}"

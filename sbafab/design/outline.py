@@ -6,13 +6,12 @@ A DXF or SVG file holds polylines, chains of edges, whose ends make loops. All c
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
 
-from sbafab.design.files import listed, shown
+from sbafab.design.files import is_file, listed, read_bytes, shown
 from sbafab.design.laminate_file import read_laminate
 from sbafab.design.outline_dxf import dxf_polylines
 from sbafab.design.outline_svg import svg_polylines
@@ -24,13 +23,12 @@ from sbafab.design.polylines import (
     is_closed,
     joined,
     sealed,
-    widest_gap,
 )
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import FitError
 from sbafab.geometry.arrangement import split_edges
 from sbafab.geometry.contour import Contour, in_reading_order, tidy
-from sbafab.geometry.edges import EPSILON, Point, box_round, meeting_points
+from sbafab.geometry.edges import EPSILON, Bounds, Point, box_round, meeting_points
 from sbafab.geometry.region import Region, centroid
 from sbafab.geometry.spatial_index import close_pairs
 
@@ -39,13 +37,27 @@ MOST_OUTLINE_EDGES = 500
 LARGEST = 150.0
 SMALLEST = 1.0
 """Bounds of the outline's extent, in mm."""
+LARGEST_DRAWING = 2000.0
+"""Bound of a drawing's extent, mm."""
+OUTLINE = "outline"
+"""Name of the outline of a ``laminate.json``, beside its patterns."""
 
 
-class Outline(NamedTuple):
-    """A drawn outline, and one sentence on its size."""
+@contextmanager
+def _faults_of(what: str, path: Path) -> Iterator[None]:
+    """Raise the faults of a drawing with its name."""
+    try:
+        yield
+    except FitError as error:
+        raise DesignError(f"{what} {path} has a {error}; round it off") from None
+    except DesignError as error:
+        raise DesignError(f"{what} {path} {str(error).removeprefix(f'{path} ')}") from None
 
-    region: Region
-    description: str
+
+def _content(path: Path) -> bytes:
+    if not is_file(path):
+        raise DesignError("does not exist as a file; check its path")
+    return read_bytes(path, MOST_BYTES)
 
 
 def read_outline(path: Path) -> Region:
@@ -56,42 +68,25 @@ def read_outline(path: Path) -> Region:
     read as 1 unit = 1 mm, and its y axis is turned upward, so that the outline looks as drawn.
     Ellipses, Béziers and splines become arcs within 0.5 um. Raises DesignError.
     """
-    return understood(path).region
+    return described_outline(path)[0]
 
 
-def understood(path: Path) -> Outline:
-    """Return a drawn outline with its size as text. Raises DesignError."""
-    with _faults_of(f"outline {path}"):
-        return _understood(path, content(path))
-
-
-@contextmanager
-def _faults_of(drawing: str) -> Iterator[None]:
-    """Raise the faults of a drawing with its name."""
-    try:
-        yield
-    except FitError as error:
-        raise DesignError(f"{drawing} has a {error}; round it off") from None
-    except DesignError as error:
-        raise DesignError(f"{drawing} {error}") from None
+def described_outline(path: Path) -> tuple[Region, str]:
+    """Return a drawn outline, and its size as text. Raises DesignError."""
+    with _faults_of("outline", path):
+        return _outline(path, _content(path))
 
 
 @lru_cache(maxsize=4)
-def _understood(path: Path, content: bytes) -> Outline:
+def _outline(path: Path, content: bytes) -> tuple[Region, str]:
     """The outline of a file with this content; cached, as a run needs it more than once."""
     polylines, scale = _traced(path)
-    region = nested(_contours(polylines, MOST_OUTLINE_EDGES))
+    region = _nested(_contours(polylines, MOST_OUTLINE_EDGES))
     if len(region.contours) > 1:
         raise DesignError(
             f"holds {len(region.contours)} closed paths; keep only the pocket's outline"
         )
-    low_x, low_y, high_x, high_y = region.bounds
-    width, height = high_x - low_x, high_y - low_y
-    if max(width, height) > LARGEST or min(width, height) < SMALLEST:
-        raise DesignError(
-            f"measures {width:.4g} x {height:.4g} mm, where {SMALLEST:g} to {LARGEST:g} is "
-            "allowed; check its units"
-        )
+    width, height = _extent(region.bounds, SMALLEST, LARGEST)
     shift = ""
     if not _surrounds(region, (0.0, 0.0)):
         x, y = centroid(region)
@@ -103,23 +98,78 @@ def _understood(path: Path, content: bytes) -> Outline:
         # The printed shift is the one applied.
         region, shift = region.moved(-round(x, 6), -round(y, 6)), ", centred on its centroid"
     # Without the file's name: the design is the same wherever its drawing is stored.
-    return Outline(region, f"drawn outline: {width:.3f} x {height:.3f} mm, {scale}{shift}")
+    return region, f"drawn outline: {width:.3f} x {height:.3f} mm, {scale}{shift}"
 
 
-def content(path: Path) -> bytes:
-    """Return the content of a drawing. Raises DesignError if it cannot be read, or is too large."""
-    try:
-        if not path.is_file():
-            raise DesignError("does not exist as a file; check its path")
-        size = path.stat().st_size
-        if size > MOST_BYTES:
-            raise DesignError(f"has {size:,} bytes, where at most {MOST_BYTES:,} are allowed")
-        return path.read_bytes()
-    except DesignError:
-        raise
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise DesignError(f"cannot be read ({reason}); check its path") from None
+def _extent(bounds: Bounds, least: float, most: float) -> tuple[float, float]:
+    """Return width and height, mm. Raises DesignError if they are not within the limits."""
+    width, height = bounds[2] - bounds[0], bounds[3] - bounds[1]
+    if max(width, height) > most or min(width, height) < least:
+        allowed = f"{least:g} to {most:g}" if least else f"at most {most:g}"
+        raise DesignError(
+            f"measures {width:.4g} x {height:.4g} mm, where {allowed} is allowed; check its units"
+        )
+    return width, height
+
+
+def _surrounds(region: Region, p: Point) -> bool:
+    return region.contains(p) and region.distance_to_edge(p) >= EPSILON
+
+
+def read_drawing(path: Path, layer: str | None = None) -> Region:
+    """Return the region enclosed by the closed contours of a drawing, at their place in it, mm.
+
+    Contours are nested by the even-odd rule: one inside another is a hole. Layers of a DXF file
+    that are not plotted are ignored unless named. ``layer`` names a layer of a DXF file, a group of
+    an SVG file by its label or id, or a pattern, ``outline`` or ``seam NAME`` of a
+    ``laminate.json``. Units are read as for an outline. Raises DesignError with the file and the
+    place.
+    """
+    with _faults_of("drawing", path):
+        if path.suffix.lower() == ".json":
+            return _profile(_profiles(path, _content(path)), layer)
+        return _drawn(path, _content(path), layer)
+
+
+@lru_cache(maxsize=64)
+def _drawn(path: Path, content: bytes, layer: str | None) -> Region:
+    """The region of a file with this content; cached, as a run needs it more than once."""
+    polylines, _ = _traced(path, layer, is_plot=True)
+    contours = _contours(polylines, MOST_EDGES)
+    p = crossing(tuple(edge for contour in contours for edge in contour.edges))
+    if p is not None:
+        raise DesignError(
+            f"has contours that cross or touch each other at x {p[0]:.4f}, y {p[1]:.4f}; draw them "
+            "apart, or join them"
+        )
+    _extent(box_round([contour.bounds for contour in contours]), 0.0, LARGEST_DRAWING)
+    return _nested(contours)
+
+
+@lru_cache(maxsize=4)
+def _profiles(path: Path, content: bytes) -> dict[str, Region]:
+    laminate = read_laminate(path)
+    profiles = {layer.pattern: layer.profile for layer in laminate.layers}
+    for seam in laminate.seams:
+        if all(is_closed(chain) for chain in seam.path):
+            profiles[seam_layer(seam.name)] = Region(tuple(map(Contour, seam.path)))
+    return profiles | ({} if laminate.outline.is_empty else {OUTLINE: laminate.outline})
+
+
+def seam_layer(name: str) -> str:
+    """Return the name of a seam's closed path among a laminate's patterns."""
+    return f"seam {name}"
+
+
+def _profile(profiles: Mapping[str, Region], layer: str | None) -> Region:
+    if layer is None:
+        raise DesignError(f"is a laminate; name one of its patterns as layer: {listed(profiles)}")
+    if layer not in profiles:
+        raise DesignError(f"has no pattern {shown(layer)}; there are {listed(profiles)}")
+    return profiles[layer]
+
+
+# From a file's polylines to contours, and to the region that they enclose.
 
 
 def _traced(
@@ -129,7 +179,6 @@ def _traced(
 
     ``is_plot``: layers of a DXF file that are not plotted count only if named.
     """
-    # Each reader loads its own library, only for the format needed.
     if path.suffix.lower() == ".dxf":
         return dxf_polylines(path, layer, is_plot)
     if path.suffix.lower() == ".svg":
@@ -137,7 +186,22 @@ def _traced(
     raise DesignError("is neither .dxf nor .svg; export it as one of them")
 
 
-def closed_loops(polylines: list[Polyline]) -> list[Polyline]:
+def _contours(polylines: Iterable[Polyline], most: int) -> list[Contour]:
+    """Return the contours that polylines of at most ``most`` edges close to. Raises DesignError."""
+    contours = []
+    for loop in map(sealed, _closed_loops(list(counted(polylines, most)))):
+        refuse_crossings(loop)
+        contour = tidy(loop) if loop else None
+        if contour is None:
+            x, y = loop[0].start if loop else (0.0, 0.0)
+            raise DesignError(
+                f"has a contour without area at x {x:.4f}, y {y:.4f}; delete it, or check the units"
+            )
+        contours.append(contour)
+    return contours
+
+
+def _closed_loops(polylines: list[Polyline]) -> list[Polyline]:
     """Return the loops that polylines close to. Raises DesignError if one is open or doubled."""
     drawn = set()
     for edge in (edge for chain in polylines for edge in chain):
@@ -151,7 +215,10 @@ def closed_loops(polylines: list[Polyline]) -> list[Polyline]:
         drawn.add(key)
     loops, opens = joined(polylines)
     if opens:
-        gap, (x, y) = widest_gap(opens)
+        x, y = opens[0][-1].end
+        ends = [p for chain in opens for p in (chain[0].start, chain[-1].end)]
+        # All but the end itself.
+        gap = min(math.dist((x, y), p) for p in (ends[0], *ends[2:]))
         raise DesignError(
             f"is open: a gap of {gap:.4f} mm at x {x:.4f}, y {y:.4f}, where {JOIN} is allowed; "
             "join the ends, or delete what is not the outline"
@@ -163,23 +230,15 @@ def closed_loops(polylines: list[Polyline]) -> list[Polyline]:
     return loops
 
 
-def _contours(polylines: Iterator[Polyline], most: int) -> list[Contour]:
-    """Return the contours that polylines of at most ``most`` edges close to. Raises DesignError."""
-    contours = []
-    for loop in map(sealed, closed_loops(list(counted(polylines, most)))):
-        refuse_crossings(loop)
-        contour = tidy(loop) if loop else None
-        if contour is None:
-            x, y = loop[0].start if loop else (0.0, 0.0)
-            raise DesignError(
-                f"has a contour without area at x {x:.4f}, y {y:.4f}; delete it, or check the units"
-            )
-        contours.append(contour)
-    return contours
-
-
-def _surrounds(region: Region, p: Point) -> bool:
-    return region.contains(p) and region.distance_to_edge(p) >= EPSILON
+def _nested(contours: list[Contour]) -> Region:
+    """Return the region enclosed by disjoint contours: each inside an odd number is a hole."""
+    oriented = []
+    for contour in contours:
+        place = contour.edges[0].at(0.5)
+        around = sum(other is not contour and other.winding(place) != 0 for other in contours)
+        is_hole = around % 2 == 1
+        oriented.append(contour if contour.is_hole == is_hole else contour.reversed())
+    return Region(in_reading_order(oriented))
 
 
 def refuse_crossings(loop: Polyline) -> None:
@@ -206,85 +265,3 @@ def crossing(loop: Polyline) -> Point | None:
             return pieces[0].end if len(pieces) > 1 else edge.start
         corners.add(start)
     return None
-
-
-# Whole layers: all closed contours of a file, or a profile of a ``laminate.json``.
-
-
-LARGEST_DRAWING = 2000.0
-"""Bound of a drawing's extent, mm."""
-OUTLINE = "outline"
-"""Name of the outline of a ``laminate.json``, beside its patterns."""
-
-
-def read_drawing(path: Path, layer: str | None = None) -> Region:
-    """Return the region enclosed by the closed contours of a drawing, at their place in it, mm.
-
-    Contours are nested by the even-odd rule: one inside another is a hole. Layers of a DXF file
-    that are not plotted are ignored unless named. ``layer`` names a layer of a DXF file, a group of
-    an SVG file by its label or id, or a pattern, ``outline`` or ``seam NAME`` of a
-    ``laminate.json``. Units are read as for an outline. Raises DesignError with the file and the
-    place.
-    """
-    with _faults_of(f"drawing {path}"):
-        if path.suffix.lower() == ".json":
-            return _profile(path, content(path), layer)
-        return _drawn(path, content(path), layer)
-
-
-@lru_cache(maxsize=64)
-def _drawn(path: Path, content: bytes, layer: str | None) -> Region:
-    """The region of a file with this content; cached, as a run needs it more than once."""
-    polylines, _ = _traced(path, layer, is_plot=True)
-    contours = _contours(polylines, MOST_EDGES)
-    p = crossing(tuple(edge for contour in contours for edge in contour.edges))
-    if p is not None:
-        raise DesignError(
-            f"has contours that cross or touch each other at x {p[0]:.4f}, y {p[1]:.4f}; draw them "
-            "apart, or join them"
-        )
-    low_x, low_y, high_x, high_y = box_round([contour.bounds for contour in contours])
-    if max(high_x - low_x, high_y - low_y) > LARGEST_DRAWING:
-        raise DesignError(
-            f"measures {high_x - low_x:.4g} x {high_y - low_y:.4g} mm, where at most "
-            f"{LARGEST_DRAWING:g} is allowed; check its units"
-        )
-    return nested(contours)
-
-
-def nested(contours: list[Contour]) -> Region:
-    """Return the region enclosed by disjoint contours: each inside an odd number is a hole."""
-    oriented = []
-    for contour in contours:
-        place = contour.edges[0].at(0.5)
-        around = sum(other is not contour and other.winding(place) != 0 for other in contours)
-        is_hole = around % 2 == 1
-        oriented.append(contour if contour.is_hole == is_hole else contour.reversed())
-    return Region(in_reading_order(oriented))
-
-
-@lru_cache(maxsize=4)
-def _profiles(path: Path, content: bytes) -> dict[str, Region]:
-    try:
-        laminate = read_laminate(path)
-    except DesignError as error:
-        raise DesignError(str(error).removeprefix(f"{path} ")) from None
-    profiles = {layer.pattern: layer.profile for layer in laminate.layers}
-    for seam in laminate.seams:
-        if all(is_closed(chain) for chain in seam.path):
-            profiles[seam_layer(seam.name)] = Region(tuple(map(Contour, seam.path)))
-    return profiles | ({} if laminate.outline.is_empty else {OUTLINE: laminate.outline})
-
-
-def seam_layer(name: str) -> str:
-    """Return the name of a seam's closed path among a laminate's patterns."""
-    return f"seam {name}"
-
-
-def _profile(path: Path, content: bytes, layer: str | None) -> Region:
-    profiles = _profiles(path, content)
-    if layer is None:
-        raise DesignError(f"is a laminate; name one of its patterns as layer: {listed(profiles)}")
-    if layer not in profiles:
-        raise DesignError(f"has no pattern {shown(layer)}; there are {listed(profiles)}")
-    return profiles[layer]

@@ -130,11 +130,3 @@ def _from(start: Point, edge: Edge) -> Edge:
     if isinstance(edge, Line):
         return Line(start, edge.end)
     return edge_from_bulge(start, edge.end, edge.bulge)
-
-
-def widest_gap(opens: Sequence[Polyline]) -> tuple[float, Point]:
-    """The least distance from the first polyline's last end to another loose end, and that end."""
-    here = opens[0][-1].end
-    ends = [opens[0][0].start]
-    ends += [end for chain in opens[1:] for end in (chain[0].start, chain[-1].end)]
-    return min(math.dist(here, other_end) for other_end in ends), here

@@ -15,7 +15,7 @@ from pydantic import Field
 from sbafab.actuators.drawn import DRAWN
 from sbafab.actuators.shapes import Coordinate
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.design.files import checked, name_of, shown
+from sbafab.design.files import checked, name_of, read_text, shown
 from sbafab.design.outline import read_drawing
 from sbafab.design.records import without_none
 from sbafab.design.toml_table import Section
@@ -30,7 +30,6 @@ from sbafab.importing.records import (
     json_of,
     key_name,
     layer_index,
-    read_text,
     read_yaml,
     refuse_without_table,
     region_of,

@@ -17,13 +17,13 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from sbafab.actuators.drawn import DRAWN
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.design.files import checked, name_of, shown
+from sbafab.design.files import checked, name_of, read_text, shown
 from sbafab.design.outline import crossing
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Line, Point, box_round
 from sbafab.geometry.offset import swept
 from sbafab.geometry.region import Region, disc, rectangle, union
-from sbafab.importing.records import UNNAMED, Imported, json_of, key_name, named, read_text
+from sbafab.importing.records import UNNAMED, Imported, json_of, key_name, named
 from sbafab.laminate.netlist import NO_MASK, VIA, parchmint_labels, parchmint_nets
 
 MM = 0.001

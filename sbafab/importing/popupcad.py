@@ -18,7 +18,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
-from sbafab.design.files import shown
+from sbafab.design.files import read_text, shown
 from sbafab.design.outline import crossing
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Line, Point, meeting_points
@@ -27,7 +27,6 @@ from sbafab.geometry.region import Region, disc, polygon, union
 from sbafab.importing.records import (
     MOST_NAMED,
     layer_index,
-    read_text,
     read_yaml,
     refuse_without_table,
     region_of,

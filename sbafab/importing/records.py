@@ -97,19 +97,6 @@ def named(remark: str, places: list[str]) -> list[str]:
     return remarks
 
 
-def read_text(path: Path, most_bytes: int) -> str:
-    """Return the text of a UTF-8 file. Raises DesignError if it is none, or too large."""
-    try:
-        size = path.stat().st_size
-        text = path.read_text(encoding="utf-8-sig") if size <= most_bytes else ""
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "it is not text in UTF-8"
-        raise DesignError(f"{path} cannot be read: {reason}; check the file") from None
-    if size > most_bytes:
-        raise DesignError(f"{path} has {size:,} bytes, where at most {most_bytes:,} are allowed")
-    return text
-
-
 def json_of(path: Path, text: str) -> Any:
     """Return the content of a JSON file's text. Raises DesignError with the place at fault."""
     try:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sbafab import plugins
+from sbafab.design.files import read_text
 from sbafab.design.laminate_file import SCHEMA
 from sbafab.errors import DesignError
 from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
@@ -19,7 +20,6 @@ from sbafab.importing.records import (
     Imported,
     Written,
     json_of,
-    read_text,
     write_imported,
 )
 

@@ -11,7 +11,7 @@ import ezdxf
 import pytest
 import shapely
 
-from sbafab.design.outline import read_outline, understood
+from sbafab.design.outline import described_outline, read_outline
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc, Line
 from sbafab.geometry.region import Region, disc, stadium
@@ -81,7 +81,7 @@ def test_what_is_hidden_or_lettering_is_no_outline(tmp_path: Path) -> None:
 def test_dxf_units_are_honoured(tmp_path: Path, unit: int, mm: float) -> None:
     path = dxf(tmp_path, lambda m: m.add_circle((0, 0.1 / mm), 2.5 / mm), unit)
     assert read_outline(path) == disc((0, 0.1), 2.5)
-    assert understood(path).description.startswith("drawn outline: 5.000 x 5.000 mm, ")
+    assert described_outline(path)[1].startswith("drawn outline: 5.000 x 5.000 mm, ")
 
 
 def test_an_arc_of_more_than_half_a_turn(tmp_path: Path) -> None:
@@ -179,9 +179,9 @@ def test_svg_ellipses_are_fitted(tmp_path: Path) -> None:
 def test_an_outline_drawn_elsewhere_is_centred_on_its_centroid(
     tmp_path: Path, centre: tuple[float, float]
 ) -> None:
-    outline = understood(dxf(tmp_path, lambda m: m.add_circle(centre, 2)))
-    assert outline.region.bounds == pytest.approx((-2, -2, 2, 2), abs=1e-6)
-    assert outline.description.endswith("centred on its centroid")
+    region, description = described_outline(dxf(tmp_path, lambda m: m.add_circle(centre, 2)))
+    assert region.bounds == pytest.approx((-2, -2, 2, 2), abs=1e-6)
+    assert description.endswith("centred on its centroid")
 
 
 @pytest.mark.parametrize(
@@ -197,6 +197,6 @@ def test_the_size_that_is_understood_is_said(tmp_path: Path, unit: int, said: st
     path = dxf(tmp_path, lambda m: m.add_circle((0, 0), 3), unit)
     if unit == 1:
         with pytest.raises(DesignError, match=r"measures 152\.4 x 152\.4 mm"):
-            understood(path)
+            described_outline(path)
     else:
-        assert understood(path).description.startswith(f"drawn outline: {said}")
+        assert described_outline(path)[1].startswith(f"drawn outline: {said}")

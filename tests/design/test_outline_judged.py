@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.design.outline import understood
+from sbafab.design.outline import described_outline
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region
 from tests.design.judging_svg import PIXEL, seen
@@ -36,10 +36,10 @@ def drawing(page: str, body: str) -> str:
 def understood_as(folder: Path, text: str) -> Region:
     path = folder / "outline.svg"
     path.write_text(text, encoding="utf-8")
-    found = understood(path)
-    low_x, low_y, high_x, high_y = found.region.bounds
-    assert f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm" in found.description
-    return found.region
+    region, description = described_outline(path)
+    low_x, low_y, high_x, high_y = region.bounds
+    assert f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm" in description
+    return region
 
 
 def assert_same(region: Region, page: str, body: str) -> None:
@@ -95,7 +95,7 @@ def test_how_large_a_unit_is_is_said(tmp_path: Path) -> None:
         ('width="9mm"', "1.058 x 1.058 mm, read at 0.264583 mm a unit, 96 units an inch"),
     ):
         path.write_text(drawing(page, '<circle r="2"/>'))
-        assert understood(path).description == f"drawn outline: {said}"
+        assert described_outline(path)[1] == f"drawn outline: {said}"
 
 
 def a_shape(dice: random.Random, size: float) -> str:
