@@ -7,9 +7,8 @@ import re
 import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from copy import deepcopy
 from fnmatch import fnmatchcase
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
@@ -331,7 +330,7 @@ def toml_tables(text: str, path: str | Path) -> dict[str, Any]:
             f"{text.count(chr(10), 0, deep.start()) + 1}; write [table] and key = value"
         )
     try:
-        return deepcopy(_parsed(text))
+        return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         reason = str(error) or "nested too deeply"
         # The parser names no key, but its line shows it.
@@ -347,12 +346,6 @@ def toml_tables(text: str, path: str | Path) -> dict[str, Any]:
 
 LONGEST_LINE = 120
 """Letters of a line that a message repeats."""
-
-
-@lru_cache(maxsize=8)
-def _parsed(text: str) -> dict[str, Any]:
-    """The tables of a text; cached, as a varied file is read again and again."""
-    return tomllib.loads(text)
 
 
 def override(data: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, Any]:

@@ -14,12 +14,13 @@ from typing import Any
 from sbafab.actuators import load_design
 from sbafab.actuators.drawn import DRAWN, DrawnDesign
 from sbafab.design.files import ASSEMBLY, checked, kit_names, listed, name_of, read_toml
-from sbafab.design.films import FILM_NAME, HOTTEST, Films
+from sbafab.design.films import FILM_NAME, HOTTEST, Films, OtherFilm, PtfeFilm, TpeFilm
 from sbafab.design.laminate_file import FILE, laminate_json, read_laminate
 from sbafab.design.outline import OUTLINE, seam_layer
 from sbafab.design.polylines import is_closed
 from sbafab.design.records import Design, plain_tables, without_kit, without_none
 from sbafab.design.sections import Inlet as Inlets
+from sbafab.design.toml_table import Section
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Edge, Line, Point, unit
 from sbafab.importing.records import UNNAMED, Imported, key_name
@@ -283,25 +284,23 @@ def _film_tables(
 
 
 def _film_table(name: str, film: Film) -> dict[str, Any]:
+    records: dict[str, type[Section]] = {"tpe": TpeFilm, "ptfe": PtfeFilm}
     modulus, poisson = film.elastic or (None, None)
-    keys: dict[str, Any] = {
+    upper, lower = film.faces or (None, None)
+    keys = {
+        "kind": film.kind,
         "product": film.product,
         "thickness": film.thickness,
         "density": film.density,
+        "melting_point": None if film.is_mask else film.softens_above,
+        "temperature_limit": film.limit if film.is_mask or film.limit != HOTTEST else None,
+        "modulus": modulus,
+        "poisson": poisson,
+        "faces": {"upper": upper, "lower": lower} if film.faces else None,
+        "warning": film.warning or None,
     }
-    if name == "ptfe":
-        keys["temperature_limit"] = film.limit
-    elif film.is_mask:
-        keys |= {"kind": film.kind, "temperature_limit": film.limit, "warning": film.warning}
-        keys |= {"modulus": modulus, "poisson": poisson}
-    else:
-        keys |= {"melting_point": film.softens_above, "modulus": modulus, "poisson": poisson}
-        if name != "tpe":
-            limit = None if film.limit == HOTTEST else film.limit
-            keys |= {"kind": film.kind, "temperature_limit": limit, "warning": film.warning}
-    if film.faces is not None:
-        keys["faces"] = dict(zip(("upper", "lower"), film.faces, strict=True))
-    return {key: value for key, value in keys.items() if value not in (None, "")}
+    record = records.get(name, OtherFilm)
+    return without_none({key: keys[key] for key in keys if key in record.model_fields})
 
 
 def _layup(laminate: Laminate, names: Mapping[str, str]) -> dict[str, str]:

@@ -334,7 +334,10 @@ class Circuit:
         holes: dict[int, list[Region]] = {}
         ports = self._ports(holes, numbers, top)
         if not any(row.get("kind") == "hole" for row in ports):
-            raise DesignError(self._why_no_hole())
+            raise DesignError(
+                "components holds no PORT with params.portRadius, um, on the bottom or top layer, "
+                "and no tube reaches any other; add one"
+            )
         layers = {numbers[layer]: (self.titles[layer], mask) for layer, mask in masks.items()}
         films = range(1, top + 1, 2)
         layers |= {number: ("film", plain - union(holes.get(number, ()))) for number in films}
@@ -394,21 +397,6 @@ class Circuit:
                 for number in range(between[0] + 1, between[-1], 2):
                     holes.setdefault(number, []).append(hole)
         return rows
-
-    def _why_no_hole(self) -> str:
-        ports = [part for part in self.components.values() if part.entity == PORT]
-        if not ports:
-            return "components holds no PORT, so no tube can be joined; add one"
-        unsized = next((port.id for port in ports if port.radius is None), None)
-        if unsized is not None:
-            return (
-                f"component {unsized} (PORT) has no params.portRadius, and no other port has a "
-                "hole for a tube; add it, in um"
-            )
-        return (
-            f"component {ports[0].id} (PORT) and all others lie between inner films, which no tube "
-            "reaches; place one on the bottom or the top layer"
-        )
 
 
 def _refuse_unplaced(rows: Sequence[ComponentRow], placed: Mapping[Any, object]) -> None:
