@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from filecmp import cmp
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
-
-from pydantic import TypeAdapter
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import assemble
@@ -28,14 +26,10 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.folders.artefacts import (
     EVERYTHING,
-    PAGES,
     PICTURES,
     TRAVELLER,
-    DesignFolder,
     RunPart,
-    artefacts,
     tops_of,
-    write_artefacts,
     write_folder,
     write_text,
 )
@@ -73,11 +67,9 @@ from sbafab.folders.manifest import (
     read_index,
 )
 from sbafab.folders.order import Order, of_assembly
-from sbafab.folders.swap import JOB_SCHEMA, MANIFEST, SCHEMA, is_among_cut_files
+from sbafab.folders.swap import JOB_SCHEMA, MANIFEST, SCHEMA, Schema, is_among_cut_files
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.netlist import read_netlist
-from sbafab.models.figures import PredictionRequest
-from sbafab.models.prediction import predict
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding, Verdict
 from sbafab.rules.measures import Measures
@@ -106,63 +98,65 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
     what that netlist lists.
 
     In a job's folder all designs are checked, and the film sheets they share. Raises OutputError
-    for a folder without a sound manifest or without cut files, DesignError for a netlist that
-    cannot be read, or one of a job.
+    for a folder without a sound manifest or without cut files, and for one inside a job's,
+    DesignError for a netlist that cannot be read, or one of a job.
     """
     netlist = None if nets is None else read_netlist(nets)
     index = read_index(folder)
+    if is_job(folder.absolute().parent):
+        raise OutputError(
+            f"{folder} is cut from the film sheets of a job; check the folder above it"
+        )
+    if isinstance(index, JobManifest) and nets is not None:
+        raise DesignError(
+            f"{folder} holds several designs, and a netlist is one design's; check the folder "
+            "of that one"
+        )
+    places = {"": folder}
     if isinstance(index, JobManifest):
-        if nets is not None:
-            raise DesignError(
-                f"{folder} holds several designs, and a netlist is one design's; check the folder "
-                "of that one"
-            )
-        return _check_job(folder, index)
-    try:
-        built = read_folder(folder)
-    except DesignError as error:
-        return _by_hashes(folder, index, [str(error)])
-    order = Order(SCHEMA, built.design.name, (built.build,))
-    remade, equal = _remade_problems(folder, index, order)
-    findings = _findings(built, [*file_problems(folder, index, equal), *built.problems, *remade])
-    if netlist is None or nets is None:
-        return findings
-    if built.laminate is None:
-        message = f"{nets.name} was not compared: not all layers could be read"
-        return (*findings, problem(NETLIST, message))
-    return (*findings, *netlist_findings(built.laminate, built.design, netlist, nets.name))
-
-
-def _check_job(folder: Path, job: JobManifest) -> tuple[Finding, ...]:
-    """Return the findings on the designs of a job, its sheets, and between an assembly's parts."""
+        places = {f"{each.name}: ": path_in_folder(folder, each.folder) for each in index.designs}
     built: list[AsBuiltFolder] = []
     unusable: list[str] = []
-    for entry in job.designs:
+    for name, place in places.items():
         try:
-            built.append(read_folder(path_in_folder(folder, entry.folder)))
+            built.append(read_folder(place))
         except DesignError as error:
-            unusable.append(f"{entry.name}: {error}")
-    order = Order(JOB_SCHEMA, job.name, tuple(each.build for each in built))
-    if isinstance(job, AssemblyManifest) and not unusable:
+            unusable.append(f"{name}{error}")
+    schema: Schema = JOB_SCHEMA if isinstance(index, JobManifest) else SCHEMA
+    order = Order(schema, index.name, tuple(each.build for each in built))
+    if isinstance(index, AssemblyManifest) and not unusable:
         try:
             order = of_assembly(assemble(load_assembly(folder / DESIGN_FILE)), order.builds)
         except (DesignError, OSError) as error:
             unusable.append(f"the parts were not put together, for {error or type(error).__name__}")
     if unusable:
-        return _by_hashes(folder, job, unusable)
-    remade, equal = _remade_problems(folder, job, order)
-    problems = [*file_problems(folder, job, equal), *remade]
-    findings = []
+        return _by_hashes(folder, index, unusable)
+    remade, equal = _remade_problems(folder, index, order)
+    problems = file_problems(folder, index, equal)
+    if isinstance(index, JobManifest):
+        passed = f"{len(index.sheets)} sheets read back", "designs"
+        of_designs = _findings_of_designs(folder, index, built, equal)
+        return (*of_designs, *(order.between or ()), *_of_files([*problems, *remade], *passed))
+    [own] = built
+    findings = _findings(own, [*problems, *own.problems, *remade])
+    if netlist is None or nets is None:
+        return findings
+    if own.laminate is None:
+        message = f"{nets.name} was not compared: not all layers could be read"
+        return (*findings, problem(NETLIST, message))
+    return (*findings, *netlist_findings(own.laminate, own.design, netlist, nets.name))
+
+
+def _findings_of_designs(
+    folder: Path, job: JobManifest, built: Sequence[AsBuiltFolder], equal: Collection[str]
+) -> Iterator[Finding]:
+    """Yield the findings on the designs of a job, each with its design's name."""
     for entry, each in zip(job.designs, built, strict=True):
         own = {name.removeprefix(f"{entry.folder}/") for name in equal}
         of_files = file_problems(folder / entry.folder, each.claims, own)
-        findings += [
-            replace(finding, design=each.design.name)
-            for finding in _findings(each, [*of_files, *each.problems])
-            if finding.rule != DESIGNED or finding.verdict == "fail"
-        ]
-    passed = f"{len(job.sheets)} sheets read back", "designs"
-    return (*findings, *(order.between or ()), *_of_files(problems, *passed))
+        for finding in _findings(each, [*of_files, *each.problems]):
+            if finding.rule != DESIGNED or finding.verdict == "fail":
+                yield replace(finding, design=each.design.name)
 
 
 def _of_files(
@@ -345,52 +339,35 @@ def _remade_problems(
     folder: Path, index: Manifest | JobManifest, order: Order
 ) -> tuple[list[Finding], set[str]]:
     """Return the files of a folder that differ from those made again, and those that were saved
-    anew and are equal; differences of layers are told before.
+    anew and are equal; differences of layers were told when they were read.
     """
-    is_of_job = isinstance(index, Manifest) and is_job(folder.absolute().parent)
-    problems: list[Finding] = []
-    equal: set[str] = set()
-    if is_of_job:
-        message = "the film sheets are those of the job, and were not compared; check the folder "
-        problems.append(problem(CLAIMS, f"{message}above this one", verdict="warn"))
+    if index.generator != GENERATOR:
+        message = (
+            f"the folder was made by {index.generator}, and this is {GENERATOR}: only its layers "
+            "were compared; regenerate the folder"
+        )
+        return [problem(DESIGNED, message)], set()
     with TemporaryDirectory() as name:
         fresh = Path(name)
         try:
-            _remake(folder, index, order, is_of_job, fresh)
-            problems += _foreign_problems(index, file_names(fresh), is_of_job)
-            differing, equal = _compared(folder, fresh, index.files, index.generator, is_of_job)
-            problems += differing
-            if index.generator == GENERATOR:
-                problems += _prediction_problems(folder, index, order.builds[0], fresh)
+            _remake(folder, index, order, fresh)
+            foreign = _foreign_problems(index, file_names(fresh))
+            problems, equal = _compared(folder, fresh, index)
+            return [*foreign, *problems], equal
         except DESIGN_ERRORS as error:
             message = f"{folder.name} could not be made again to be compared: {error}"
-            problems.append(problem(DESIGNED, message))
-    if index.generator != GENERATOR:
-        message = (
-            f"the folder was made by {index.generator}, and this is {GENERATOR}: only what is cut "
-            "and pressed was compared; regenerate the folder"
-        )
-        problems.append(problem(DESIGNED, message))
-    return problems, equal
+            return [problem(DESIGNED, message)], set()
 
 
-def _remake(
-    folder: Path, index: Manifest | JobManifest, order: Order, is_of_job: bool, fresh: Path
-) -> None:
-    """Write the files of a run to ``fresh``, its manifest without hashes.
-
-    A design of a job has no film sheets and no pages in its own folder.
-    """
-    if isinstance(index, JobManifest):
-        parts = {*(PICTURES if order.assembled is not None and order.failed else EVERYTHING)}
-    else:
+def _remake(folder: Path, index: Manifest | JobManifest, order: Order, fresh: Path) -> None:
+    """Write the files of a run to ``fresh``, its manifest without hashes."""
+    parts = {*EVERYTHING}
+    if isinstance(index, Manifest):
         parts = _parts(index.files)
-        # Pictures come with a run that makes everything: then there is a page as well.
-        if not is_of_job and (TRAVELLER in index.files or {"press", "preview"} <= parts):
-            parts |= {"press", "preview"}
-    nests = order.nests(folder, ignore_progress) if "cut" in parts and not is_of_job else ()
-    extras = {"has_pages": not is_of_job} if order.schema == SCHEMA else {}
-    remade, *_ = write_folder(order, parts, nests, fresh, ignore_progress, **extras)
+    elif order.assembled is not None and order.failed:
+        parts = {*PICTURES}
+    nests = order.nests(folder, ignore_progress) if "cut" in parts else ()
+    remade, *_ = write_folder(order, parts, nests, fresh, ignore_progress)
     write_text(fresh / MANIFEST, as_json(remade))
 
 
@@ -403,57 +380,43 @@ def _parts(files: Collection[str]) -> set[RunPart]:
         parts.add("preview")
     if any(path.startswith(("mesh/solid.", "mesh/cavity_")) for path in files):
         parts.add("mesh")
-    return parts
+    # Pictures come with a run that makes everything: then there is a page as well.
+    return parts | {"press", "preview"} if TRAVELLER in files else parts
 
 
-def _foreign_problems(
-    index: Manifest | JobManifest, remade: Collection[str], is_of_job: bool
-) -> list[Finding]:
-    """Return the files that a manifest lists and its design does not make.
+def _foreign_problems(index: Manifest | JobManifest, remade: Collection[str]) -> Iterator[Finding]:
+    """Yield the files that a manifest lists and its design does not make.
 
-    Files of other commands may be there, except those that could be cut.
+    Files of other commands, which are not made again, may be there if they cannot be cut.
     """
-    # What other commands write is not made again.
-    excluded = tops_of("mesh", "predict", *SIMULATORS)
-    if isinstance(index, JobManifest):
-        excluded = ()
-    # The pages of a job's design show the sheets of the job, and are compared there.
-    excluded = (*excluded, *PAGES) if is_of_job else excluded
-    return [
-        problem(
-            DESIGNED, f"{path} is listed, but is not a file of this design; regenerate the folder"
-        )
-        for path in index.files
-        if path not in remade
-        and (_could_be_cut(path) or path.partition("/")[0] not in excluded)
-        and _is_compared(path, index.generator)
-    ]
+    is_design = isinstance(index, Manifest)
+    excluded = tops_of("mesh", "predict", *SIMULATORS) if is_design else ()
+    for path in index.files:
+        is_excluded = path.partition("/")[0] in excluded and not _could_be_cut(path)
+        if path not in remade and not is_excluded:
+            message = f"{path} is listed, but is not a file of this design; regenerate the folder"
+            yield problem(DESIGNED, message)
 
 
 def _compared(
-    folder: Path, fresh: Path, listed: Collection[str], generator: str, is_of_job: bool = False
+    folder: Path, fresh: Path, index: Manifest | JobManifest
 ) -> tuple[list[Finding], set[str]]:
-    """Return the files that differ from those made again, and those that were saved anew.
-
-    Differences of the files in ``layers`` were told when they were read.
-    """
+    """Return the files that differ from those made again, and those that were saved anew."""
     problems: list[Finding] = []
     equal: set[str] = set()
     bare: list[str] = []
     for name in file_names(fresh):
         path, actual = fresh / name, folder / name
         is_layer = path.parent.name == LAYERS and path.suffix == ".dxf"
-        if not _is_compared(name, generator):
-            continue
         rule = DESIGNED
-        if name != MANIFEST and (name not in listed or not os.path.lexists(actual)):
+        if name != MANIFEST and (name not in index.files or not os.path.lexists(actual)):
             difference = f"{name} is missing"
         elif not actual.is_file():
             rule, difference = INTEGRITY, f"{name}: not a plain file"
         elif cmp(actual, path, shallow=False):
             continue
         elif path.name == MANIFEST:
-            rule, difference = CLAIMS, _index_difference(folder, fresh, name, is_of_job)
+            rule, difference = CLAIMS, _index_difference(folder, fresh, name)
             difference = difference and f"{name}: {difference}"
         elif unsound := unreadable(actual):
             rule, difference = INTEGRITY, f"{name}: {unsound}"
@@ -471,24 +434,16 @@ def _compared(
     return problems, equal
 
 
-def _is_compared(path: str, generator: str) -> bool:
-    """Return True for a file of this version, and for one of any version that is cut or pressed."""
-    return generator == GENERATOR or path.lower().endswith((*tops_of("press"), *CUT_ENDINGS))
-
-
-def _read_json(path: Path) -> Any:
-    return json.loads(path.read_text(encoding="utf-8"))
-
-
-def _index_difference(folder: Path, fresh: Path, name: str, is_of_job: bool) -> str:
+def _index_difference(folder: Path, fresh: Path, name: str) -> str:
     """Return the first difference of a manifest from the one made again; "" if none."""
-    actual, expected = _read_json(folder / name), _read_json(fresh / name)
+    actual, expected = (
+        json.loads((root / name).read_text(encoding="utf-8")) for root in (folder, fresh)
+    )
     if not isinstance(actual, dict):
         return "it is not an index"
-    # Meshes may be of several commands, and sheets those of the job.
+    # Meshes may be of several commands.
     is_design = name == MANIFEST and expected["schema"] == SCHEMA
     left_out = {"files"} | ({"mesh_statistics", "meshes"} if is_design else set())
-    left_out |= {"sheets", "films"} if is_of_job else set()
     here, there = (
         {key: value for key, value in index.items() if key not in left_out}
         for index in (actual, expected)
@@ -514,25 +469,3 @@ def _mesh_difference(folder: Path, actual: dict[str, Any], expected: dict[str, A
         if difference:
             return f"{mesh['file']}: {difference}"
     return ""
-
-
-def _prediction_problems(
-    folder: Path, index: Manifest | JobManifest, build: Build, fresh: Path
-) -> list[Finding]:
-    """Return differences of the prediction from one for the same request."""
-    if "predict.json" not in index.files:
-        return []
-    try:
-        stated = _read_json(folder / "predict.json")["asked"]
-        factors = None if stated["calibration"] else stated
-        request = TypeAdapter(PredictionRequest).validate_python({**stated, "calibration": factors})
-        written = fresh / "prediction"
-        written.mkdir()
-        parts: frozenset[RunPart] = frozenset(("predict",))
-        again = DesignFolder(build, parts, (), written, ignore_progress)
-        again.prediction = predict(build.design, request)
-        write_artefacts(again, [row for row in artefacts() if row.part == "predict"])
-    except (ValueError, LookupError, TypeError, OSError):
-        message = "predict.json does not say what was asked for; regenerate the folder"
-        return [problem(DESIGNED, message)]
-    return _compared(folder, written, index.files, index.generator)[0]

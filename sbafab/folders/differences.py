@@ -421,9 +421,10 @@ def _body_difference(body: MeshBody, designed: MeshBody) -> str:
     (surface, metadata), (expected, expected_metadata) = body, designed
     if metadata != expected_metadata:
         return "names, materials or scales of its bodies are others"
-    defect = _unsound(surface)
-    if defect:
-        return defect
+    if not (np.abs(surface.points) <= MAX_COORDINATE).all():
+        return "it has a point that is nowhere"
+    if not len(surface.faces) or len(open_edges(surface)):
+        return "it is not watertight"
     for points, points_there, fault in (
         (surface.points, expected.points, "too many"),
         (expected.points, surface.points, "missing"),
@@ -434,27 +435,11 @@ def _body_difference(body: MeshBody, designed: MeshBody) -> str:
             return f"the point at x {x:.3f}, y {y:.3f}, z {z:.3f} is {fault}"
     for what, here, there in (
         ("mm3 inside", surface.volume, expected.volume),
-        ("mm2 of surface", _area(surface), _area(expected)),
+        ("mm2 of surface", surface.trimesh().area, expected.trimesh().area),
     ):
         if abs(here - there) > MESH_SHARE * abs(there):
             return f"it has {here:.4f} {what}, not {there:.4f}"
     return ""
-
-
-def _unsound(surface: Surface) -> str:
-    points, faces = surface.points, surface.faces
-    if not len(points) or not len(faces):
-        return "it is empty"
-    if not np.isfinite(points).all() or float(np.abs(points).max()) > MAX_COORDINATE:
-        return "it has a point that is nowhere"
-    if int(faces.min()) < 0 or int(faces.max()) >= len(points):
-        return "it has a face of a point that is not there"
-    return "it is not watertight" if len(open_edges(surface)) else ""
-
-
-def _area(surface: Surface) -> float:
-    a, b, c = (surface.points[surface.faces[:, corner]] for corner in range(3))
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
 def _unmatched_point(

@@ -195,18 +195,15 @@ def _refuse_names(names: Sequence[str], name: str) -> None:
             f"--name {name!r} must be a folder's name of letters, digits, dots, dashes and "
             "underscores; for another place use -o"
         )
-    repeated = next((design for design in names if names.count(design) > 1), None)
-    if repeated is not None:
-        raise DesignError(
-            f"two designs are named {repeated}; give each a name of its own, or say --copies"
-        )
-    folders = {design.lower(): design for design in reversed(names)}
     # Some systems hold names that differ in small and capital letters for one.
-    similar = next((design for design in names if folders[design.lower()] != design), None)
-    if similar is not None:
+    lower = [design.lower() for design in names]
+    folders = dict(zip(reversed(lower), reversed(names), strict=True))
+    repeated = next((k for k, name in enumerate(lower) if name in lower[:k]), None)
+    if repeated is not None:
+        both = " and ".join(dict.fromkeys((folders[lower[repeated]], names[repeated])))
         raise DesignError(
-            f"two designs are named {folders[similar.lower()]} and {similar}, which is one folder "
-            "on some machines; give one of them another name"
+            f"two designs are named {both}, which is one folder on some machines; give each a name "
+            "of its own, or say --copies"
         )
     reserved = next((design for design in names if design.lower() in RESERVED), None)
     if reserved is not None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-import tomllib
 import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,9 +18,7 @@ from typing import TYPE_CHECKING, Any
 from sbafab import plugins
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.cut_settings import TRUE_ARCS, Curves
-from sbafab.design.files import shown
-from sbafab.design.identity import kit_of
-from sbafab.design.records import Design, dotted, resolved
+from sbafab.design.records import Design
 from sbafab.errors import OccupiedError, OutputError
 from sbafab.folders.artefacts import (
     EVERYTHING,
@@ -354,8 +351,6 @@ def _with_log(error: OutputError, folder: Path, copy: Path) -> OutputError:
 # The earlier run that lies where a new one is to be written: which of its files stay, and when.
 
 
-MOST_KEYS = 3
-"""Keys that a message names, at most."""
 RESULTS = "result.json"
 """Result of a simulator; a folder without it holds input only."""
 WHOLE = {"layers", "sheets", "preview", "predict"}
@@ -385,40 +380,10 @@ def refuse_to_replace(target: Path, build: Build, replaced: Collection[str]) -> 
     if lost:
         names = dict.fromkeys(path.partition("/")[0] for path in lost)
         raise OccupiedError(
-            f"{target} holds {', '.join(names)} {_unlike(target, build.design, mine)}; take "
-            f"{target / 'design.toml'} for the design that was run there, or give this one a "
-            "folder of its own with --set name=NAME or -o"
+            f"{target} holds {', '.join(names)} of another design or version (sbafab compare "
+            f"shows what differs); take {target / 'design.toml'} for the design that was run "
+            "there, or give this one a folder of its own with --set name=NAME or -o"
         )
-
-
-def _unlike(target: Path, design: Design, mine: Mapping[str, Any]) -> str:
-    """Return the differences of another run in ``target``, so far as its design.toml is legible."""
-    old = read_manifest(target) or {}
-    try:
-        text = (target / "design.toml").read_text(encoding="utf-8")
-        there = dict(dotted(tomllib.loads(text)))
-    except (OSError, ValueError):
-        there = {}
-    here = dict(dotted(resolved(design)))
-    keys = [key for key in {**there, **here} if there.get(key) != here.get(key)]
-    # The folder has a copy of the kit, under another path.
-    if "kit" in keys and (old.get("kit") or {}).get("sha256") == kit_of(design).sha256:
-        keys.remove("kit")
-    if there and keys:
-        differences = [
-            f"{key} = {_value(there, key)} there, {_value(here, key)} here"
-            for key in keys[:MOST_KEYS]
-        ]
-        more = len(keys) - len(differences)
-        rest = f"; and {more} more keys" if more else ""
-        return f"of another design ({'; '.join(differences)}{rest})"
-    if old.get("generator") != mine["generator"]:
-        return f"of another version ({shown(old.get('generator'))}, not {mine['generator']})"
-    return "of a run with other settings"
-
-
-def _value(keys: Mapping[str, object], key: str) -> str:
-    return shown(keys[key]) if key in keys else "not set"
 
 
 def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:

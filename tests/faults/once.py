@@ -30,7 +30,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     )
     made: dict[str, Any] = {}
 
-    def remake_once(folder: Path, index: Any, order: Order, is_of_job: bool, fresh: Path) -> Any:
+    def remake_once(folder: Path, index: Any, order: Order, fresh: Path) -> Any:
         asked = [folder / name for name in ("design.toml", "sheets/nest.json")]
         files = [path.read_bytes() if path.exists() else b"" for path in asked]
         curves = [build.curves for build in order.builds]
@@ -38,7 +38,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
         key = sha256(b"".join(files) + said).hexdigest()
         if key not in made:
             (root / key).mkdir(parents=True)
-            made[key] = remake(folder, index, order, is_of_job, root / key)
+            made[key] = remake(folder, index, order, root / key)
         shutil.copytree(root / key, fresh, dirs_exist_ok=True)
         return made[key]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,8 +26,6 @@ from sbafab.folders.check import check_folder
 from sbafab.folders.manifest import file_hashes
 from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.contour import Contour
-from sbafab.models.figures import Factors, PredictionRequest
-from sbafab.models.prediction import predict
 from sbafab.rules.rule import Explanation, Rule
 from tests.folders.doctoring import Doctor
 
@@ -112,20 +109,6 @@ def test_a_mistake_of_the_program_is_no_finding(doctor: Doctor) -> None:
 def as_designed(folder: Path) -> list[str]:
     found = check_folder(folder)
     return [f.message for f in found if f.rule == "as-designed" and f.verdict == "fail"]
-
-
-def test_a_prediction_is_asked_for_again(tmp_path: Path) -> None:
-    design = load_design("1dof-5mm", FEW)
-    wish = PredictionRequest(volumes_ul=(5.0,), calibration=Factors(0.9, 0.1, 1.2))
-    generate(RunRequest(design, tmp_path, ("cut", "predict"), prediction=predict(design, wish)))
-    doctor = Doctor(tmp_path / "1dof-5mm")
-    assert as_designed(doctor.folder) == []
-    path = doctor.folder / "predict.json"
-    told = json.loads(path.read_text())
-    told["figures"][0]["value"] += 1
-    path.write_text(json.dumps(told))
-    doctor.rehash()
-    assert as_designed(doctor.folder)[0].startswith("predict.json is not what design.toml makes")
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 from pathlib import Path
-from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -21,7 +20,6 @@ from sbafab.simulators.calculix.run import (
     deck_mesh,
     history,
     history_csv,
-    history_svg,
     read_frd,
     write_deformed,
 )
@@ -173,19 +171,3 @@ def test_deformed_vtu_holds_moved_points_and_stress(tmp_path: Path) -> None:
     np.testing.assert_allclose(grid.point_data["displacement"], mesh.points)
     np.testing.assert_array_equal(grid.point_data["stress"], frame.stress)
     np.testing.assert_array_equal(grid.cells_dict[pyvista.CellType.QUADRATIC_WEDGE], mesh.cells)
-
-
-def test_plot_draws_every_state_and_names_its_axes() -> None:
-    _, _, (start, end) = states_of("quarter")
-    pressures = {"left": 6.0, "right & up": 3.0}
-    volumes = {"left": 19.0, "right & up": 9.0}
-    states = [
-        start.model_copy(update={"pressures": dict.fromkeys(pressures, 0.0), "volumes": volumes}),
-        end.model_copy(update={"pressures": pressures, "volumes": volumes}),
-    ]
-    root = ET.fromstring(history_svg("a < b", states))
-    texts = ["".join(text.itertext()) for text in root.iter("{http://www.w3.org/2000/svg}text")]
-    assert {"a < b", "stroke, mm", "volume, ul", "stress, MPa", "left", "right & up"} <= set(texts)
-    assert texts.count("pressure in left, kPa") == 3
-    curves = [g.get("id", "") for g in root.iter("{http://www.w3.org/2000/svg}g")]
-    assert {"curve1.1", "curve2.1", "curve2.2", "curve3.1"} <= set(curves)

@@ -28,7 +28,6 @@ from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.meshing.conforming.meshes import volume_mesh
 from sbafab.meshing.formats import write_fields
 from sbafab.meshing.surface import Floats, Ints
-from sbafab.reports.charts import ChartCurve, Panel, chart_svg
 from sbafab.runtime import Progress
 from sbafab.simulators.calculix.deck import (
     JOB,
@@ -279,37 +278,6 @@ def write_deformed(mesh: Mesh, frame: Frame, path: Path) -> None:
     write_fields(path, mesh.kind, mesh.points + frame.displacement, mesh.cells, fields, {})
 
 
-# Stroke, air and wall stress against pressure as one SVG, for screen and print.
-
-
-def history_svg(title: str, states: Sequence[State]) -> str:
-    """Three panels side by side; x is the chamber pressure farthest from 0."""
-    last = states[-1]
-    fullest = max(last.pressures, key=lambda name: abs(last.pressures[name]))
-    x = [state.pressures[fullest] for state in states]
-    is_even = len(set(last.pressures.values())) == 1
-    x_label = "pressure, kPa" if is_even else f"pressure in {fullest}, kPa"
-    several = len(last.volumes) > 1
-
-    def curve(label: str, values: Sequence[float]) -> ChartCurve:
-        return ChartCurve(label, x, values, dotted=True)
-
-    volumes = [
-        curve(name if several else "", [state.volumes[name] for state in states])
-        for name in last.volumes
-    ]
-    stroke = [curve("", [state.stroke for state in states])]
-    stress = [curve("", [state.stress for state in states])]
-    return chart_svg(
-        title,
-        [
-            Panel("stroke of the tip", x_label, "stroke, mm", stroke),
-            Panel("air in the chambers", x_label, "volume, ul", volumes),
-            Panel("largest von Mises stress", x_label, "stress, MPa", stress),
-        ],
-    )
-
-
 # The program.
 
 
@@ -386,7 +354,7 @@ def simulate(
     timeout: float,
     progress: Progress,
 ) -> Result:
-    """Inflates a laminate in CalculiX; ``folder`` receives deck, results, table and pictures.
+    """Inflates a laminate in CalculiX; ``folder`` receives deck, results and table.
 
     ``timeout`` is in seconds. A run that diverges or takes too long keeps its results so far.
     Raises OutputError if ccx is not installed or gives no results.
@@ -429,8 +397,7 @@ def simulate(
                 "less in one chamber, or for less vacuum"
             )
         frames, states = frames[:number], states[: number + 1]
-    plot = history_svg(f"{laminate.name}, CalculiX", states)
-    write_files({HISTORY: history_csv(states), "history.svg": plot}, folder)
+    write_files({HISTORY: history_csv(states)}, folder)
     write_deformed(run_mesh, frames[-1], folder / "deformed.vtu")
     _tidy(folder)
     stopped, last = None, f"{_largest(states[-1]):.3g} kPa"
@@ -532,7 +499,7 @@ def export(laminate: Laminate, request: SimulationRequest, folder: Path) -> None
 
 
 def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: Progress) -> Result:
-    """Run the deck; the folder holds deck, results, table and pictures."""
+    """Run the deck; the folder holds deck, results and table."""
     mesh, settings = _settings(laminate, request)
     return simulate(laminate, mesh, settings, folder, 60 * request.minutes, progress)
 
