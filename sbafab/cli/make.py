@@ -406,11 +406,11 @@ def _film_text(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], cop
 def simulate(design: Design, as_json: bool, **settings: Any) -> None:
     """Inflate a design in an installed simulator.
 
-    OUT/<name>/calculix/ receives stroke, air volume and wall stress over pressure as table and
-    plot, and the deformed shape as VTU and picture; OUT/<name>/sofa/ or mujoco/ the input files of
+    OUT/<name>/calculix/ receives stroke, air volume and wall stress over pressure as a table,
+    and the deformed shape as VTU; OUT/<name>/sofa/ or mujoco/ the input files of
     the run. result.json holds height, tip, tilt and volumes over time. If a run stops early, its
     results are kept and the exit code is 1. A result that cannot be, such as air below 0, is void:
-    the reason is printed, nothing is written, and the exit code is 1.
+    the reason is printed, the log is kept beside, and the exit code is 1.
     """
     with show.progress(as_json) as progress, _printed_warnings():
         simulation = runs.simulate(design, progress=progress, **settings)

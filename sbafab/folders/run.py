@@ -11,7 +11,6 @@ import tempfile
 import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +27,7 @@ from sbafab.folders.artefacts import (
     close_folder,
     tops_of,
     write_folder,
+    write_text,
 )
 from sbafab.folders.as_cut import refuse_coarse
 from sbafab.folders.build import Build, make_build
@@ -40,6 +40,7 @@ from sbafab.folders.swap import (
     read_manifest,
     refuse_busy,
     replaced_folder,
+    writing,
 )
 from sbafab.laminate.burst import burst
 from sbafab.laminate.laminate import Laminate
@@ -273,39 +274,39 @@ def simulate(
     """Run the simulator into ``out/<design name>/<name>/``; ``export`` only writes its input.
 
     Raises DesignError or OutputError for what it cannot do, if possible before it starts, and
-    VoidError where its result cannot be; nothing is written then.
+    VoidError where its result cannot be. It runs in a folder beside the design's, which stays if it
+    has a log that says what went wrong, or results whose place was taken meanwhile.
     """
     progress = progress or ignore_progress
     refuse_unused(name, wish)
     wish = under_vacuum(name, wish) if design.form.works_under_vacuum else wish
-    result = None
-    with tempfile.TemporaryDirectory() as temporary:
-        build = make_build(design, progress)
-        if build.failed:
-            return Simulated(build.findings, None)
-        # Said before a run of hours, not after it.
-        refuse_to_replace(out / design.name, build, (name,))
-        refuse_busy(out / design.name)
-        _warn_past_burst(build.laminate, wish)
-        # A folder in the temporary one has the usual rights, the temporary one itself has not.
-        folder = Path(temporary) / name
+    build = make_build(design, progress)
+    if build.failed:
+        return Simulated(build.findings, None)
+    # Said before a run of hours, not after it.
+    refuse_to_replace(out / design.name, build, (name,))
+    refuse_busy(out / design.name)
+    _warn_past_burst(build.laminate, wish)
+    with writing(out):
+        out.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=f"{design.name}-{name}-", dir=out))
+        folder.chmod(0o755)
+    result, stays = None, False
+    try:
         if export:
             simulator(name).export(build.laminate, wish, folder)
         else:
-            try:
-                result = simulator(name).run(build.laminate, wish, folder, progress)
-            except OutputError as error:
-                raise _with_log(error, folder, out / f"{design.name}-{name}-failed.log") from None
-            text = as_json(result_json(result))
-            (folder / "result.json").write_text(text, encoding="utf-8", newline="\n")
-        try:
-            run = generate(RunRequest(design, out, (name,), simulated=folder), progress)
-        except OutputError as error:
-            if result is None:
-                raise
-            return Simulated(
-                build.findings, _kept(folder, out / f"{design.name}-{name}"), result, str(error)
-            )
+            result = simulator(name).run(build.laminate, wish, folder, progress)
+            write_text(folder / "result.json", as_json(result_json(result)))
+        run = generate(RunRequest(design, out, (name,), simulated=folder), progress)
+    except OutputError as error:
+        stays = result is not None or any(folder.glob("*.log"))
+        if result is None:
+            raise
+        return Simulated(build.findings, folder, result, str(error))
+    finally:
+        if not stays:
+            shutil.rmtree(folder, ignore_errors=True)
     return Simulated(build.findings, run.folder / name, result)
 
 
@@ -318,34 +319,6 @@ def _warn_past_burst(laminate: Laminate, wish: SimulationRequest) -> None:
             "cannot tear or yield in the simulation, so its results there are not physical",
             stacklevel=3,
         )
-
-
-def _kept(folder: Path, place: Path) -> Path:
-    """Return where the results of a run were put, as their own place could not be written."""
-    for number in count(1):
-        free = place if number == 1 else place.with_name(f"{place.name}-{number}")
-        try:
-            shutil.copytree(folder, free)
-        except FileExistsError:
-            continue
-        except OSError:
-            return Path(shutil.move(folder, tempfile.mkdtemp(prefix=f"{place.name}-")))
-        return free
-    raise AssertionError
-
-
-def _with_log(error: OutputError, folder: Path, copy: Path) -> OutputError:
-    """Return the error with its log copied to a place that stays and named there."""
-    for log in sorted(folder.glob("*.log")):
-        message = str(error)
-        if str(log) in message:
-            try:
-                copy.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(log, copy)
-            except OSError:
-                return type(error)(message.replace(f" (see {log})", ""))
-            return type(error)(message.replace(str(log), str(copy)))
-    return error
 
 
 # The earlier run that lies where a new one is to be written: which of its files stay, and when.
