@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import shapely
-from scipy.stats import binom
 from shapely import affinity
 from shapely.geometry.base import BaseGeometry
 
@@ -101,14 +100,7 @@ class Folder:
 
     @property
     def copies(self) -> int:
-        """As many as are asked for, or the fewest of which so many come out good."""
-        copies, good = int(self.wish("order", "copies", 1)), int(self.wish("order", "good", 0))
-        rate = float(self.wish("order", "success_rate", 0.9))
-        while good and float(binom.sf(good - 1, max(copies, good), rate)) < float(
-            self.wish("order", "certainty", 0.8)
-        ):
-            copies = max(copies, good) + 1
-        return max(copies, good)
+        return int(self.wish("order", "copies", 1))
 
     def spares(self, needed: int) -> int:
         """Of a pattern of which so many are needed: a share of them, and at least some."""

@@ -353,7 +353,6 @@ FAULTS = {
     "an upper layer before a lower one": Fault(
         step(0, adds=[3, 2], layers=[3, 2]), judge_press, "lower before upper"
     ),
-    "a press too hot": Fault(step(2, temperature_c=270.0), judge_press, "270 C"),
     "a missing step": Fault(
         edit("press.json", lambda press: press["steps"].pop()),
         judge_press,
