@@ -1,14 +1,10 @@
-"""What the manifest says of sizes and areas, and what was drawn, against the files."""
+"""What the manifest says of areas, and what was drawn, against the files."""
 
 from __future__ import annotations
 
-import hashlib
 import math
-import re
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-import shapely
 from shapely import Polygon, affinity
 from shapely.geometry.base import BaseGeometry
 
@@ -16,42 +12,12 @@ from tests.judge.bonds import bond_of
 from tests.judge.folder import Folder, asked_kerf, closed_by, pieces, place
 
 SHARE = 1e-4
-SIZE = 0.002
-"""mm by which a stated size may differ."""
-LIMITS = re.compile(r"\bLIMITS\s+9\s+\$CUSTOMPROPERTY\s+1\s+([^\n]*)")
 
 
 def judge_claims(folder: Folder) -> Iterator[str]:
-    """Areas, pieces and sizes are those of the files, and the files those of the hashes."""
-    yield from _files(folder)
+    """Areas and pieces are those of the files."""
     yield from _layers(folder)
     yield from _interfaces(folder)
-    yield from _sizes(folder)
-    yield from _lowered(folder)
-
-
-def _lowered(folder: Folder) -> Iterator[str]:
-    """Limits below the paper's are named in every cut file."""
-    names = {
-        name.replace("_", " ")
-        for name, usual in (("bond_width", 0.75), ("mask_overhang", 0.5))
-        if float(folder.wish("rules", name, usual)) < usual
-    }
-    for file in {layer.file for layer in folder.layers} if names else ():
-        text = (folder.path / file).read_text(encoding="utf-8")
-        stated = LIMITS.search(text)
-        said = stated.group(1).replace("_", " ").replace("-", " ") if stated else "nothing"
-        if any(name not in said for name in names):
-            yield f"{file} says {said} of limits that are lowered"
-
-
-def _files(folder: Folder) -> Iterator[str]:
-    for name, stated in folder.manifest["files"].items():
-        path = folder.path / name
-        if not path.is_file():
-            yield f"{name} is listed and missing"
-        elif hashlib.sha256(path.read_bytes()).hexdigest() != stated:
-            yield f"{name} is not the file that is listed"
 
 
 def _slack(folder: Folder, region: BaseGeometry) -> float:
@@ -93,23 +59,6 @@ def _interfaces(folder: Folder) -> Iterator[str]:
                     f"the {name} of interface {interface.number} has {region.area:.4f} mm2, "
                     f"stated {entry[f'{name}_area']:.4f}"
                 )
-
-
-def _sizes(folder: Folder) -> Iterator[str]:
-    whole = shapely.union_all([layer.profile for layer in folder.layers])
-    low_x, low_y, high_x, high_y = whole.bounds
-    far = shapely.get_coordinates(whole)
-    slack = SIZE + folder.chord_error + folder.slack
-    measured = {
-        "thickness": sum(layer.thickness for layer in folder.layers),
-        "width": high_x - low_x,
-        "length": high_y - low_y,
-        "overall_diameter": 2 * float(np.hypot(far[:, 0], far[:, 1]).max()),
-    }
-    stated = folder.manifest["sizes"]
-    for name, value in measured.items():
-        if abs(stated.get(name, value) - value) > slack * (1 + (name == "overall_diameter")):
-            yield f"the {name} is {value:.3f}, stated {stated[name]:.3f}"
 
 
 # The pockets against what was drawn: same shape, same size, same side up.
