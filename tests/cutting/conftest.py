@@ -11,7 +11,7 @@ import pytest
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.offset import fillet
-from sbafab.geometry.region import Region, disc, stadium, strip, union
+from sbafab.geometry.region import Region, disc, strip, union
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate, Layer, Role
 
@@ -29,20 +29,6 @@ def plate() -> Region:
     outline = union([disc((0.0, 0.0), 1.75), *(disc(axis, 3.25) for axis in axes)])
     outline = fillet(outline, 1.0) | strip((0.0, 4.25), (0.0, 12.5), 3.1)
     return outline - union([disc((0.0, 0.0), 1.0), *(disc(axis, 0.5) for axis in axes)])
-
-
-@pytest.fixture(scope="session")
-def profiles(plate: Region) -> dict[str, Region]:
-    ring = disc((1.0, -2.0), 3.25) - disc((1.0, -2.0), 0.5)
-    return {
-        "disc": disc((0.1, 1 / 3), 2.5),
-        "ring": ring,
-        "discs": union([disc((x, 0.0), 2.5) for x in (-6.0, 0.0, 6.0)]),
-        "stadium": stadium((0.0, 0.0), 11.5, 20.0),
-        "tab": disc((0.0, 0.0), 3.25) | strip((0.0, 0.0), (5.0, 5.0), 3.1),
-        "plate": plate,
-        "island": (disc((0.0, 0.0), 9.0) - disc((0.0, 0.0), 7.0)) | ring,
-    }
 
 
 @pytest.fixture(scope="session")

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from sbafab.cutting import layer_files
-from sbafab.cutting.cut_settings import CutSettings, DxfProfile
+from sbafab.cutting.cut_settings import CutSettings
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.kerf import compensated_paths, in_chords
+from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.layer_files import path_difference, write_layer_files
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.cutting.verify import verify_file
@@ -102,18 +102,6 @@ def ring(hole_x: float = 1.0, hole_radius: float = 0.5, radius: float = 5.0) -> 
 
 def check(found: Region, expected: Region, write: Write) -> None:
     verify_file(write(dxf_text(cutting_sequence(found), {"A": "b"})), expected, {"A": "b"})
-
-
-@pytest.mark.parametrize("name", ["disc", "discs", "stadium", "tab", "plate", "island"])
-@pytest.mark.parametrize("profile", ["bulges", "arcs", "chords"])
-def test_what_was_written_passes(
-    name: str, profile: DxfProfile, profiles: dict[str, Region], write: Write
-) -> None:
-    region = profiles[name]
-    if profile == "chords":
-        region = in_chords(region, "wall", 0.005)
-    path = write(dxf_text(cutting_sequence(region), {}, profile))
-    verify_file(path, region, {})
 
 
 SHEET = rectangle((0.0, 0.0), (100.0, 100.0))

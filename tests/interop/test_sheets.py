@@ -144,19 +144,6 @@ def test_layers_come_in_cutting_order_and_parts_lie_inside_the_border(
     assert all(frame.contains(run) and parts.disjoint(run) for run in found["ENGRAVE"])
 
 
-def test_the_pin_plate_has_a_hole_for_every_pin(sheets: dict[str, Sheet]) -> None:
-    holes = rings(
-        lines(sheets["3dof-15mm TPE"].files["arcs"].with_name("fixture.dxf"))["CUT_INNER"]
-    )
-    # Lobes of 6.5 mm stand 4.25 from the axis in an overall diameter of 15; their bores are 1 mm.
-    turns = [math.radians(turn) for turn in (0, 120, 240)]
-    bores = [shapely.Point(4.25 * math.cos(turn), 4.25 * math.sin(turn)) for turn in turns]
-    expected = [math.pi * 0.5**2] * 3 + [math.pi * 1.0**2]
-    assert [hole.area for hole in holes] == pytest.approx(expected, rel=1e-5)
-    for bore in (*bores, shapely.Point(0, 0)):
-        assert min(bore.distance(hole.centroid) for hole in holes) < 1e-5
-
-
 # Programs that paint: black, red and blue lines on white. Each gives the picture and dots per mm.
 
 
