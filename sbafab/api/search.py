@@ -8,10 +8,9 @@ from typing import Any
 
 from sbafab.actuators import load_design
 from sbafab.api.designs import Source, command, load, numbers
-from sbafab.design.files import Change, changed_keys, name_of, template_names
+from sbafab.design.files import Change, changed_keys, name_of
 from sbafab.design.records import Design, Free
 from sbafab.laminate.burst import is_near_burst
-from sbafab.models.figures import FLAGS
 from sbafab.models.pneumatics import MOST_PRESSURE
 from sbafab.runtime import Progress, ignore_progress
 from sbafab.search import compare as comparing
@@ -20,20 +19,16 @@ from sbafab.search.advice import reach_yield as run_reach_yield
 from sbafab.search.compare import DesignComparison, YieldEntry, load_compared, write_page
 from sbafab.search.compare import compare as run_compare
 from sbafab.search.find import (
+    MEDIANS,
     FoundDesign,
     find_document,
     found_toml,
-    free_keys,
     refuse_existing,
     write_found,
 )
 from sbafab.search.find import find as run_find
-from sbafab.search.quantities import (
-    quantity_lines,
-    read_all,
-    shown_value,
-)
-from sbafab.search.space import FindRequest, figure_text, free_of, read_free
+from sbafab.search.quantities import quantity_lines, read_all
+from sbafab.search.space import FindRequest, free_of, read_free
 from sbafab.search.sweep import SweepDocument, SweepRequest, SweptDesigns
 from sbafab.search.sweep import sweep as run_sweep
 from sbafab.search.vary import format_keys, format_value, varied_keys
@@ -103,10 +98,10 @@ def compare(
 ) -> DesignComparison:
     """Compare two designs: keys and rules that differ, and the figures of each with 90 % intervals.
 
-    Each is a design, or the name of a template, a design file, an output folder, or a row of a
-    sweep such as ``"out/1dof-5mm-sweep/sweep.csv:12"``. Figures are at ``pressures_kpa``, by
-    default 10, times at ``flow_ml_min``. With ``out``, ``out/compare/compare.html`` is written,
-    with pictures of both. Raises DesignError, and OutputError.
+    Each is a design, or the name of a template, a design file or an output folder. Figures are at
+    ``pressures_kpa``, by default 10, times at ``flow_ml_min``. With ``out``,
+    ``out/compare/compare.html`` is written, with pictures of both. Raises DesignError, and
+    OutputError.
     """
     (a, name_a), (b, name_b) = (
         (source, source.name)
@@ -133,7 +128,6 @@ def sweep(
     workers: int | None = None,
     dask: str | None = None,
     seconds: float = SweepRequest.seconds,
-    all_columns: bool = False,
     least: Limits = (),
     most: Limits = (),
     progress: Progress | None = None,
@@ -158,7 +152,6 @@ def sweep(
         workers,
         dask,
         seconds,
-        all_columns,
         read_all(_texts(least), _texts(most))[0],
     )
     return run_sweep(request, Path(out), progress or ignore_progress)

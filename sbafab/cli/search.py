@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -17,19 +15,16 @@ from sbafab.api.designs import Design, design_of
 from sbafab.cli import options as opt
 from sbafab.cli import show
 from sbafab.cli.exit import RULE_FAILED, end
-from sbafab.errors import DesignError
-from sbafab.runtime import Progress
 
-Outcome = TypeVar("Outcome")
 FOUND = "found.toml"
 """The default file name in the folder of ``-o``."""
 HELP = """Find the best design that meets requirements.
 
-Without DESIGN the search starts from every family. If no design meets all requirements, the nearest
-miss is shown, no file is written, and the exit code is 1. A quantity may name its pressure P and
-height H with units, such as force@12.5mm@50kPa or, flat, force@0mm@50kPa. Without a pressure it is
-at the highest that another one names, or at 10 kPa. H in % is of the reference stroke, force@50%,
-which round pockets have of the paper's film alone:
+If no design meets all requirements, the nearest miss is shown, no file is written, and the exit
+code is 1. A quantity may name its pressure P and height H with units, such as force@12.5mm@50kPa
+or, flat, force@0mm@50kPa. Without a pressure it is at the highest that another one names, or at
+10 kPa. H in % is of the reference stroke, force@50%, which round pockets have of the paper's film
+alone. If inlet tabs may stand out, ask for outline_diameter:
 
 \b
 {quantities}
@@ -47,7 +42,7 @@ MOST = opt.option(
 
 
 @click.command(help=HELP.format(quantities=api.quantity_lines()))
-@opt.design_argument(metavar="[DESIGN]", required=False)
+@opt.design_argument()
 @LEAST
 @MOST
 @opt.option(
@@ -70,7 +65,7 @@ MOST = opt.option(
 @opt.option("--fix fixed KEY...", "Do not vary this key; keys of --set are not varied either.")
 @opt.option(
     "--tries N",
-    "Largest number of designs to try, for each family.",
+    "Largest number of designs to try.",
     click.IntRange(4, 100_000),
     default=api.FindRequest.tries,
 )
@@ -78,96 +73,40 @@ MOST = opt.option(
 @opt.file_option(FOUND)
 @opt.set_option
 @opt.json_option
-def find(source: str | None, **options: Any) -> None:
-    names = [source] if source else _family_templates()
-    requests = _each(names, partial(_request, options=options))
-    target = opt.design_file(options["to"], options["out"], FOUND)
+def find(source: str, to: Path | None, out: Path, as_json: bool, **options: Any) -> None:
+    target = opt.design_file(to, out, FOUND)
+    request = _request(source, options)
     api.refuse_existing(target)
-    if any(_counts_tabs(request) for request in requests.values()):
-        show.note(TABS_HINT)
-    with show.progress(options["as_json"]) as progress:
-        origin, result = _best_result(requests, progress)
+    with show.progress(as_json) as progress:
+        result = api.run_find(request, progress)
     if result.holds:
-        name = api.name_of(target.stem) or origin
+        name = api.name_of(target.stem) or source
         api.write_found(
-            api.found_toml(origin, options["assignments"], name, result, target), target
+            api.found_toml(source, options["assignments"], name, result, target), target
         )
-    if options["as_json"]:
-        show.document(api.find_document(result, origin, target))
+    if as_json:
+        show.document(api.find_document(result, source, target))
     else:
-        _print_found(result, origin, target)
+        _print_found(result, source, target)
     if not result.holds:
         show.end_failed()
 
 
-def _request(name: str, options: dict[str, Any]) -> api.FindRequest:
+def _request(source: str, options: dict[str, Any]) -> api.FindRequest:
     """Return the search from a design. Raises DesignError without a requested quantity."""
-    requirements, goal = api.read_all(
-        options["least"], options["most"], options["best"], options["flow_ml_min"]
-    )
+    limits = (options[name] for name in ("least", "most", "best", "flow_ml_min"))
+    requirements, goal = api.read_all(*limits)
     assigned = options["assignments"]
-    design = api.load_design(name, assigned)
+    design = api.load_design(source, assigned)
     free = api.read_free(
         design, options["free"], options["fixed"], tuple(api.changed_keys(assigned))
     )
-    settings = {name: options[name] for name in ("tries", "sure")}
-    request = api.FindRequest(design, requirements, goal, free, **settings)
-    api.free_keys(request)  # raises DesignError for keys that cannot vary
-    return request
-
-
-def _each(names: Iterable[str], value: Callable[[str], Outcome]) -> dict[str, Outcome]:
-    """Return a value for each name that has one. Raises DesignError if none has."""
-    values: dict[str, Outcome] = {}
-    problems = []
-    for name in names:
-        try:
-            values[name] = value(name)
-        except DesignError as error:
-            problems.append(str(error))
-    if not values:
-        raise DesignError("; ".join(dict.fromkeys(problems)))
-    return values
-
-
-def _best_result(
-    requests: dict[str, api.FindRequest], progress: Progress
-) -> tuple[str, api.FoundDesign]:
-    """Run the searches; return the best result and the design that it started from."""
-    names = list(requests)
-
-    def result(name: str) -> api.FoundDesign:
-        def report(stage: str, done: int, total: int) -> None:
-            progress(stage, names.index(name) * total + done, len(names) * total)
-
-        return api.run_find(requests[name], report)
-
-    return min(_each(names, result).items(), key=lambda item: item[1].best.rank)
-
-
-def _family_templates() -> list[str]:
-    """Return the first template of each family."""
-    templates: dict[type, str] = {}
-    for name in api.template_names():
-        with suppress(DesignError):
-            templates.setdefault(type(api.load_design(name)), name)
-    return list(templates.values())
+    return api.FindRequest(
+        design, requirements, goal, free, tries=options["tries"], sure=options["sure"]
+    )
 
 
 # Printing of a result.
-
-
-TABS_HINT = (
-    "overall_diameter counts the inlet tabs; use outline_diameter if they may stand out, or add "
-    "--free inlet.tab_length=3:5:0.5"
-)
-
-
-def _counts_tabs(request: api.FindRequest) -> bool:
-    """Return True if a search limits the diameter with tabs, and may not shorten these."""
-    names = [requirement.quantity.name for requirement in request.requirements]
-    free = [free.key for free in api.free_keys(request)]
-    return "overall_diameter" in names and "inlet.tab_length" not in free
 
 
 def _print_found(result: api.FoundDesign, origin: str, target: Path) -> None:
@@ -220,31 +159,15 @@ def _binding_limits(result: api.FoundDesign) -> Iterator[str]:
 
 
 def _print_quantities(result: api.FoundDesign) -> None:
-    """Print the required quantities and the goal of the best design, each with its flags and the
-    paper's measured value.
-    """
-    request, best, goal = result.request, result.best, result.request.goal
-    is_sure = request.sure is not None
-    lines: dict[str, list[str]] = {}
-    for row in request.requirements:
-        value = api.figure_text(request, best, row) + ("" if is_sure else result.interval_text(row))
-        missed = "" if best.meets(row) else ": MISSED"
-        line = f"{row.quantity.label} {value}; {row.bound}{missed}"
-        lines.setdefault(row.quantity.label, []).append(line)
-    label = goal.label if result.holds else goal.quantity.label
-    value = api.shown_value(goal.quantity, best.value(goal)) + result.interval_text(goal)
-    lines.setdefault(goal.quantity.label, []).append(f"{label}: {value}")
-    for name, told_of in lines.items():
-        for line in told_of:
-            show.line(f"  {line}")
-        for flag in result.flags.get(name, ()):
-            show.wrapped(f"({api.FLAGS[flag]})", indent="    ")
-        if name in result.measured:
-            show.wrapped(f"({result.measured[name].sentence})", indent="    ")
-    if goal.quantity.label in result.intervals or (result.intervals and not is_sure):
+    """Print the required quantities and the goal of the best design, each with its notes."""
+    for text, notes in result.lines:
+        show.line(f"  {text}")
+        for note in notes:
+            show.wrapped(f"({note})", indent="    ")
+    if result.has_medians:
+        is_sure = result.request.sure is not None
         hint = "" if is_sure else "; --sure 0.9 requires each requirement with that probability"
-        note = f"in parentheses the 90 % interval of what would be measured{hint}"
-        show.wrapped(note, indent="  ")
+        show.wrapped(f"{api.MEDIANS}{hint}", indent="  ")
 
 
 USEFUL_KPA = 50.0
@@ -307,11 +230,6 @@ def _print_front(result: api.FoundDesign) -> None:
     opt.FiniteRange(0, min_open=True),
     default=api.SweepRequest.seconds,
 )
-@opt.option(
-    "--all-columns",
-    "Write every key, rule and figure, not only those varied, requested and binding.",
-    bool,
-)
 def sweep(
     design: Design,
     out: Path,
@@ -321,7 +239,7 @@ def sweep(
     """Check and predict variants of a design.
 
     OUT/<name>-sweep/ receives sweep.csv with a row for
-    each design, times.csv, and the page sweep.html. Run the same command again to resume a sweep
+    each design, and the page sweep.html. Run the same command again to resume a sweep
     that was stopped. A design that misses a --min or --max fails; `sbafab find --help` lists the
     quantities.
     """
@@ -334,11 +252,6 @@ def sweep(
         show.line(
             f"The tables leave out {swept.no_longer_asked} designs of an earlier sweep; its "
             "command restores them from the journal"
-        )
-    if not settings["all_columns"]:
-        show.line(
-            "columns: varied, requested and binding; --all-columns writes all without computing "
-            "again"
         )
     failed = ", ".join(f"{cause} {number}" for cause, number in swept.failed.items())
     words = {"passes": "passed", "fails": f"failed ({failed})"}
@@ -375,8 +288,8 @@ def compare(
 ) -> None:
     """Compare two designs: what differs, what each reaches.
 
-    A and B are templates, design files, output folders, or rows of a sweep by number, such as
-    out/1dof-5mm-sweep/sweep.csv:12. OUT/compare/compare.html has pictures of both side by side.
+    A and B are templates, design files or output folders. OUT/compare/compare.html has pictures of
+    both side by side.
     """
     a, b = (api.comparing.load_compared(source, assignments) for source in (first, second))
     with show.progress(as_json) as progress:

@@ -255,7 +255,7 @@ def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,))
     once, one number for each size of cycle, the largest first: they share the force.
     """
     press = design.press
-    _refuse_temperature(laminate, press)
+    refuse_temperature(laminate, press)
     parts = press_steps(laminate)
     under, *smaller = (
         [press_force.footprint(laminate, part.layers, count) for part in parts]
@@ -508,7 +508,7 @@ HOTTEST_TRIED = 150.0
 PRESSURES_TRIED = (70.0, 200.0)
 
 
-def _refuse_temperature(laminate: Laminate, press: Press) -> None:
+def refuse_temperature(laminate: Laminate, press: Press) -> None:
     """Raise DesignError at a temperature that bonds no films, or is too hot for one or the pad."""
     pressed = pressed_layers(laminate)
     if not pressed:

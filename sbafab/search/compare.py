@@ -5,9 +5,6 @@ pictures.
 from __future__ import annotations
 
 import base64
-import csv
-import json
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,10 +14,10 @@ from typing import Annotated, Any, TypeVar
 from pydantic import AliasPath, Field
 from pydantic.json_schema import SkipJsonSchema
 
-from sbafab.actuators import load_design, records
-from sbafab.design.files import Change, override, shown
+from sbafab.actuators import load_design
+from sbafab.design.files import Change
 from sbafab.design.identity import design_sha256
-from sbafab.design.records import Design, validated
+from sbafab.design.records import Design
 from sbafab.documents import Document, PlainNumber, Short, attribute
 from sbafab.errors import DesignError
 from sbafab.folders.build import Build, make_build
@@ -36,7 +33,7 @@ from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import MOST_PRESSURE, stack
 from sbafab.reports.solid_pictures import WHY, PictureRequest, pictures_at_one_scale, solid_png
 from sbafab.runtime import Progress, ignore_progress
-from sbafab.search.sweep_report import CSV, JOURNAL, PageSection, page_html
+from sbafab.search.sweep_report import PageSection, page_html
 from sbafab.search.trials import margin, worst_findings
 from sbafab.search.vary import NOTHING, KeyDifference, format_value, key_values
 from sbafab.version import GENERATOR
@@ -60,11 +57,10 @@ DIGITS = 4
 """Figures that agree to this many significant digits count as equal."""
 SIZE = 640, 512
 """Width of a picture, pixels."""
-_ROW = re.compile(r"(.+\.csv):(\d+)")
 Pair = tuple[Any, Any]
 """Findings or figures of both designs, None of one that has none."""
 ShortOrNone = Short | None
-ShortEnds = tuple[Short, Short]
+MeasuredEnds = tuple[Short, Short]
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 
@@ -116,7 +112,7 @@ class FigurePair(Document):
     differs: bool
     """true if the values differ in the first four digits, or one is missing"""
     values: tuple[ShortOrNone, ShortOrNone]
-    intervals: tuple[ShortEnds | None, ShortEnds | None]
+    intervals: tuple[MeasuredEnds | None, MeasuredEnds | None]
     """90 % intervals, if a calibration says so"""
     models: tuple[TextOrNone, TextOrNone]
 
@@ -164,44 +160,13 @@ class CompareDocument(Document, schema="sbafab/compare@1"):
 
 
 def load_compared(source: str | Path, changes: Iterable[Change] = ()) -> Design:
-    """Return the design of a template, a design file, an output folder, or a row of a sweep such as
-    ``out/1dof-5mm-sweep/sweep.csv:12``. Raises DesignError if there is none.
+    """Return the design of a template, a design file or an output folder. Raises DesignError if
+    there is none.
     """
-    row = _ROW.fullmatch(str(source))
-    if row is not None and not Path(source).exists():
-        return _swept(Path(row[1]), row[2]).with_(*changes)
     file = Path(source) / "design.toml"
     with suppress(OSError):  # a text too long for a path
         source = file if file.is_file() else source
     return load_design(source, changes)
-
-
-def _swept(table: Path, number: str) -> Design:
-    """Return the design of a row of a sweep by row number, from the journal beside the table."""
-    journal = table.with_name(JOURNAL)
-    try:
-        with table.open(encoding="utf-8", newline="") as opened:
-            rows = (row for row in csv.DictReader(opened) if row.get("number") == number)
-            sha256 = next(rows, {}).get("sha256")
-        if not sha256:
-            raise DesignError(f"{table} has no design of number {number}")
-        with journal.open(encoding="utf-8") as opened:
-            # The last line may be incomplete.
-            whole = (line for line in opened if f'"{sha256}"' in line and line.endswith("}}\n"))
-            line = next(whole, "")
-    except (OSError, UnicodeError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or error
-        message = f"{shown(table)} cannot be read: {reason}; name a sweep's {CSV}"
-        raise DesignError(message) from None
-    if not line:
-        raise DesignError(f"{journal} has no design of number {number}; sweep again")
-    design = validated(override({}, [json.loads(line)["row"]["keys"]]), records(), table.parent)
-    if design_sha256(design) != sha256:
-        raise DesignError(
-            f"number {number} of {table} names files that are not beside it, or another version "
-            "measured it; compare its design file"
-        )
-    return design
 
 
 def compare(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -40,6 +39,7 @@ from sbafab.models.balloons import balloons_of, has_balloons
 from sbafab.models.calibration import SHARE, uncertainty_of
 from sbafab.models.figures import FLAGS, Figure, Flag, FlagList
 from sbafab.models.paper import Counterpart, CounterpartEntry
+from sbafab.pressing.schedule import refuse_temperature
 from sbafab.rules.finding import Place
 from sbafab.runtime import Progress, ignore_progress
 from sbafab.search.quantities import (
@@ -48,7 +48,6 @@ from sbafab.search.quantities import (
     RequestedQuantity,
     Requirement,
     refuse_absent,
-    shown_interval,
     shown_value,
 )
 from sbafab.search.space import (
@@ -65,6 +64,7 @@ from sbafab.search.trials import margin_share
 from sbafab.search.vary import format_keys, key_values
 
 LEAST_TRIES = 4
+MEDIANS = "in parentheses the 90 % interval of what would be measured"
 
 
 @dataclass(frozen=True, repr=False)
@@ -139,12 +139,40 @@ class FoundDesign:
         """Requirements and rules that the best design breaks, one sentence each."""
         return misses(self.request, self.best)
 
-    def interval_text(self, subject: Requirement | Goal, words: str = " ({})") -> str:
-        """Return the 90 % interval of a requirement or the goal, in words; empty without one."""
+    @property
+    def lines(self) -> list[tuple[str, list[str]]]:
+        """The required quantities and the goal, each with flags and the paper's measured value."""
+        request, best, goal = self.request, self.best, self.request.goal
+        texts: dict[str, list[str]] = {}
+        for row in request.requirements:
+            interval = "" if request.sure is not None else self._interval(row)
+            missed = "" if best.meets(row) else ": MISSED"
+            value = f"{figure_text(request, best, row)}{interval}; {row.bound}{missed}"
+            texts.setdefault(row.quantity.label, []).append(f"{row.quantity.label} {value}")
+        label = goal.label if self.holds else goal.quantity.label
+        value = shown_value(goal.quantity, best.value(goal)) + self._interval(goal)
+        texts.setdefault(goal.quantity.label, []).append(f"{label}: {value}")
+        lines = []
+        for name, (*others, last) in texts.items():
+            notes = [FLAGS[flag] for flag in self.flags.get(name, ())]
+            notes += [self.measured[name].sentence] if name in self.measured else []
+            lines += [*((text, []) for text in others), (last, notes)]
+        return lines
+
+    @property
+    def has_medians(self) -> bool:
+        """True if some of the lines are medians with their interval."""
+        quantities = self.request.quantities
+        shown = quantities if self.request.sure is None else quantities[-1:]
+        return any(quantity.label in self.intervals for quantity in shown)
+
+    def _interval(self, subject: Requirement | Goal) -> str:
+        """Return the 90 % interval of a requirement or the goal; empty without one."""
         interval = self.intervals.get(subject.quantity.label)
         if interval is None or self.best.value(subject) < 0:
             return ""
-        return words.format(shown_interval(interval))
+        low, high = (max(end, 0.0) for end in interval)
+        return f" ({low:.3g} to {high:.3g})"
 
 
 @dataclass(frozen=True)
@@ -198,15 +226,12 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
         raise Stopped("the search was stopped, and no file was written", *stop.args) from stop
     point, best = space.best()
     if best.refused:
-        # The most common reason, in the words of the nearest candidate that has it.
+        # The most common cause, in the words of the nearest candidate that has it.
         refused = sorted(space.trials.values(), key=lambda trial: trial.rank)
-        # One reason, whatever its numbers.
-        reasons = [re.sub(r"[\d.]+", "", trial.refused) for trial in refused]
-        (reason, count), *_ = Counter(reasons).most_common()
-        nearest = refused[reasons.index(reason)]
-        raise DesignError(
-            f"no design could be made: {nearest.refused} ({count} of the {len(refused)} tried)"
-        )
+        ((cause, count),) = Counter(trial.cause for trial in refused).most_common(1)
+        reason = next(trial.refused for trial in refused if trial.cause == cause)
+        told = f"{count} of the {len(refused)} tried"
+        raise DesignError(f"no design could be made: {reason} ({told})")
     shown_front, count = pareto_front(space, best) if best.holds else ([], 0)
     return FoundDesign(
         request,
@@ -235,8 +260,8 @@ def _figures(request: FindRequest, best: Trial) -> Iterator[tuple[str, Figure]]:
 # The free keys of a request, and what no search could answer.
 
 
-OF_FILMS = ("films.", "layup.")
-"""Prefixes of keys that change a design's films."""
+OF_FILMS = ("films.", "layup.", "press.", KIT)
+"""Prefixes of keys that change a design's films or how they are pressed."""
 KNOWN_BY_FILM = ("mass", "burst", "reference_stroke")
 """Quantities whose availability depends only on a design's films, and quick to evaluate."""
 
@@ -263,19 +288,20 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
         )
     narrowed = tuple(_within(key, request.requirements) for key in free)
     if not any(key.startswith(OF_FILMS) for key in keys):
-        _refuse_unknown_films(request)
+        _refuse_films(request)
     return narrowed
 
 
-def _refuse_unknown_films(request: FindRequest) -> None:
-    """Raises DesignError if a quantity is unknown for a design's films at any size: no candidate
-    could be evaluated.
+def _refuse_films(request: FindRequest) -> None:
+    """Raises DesignError if a quantity is unknown for a design's films, or the press cannot bond
+    them, at any size: no candidate could be evaluated or made.
     """
     design = request.design
     try:
         laminate = build(design)
     except SbafabError:
         return  # the search may start from impossible sizes
+    refuse_temperature(laminate, design.press)
     has_modulus = all(layer.film.elastic for layer in laminate.tpe_layers)
     for quantity in request.quantities:
         try:
@@ -540,22 +566,15 @@ def found_toml(
     source: str | Path, assignments: Sequence[str], name: str, outcome: FoundDesign, target: Path
 ) -> str:
     """Return the text of the design file ``target`` of a result, with its figures as comments."""
-    request, best = outcome.request, outcome.best
+    best, design = outcome.best, outcome.request.design
     changes: list[Change] = [*assignments, dict(best.values), {"name": name}]
     data = override(read_toml(design_path(source)), changes)
-    data = override(data, [_paths_beside(target, data, request.design)])
+    data = override(data, [_paths_beside(target, data, design)])
     first = {key: value for key, value in data.items() if not isinstance(value, dict)}
     head = [f"Found by sbafab find, from {Path(source).name}: {format_keys(best.values)}."]
-    goal = request.goal
-    told: list[tuple[Requirement | Goal, str, str]] = [
-        (row, figure_text(request, best, row), row.bound) for row in request.requirements
-    ]
-    told.append((goal, shown_value(goal.quantity, best.value(goal)), "the goal"))
-    for subject, value, what in told:
-        interval = outcome.interval_text(subject, "; 90 % interval {}")
-        head.append(f"{subject.quantity.label} = {value} ({what}{interval})")
-    head += [f"{name}: {measured.sentence}" for name, measured in outcome.measured.items()]
-    head += [f"{name}: {FLAGS[flag]}" for name, flags in outcome.flags.items() for flag in flags]
+    for text, notes in outcome.lines:
+        head += [text, *(f"  ({note})" for note in notes)]
+    head += [MEDIANS] if outcome.has_medians else []
     comments = "".join(f"# {line}".rstrip() + "\n" for line in head)
     return f"{comments}\n{tomli_w.dumps(first | data)}"
 

@@ -367,12 +367,6 @@ def shown_value(quantity: RequestedQuantity, value: float) -> str:
     return f"{value:.4g} {quantity.unit}".rstrip()
 
 
-def shown_interval(interval: tuple[float, float]) -> str:
-    """An interval without its unit; of quantities that are at least 0."""
-    low, high = (max(end, 0.0) for end in interval)
-    return f"{low:.3g} to {high:.3g}"
-
-
 # Requirements on quantities, and the goal.
 
 

@@ -95,9 +95,9 @@ class Trial:
     ``values`` are of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
     ``missed`` is the total share by which requirements and rules are missed; 0 if none is. A lower
     ``cost``, in the unit of the goal, is better; ``mass`` is in g. ``refused`` says why the design
-    cannot be made. ``intervals``, by quantity in its unit, have ends that are compared with
-    limits, if requirements have a probability. ``words`` counts keys with words that differ from
-    the starting design's.
+    cannot be made, and equal reasons have one ``cause``. ``intervals``, by quantity in its unit,
+    have ends that are compared with limits, if requirements have a probability. ``words`` counts
+    keys with words that differ from the starting design's.
     """
 
     values: Mapping[str, Any]
@@ -110,6 +110,7 @@ class Trial:
     laminate: Laminate | None = field(default=None, repr=False, compare=False)
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     words: int = 0
+    cause: tuple[type, int] | None = None
 
     @property
     def holds(self) -> bool:
@@ -146,6 +147,7 @@ class Trial:
 def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
     """Return the candidate with these values; without rules, only requirements count: quicker."""
     rules: Mapping[str, Finding] | None = None
+    figures: dict[str, float] = {}
     try:
         design = request.design.with_(dict(values))
         laminate = build(design)
@@ -155,11 +157,12 @@ def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool 
             if not checked_build.failed:
                 refuse_undoable([checked_build])
         share = rules[YIELD].measured if rules and YIELD in rules else None
-        figures, intervals = _figures(request, design, laminate, share)
+        intervals = _add_figures(figures, request, design, laminate, share)
     except (DesignError, GeometryError) as error:
         excess = error.excess if isinstance(error, BeyondError) else IMPOSSIBLE
         reason = " ".join(str(error).split())
-        return Trial(values, missed=IMPOSSIBLE + excess, refused=reason)
+        cause = type(error), len(figures)
+        return Trial(values, missed=IMPOSSIBLE + excess, refused=reason, cause=cause)
     keys = key_values(request.design)
     words = sum(isinstance(value, str) and value != keys.get(key) for key, value in values.items())
     trial = Trial(values, figures, rules, laminate=laminate, intervals=intervals, words=words)
@@ -174,13 +177,16 @@ def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool 
     return replace(trial, missed=sum(missed), cost=cost, mass=mass)
 
 
-def _figures(
-    request: FindRequest, design: Design, laminate: Laminate, good: float | None
-) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
-    """Return the quantities of a candidate, and the intervals whose ends a measured value passes
-    with a probability of ``1 - sure``.
+def _add_figures(
+    figures: dict[str, float],
+    request: FindRequest,
+    design: Design,
+    laminate: Laminate,
+    good: float | None,
+) -> dict[str, tuple[float, float]]:
+    """Add the quantities of a candidate to ``figures``, and return the intervals whose ends a
+    measured value passes with a probability of ``1 - sure``.
     """
-    figures: dict[str, float] = {}
     intervals: dict[str, tuple[float, float]] = {}
     required = {row.quantity for row in request.requirements if request.sure is not None}
     for quantity in dict.fromkeys(request.quantities):
@@ -193,7 +199,7 @@ def _figures(
             intervals[label] = figure.interval
         elif probability and figure and quantity.is_calibrated(design.form) and label != "height":
             raise DesignError(f"{label} is not known at other factors of the calibration")
-    return figures, intervals
+    return intervals
 
 
 def figure_text(request: FindRequest, trial: Trial, requirement: Requirement) -> str:
@@ -242,10 +248,8 @@ def read_free(
     keys = key_values(design)
     assigned = [key for key in assigned if not numbers_of(keys.get(key))]
     is_several = isinstance(free, Iterable) and not isinstance(free, str)
-    given = list(free) if is_several else [free]
-    named = [_free_of(key) for key in given]
-    texts = [key for key in given if isinstance(key, str)]
-    refuse_unknown(design, [read_varied(text, "--free") for text in texts], "--free")
+    named = [_free_of(key) for key in (free if is_several else [free])]
+    refuse_unknown(design, named, "--free")
     for key, word in ((each.key, word) for each in named for word in each.choices):
         design.with_({key: word})
     fits = any(key.startswith("fits.") for key in assigned)

@@ -33,7 +33,7 @@ from sbafab.search.sweep_report import (
     refuse_foreign,
     stale_designs,
     sweep_html,
-    write_tables,
+    write_table,
 )
 from sbafab.search.trials import (
     MeasureJob,
@@ -60,9 +60,8 @@ class SweepRequest:
     """Designs and settings of a sweep: ``samples`` drawn by Latin hypercube, or the whole grid.
 
     ``workers`` processes of this machine (as many as processors by default), or the cluster behind
-    ``dask``; each design may take ``seconds``. ``all_columns``: the tables hold every key, rule and
-    figure. ``pressures_kpa`` default to a prediction's. A design that misses one of the
-    ``requirements`` fails.
+    ``dask``; each design may take ``seconds``. ``pressures_kpa`` default to a prediction's. A
+    design that misses one of the ``requirements`` fails.
     """
 
     design: Design
@@ -73,7 +72,6 @@ class SweepRequest:
     workers: int | None = None
     dask: str | None = None
     seconds: float = SECONDS
-    all_columns: bool = False
     requirements: tuple[Requirement, ...] = ()
 
     def __post_init__(self) -> None:
@@ -167,18 +165,23 @@ def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress
                 sentence = f"{done} of {len(keys)} designs are computed; run the same command again"
                 raise Stopped(f"{sentence} to resume", *stop.args) from stop
         progress("writing tables", 0, 1)
-        is_calibrated = bool(factors_of(request.design).calibration)
-        settings = (values, request.pressures_kpa, request.all_columns, is_calibrated)
         judge = partial(_judged, requirements=request.requirements)
-        limits = {row.quantity.label: row for row in request.requirements}
-        table = Table(lambda: map(judge, journal.rows(keys)), *settings, tuple(limits))
+        table = Table(
+            lambda: map(judge, journal.rows(keys)),
+            values,
+            request.pressures_kpa,
+            is_calibrated=bool(factors_of(request.design).calibration),
+            limited=_labels(request),
+        )
         gone = stale_designs(folder / CSV, table)
-        files = (*write_tables(table, folder), PAGE, JOURNAL)
+        write_table(table, folder / CSV)
         limit_lines = [f"{row.quantity.label}: {row.bound}" for row in request.requirements]
         page = sweep_html(request.design, request.varied, table, limit_lines)
         replace_text(folder / PAGE, page)
     outcomes = dict(table.outcomes)
-    return SweptDesigns(folder, len(values), len(missing), outcomes, files, table, gone)
+    return SweptDesigns(
+        folder, len(values), len(missing), outcomes, (CSV, PAGE, JOURNAL), table, gone
+    )
 
 
 def _measure(

@@ -1,7 +1,7 @@
 """Reports of searches: the rows of a sweep as CSV, and pages of pictures and tables.
 
-A table has the same bytes, whoever measured the rows and when; the time of each design is in a
-separate file. Pages are self-contained: style and pictures are inline, nothing is fetched.
+A table has the same bytes, whoever measured the rows and when. Pages are self-contained: style and
+pictures are inline, nothing is fetched.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import chain
 from operator import le
@@ -35,10 +36,9 @@ from sbafab.version import GENERATOR
 # The tables: one design per row, in the order requested.
 
 
-CSV, TIMES = "sweep.csv", "times.csv"
-PAGE, JOURNAL = "sweep.html", "journal.jsonl"
+CSV, PAGE, JOURNAL = "sweep.csv", "sweep.html", "journal.jsonl"
 """Files of a sweep's folder."""
-PARTS = ("verdict", "margin", "measured", "limit")
+PARTS = ("verdict", "margin")
 """Columns of each rule, in the order of its list."""
 HEAD = ("number", "sha256", "outcome", "reason")
 """The first columns of every table."""
@@ -61,93 +61,65 @@ LITTLE = 0.005
 """Largest share of a limit that counts as nothing to spare."""
 
 
+@dataclass(frozen=True)
 class Table:
     """Rows of a sweep, read again for each pass, so that only the disk limits their number.
 
-    Files get the most important columns; ``is_whole``: all of them.
+    ``values`` are of the varied keys, a set for each row; ``limited`` are labels of the quantities
+    that have limits, which stand among the rules.
     """
 
-    def __init__(
-        self,
-        rows: Callable[[], Iterator[SweepRow]],
-        values: Sequence[Values],
-        pressures_kpa: Sequence[float] = (),
-        is_whole: bool = False,
-        is_calibrated: bool = False,
-        limited: Sequence[str] = (),
-    ) -> None:
-        self.limited = limited
-        """Labels of the quantities that have limits; they stand among the rules."""
-        self.limited_columns: dict[str, None] = {}
-        self.rows = rows
-        self.values = values
-        self.pressures_kpa = pressures_kpa
-        self.is_whole = is_whole
-        self.is_calibrated = is_calibrated
-        self.columns: list[str] = []
-        """Columns of all rows: keys, the varied ones first, then rules, then figures."""
-        self.figures: dict[str, FigureKey] = {}
-        """The figures of all rows by their columns."""
-        self.outcomes: Counter[SweepOutcome] = Counter()
-        self.causes: dict[str, list[str]] = {}
-        """Reasons of each cause of failure, each with the number of its design."""
-        self.hashes = {""}
-        self._binding: set[str] = set()
-        """Rules that anywhere fail, warn or pass without margin."""
-        self._scan()
+    rows: Callable[[], Iterator[SweepRow]]
+    values: Sequence[Values]
+    pressures_kpa: Sequence[float] = ()
+    is_calibrated: bool = False
+    limited: Sequence[str] = ()
+    figures: dict[str, FigureKey] = field(default_factory=dict, init=False)
+    """The figures of all rows by their columns."""
+    outcomes: Counter[SweepOutcome] = field(default_factory=Counter, init=False)
+    causes: dict[str, list[str]] = field(default_factory=dict, init=False)
+    """Reasons of each cause of failure, each with the number of its design."""
+    hashes: set[str] = field(default_factory=lambda: {""}, init=False)
+    _limited_columns: dict[str, None] = field(default_factory=dict, init=False)
+    _binding: set[str] = field(default_factory=set, init=False)
+    """Rules that anywhere fail, warn or pass without margin."""
 
-    def _scan(self) -> None:
-        order: tuple[dict[str, None], ...] = ({}, {}, {}, {})
+    def __post_init__(self) -> None:
+        self._binding.update(self.limited)
         for number, row in enumerate(self.rows(), 1):
-            for part, cells in zip(order, self._parts(number, row), strict=True):
-                part.update(dict.fromkeys(cells))
             self.outcomes[row["outcome"]] += 1
             self.hashes.add(row.get("sha256", ""))
             failed = {} if row["outcome"] == "passes" else {row["outcome"]: row["reason"]}
             for cause, message in row.get("failed", failed).items():
                 told = f"no. {number}: {cause}: {message}"
                 self.causes.setdefault(cause, []).append(told)
-            self.figures |= {_heading(key): FigureKey.read(key) for key in row.get("figures", ())}
+            keys = row.get("figures", ())
+            self.figures.update({_heading(key): FigureKey.read(key) for key in keys})
             columns = [cells[1] for cells in row.get("quantities", {}).values()]
-            self.limited_columns |= dict.fromkeys(columns)
+            self._limited_columns.update(dict.fromkeys(filter(None, columns)))
             for name, (verdict, margin, _, limit, _) in row.get("rules", {}).items():
                 is_tight = margin is not None and limit and abs(margin) < LITTLE * abs(limit)
                 if verdict != "pass" or is_tight:
                     self._binding.add(name)
-        self.columns = list(dict.fromkeys(name for part in order for name in part))
 
-    def _parts(self, number: int, row: SweepRow) -> tuple[dict[str, Any], ...]:
-        """Return the cells of a row by column: its head, keys, rules and figures."""
-        cells = (number, row.get("sha256", ""), row["outcome"], row["reason"])
-        rules = row.get("rules", {})
-        by_rule = {
-            f"{name}.{part}": cell
-            for name in (*rule_names(), *self.limited)
-            for part, cell in zip(PARTS, rules.get(name, ()), strict=False)
-        }
-        figures = dict(zip(YIELD, row.get("yield", ()), strict=False))
-        figures |= {_heading(key): value for key, value in row.get("figures", {}).items()}
-        # Varied values are listed even if no design resulted.
-        keys = {**self.values[number - 1], **row.get("keys", {})}
-        return dict(zip(HEAD, cells, strict=True)), keys, by_rule, figures
+    @cached_property
+    def has_yield(self) -> bool:
+        """True if any design has a yield."""
+        return any(row.get("yield") for row in self.rows())
 
     @cached_property
     def written(self) -> list[str]:
-        """Columns of the files: varied keys, leading figures, binding rules; or all."""
+        """Columns of the files: varied keys, leading figures, limited quantities, yield, and rules
+        that bind or stand for limits.
+        """
         moved = [(of, Conditions(kpa=kpa)) for kpa in self.pressures_kpa for of in MOVED]
         leading = (self.first(*sought) for sought in (*((of, ANYWHERE) for of in FIRST), *moved))
-        binding = (
-            f"{name}.{part}"
-            for name in (*rule_names(), *self.limited)
-            if name in {*self._binding, *self.limited}
-            for part in PARTS[:2]
-        )
+        rules = (name for name in (*rule_names(), *self.limited) if name in self._binding)
+        margins = (f"{name}.{part}" for name in rules for part in PARTS)
         varied = (name for values in self.values for name in values)
-        every = self.columns if self.is_whole else ()
-        names = dict.fromkeys(
-            [*HEAD, *varied, *leading, *self.limited_columns, *YIELD, *binding, *every]
-        )
-        return [name for name in names if name in self.columns]
+        good = YIELD if self.has_yield else ()
+        names = (*HEAD, *varied, *filter(None, leading), *self._limited_columns, *good, *margins)
+        return list(dict.fromkeys(names))
 
     def first(self, quantity: Quantity, at: Conditions = ANYWHERE) -> str:
         """Return the column of the first figure of a quantity, at conditions that match ``at``, by
@@ -165,7 +137,14 @@ class Table:
         """The cells of every row in these columns; None for empty cells."""
         chosen = list(names)
         for number, row in enumerate(self.rows(), 1):
-            every = {name: cell for part in self._parts(number, row) for name, cell in part.items()}
+            head = (number, row.get("sha256", ""), row["outcome"], row["reason"])
+            # Varied values are listed even if no design resulted.
+            every = {**self.values[number - 1], **row.get("keys", {})}
+            for rule, cells in row.get("rules", {}).items():
+                every |= {f"{rule}.{part}": cell for part, cell in zip(PARTS, cells, strict=False)}
+            every |= zip(HEAD, head, strict=True)
+            every |= zip(YIELD, row.get("yield", ()), strict=False)
+            every |= {_heading(key): value for key, value in row.get("figures", {}).items()}
             yield [_cell(every.get(name)) for name in chosen]
 
 
@@ -185,17 +164,9 @@ def _cell(value: Any) -> Any:
     return json.dumps(value, ensure_ascii=False)
 
 
-def write_tables(table: Table, folder: Path) -> list[str]:
-    """Write every row in the table's ``written`` columns, and the time of each design, s.
-
-    Unknown values are empty cells. Returns the files' names.
-    """
-    replace_text(folder / CSV, csv_text(chain([table.written], table.cells(table.written))))
-    times = (
-        [n, row.get("sha256", ""), row.get("seconds")] for n, row in enumerate(table.rows(), 1)
-    )
-    replace_text(folder / TIMES, csv_text(chain([["number", "sha256", "seconds"]], times)))
-    return [CSV, TIMES]
+def write_table(table: Table, path: Path) -> None:
+    """Write every row in the table's ``written`` columns; unknown values are empty cells."""
+    replace_text(path, csv_text(chain([table.written], table.cells(table.written))))
 
 
 # The tables of an earlier sweep in the folder.
@@ -396,8 +367,8 @@ def sweep_html(
     if pairs:
         sections += _trade_offs(design, table, keys, [*costs, *gains], columns, pairs)
     footer = (
-        f"Design {design_sha256(design)[:12]}, {GENERATOR}. Values: sweep.csv; all of them: sbafab "
-        "sweep --all-columns. Predictions are models, each with its validity: sbafab predict."
+        f"Design {design_sha256(design)[:12]}, {GENERATOR}. Values: sweep.csv; all of them: "
+        "journal.jsonl. Predictions are models, each with its validity: sbafab predict."
     )
     lines = [*(f"{swept.key} {_values_text(swept)}" for swept in varied), *limits]
     tiles = [
@@ -453,7 +424,7 @@ def _objectives(table: Table) -> tuple[list[str], list[str]]:
     flat = Conditions(share=0.0, kpa=max(table.pressures_kpa, key=abs, default=None))
     stroke = first(Quantity.FREE_STROKE) or first(Quantity.REFERENCE_STROKE)
     force = first(Quantity.BLOCKED_FORCE, flat) or first(Quantity.FORCE_BOUND)
-    good = YIELD[0] if YIELD[0] in table.columns else ""
+    good = YIELD[0] if table.has_yield else ""
     costs, gains = map(first, INTRODUCTION), (stroke, force, good)
     return [*filter(None, costs)], [*filter(None, gains)]
 

@@ -19,10 +19,8 @@ from sbafab.design.records import design_toml
 from sbafab.errors import DesignError
 from sbafab.reports.solid_pictures import PictureRequest, pictures_at_one_scale
 from sbafab.search import compare as module
-from sbafab.search import sweep as sweep_module
 from sbafab.search.compare import compare, compare_html, load_compared
 from sbafab.search.sweep_report import PageSection
-from tests.search.test_sweep import QUICK, _here
 from tests.site.formats import hold
 
 TWELVE = {"stack": {"balloons": 12}}
@@ -68,25 +66,12 @@ def test_rules_that_differ_have_their_margins() -> None:
         compare(design, design, pressures_kpa=[])
 
 
-def test_an_output_folder_and_a_row_of_a_sweep_are_designs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_output_folder_is_a_design(tmp_path: Path) -> None:
     design = sbafab.load("3dof-15mm", "chamber.diameter=6")
     (tmp_path / "made").mkdir()
     (tmp_path / "made" / "design.toml").write_text(design_toml(design), encoding="utf-8")
     assert design_sha256(load_compared(tmp_path / "made")) == design_sha256(design)
-    monkeypatch.setattr(sweep_module, "run_jobs", _here)
-    swept = sbafab.sweep("1dof-5mm", vary=["stack.balloons=3,4"], out=tmp_path, **QUICK)
-    row = load_compared(f"{swept.folder / 'sweep.csv'}:2")
-    assert row.stack.balloons == 4
-    assert row.rules.yield_builds == 100
-    changed = load_compared(f"{swept.folder / 'sweep.csv'}:1", ["stack.balloons=7"])
-    assert changed.stack.balloons == 7
-    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     for source, said in (
-        (f"{swept.folder / 'sweep.csv'}:3", "has no design of number 3"),
-        (tmp_path / "none.csv:1", "cannot be read"),
-        (tmp_path / "other.csv:1", "has no design of number 1"),
         (tmp_path, "is a folder"),
         ("brace", "is an assembly"),
     ):

@@ -378,16 +378,6 @@ def test_a_requirement_beyond_a_range_that_widens_moves_it() -> None:
         assert (free.low, free.high) == ends
 
 
-def test_tabs_in_the_way_are_named(tmp_path: Path) -> None:
-    """Two tabs of 5 mm, or three, leave nothing within 10."""
-    asked = ("--max", "overall_diameter=10", "--tries", "4")
-    ended = run(*asked, to=tmp_path / "found.toml")
-    assert ended.exit_code == 1
-    assert ended.stderr.startswith("note: overall_diameter counts the inlet tabs; use outline_diam")
-    freed = run(*asked, "--free", "inlet.tab_length=3:5:1", to=tmp_path / "found.toml")
-    assert "inlet tabs" not in freed.output
-
-
 def test_keys_are_freed_and_fixed_by_name() -> None:
     design = sbafab.load("3dof-15mm")
     keys = [one.key for one in read_free(design, ["inlet.tab_length=3:5:0.5"], ["lumen.diameter"])]
@@ -490,6 +480,18 @@ def test_what_no_film_of_the_design_is_known_for_is_refused_before_any_is_tried(
     free = (Free("films.tpe.thickness", 0.038, 0.1, 0.062),)
     design = sbafab.load("3dof-15mm", films={"tpe": film})
     assert free_keys(FindRequest(design, *read_all([], [f"{asked}=1"], "width"), free)) == free
+
+
+def test_a_press_that_bonds_no_film_is_told_before_any_design_is_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "evaluated", None)
+    with pytest.raises(DesignError, match=r"press\.temperature_c = 80 does not bond"):
+        sbafab.find("1dof-5mm", press={"temperature_c": 80}, least={"stroke": 8})
+    # A temperature that is to be found may bond them.
+    free = (Free("press.temperature_c", 80, 140, 60),)
+    design = sbafab.load("1dof-5mm", press={"temperature_c": 80})
+    assert free_keys(FindRequest(design, *read_all([], [], "mass"), free)) == free
 
 
 def test_a_flat_force_needs_no_modulus_as_in_predict() -> None:
