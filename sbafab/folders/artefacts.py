@@ -45,6 +45,7 @@ from sbafab.models.calibration import NONE, load_calibration, shipped_names
 from sbafab.models.figures import Prediction, PredictionDocument
 from sbafab.pressing.cycles import batch_entry
 from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json
+from sbafab.rules.finding import Finding
 from sbafab.runtime import Progress
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 from sbafab.simulators.simulator import (
@@ -108,12 +109,9 @@ class DesignFolder:
     @cached_property
     def marked(self) -> Laminate:
         """The laminate with notes for its pictures: failed and waived rules, lowered limits."""
-        build = self.build
-        failed = dict.fromkeys(f.rule for f in build.findings if f.verdict == "fail")
-        notes = [f"must not be built; failed: {', '.join(failed)}"] if failed else []
-        notes += [f"waived: {', '.join(build.waived)}"] if build.waived else []
-        notes += [f"limits lowered: {', '.join(build.lowered)}"] if build.lowered else []
-        laminate = build.laminate
+        laminate, lowered = self.build.laminate, self.build.lowered
+        notes = _remarks(self.build.findings)
+        notes += [f"limits lowered: {', '.join(lowered)}"] if lowered else []
         return replace(laminate, notes=(*laminate.notes, *notes)) if notes else laminate
 
     @cached_property
@@ -126,6 +124,14 @@ class DesignFolder:
         """The picture of the solid, which the traveller shows as well."""
         picture: bytes = plugins.load("sbafab.reports.solid_pictures:solid_png")(self.marked)
         return picture
+
+
+def _remarks(findings: Sequence[Finding]) -> list[str]:
+    """Return what a picture says of the rules that failed, and of those that were waived."""
+    failed = dict.fromkeys(f.rule for f in findings if f.verdict == "fail")
+    waived = dict.fromkeys(f.rule for f in findings if f.by_user)
+    notes = [f"must not be built; failed: {', '.join(failed)}"] if failed else []
+    return notes + ([f"waived: {', '.join(waived)}"] if waived else [])
 
 
 @dataclass(frozen=True)
@@ -157,9 +163,12 @@ class Artefact:
         return is_wanted and (folder.has_pages or not self.is_page)
 
 
+Parameters = Callable[[DesignFolder], tuple[Any, ...]]
+
+
 def made_by(
     entry: str,
-    parameters: Callable[[DesignFolder], tuple[Any, ...]],
+    parameters: Parameters,
     is_made: Callable[[DesignFolder], bool] = lambda folder: True,
 ) -> Callable[[DesignFolder], str | bytes | None]:
     """Return a row's ``render``: the function that an entry names, ``module:function``, called with
@@ -173,6 +182,28 @@ def made_by(
         return contents
 
     return render
+
+
+def _print(name: str, about: str, *of: Any) -> Artefact:
+    """Return the row of a print at 1:1; ``of`` as in ``made_by``."""
+    return Artefact(
+        f"{name}.pdf", "press", about, made_by(f"sbafab.reports.prints:{name}_pdf", *of)
+    )
+
+
+def _drawing(name: str, about: str) -> Artefact:
+    """Return the row of a drawing of the laminate."""
+    entry = f"sbafab.reports.{name}_svg:{name}_svg"
+    return Artefact(
+        f"preview/{name}.svg", "preview", about, made_by(entry, lambda of: (of.marked,))
+    )
+
+
+def _page(path: str, about: str, entry: str, parameters: Parameters) -> Artefact:
+    """Return the row of a page for the bench, with a function of ``reports/traveller``."""
+    render = made_by(f"sbafab.reports.traveller.{entry}", parameters)
+    needs = frozenset(("press", "preview"))
+    return Artefact(path, "cut", about, render, needs=needs, is_page=True)
 
 
 def write_artefacts(folder: DesignFolder, rows: Iterable[Artefact] | None = None) -> None:
@@ -358,52 +389,25 @@ _OWN: tuple[Artefact, ...] = (
         "the press schedule as a table",
         lambda folder: press_csv(folder.build.schedule),
     ),
-    Artefact(
-        "tray.pdf",
-        "press",
+    _print(
+        "tray",
         "of a batch: a place for every part, 1:1",
-        made_by(
-            "sbafab.reports.prints:tray_pdf",
-            lambda of: (of.laminate, of.build.cycles, of.build.sha256, of.design.order.batch),
-            _has_tray,
-        ),
+        lambda of: (of.laminate, of.build.cycles, of.build.sha256, of.design.order.batch),
+        _has_tray,
     ),
-    Artefact(
-        "underlay.pdf",
-        "press",
+    _print(
+        "underlay",
         "guides for placing parts by hand, 1:1",
-        made_by(
-            "sbafab.reports.prints:underlay_pdf",
-            lambda of: (
-                of.laminate,
-                of.build.sha256,
-                of.build.cycles.places,
-                of.design.press.platen,
-            ),
-        ),
+        lambda of: (of.laminate, of.build.sha256, of.build.cycles.places, of.design.press.platen),
     ),
-    Artefact(
-        "seams.pdf",
-        "press",
+    _print(
+        "seams",
         "paths of seams on the films in hand, 1:1",
-        made_by(
-            "sbafab.reports.prints:seams_pdf",
-            lambda of: (of.laminate, of.build.sha256, of.design.seam_offsets),
-        ),
+        lambda of: (of.laminate, of.build.sha256, of.design.seam_offsets),
     ),
     Artefact("mesh", "mesh", "solid, cavities, and meshes for simulation", _write_meshes),
-    Artefact(
-        "preview/layers.svg",
-        "preview",
-        "every pattern",
-        made_by("sbafab.reports.layers_svg:layers_svg", lambda of: (of.marked,)),
-    ),
-    Artefact(
-        "preview/stack.svg",
-        "preview",
-        "the layers in section",
-        made_by("sbafab.reports.stack_svg:stack_svg", lambda of: (of.marked,)),
-    ),
+    _drawing("layers", "every pattern"),
+    _drawing("stack", "the layers in section"),
     Artefact("preview/solid.png", "preview", "the actuator, flat", lambda of: of.solid_png),
     Artefact(
         "predict.json",
@@ -423,35 +427,23 @@ _OWN: tuple[Artefact, ...] = (
         )
         for name in SIMULATORS
     ),
-    Artefact(
+    _page(
         "bill.csv",
-        "cut",
         "of a batch: the bill of materials",
-        made_by("sbafab.reports.traveller.work:bill_csv", lambda of: (of.work,)),
-        needs=frozenset(("press", "preview")),
-        is_page=True,
+        "work:bill_csv",
+        lambda of: (of.work,),
     ),
-    Artefact(
+    _page(
         TRAVELLER,
-        "cut",
         "the pages that go with each actuator: steps, cut list, press steps with pictures, tests",
-        made_by(
-            "sbafab.reports.traveller.page:traveller_html",
-            lambda of: (replace(of.work, solid_png=of.solid_png),),
-        ),
-        needs=frozenset(("press", "preview")),
-        is_page=True,
+        "page:traveller_html",
+        lambda of: (replace(of.work, solid_png=of.solid_png),),
     ),
-    Artefact(
+    _page(
         BENCH,
-        "cut",
         "what is made, measured and read once for a bench: base plate, press, laser",
-        made_by(
-            "sbafab.reports.traveller.bench:bench_html",
-            lambda of: (of.design.name, of.build.sha256, [of.work]),
-        ),
-        needs=frozenset(("press", "preview")),
-        is_page=True,
+        "bench:bench_html",
+        lambda of: (of.design.name, of.build.sha256, [of.work]),
     ),
     Artefact(
         FINDINGS,
@@ -601,7 +593,7 @@ def _write_assembly(
     progress("assembled", 0, 1)
     (path / "preview").mkdir()
     draw = plugins.load("sbafab.reports.solid_pictures:assembly_pngs")
-    picture, bare = draw(assembled, _note(order))
+    picture, bare = draw(assembled, "".join(f"; {each}" for each in _remarks(order.findings)))
     (path / PICTURE).write_bytes(picture)
     meshes = []
     if sheets:
@@ -626,13 +618,6 @@ def _write_assembly(
         "parts": [part_entry(placed) for placed in assembled.parts],
         "meshes": meshes,
     }
-
-
-def _note(order: Order) -> str:
-    failed = dict.fromkeys(f.rule for f in order.findings if f.verdict == "fail")
-    waived = dict.fromkeys(f.rule for f in order.findings if f.by_user)
-    note = f"; must not be built; failed: {', '.join(failed)}" if failed else ""
-    return note + (f"; waived: {', '.join(waived)}" if waived else "")
 
 
 def _write_solid(assembled: Assembled, folder: Path) -> dict[str, Any]:

@@ -38,9 +38,7 @@ def test_a_balloon_rises_as_the_paraboloid(one_balloon: Laminate) -> None:
     assert lowest[1.25] == pytest.approx(FILM + 0.75 * apex, rel=2e-3)
     assert lowest[2.5] == pytest.approx(FILM)
     area = math.pi * 2.5 / (6 * apex**2) * ((2.5**2 + 4 * apex**2) ** 1.5 - 2.5**3)
-    assert thinning(meshes.shell, meshes.flat_shell)[0] == pytest.approx(
-        area / (math.pi * 2.5**2) - 1, rel=0.01
-    )
+    assert thinning(meshes.shell)[0] == pytest.approx(area / (math.pi * 2.5**2) - 1, rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +69,6 @@ def test_cavities_hold_what_was_asked(template: str, changes: tuple[str, ...], f
     films = sum(layer.profile.area * layer.film.thickness for layer in laminate.tpe_layers)
     assert meshes.statistics["volume"]["volume_mm3"] == pytest.approx(films, rel=1e-3)
     assert meshes.statistics["volume"]["least_scaled_jacobian"] > 0.02
-    assert meshes.flat_shell.cells.tobytes() == meshes.shell.cells.tobytes()
 
 
 @pytest.mark.parametrize(

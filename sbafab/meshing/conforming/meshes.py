@@ -456,20 +456,18 @@ ROUNDS = 2
 class ConformingMeshes:
     """Volume and shell mesh of one triangulation.
 
-    ``flat_shell`` is the shell before it was filled (the same one without fill): its rest
-    position. Without gaps all mid-surfaces of a flat shell lie at z = 0, and the volume is as high
-    as its TPE films.
+    Without gaps all mid-surfaces of a flat shell lie at z = 0, and the volume is as high as its TPE
+    films.
     """
 
     settings: MeshSettings
     volume: Mesh
     shell: Mesh
-    flat_shell: Mesh
 
     @cached_property
     def statistics(self) -> dict[str, dict[str, Any]]:
         """The figures of both meshes, for printing and the manifest."""
-        thin_mm = thinning(self.shell, self.flat_shell)[2]
+        thin_mm = thinning(self.shell)[2]
         return {mesh.name: mesh_statistics(mesh, thin_mm) for mesh in (self.volume, self.shell)}
 
 
@@ -487,24 +485,22 @@ def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) 
         )
     settings = settings or MeshSettings()
     stack = layup(laminate, settings)
-    sheet = thin(stack)
-    unwrapped = replace(settings, wrapped=False)
-    flat_shell = shell_mesh(replace(sheet, settings=unwrapped))
-    volume, shell = _filled(stack, volume_mesh), _filled(sheet, shell_mesh)
-    notes = tuple(_notes(laminate, settings, thinning(shell, flat_shell)))
-    rest = Sweep(replace(stack, settings=unwrapped)).points
-    volume = _noted(volume, rest, (HEIGHTS[settings.gaps], *notes))
-    shell = _noted(shell, flat_shell.points, (HEIGHT_OF_SHELL, *notes))
-    return ConformingMeshes(settings, volume, shell, flat_shell)
-
-
-def _noted(mesh: Mesh, rest: Floats, notes: tuple[str, ...]) -> Mesh:
-    is_at_rest = np.array_equal(mesh.points, rest)
-    return replace(mesh, notes=notes, rest=None if is_at_rest else rest)
+    volume, shell = _filled(stack, volume_mesh), _filled(thin(stack), shell_mesh)
+    notes = tuple(_notes(laminate, settings, thinning(shell)))
+    volume = replace(volume, notes=(HEIGHTS[settings.gaps], *notes))
+    shell = replace(shell, notes=(HEIGHT_OF_SHELL, *notes))
+    return ConformingMeshes(settings, volume, shell)
 
 
 def _filled(stack: Layup, make: Callable[[Layup, Floats | None], Mesh]) -> Mesh:
-    """The mesh whose balloons hold the fill, round a tube as well as flat."""
+    """The mesh whose balloons hold the fill, round a tube as well as flat, with its rest."""
+    mesh = _lifted(stack, make)
+    flat_stack = replace(stack, settings=replace(stack.settings, wrapped=False))
+    rest = Sweep(flat_stack).points
+    return mesh if np.array_equal(mesh.points, rest) else replace(mesh, rest=rest)
+
+
+def _lifted(stack: Layup, make: Callable[[Layup, Floats | None], Mesh]) -> Mesh:
     fill, laminate = stack.settings.fill_ul, stack.laminate
     if fill is None:
         return make(stack, None)
@@ -597,9 +593,9 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
 # Size and quality of a mesh.
 
 
-def thinning(shell: Mesh, flat: Mesh) -> tuple[float, float, float]:
-    """Return the relative growth in area of a shell's films over the pockets, mean and largest, and
-    their least thickness in mm there: no film changes its volume. ``flat`` is the shell when flat.
+def thinning(shell: Mesh) -> tuple[float, float, float]:
+    """Return the relative growth in area of a shell's films over the pockets since they were flat,
+    mean and largest, and their least thickness in mm there: no film changes its volume.
 
     The fill does not preserve lengths: the mean is 0.01 at 5 ul in the paper's 5 mm balloon.
     """
@@ -608,8 +604,8 @@ def thinning(shell: Mesh, flat: Mesh) -> tuple[float, float, float]:
     for name, value in shell.thickness.items():
         thickness[shell.cell_sets[name]] = value
     slopes = (
-        jacobians(mesh.kind, mesh.points, mesh.cells[pockets], integration=True)
-        for mesh in (shell, flat)
+        jacobians(shell.kind, points, shell.cells[pockets], integration=True)
+        for points in (shell.points, shell.points if shell.rest is None else shell.rest)
     )
     raised, before = (np.linalg.norm(np.cross(s[..., 0], s[..., 1]), axis=2) for s in slopes)
     growth = np.maximum((raised / before).max(axis=1), 1.0)
