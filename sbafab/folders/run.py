@@ -326,6 +326,8 @@ def _warn_past_burst(laminate: Laminate, wish: SimulationRequest) -> None:
 
 RESULTS = "result.json"
 """Result of a simulator; a folder without it holds input only."""
+CUT_KEYS = {"layers": ("fixture", "curves", "seams"), "sheets": ("films",)}
+"""Keys of a manifest that belong to layer files, and to film sheets."""
 WHOLE = {"layers", "sheets", "preview", "predict"}
 """Folders that a run which writes into them writes whole."""
 
@@ -391,19 +393,14 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(old_folder / path, target)
             carried.add(path)
-    layers, meshes, plate = old.get("layers"), old.get("meshes"), old.get("fixture")
-    if _are_files(layers, carried):
-        index["layers"] = layers
-        index["fixture"] = plate if plate in carried else None
-        # How the layers that stay were cut stays with them.
-        index.update({name: old[name] for name in ("curves", "seams") if name in old})
-        if _are_files(old.get("sheets"), carried):
-            index["sheets"], index["films"] = old["sheets"], old.get("films")
-    if isinstance(meshes, list):
-        kept_meshes = [mesh for mesh in meshes if _are_files([mesh], carried)]
-        index["meshes"] += kept_meshes
-        if any(mesh.get("kind") == "volume" for mesh in kept_meshes):
-            index["mesh_statistics"] = old.get("mesh_statistics", {})
+    for key, belonging in CUT_KEYS.items():
+        if _are_files(old.get(key), carried):
+            # How the layers that stay were cut stays with them.
+            index.update({name: old[name] for name in (key, *belonging) if name in old})
+    meshes = [mesh for mesh in old.get("meshes") or () if _are_files([mesh], carried)]
+    index["meshes"] += meshes
+    if any(mesh.get("kind") == "volume" for mesh in meshes):
+        index["mesh_statistics"] = old.get("mesh_statistics", {})
 
 
 def _differs(path: str, old_folder: Path, folder: Path) -> bool:

@@ -166,8 +166,9 @@ def settings_by_step(
     standard: Standard,
     stock: Sequence[float],
     plate: float | None,
-) -> list[tuple[PinSetting, ...]]:
-    """Return the pins of every step, given its inserted pins and the height of its stack's top, mm.
+) -> tuple[list[tuple[PinSetting, ...]], float]:
+    """Return the pins of every step, given its inserted pins and the height of its stack's top, mm,
+    and the thickness of the plate.
 
     The height is over the plate and includes every part under the stack. Holes of one diameter have
     one depth, and a step with a higher stack needs longer pins. Of all depths that fit a plate
@@ -188,18 +189,19 @@ def settings_by_step(
         )
         for diameter, heights in tops.items()
     }
-    thickness = _thickness(choices, plate) - FLOOR + ROUNDING
+    thickness = _thickness(choices, plate)
     # Of the depths that fit the plate the one at which the pins stand out least.
     chosen = {
         diameter: min(
-            (choice for choice in every if choice.depth <= thickness),
+            (choice for choice in every if choice.depth <= thickness - FLOOR + ROUNDING),
             key=lambda choice: (choice.out, choice.depth),
         )
         for diameter, every in choices.items()
     }
-    return [
+    settings = [
         tuple(_setting(pin, height, chosen[pin.diameter]) for pin in pins) for height, pins in steps
     ]
+    return settings, thickness
 
 
 class _Choice(NamedTuple):
@@ -317,13 +319,6 @@ def hole_notes(
     if len(pins) > 1:
         lines.append(f"each hole within {making.position:g} of its place, {making.words}")
     return tuple(lines)
-
-
-def plate_thickness(thickness: float | None, settings: Sequence[Sequence[PinSetting]]) -> float:
-    """Return the base plate's thickness in mm: as set, or the thinnest under every seat."""
-    if thickness is not None:
-        return thickness
-    return _plate_sold(max((pin.seat_mm + FLOOR for step in settings for pin in step), default=0.0))
 
 
 def _plate_sold(least: float) -> float:

@@ -35,7 +35,6 @@ from sbafab.pressing.dowels import (
     PinSetting,
     is_sold,
     pin_holes,
-    plate_thickness,
     settings_by_step,
 )
 from sbafab.pressing.plate_heating import Heating, HeatPoint, heating
@@ -262,8 +261,7 @@ def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,))
         for count in dict.fromkeys(together)
     )
     pad = press_force.pad_thickness(press, [*under, *chain.from_iterable(smaller)])
-    pins, warming = pins_by_step(laminate, design), heating(laminate, press)
-    plate = plate_thickness(press.plate_thickness, pins)
+    (pins, plate), warming = pins_by_step(laminate, design), heating(laminate, press)
     has_minutes = not films_without_minutes(laminate, press.timed_films)
     steps = []
     for part, stack, step_pins in zip(parts, under, pins, strict=True):
@@ -296,8 +294,11 @@ def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,))
     )
 
 
-def pins_by_step(laminate: Laminate, design: Design) -> list[tuple[PinSetting, ...]]:
-    """Return the pins of every press step. Raises DesignError if pins or plate do not fit."""
+def pins_by_step(laminate: Laminate, design: Design) -> tuple[list[tuple[PinSetting, ...]], float]:
+    """Return the pins of every press step, and the base plate's thickness in mm.
+
+    Raises DesignError if pins or plate do not fit.
+    """
     press, registration = design.press, design.registration
     on_plate = [
         press_force.footprint(laminate, part.layers).height
@@ -318,7 +319,7 @@ def pins_by_step(laminate: Laminate, design: Design) -> list[tuple[PinSetting, .
 
 def plate_holes(laminate: Laminate, design: Design) -> dict[str, PinHole]:
     """Return the base plate's hole of every pin that some step uses, by the pin's name."""
-    return pin_holes(pins_by_step(laminate, design))
+    return pin_holes(pins_by_step(laminate, design)[0])
 
 
 def _underlay(laminate: Laminate, part: LayUpStep, press: Press) -> float:
