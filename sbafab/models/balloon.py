@@ -2,7 +2,7 @@
 
 Two films, bonded round the pocket and, between neighbours, at the neck. If the films are equal, one
 is computed and the other mirrors it; different films are computed together. A film stretches (plane
-stress; Saint Venant and Kirchhoff's law, or Hencky's) and bends. It wrinkles under hoop
+stress; Saint Venant and Kirchhoff's law) and bends. It wrinkles under hoop
 compression, and the wrinkles of least energy carry
 
     N = 2 sqrt(B K)    K = T (pi / L)^2 + E t c^2      (after Cerda and Mahadevan, 2003)
@@ -26,11 +26,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
 from sbafab.laminate.films import PAPER_TPE
-from sbafab.models import least_energy
 from sbafab.models.film_elements import (
     Array,
     Elements,
-    FlatFilm,
     air_volume,
     assembled_gradient,
     assembled_tangent,
@@ -38,9 +36,8 @@ from sbafab.models.film_elements import (
     curvature,
     membrane,
     strain,
-    strain_measure,
 )
-from sbafab.models.least_energy import Descent, NoEquilibrium, equilibrium
+from sbafab.models.least_energy import NoEquilibrium, Packing, equilibrium, packing
 from sbafab.runtime import one_blas_thread
 
 FILM_ELEMENTS = 24
@@ -52,8 +49,6 @@ LEAST_PRESSURE = 0.01
 """Least pressure in kPa for the tolerance of the residual."""
 PLATE_STIFFNESS = 20_000.0
 """Penalty of a plate: the pressure on the film presses it in by 1 / PLATE_STIFFNESS mm."""
-FEW = 8
-"""Number of balloons up to which solving whole matrices is faster than all bands together."""
 BAND = 6
 """Coordinates that a film couples, from each one on."""
 WRINKLE_ROUNDS = 3
@@ -67,9 +62,7 @@ class Balloon:
     ``neck`` is the radius bonded to the next balloon, ``bore`` the radius of its hole; both are 0
     for a lone balloon. Without ``wrinkles`` films stay as smooth as in an axisymmetric mesh.
     ``inextensible`` is the limit of a film, rim included, that neither bends nor carries
-    compression: the modulus must then be large. ``order`` is the order of the film's law
-    (``FlatFilm``): 2 for Saint Venant's and Kirchhoff's, as in programs for linear films; 0 for
-    Hencky's.
+    compression: the modulus must then be large.
     """
 
     pocket: float = 2.5
@@ -81,7 +74,6 @@ class Balloon:
     poisson: float = PAPER_TPE[1]
     wrinkles: bool = True
     inextensible: bool = False
-    order: int = 2
     mate: Balloon | None = None
     """The second film if the two differ: of the same sizes, and without a mate itself."""
 
@@ -112,8 +104,20 @@ class Balloon:
         return self.neck_edge + FILM_ELEMENTS
 
     @cached_property
-    def film(self) -> FlatFilm:
-        return FlatFilm(self.nodes, self.thickness, self.modulus, self.poisson, self.order)
+    def lengths(self) -> Array:
+        return np.diff(self.nodes)
+
+    @cached_property
+    def middles(self) -> Array:
+        return np.asarray((self.nodes[1:] + self.nodes[:-1]) / 2)
+
+    @cached_property
+    def squares(self) -> tuple[Array, Array, Array]:
+        """Squares of the flat elements' lengths and middle radii, mm2, and their volumes in mm3:
+        (elements, 1) each.
+        """
+        volumes = math.tau * self.middles * self.lengths * self.thickness
+        return self.lengths[:, None] ** 2, self.middles[:, None] ** 2, volumes[:, None]
 
     @cached_property
     def node_areas(self) -> Array:
@@ -134,28 +138,16 @@ class Balloon:
         return self.modulus * self.thickness**3 / (12 * (1 - self.poisson**2))
 
     @cached_property
-    def freedoms(self) -> NDArray[np.int_]:
-        """Numbers of the coordinates (r, z of each node in turn) that are degrees of freedom.
-
-        The neck stays level: its heights follow ``level``. The rim stays in the plane between the
-        films, the pole on the axis.
-        """
-        nodes = range(len(self.nodes))
-        numbers = [2 * node for node in nodes if node or self.bore]
-        numbers += [2 * node + 1 for node in nodes[self.neck_edge : self.edge]]
-        return np.array(sorted(numbers))
-
-    @property
-    def level(self) -> int:
-        """Number of the height that all heights of the neck are tied to."""
-        return 2 * self.neck_edge + 1
+    def is_free(self) -> NDArray[np.bool_]:
+        """True for the elements between neck and rim."""
+        number = np.arange(len(self.nodes) - 1)
+        return (number >= self.neck_edge) & (number < self.edge)
 
     @cached_property
     def may_wrinkle(self) -> NDArray[np.bool_]:
         """True for the elements that may wrinkle: in the film, not in neck and rim."""
-        number = np.arange(len(self.nodes) - 1)
-        free = (number >= self.neck_edge) & (number < self.edge) & self.wrinkles
-        return free | ((number >= self.edge) & self.inextensible)
+        beyond = np.arange(len(self.nodes) - 1) >= self.edge
+        return (self.is_free & self.wrinkles) | (beyond & self.inextensible)
 
 
 class Shapes(NamedTuple):
@@ -226,7 +218,9 @@ def inflate(
         raise DesignError("pressure and height of a balloon must be above 0 kPa and 0 mm")
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
     cap = np.broadcast_to(smooth[:, None], (len(smooth), len(p)))
-    load = BalloonLoad(p, high / 2, cap, tied, no_ripples(balloon, len(p)))
+    none = np.zeros((len(balloon.nodes) - 1 - balloon.edge, len(p)))
+    ripple = Ripple(p * 0.0, p + math.inf, none, np.ones(len(p)))
+    load = BalloonLoad(p, high / 2, cap, tied, ripple)
     mate = balloon.mate
     films = (balloon,) if mate is None else (replace(balloon, mate=None), mate)
     motion = _motion(films, is_free=bool(np.isinf(high).any()))
@@ -234,7 +228,7 @@ def inflate(
     y = motion.inverse @ np.concatenate([initial_shape(film, load) for film in films])
     # Elements may collapse before equilibrium; that raises an error in the end.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        y = _equilibrium(FilmEnergy(films, loads, motion), y)
+        y = _balanced(films, loads, motion, y)
         if balloon.wrinkles and not balloon.inextensible:
             zones = [compressed_length(*each) for each in zip(films, motion.shapes(y), strict=True)]
             for _ in range(WRINKLE_ROUNDS):
@@ -244,7 +238,7 @@ def inflate(
                     load._replace(cap=wrinkle_stress(film, x, zone), ripple=ripple)
                     for film, x, zone, ripple in zip(films, shapes, zones, ripples, strict=True)
                 ]
-                y = _equilibrium(FilmEnergy(films, loads, motion), y)
+                y = _balanced(films, loads, motion, y)
     return _shapes(films, loads, motion, y)
 
 
@@ -255,7 +249,7 @@ def _shapes(films: FilmPair, loads: Sequence[BalloonLoad], motion: FilmMotion, y
     energy = motion.twist @ y**2 / 2
     for film, load, x in zip(films, loads, shapes, strict=True):
         state = total_energy(film, load, x)
-        half = air_volume(film.film, film.edge, Elements.of(x[0::2], x[1::2])).energy
+        half = air_volume(film, Elements.of(x)).energy
         energy = energy + both * (state.energy + load.pressure * half)
         height, volume = height + both * x[1], volume + both * half
         force = force + both / 2 * state.force
@@ -310,13 +304,10 @@ def coordinates(r: Array, z: Array) -> Array:
 
 def total_energy(balloon: Balloon, load: BalloonLoad, x: Array) -> TotalEnergy:
     """Return the potential energy at coordinates, with residual and tangent stiffness."""
-    film, edge, p = balloon.film, balloon.edge, load.pressure
-    r, z = x[0::2], x[1::2]
-    elements = Elements.of(r, z)
-    bent = slice(balloon.neck_edge, edge)
-    bend, joined = bending(film, balloon.bending_stiffness, bent, elements)
-    stretch, content = membrane(film, elements, load.cap), air_volume(film, edge, elements)
-    eased = ripple_energy(film, edge, load.ripple, r)
+    p, elements = load.pressure, Elements.of(x)
+    bend, joined = bending(balloon, elements)
+    stretch, content = membrane(balloon, elements, load.cap), air_volume(balloon, elements)
+    eased = ripple_energy(balloon, load.ripple, x[0::2])
     slopes, curves = (
         [a - p * b for a, b in zip(*both, strict=True)]
         for both in ((stretch.slopes, content.slopes), (stretch.curves, content.curves))
@@ -324,7 +315,7 @@ def total_energy(balloon: Balloon, load: BalloonLoad, x: Array) -> TotalEnergy:
     for total, parts in ((slopes, bend.slopes), (curves, bend.curves)):
         for number, part in enumerate(parts):
             total[number] += part
-    over = z - load.half
+    over = x[1::2] - load.half
     touches = over > 0
     stiff = PLATE_STIFFNESS * p * balloon.node_areas
     if load.tied:
@@ -337,7 +328,7 @@ def total_energy(balloon: Balloon, load: BalloonLoad, x: Array) -> TotalEnergy:
     energy = energy - p * content.energy + (pressed * over).sum(0) / 2
     by_place, band = assembled_gradient(slopes), assembled_tangent(curves, joined)
     by_place[1::2] += pressed
-    by_place[2 * edge :: 2] += eased.slopes
+    by_place[2 * balloon.edge :: 2] += eased.slopes
     band[1::2, 0] += stiff
     return TotalEnergy(energy, by_place, band, eased.curves, pressed.sum(0))
 
@@ -357,7 +348,7 @@ class FilmMotion(NamedTuple):
 
     bases: Array
     inverse: Array
-    packing: least_energy.Packing
+    packing: Packing
     twist: Array
 
     def shapes(self, y: Array) -> list[Array]:
@@ -372,17 +363,18 @@ def _motion(films: FilmPair, is_free: bool) -> FilmMotion:
     its overall height is fixed.
     """
     balloon, several = films[0], len(films)
-    inner, rim = (
-        balloon.freedoms[balloon.freedoms < 2 * balloon.edge],
-        np.arange(balloon.edge, len(balloon.nodes)),
-    )
+    nodes = np.arange(balloon.edge)
+    rim = np.arange(balloon.edge, len(balloon.nodes))
+    level = 2 * balloon.neck_edge + 1
+    radii = 2 * nodes[(nodes > 0) | (balloon.bore > 0)]
+    inner = np.sort(np.concatenate([radii, 2 * nodes[balloon.neck_edge :] + 1]))
     shared = several * len(inner)
     count = shared + len(rim) + (several - 1) * (2 - is_free)
     bases = np.zeros((several, 2 * len(balloon.nodes), count))
     for number, basis in enumerate(bases):
         own, side = several * np.arange(len(inner)) + number, 1.0 - 2 * number
         basis[inner, own] = 1.0
-        basis[1 : balloon.level : 2, own[np.searchsorted(inner, balloon.level)]] = 1.0
+        basis[1:level:2, own[np.searchsorted(inner, level)]] = 1.0
         basis[2 * rim, shared + np.arange(len(rim))] = 1.0
         if several > 1:
             basis[2 * rim + 1, shared + len(rim)] = side * (balloon.nodes[rim] - balloon.pocket)
@@ -394,50 +386,41 @@ def _motion(films: FilmPair, is_free: bool) -> FilmMotion:
         twist[shared + len(rim)] = math.tau * bonded_bending_stiffness(films) * widening
     inverse = np.asarray(np.linalg.pinv(bases.reshape(-1, count)), dtype=float)
     # Entries of each film: those of its band, and of the rim's radii, which ripples couple.
-    first, second = np.divmod(np.arange(bases.shape[1] * BAND), BAND)
+    first, off = np.divmod(np.arange(bases.shape[1] * BAND), BAND)
+    second = np.concatenate([first + off, np.tile(2 * rim, len(rim))])
     first = np.concatenate([first, np.repeat(2 * rim, len(rim))])
-    second = np.concatenate([first[: len(second)] + second, np.tile(2 * rim, len(rim))])
     good = np.flatnonzero((second < bases.shape[1]) & (first <= second))
-    part = np.repeat(np.arange(several), len(good))
-    source = np.tile(good, several)
-    i, j = first[source], second[source]
-    packing = least_energy.packing(bases, source + part * len(first), part, i, j, i != j)
-    return FilmMotion(bases, inverse, packing, twist)
+    source = (good + len(first) * np.arange(several)[:, None]).ravel()
+    moved, others = (bases[:, each[good]].reshape(-1, count) for each in (first, second))
+    is_pair = np.tile(first[good] != second[good], several)
+    return FilmMotion(bases, inverse, packing(moved, others, source, is_pair), twist)
 
 
-class FilmEnergy:
-    """The energy of one film, or of two, under their loads, by freedoms (freedoms, rows), as a
-    ``least_energy.Potential``.
-    """
+def _balanced(films: FilmPair, loads: Sequence[BalloonLoad], motion: FilmMotion, y: Array) -> Array:
+    """Return the freedoms (freedoms, rows) of least energy downhill. Raises DesignError."""
+    twist, bases, pocket = motion.twist[:, None], motion.bases, films[0].pocket
 
-    def __init__(self, films: FilmPair, loads: Sequence[BalloonLoad], motion: FilmMotion) -> None:
-        self.films, self.loads, self.motion = films, loads, motion
-        pressure, pocket = loads[0].pressure, films[0].pocket
-        self.scale = pressure * pocket**3
-        self.close = RESIDUAL * np.maximum(pressure, LEAST_PRESSURE) * math.pi * pocket**2
-
-    def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
-        twist = self.motion.twist[:, None]
-        energy, slopes, entries = (twist * x**2 / 2).sum(0), twist * x, []
-        for film, load, basis in zip(self.films, self.loads, self.motion.bases, strict=True):
-            state = total_energy(film, load.rows(rows), basis @ x)
+    def energies(y: Array, rows: NDArray[np.int_]) -> tuple[Array, Array, Array]:
+        energy, slopes, entries = (twist * y**2 / 2).sum(0), twist * y, []
+        for film, load, basis in zip(films, loads, bases, strict=True):
+            state = total_energy(film, load.rows(rows), basis @ y)
             energy, slopes = energy + state.energy, slopes + basis.T @ state.gradient
-            entries += [part.reshape(-1, x.shape[1]) for part in (state.matrix, state.rim)]
-        band = self.motion.packing.band(np.concatenate(entries))
+            entries += [part.reshape(-1, y.shape[1]) for part in (state.matrix, state.rim)]
+        band = motion.packing.band(np.concatenate(entries))
         band[:, 0] += twist
-        return Descent(energy, slopes, band)
+        return energy, slopes, band
 
-    def newton_step(self, state: Descent, damping: Array) -> Array:
-        band, size = state.matrix.copy(), np.abs(state.matrix[:, 0])
-        # A share of the order of rounding is for slack films, which may be unsupported.
-        band[:, 0] += damping * size + 1e-15 * size.max(0)
-        few = len(damping) <= FEW
-        step = least_energy.solve_whole(band, -state.gradient) if few else None
-        return least_energy.solve(band, -state.gradient) if step is None else step
+    def change(y: Array, ahead: Array) -> Array:
+        return np.asarray(np.max([relative_change(b @ y, b @ ahead) for b in bases], axis=0))
 
-    def change(self, x: Array, ahead: Array) -> Array:
-        parts = [relative_change(basis @ x, basis @ ahead) for basis in self.motion.bases]
-        return np.asarray(np.max(parts, axis=0))
+    pressure = loads[0].pressure
+    close = RESIDUAL * np.maximum(pressure, LEAST_PRESSURE) * math.pi * pocket**2
+    try:
+        return equilibrium(energies, change, y, pressure * pocket**3, close)
+    except (NoEquilibrium, np.linalg.LinAlgError):
+        raise DesignError(
+            f"no equilibrium found for a balloon of radius {pocket:g} mm; try another load"
+        ) from None
 
 
 def relative_change(x: Array, ahead: Array) -> Array:
@@ -446,43 +429,33 @@ def relative_change(x: Array, ahead: Array) -> Array:
     return np.asarray((by / length).max(0))
 
 
-def _equilibrium(problem: FilmEnergy, y: Array) -> Array:
-    """Return the freedoms (freedoms, rows) of least energy downhill. Raises DesignError."""
-    try:
-        return equilibrium(problem, y)
-    except (NoEquilibrium, np.linalg.LinAlgError):
-        raise DesignError(
-            f"no equilibrium found for a balloon of radius {problem.films[0].pocket:g} mm; try "
-            "another load"
-        ) from None
-
-
 def compressed_length(balloon: Balloon, x: Array) -> Array:
     """Return the length in mm along the film over which the smooth hoop is compressed."""
-    (meridian, hoop), lengths = strain(balloon.film, x[0::2], x[1::2]), balloon.film.lengths
-    is_compressed = hoop + balloon.poisson * meridian < 0
+    meridian, hoop = strain(balloon, Elements.of(x))
+    is_compressed, lengths = hoop + balloon.poisson * meridian < 0, balloon.lengths
     return np.asarray(np.maximum((lengths * balloon.may_wrinkle) @ is_compressed, lengths.min()))
 
 
 def wrinkle_stress(balloon: Balloon, x: Array, zone: Array) -> Array:
     """Return the hoop stress in kPa that wrinkles over a zone carry, by each element's tension."""
-    film, (r, z) = balloon.film, (x[0::2], x[1::2])
-    tension = balloon.membrane_stiffness * strain(film, r, z)[0]
+    at = Elements.of(x)
+    tension = balloon.membrane_stiffness * strain(balloon, at)[0]
     # A wrinkle in a curved film stretches the meridian: a large number of short ones costs least.
     support = np.maximum(tension, 0.0) * (math.pi / zone) ** 2
-    support = support + balloon.membrane_stiffness * curvature(film, r, z) ** 2
+    support = support + balloon.membrane_stiffness * curvature(balloon, at) ** 2
     force = 2 * np.sqrt(balloon.bending_stiffness * support)
     return np.where(balloon.may_wrinkle[:, None], force / balloon.thickness, math.inf)
 
 
 def ripples_at(films: Sequence[Balloon], shapes: Sequence[Array]) -> list[Ripple]:
     """Return the rim's ripples at coordinates of one film, mirrored by the other, or of both."""
-    strains = [strain(film.film, x[0::2], x[1::2]) for film, x in zip(films, shapes, strict=True)]
+    strains = [strain(film, Elements.of(x)) for film, x in zip(films, shapes, strict=True)]
+    edge = films[0].edge
     pulls = [
-        film.membrane_stiffness * meridian[film.edge - 1]
+        film.membrane_stiffness * meridian[edge - 1]
         for film, (meridian, _) in zip(films, strains, strict=True)
     ]
-    return rim_ripples(films, strains[0][1][films[0].edge :], pulls)
+    return rim_ripples(films, strains[0][1][edge:], pulls)
 
 
 # The bonded rim of a balloon, which buckles out of its plane where its hoop is compressed.
@@ -530,13 +503,6 @@ class Ripple(NamedTuple):
 
     def rows(self, these: NDArray[np.int_]) -> Ripple:
         return Ripple(*(part[..., these] for part in self))
-
-
-def no_ripples(balloon: Balloon, count: int) -> Ripple:
-    """Return the ripples of rims that stay smooth."""
-    none = np.full(count, math.inf)
-    pull = np.zeros((len(balloon.nodes) - 1 - balloon.edge, count))
-    return Ripple(np.zeros(count), none, pull, np.ones(count))
 
 
 def rim_ripples(films: Sequence[Balloon], hoop: Array, tensions: Sequence[Array]) -> list[Ripple]:
@@ -602,24 +568,21 @@ class RippleEnergy(NamedTuple):
     curves: Array
 
 
-def ripple_energy(flat: FlatFilm, edge: int, ripple: Ripple, r: Array) -> RippleEnergy:
+def ripple_energy(balloon: Balloon, ripple: Ripple, r: Array) -> RippleEnergy:
     """Return the energy of a rippled rim at the radii of a film's nodes (nodes, rows)."""
-    rim, middles = r[edge:], flat.middles[edge:, None]
+    rim, middles = r[balloon.edge :], balloon.middles[balloon.edge :, None]
     wide = (rim[1:] + rim[:-1]) / (2 * middles)
-    hoop = strain_measure(flat, wide * wide)
-    drive = np.maximum(-(ripple.cost + (hoop * ripple.pull).sum(0)), 0.0)
-    # Slopes of the hoop strain by the radius of either node, and their derivatives.
-    first = wide ** (flat.order - 1) / (2 * middles)
-    second = (flat.order - 1) * wide ** (flat.order - 2) / (2 * middles) ** 2
+    drive = ripple.cost + ((wide * wide - 1) / 2 * ripple.pull).sum(0)
+    drive = np.maximum(-drive, 0.0)
     tilt = drive / ripple.stiff
-    pulled = ripple.pull * first
+    # By the radius of either node of an element.
+    pulled = ripple.pull * wide / (2 * middles)
     steep = np.zeros_like(rim)
     steep[:-1] += pulled
     steep[1:] += pulled
     curves = np.where(drive > 0, -1 / ripple.stiff, 0.0) * steep[:, None] * steep
-    bent = tilt * ripple.pull * second
+    bent = tilt * ripple.pull / (2 * middles) ** 2
     number = np.arange(len(bent))
-    for i in (0, 1):
-        for j in (0, 1):
-            curves[number + i, number + j] += bent
+    for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        curves[number + i, number + j] += bent
     return RippleEnergy(tilt, -drive * tilt / 2, tilt * steep, curves)

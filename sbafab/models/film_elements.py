@@ -4,53 +4,26 @@ A film is a chain of nodes r, z (mm). Many films are computed at once: arrays ha
 each. Functions return an energy (uJ: kPa mm3) for each film with its first and second derivatives
 by the coordinates of an element: the differences of its two nodes in r and z, and their mean
 radius. Kinks couple neighbours. ``assembled_gradient`` and ``assembled_tangent`` turn these into
-derivatives by the coordinates of nodes.
+derivatives by the coordinates of nodes. Strains are Green's, so that the law of films is Saint
+Venant's and Kirchhoff's.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from sbafab.models.balloon import Balloon
 
 Array = NDArray[np.float64]
 ROOT_LENGTH = 0.645
 """Thicknesses by which a film bends on past the edge of its bond: end correction of Williams (1989)
 for a double cantilever beam, isotropic, nu = 0.2.
 """
-
-
-@dataclass(frozen=True, eq=False)
-class FlatFilm:
-    """The flat film: radii of its nodes and thickness in mm, modulus in kPa, Poisson's ratio.
-
-    ``order`` m selects the strain in which the energy is quadratic: (stretch^m - 1) / m, of the
-    family of Seth (1964) and Hill (1968). 0 is Hencky's logarithmic strain, 2 Green's.
-    """
-
-    nodes: Array
-    thickness: float
-    modulus: float
-    poisson: float
-    order: int = 2
-
-    @cached_property
-    def lengths(self) -> Array:
-        return np.diff(self.nodes)
-
-    @cached_property
-    def middles(self) -> Array:
-        return np.asarray((self.nodes[1:] + self.nodes[:-1]) / 2)
-
-    @cached_property
-    def columns(self) -> tuple[Array, Array, Array]:
-        """Squares of lengths and of middle radii, mm2, and volumes in mm3: (elements, 1) each."""
-        volumes = math.tau * self.middles * self.lengths * self.thickness
-        return self.lengths[:, None] ** 2, self.middles[:, None] ** 2, volumes[:, None]
 
 
 class Elements(NamedTuple):
@@ -64,8 +37,9 @@ class Elements(NamedTuple):
     square: Array
 
     @classmethod
-    def of(cls, r: Array, z: Array) -> Elements:
-        """Return the elements between nodes at r and z, (nodes, films)."""
+    def of(cls, x: Array) -> Elements:
+        """Return the elements between nodes at r and z in turn, (coordinates, films)."""
+        r, z = x[0::2], x[1::2]
         dr, dz = r[1:] - r[:-1], z[1:] - z[:-1]
         return cls(dr, dz, (r[1:] + r[:-1]) / 2, dr * dr + dz * dz)
 
@@ -81,68 +55,42 @@ class EnergyTerm(NamedTuple):
     curves: list[Array]
 
 
-def strain(flat: FlatFilm, r: Array, z: Array) -> tuple[Array, Array]:
+def strain(flat: Balloon, at: Elements) -> tuple[Array, Array]:
     """Return the meridional and the hoop strain of each element."""
-    along, around = _squared_stretches(flat, Elements.of(r, z))
-    return strain_measure(flat, along), strain_measure(flat, around)
+    along, around = at.square / flat.squares[0], at.middle * at.middle / flat.squares[1]
+    return (along - 1) / 2, (around - 1) / 2
 
 
-def curvature(flat: FlatFilm, r: Array, z: Array) -> Array:
+def curvature(flat: Balloon, at: Elements) -> Array:
     """Return the curvature of the meridian in 1/mm by element: mean of its two ends."""
-    slope = np.arctan2(-np.diff(z, axis=0), np.diff(r, axis=0))
-    bent = np.diff(slope, axis=0) / ((flat.lengths[1:] + flat.lengths[:-1]) / 2)[:, None]
+    bent = np.diff(np.arctan2(-at.dz, at.dr), axis=0)
+    bent /= ((flat.lengths[1:] + flat.lengths[:-1]) / 2)[:, None]
     ends = np.concatenate([bent[:1], bent, bent[-1:]])
     return np.asarray((ends[1:] + ends[:-1]) / 2)
 
 
-def _squared_stretches(flat: FlatFilm, at: Elements) -> tuple[Array, Array]:
-    """Return the squared meridional and hoop stretch of each element."""
-    length2, middle2, _ = flat.columns
-    return at.square / length2, at.middle * at.middle / middle2
-
-
-def strain_measure(flat: FlatFilm, square: Array) -> Array:
-    """Return the strain of squared stretches."""
-    if flat.order == 0:
-        return np.asarray(np.log(square) / 2)
-    power = square if flat.order == 2 else square ** (flat.order / 2)
-    return np.asarray((power - 1) / flat.order)
-
-
-def membrane(flat: FlatFilm, at: Elements, cap: Array) -> EnergyTerm:
+def membrane(flat: Balloon, at: Elements, cap: Array) -> EnergyTerm:
     """Return the membrane energy; where the hoop stress falls to ``-cap`` (kPa) the film wrinkles.
 
-    Plane stress. With logarithmic strains it is Hencky's (1928) law, good for stretches of 0.7 to
-    1.3 (Anand, 1979); with Green's it is Saint Venant's and Kirchhoff's. In a wrinkled element the
-    hoop stress stays at ``-cap``: the relaxed energy of a tension field (Pipkin, 1986), with what
-    the wrinkles themselves carry.
+    Plane stress. In a wrinkled element the hoop stress stays at ``-cap``: the relaxed energy of a
+    tension field (Pipkin, 1986), with what the wrinkles themselves carry.
     """
     nu, plane = flat.poisson, flat.modulus / (1 - flat.poisson**2)
-    sq1, sq2 = _squared_stretches(flat, at)
-    e1, e2 = strain_measure(flat, sq1), strain_measure(flat, sq2)
+    e1, e2 = strain(flat, at)
     lateral = nu * e1
     wrinkled = plane * (e2 + lateral) < -cap
     # The hoop strain of the film itself, the wrinkles' waste of length left out.
     support = np.where(wrinkled, cap, 0.0)
     film_hoop = np.where(wrinkled, support / -plane - lateral, e2)
     s1, s2 = plane * (e1 + nu * film_hoop), plane * (film_hoop + lateral)
-    length2, middle2, volume = flat.columns
+    length2, middle2, volume = flat.squares
     density = (s1 * e1 + s2 * film_hoop) / 2 + support * (film_hoop - e2)
-    c11 = np.where(wrinkled, flat.modulus, plane)
     c22 = np.where(wrinkled, 0.0, plane)
     # Strains by the squares of stretches, and those by dr, dz and the middle radius.
     by1, by2 = volume / length2, volume / middle2
-    if flat.order == 2:
-        g1, g2 = by1 * s1, by2 * s2
-        k1, k2 = by1 / length2 * c11, by2 / middle2 * c22
-        k12 = nu * by1 / middle2 * c22
-    else:
-        half = flat.order / 2 - 1
-        f1, f2 = sq1**half, sq2**half
-        g1, g2 = by1 * (s1 * f1), by2 * (s2 * f2)
-        k1 = by1 / length2 * (c11 * f1 * f1 + 2 * s1 * half * f1 / sq1)
-        k2 = by2 / middle2 * (c22 * f2 * f2 + 2 * s2 * half * f2 / sq2)
-        k12 = nu * by1 / middle2 * (c22 * f1 * f2)
+    g1, g2 = by1 * s1, by2 * s2
+    k1, k2 = by1 / length2 * np.where(wrinkled, flat.modulus, plane), by2 / middle2 * c22
+    k12 = nu * by1 / middle2 * c22
     dr, dz, middle = at.dr, at.dz, at.middle
     k1_dr, k12_middle = k1 * dr, k12 * middle
     return EnergyTerm(
@@ -159,23 +107,17 @@ def membrane(flat: FlatFilm, at: Elements, cap: Array) -> EnergyTerm:
     )
 
 
-def bending(
-    flat: FlatFilm, rigidity: float, bent: slice, at: Elements
-) -> tuple[EnergyTerm, list[Array]]:
+def bending(flat: Balloon, at: Elements) -> tuple[EnergyTerm, list[Array]]:
     """Return the bending energy along the meridian and round the hoop between clamped edges; and
     the second derivatives that couple the elements before and after a kink, by dr dr, dr dz, dz dr
     and dz dz of the two, each (kinks, films).
 
-    The elements outside the nodes ``bent`` are bonded face to face with their mirror image: they do
-    not bend, but give way at their root as the arms of a double cantilever beam do.
+    The elements of neck and rim are bonded face to face with their mirror image: they do not bend,
+    but give way at their root as the arms of a double cantilever beam do.
     """
-    slope = np.arctan2(-at.dz, at.dr)
-    first, edge = bent.start, bent.stop
+    slope, rigidity, edge = np.arctan2(-at.dz, at.dr), flat.bending_stiffness, flat.edge
     kink = slope[1 : edge + 1] - slope[:edge]
-    number = np.arange(len(flat.lengths))
-    along = np.where(
-        (number >= first) & (number < edge), flat.lengths, 2 * ROOT_LENGTH * flat.thickness
-    )
+    along = np.where(flat.is_free, flat.lengths, 2 * ROOT_LENGTH * flat.thickness)
     between = (along[:edge] + along[1 : edge + 1]) / 2
     stiff = (math.tau * rigidity * flat.nodes[1 : edge + 1] / between)[:, None]
     ring = (math.tau * rigidity * flat.lengths / flat.middles)[:, None]
@@ -200,14 +142,14 @@ def bending(
     return EnergyTerm(energy, [turn * a, turn * b], curves), joined
 
 
-def air_volume(flat: FlatFilm, edge: int, at: Elements) -> EnergyTerm:
+def air_volume(flat: Balloon, at: Elements) -> EnergyTerm:
     """Return the air (ul) between the inner face of a film and the plane of its edge.
 
     The film's middle starts half a thickness above that plane, and its inner face is smaller, by
     Steiner's formula for the volume of a thick film.
     """
     dr, dz, middle = at.dr, at.dz, at.middle
-    half = np.where(np.arange(len(dr)) < edge, math.pi * flat.thickness, 0.0)[:, None]
+    half = np.where(np.arange(len(dr)) < flat.edge, math.pi * flat.thickness, 0.0)[:, None]
     length = np.sqrt(at.square)
     area = math.pi * middle * middle + math.pi / 12 * dr * dr
     mean = half * middle
@@ -228,7 +170,7 @@ def air_volume(flat: FlatFilm, edge: int, at: Elements) -> EnergyTerm:
         -2 * pi_dz,
     ]
     # The disc at the edge, half a thickness high; its radius is middle + dr / 2 of the last one.
-    last, disc = edge - 1, math.pi * flat.thickness
+    last, disc = flat.edge - 1, math.pi * flat.thickness
     rim = middle[last] + dr[last] / 2
     by_dr[last] += disc / 2 * rim
     by_middle[last] += disc * rim

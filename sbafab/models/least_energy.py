@@ -1,15 +1,16 @@
 """Equilibria as minima of energy, many at once: damped Newton's method with a line search, and its
-linear algebra (banded solvers, safeguarded steps).
+linear algebra of banded matrices.
 """
 
 from __future__ import annotations
 
-from itertools import product
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from sbafab.models.film_elements import Array
@@ -22,48 +23,29 @@ ROUNDING = 1e-13
 HALVINGS = 12
 LAST_STEP = 1e-4
 """Share of its length by which the last step, without line search, may change an element."""
+FEW = 8
+"""Number of rows up to which solving whole matrices is faster than all bands together."""
 
 
 class NoEquilibrium(Exception):  # noqa: N818
     """Newton's method did not converge."""
 
 
-class Descent(NamedTuple):
-    """Energies (rows,), their gradient by coordinate (coordinates, rows), 0 for fixed ones, and
-    tangent stiffness in the form that the problem uses, rows last.
-    """
-
-    energy: Array
-    gradient: Array
-    matrix: Any
-
-
-class Potential(Protocol):
-    """Energies of a row of shapes.
-
-    ``scale`` (rows,) is their energy scale, ``close`` (rows,) the tolerance of the residual.
-    """
-
-    scale: Array
-    close: Array
-
-    def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
-        """Return the energies of ``rows`` at coordinates ``x`` (coordinates, rows)."""
-        ...
-
-    def newton_step(self, state: Descent, damping: Array) -> Array:
-        """Return Newton's step (coordinates, rows), the diagonal increased by ``damping``."""
-        ...
-
-    def change(self, x: Array, ahead: Array) -> Array:
-        """Return the largest share of its length by which a step changes an element: (rows,)."""
-        ...
-
-
-def equilibrium(problem: Potential, x: Array) -> Array:
+def equilibrium(
+    energies: Callable[[Array, NDArray[np.int_]], tuple[Array, Array, Array]],
+    change: Callable[[Array, Array], Array],
+    x: Array,
+    scale: Array,
+    close: Array,
+) -> Array:
     """Return the coordinates (coordinates, rows) of least energy downhill of these.
 
-    Raises NoEquilibrium if Newton's method does not converge.
+    ``energies`` of coordinates and the numbers of their rows are the energies (rows,), their
+    gradient (coordinates, rows) and second derivatives as a band (coordinates, width, rows) that
+    holds ``A[i, i + k]`` at ``[i, k]``. ``change`` is the largest share of its length by which a
+    step from coordinates changes an element: (rows,). ``scale`` (rows,) is the energies' scale,
+    ``close`` (rows,) the tolerance of the gradient. Raises NoEquilibrium if Newton's method does
+    not converge.
     """
     minimum, live = x.copy(), np.arange(x.shape[1])
     step_taken, share = np.zeros_like(x), np.ones(len(live))
@@ -71,29 +53,28 @@ def equilibrium(problem: Potential, x: Array) -> Array:
     energy = np.full(len(live), np.inf)
     halved = np.zeros(len(live), dtype=int)
     for _ in range(MOST_STEPS):
-        scale = problem.scale[live]
         to = x + share * step_taken
-        state = problem.at(to, live)
-        room = 1e-12 * (np.abs(energy) + scale)
-        good = (share == 0.0) | (state.energy <= energy + 1e-4 * share * slope + room)
-        x, energy = _where(good, to, x), np.where(good, state.energy, energy)
+        value, gradient, band = energies(to, live)
+        room = 1e-12 * (np.abs(energy) + scale[live])
+        good = (share == 0.0) | (value <= energy + 1e-4 * share * slope + room)
+        x, energy = _where(good, to, x), np.where(good, value, energy)
         lower = np.where(share > 0, damping / 10, np.clip(10 * damping, 1e-3, 1e9))
         damping = np.where(good, np.where(lower < 1e-6, 0.0, lower), damping)
-        step = problem.newton_step(state, damping)
-        falls, change = np.einsum("ij,ij->j", step, state.gradient), problem.change(x, step)
+        step = _newton_step(gradient, band, damping)
+        falls, changed = np.einsum("ij,ij->j", step, gradient), change(x, step)
         # Stop when rounding decides whether the energy falls.
-        still = np.abs(state.gradient).max(0) <= problem.close[live]
-        still |= (np.abs(falls) <= ROUNDING * (np.abs(energy) + scale)) & (damping == 0.0)
+        still = np.abs(gradient).max(0) <= close[live]
+        still |= (np.abs(falls) <= ROUNDING * (np.abs(energy) + scale[live])) & (damping == 0.0)
         still &= good
         # No element is stretched, turned or shortened by more than its length: none collapses.
-        full = np.minimum(1.0, LONGEST_STEP / np.maximum(change, 1e-300))
+        full = np.minimum(1.0, LONGEST_STEP / np.maximum(changed, 1e-300))
         halved = np.where(good, 0, halved + 1)
         less = np.where(halved < HALVINGS, share / 2, 0.0)
         share = np.where(good, np.where(falls <= 0, full, 0.0), less)
         step_taken, slope = _where(good, step, step_taken), np.where(good, falls, slope)
         if still.any():
             # The last step is too short for the energy to judge it, and squares the error.
-            last = np.where(change < LAST_STEP, step, 0.0)[:, still]
+            last = np.where(changed < LAST_STEP, step, 0.0)[:, still]
             minimum[:, live[still]] = x[:, still] + last
             if still.all():
                 return minimum
@@ -109,15 +90,21 @@ def _where(good: NDArray[np.bool_], new: Array, old: Array) -> Array:
     return new if good.all() else np.where(good, new, old)
 
 
-# Banded symmetric systems, many small ones at once.
+def _newton_step(gradient: Array, band: Array, damping: Array) -> Array:
+    """Return Newton's step, with diagonals increased by shares ``damping`` of themselves."""
+    size = np.abs(band[:, 0])
+    band[:, 0] += damping * size
+    # A share of the order of rounding is for slack films, which may be unsupported.
+    band[:, 0] += 1e-15 * size.max(0)
+    step = solve_whole(band, -gradient) if len(damping) <= FEW else None
+    return solve(band, -gradient) if step is None else step
 
 
 def solve(band: Array, right_side: Array) -> Array:
-    """Return the solution of A x = ``right_side``: (n, rows).
+    """Return the solution of A x = ``right_side``, (n, rows), by bands (n, width, rows) of A.
 
-    ``band`` (n, width, rows) holds ``A[i, i + k]`` at ``[i, k]``. By A = L D L^T without pivoting,
-    all rows in step; a negative pivot is replaced by its absolute value, so that for the gradient
-    of an energy the solution is always a descent direction.
+    By A = L D L^T without pivoting, all rows in step; a negative pivot is replaced by its absolute
+    value, so that for the gradient of an energy the solution is always a descent direction.
     """
     size, width, rows = band.shape
     reach = width - 1
@@ -161,6 +148,15 @@ def solve_whole(band: Array, right_side: Array) -> Array | None:
         return None
 
 
+def dense(band: Array) -> Array:
+    """Return the full matrices: (rows, n, n)."""
+    size, width, rows = band.shape
+    first, off = np.nonzero(np.add.outer(np.arange(size), np.arange(width)) < size)
+    whole = np.zeros((rows, size, size))
+    whole[:, first, first + off] = whole[:, first + off, first] = band[first, off].T
+    return whole
+
+
 class Packing(NamedTuple):
     """Index map to a band (size, width) of unknowns: the sums from ``starts`` of the ``source``
     entries times their ``weight`` go ``into`` its elements.
@@ -176,53 +172,36 @@ class Packing(NamedTuple):
         """Return the band (size, width, rows) from entries (n, rows)."""
         weighted = entries[self.source]
         weighted *= self.weight[:, None]
-        sums = np.add.reduceat(weighted, self.starts)
         whole = np.zeros((self.shape[0] * self.shape[1], entries.shape[1]))
-        whole[self.into] = sums
+        whole[self.into] = np.add.reduceat(weighted, self.starts)
         return whole.reshape(*self.shape, -1)
 
 
 def packing(
-    bases: Array,
-    source: NDArray[np.int_],
-    part: NDArray[np.int_],
-    first: NDArray[np.int_],
-    second: NDArray[np.int_],
-    is_pair: NDArray[np.bool_],
+    first: Array, second: Array, source: NDArray[np.int_], is_pair: NDArray[np.bool_]
 ) -> Packing:
-    """Return the map of entries to the band of unknowns, by the motion of each part's coordinates
-    by a unit of each unknown, ``bases`` (parts, coordinates, unknowns).
+    """Return the map of entries to the band of unknowns.
 
-    An entry, a number in ``source``, couples the coordinates ``first`` and ``second`` of a part; a
-    pair stands for the second with the first as well.
+    An entry, a number in ``source``, couples two coordinates, which a unit of each unknown moves by
+    ``first`` and ``second`` (entries, unknowns); a pair stands for the second with the first as
+    well.
     """
-    most = int((bases != 0).sum(-1).max())
-    columns = np.argsort(bases == 0, axis=-1, kind="stable")[..., :most]
-    weights = np.take_along_axis(bases, columns, -1)
-    entries = []
-    for one, other in product(range(most), repeat=2):
-        a, b = columns[part, first, one], columns[part, second, other]
-        weight = weights[part, first, one] * weights[part, second, other]
-        good = (weight != 0) & (is_pair | (a <= b))
-        twice = np.where(is_pair & (a == b), 2.0, 1.0)
-        each = np.minimum(a, b), np.abs(a - b), source, weight * twice
-        entries.append([values[good] for values in each])
-    row, off, sources, weight = (np.concatenate(each) for each in zip(*entries, strict=True))
+    (a, by_a), (b, by_b) = _moving(first), _moving(second)
+    a, b = np.broadcast_arrays(a[:, :, None], b[:, None])
+    pair = is_pair[:, None, None]
+    weight = by_a[:, :, None] * by_b[:, None] * np.where(pair & (a == b), 2.0, 1.0)
+    good = (weight != 0) & (pair | (a <= b))
+    off = np.abs(a - b)[good]
     wide = int(off.max()) + 1
-    order = np.argsort(row * wide + off, kind="stable")
-    into, starts = np.unique((row * wide + off)[order], return_index=True)
-    return Packing(sources[order], weight[order], starts, into, (bases.shape[2], wide))
+    places = np.minimum(a, b)[good] * wide + off
+    order = np.argsort(places, kind="stable")
+    into, starts = np.unique(places[order], return_index=True)
+    sources = source[np.nonzero(good)[0][order]]
+    return Packing(sources, weight[good][order], starts, into, (first.shape[1], wide))
 
 
-def dense(band: Array) -> Array:
-    """Return the full matrices: (rows, n, n)."""
-    size, width, rows = band.shape
-    # Room beyond the end, where the band is 0.
-    whole = np.zeros((rows, size + width - 1, size + width - 1))
-    for half in (whole, whole.swapaxes(1, 2)):
-        row, step, across = half.strides
-        diagonals = np.lib.stride_tricks.as_strided(
-            half, (rows, size, width), (row, step + across, across)
-        )
-        diagonals[:] = band.transpose(2, 0, 1)
-    return whole[:, :size, :size]
+def _moving(motion: Array) -> tuple[NDArray[np.int_], Array]:
+    """Return the unknowns that move coordinates (n, unknowns), and by how much: (n, most) each."""
+    most = int((motion != 0).sum(1).max())
+    unknowns = np.argsort(motion == 0, axis=1, kind="stable")[:, :most]
+    return unknowns, np.take_along_axis(motion, unknowns, 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from sbafab.models.balloon import (
     ripple_energy,
     total_energy,
 )
-from sbafab.models.least_energy import Descent, NoEquilibrium, equilibrium
+from sbafab.models.least_energy import NoEquilibrium, equilibrium
 
 INNER = Balloon(neck=1.25, bore=0.5)
 DRAW = np.random.default_rng(3)
@@ -54,14 +54,13 @@ def test_unknowns_that_are_equal_are_joined_and_those_that_are_held_are_none() -
     first, off = np.divmod(np.arange(48), 4)
     good = np.flatnonzero(first + off < 12)
     i, j = first[good], (first + off)[good]
-    packing = least_energy.packing(pick[None], good, 0 * i, i, j, i != j)
+    packing = least_energy.packing(pick[i], pick[j], good, i != j)
     whole = pick.T @ least_energy.dense(band) @ pick
     assert least_energy.dense(packing.band(band.reshape(-1, 3))) == pytest.approx(whole)
 
 
-@pytest.mark.parametrize("order", [0, 2])
-def test_slopes_are_what_the_energy_changes_by(order: int) -> None:
-    one = replace(INNER, order=order)
+def test_slopes_are_what_the_energy_changes_by() -> None:
+    one = INNER
     (ripple,) = rim_ripples((one,), np.full((RIM_ELEMENTS, 2), -0.04), [np.array([1.0, 9.0])])
     load = BalloonLoad(
         np.array([3.0, 50.0]),
@@ -73,7 +72,7 @@ def test_slopes_are_what_the_energy_changes_by(order: int) -> None:
     x = initial_shape(one, load)
     x += DRAW.normal(0, 0.003, x.shape)
     x[2 * one.edge :: 2] *= 0.96
-    assert (ripple_energy(one.film, one.edge, ripple, x[::2]).tilt > 0).all()
+    assert (ripple_energy(one, ripple, x[::2]).tilt > 0).all()
     found, step = total_energy(one, load, x), 1e-6
     slopes, curves = [], []
     for i in range(len(x)):
@@ -89,34 +88,27 @@ def test_slopes_are_what_the_energy_changes_by(order: int) -> None:
     assert own == pytest.approx(whole, rel=1e-4, abs=1e-6 * whole.max())
 
 
-class Well:
+def well(x: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """x^4 - x^2 a row: from near 0, where it bends downward, to one of its two floors."""
+    return (x**4 - x**2)[0], 4 * x**3 - 2 * x, (12 * x**2 - 2)[:, None]
 
-    scale, close = np.ones(2), np.full(2, 1e-12)
 
-    def at(self, x: np.ndarray, rows: np.ndarray) -> Descent:
-        return Descent((x**4 - x**2)[0], 4 * x**3 - 2 * x, (12 * x**2 - 2)[:, None])
+def endless(x: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Falls for ever."""
+    return x[0], np.ones_like(x), np.ones((1, *x.shape))
 
-    def newton_step(self, state: Descent, damping: np.ndarray) -> np.ndarray:
-        band = state.matrix + damping * np.abs(state.matrix)
-        return least_energy.solve(band, -state.gradient)
 
-    def change(self, x: np.ndarray, ahead: np.ndarray) -> np.ndarray:
-        return np.abs(ahead)[0]
+def found(energies: Callable[..., tuple[np.ndarray, ...]], start: list[float]) -> np.ndarray:
+    x = np.array([start])
+    return equilibrium(
+        energies, lambda _, ahead: np.abs(ahead)[0], x, np.ones(2), np.full(2, 1e-12)
+    )
 
 
 def test_the_least_energy_is_found_from_where_it_bends_downward() -> None:
-    found = equilibrium(Well(), np.array([[0.01, -0.3]]))
-    assert found == pytest.approx(np.array([[0.5**0.5, -(0.5**0.5)]]))
-
-
-class Slope(Well):
-    """Falls for ever."""
-
-    def at(self, x: np.ndarray, rows: np.ndarray) -> Descent:
-        return Descent(x[0], np.ones_like(x), np.ones((1, *x.shape)))
+    assert found(well, [0.01, -0.3]) == pytest.approx(np.array([[0.5**0.5, -(0.5**0.5)]]))
 
 
 def test_an_energy_without_a_least_one_is_given_up() -> None:
     with pytest.raises(NoEquilibrium):
-        equilibrium(Slope(), np.zeros((1, 2)))
+        found(endless, [0.0, 0.0])
