@@ -5,7 +5,7 @@ clearances, times, stiffness, and the curves of these.
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
@@ -102,6 +102,10 @@ class Rise(NamedTuple):
     energy: float
 
 
+FreeShapes = Mapping[float, Shapes | DesignError]
+"""Free balloons of one kind by pressure in kPa, or why there is none."""
+
+
 @dataclass(frozen=True)
 class Inflated:
     """An actuator with its stack, or why it has none (None: not computed); the ``rises`` of a free
@@ -130,7 +134,6 @@ def inflated(
         if isinstance(each, Stack) and isinstance(pose, Pose) and request.wanted is None
     ]
     rooms = iter(chamber_clearances(posed))
-    states = []
     usual = (Conditions(kpa=kpa) for kpa in request.pressures_kpa if actuators[0].radii)
     pressures = [at.kpa or 0.0 for at in request.places(usual, *RISES)]
     rises: list[dict[float, Rise | DesignError] | DesignError]
@@ -138,12 +141,13 @@ def inflated(
         rises = [{p: _attempt(_loaded_rise, *pair, p) for p in pressures} for pair in pairs]
     else:
         rises = _rises(actuators, pressures)
-    for actuator, there, rise, poses in zip(actuators, stacks, rises, bent, strict=True):
+    states = []
+    for pair, rise, poses in zip(pairs, rises, bent, strict=True):
         with_rooms = {
             at: (pose, next(rooms, math.nan)) if isinstance(pose, Pose) else pose
             for at, pose in poses.items()
         }
-        states.append(Inflated(actuator, there, rise, with_rooms))
+        states.append(Inflated(*pair, rise, with_rooms))
     return states
 
 
@@ -155,56 +159,51 @@ def _attempt(value: Callable[..., Value], *at: Any) -> Value | DesignError:
         return error
 
 
-def _drawn(of: Actuator) -> Counter[Balloon]:
-    """Return the balloons of a chamber with films of the modulus as bought."""
-    drawn = replace(of.factors, modulus_ratio=1.0)
-    return Counter(balloons_of(of.design, of.laminate, drawn, of.form))
-
-
 def _rises(
     actuators: Sequence[Actuator], pressures: Sequence[float]
 ) -> list[dict[float, Rise | DesignError] | DesignError]:
-    """Return the rises of a free chamber by pressure, or why it has no elastic balloons."""
+    """Return the rises of a free chamber by pressure, or why it has no elastic balloons; the
+    balloons of each kind are those of films as bought, computed together.
+    """
     if not pressures:
         return [{} for _ in actuators]
-    kinds = [_attempt(_drawn, of) for of in actuators]
+    drawn = [replace(of, factors=replace(of.factors, modulus_ratio=1.0)) for of in actuators]
     ratios = [of.factors.modulus_ratio for of in actuators]
-    pressures_of: dict[Balloon, dict[float, None]] = {}
-    for each, ratio in zip(kinds, ratios, strict=True):
-        for kind in () if isinstance(each, DesignError) else each:
-            pressures_of.setdefault(kind, {}).update(dict.fromkeys(p / ratio for p in pressures))
-    shapes: dict[tuple[Balloon, float], Shapes | DesignError] = {}
-    for kind, at in pressures_of.items():
-        together = _free_shapes(kind, (*at,))
-        for row, p in enumerate(at):
-            # A balloon without an equilibrium spoils no other.
-            shapes[kind, p] = (
-                _attempt(free_shapes, kind, p)
-                if isinstance(together, DesignError)
-                else together.rows(slice(row, row + 1))
-            )
+    chambers = [_attempt(_kinds, of) for of in drawn]
+    asked: dict[Balloon, dict[float, None]] = defaultdict(dict)
+    for kinds, ratio in zip(chambers, ratios, strict=True):
+        for kind in () if isinstance(kinds, DesignError) else kinds:
+            asked[kind].update(dict.fromkeys(p / ratio for p in pressures))
+    shapes = {kind: _free_shapes(kind, (*at,)) for kind, at in asked.items()}
     return [
-        each
-        if isinstance(each, DesignError)
-        else {p: _attempt(_rise, each, shapes, p, ratio) for p in pressures}
-        for each, ratio in zip(kinds, ratios, strict=True)
+        kinds
+        if isinstance(kinds, DesignError)
+        else {p: _attempt(_rise, kinds, shapes, p, ratio) for p in pressures}
+        for kinds, ratio in zip(chambers, ratios, strict=True)
     ]
 
 
+def _kinds(of: Actuator) -> Counter[Balloon]:
+    """Return how many balloons of each kind a chamber has."""
+    return Counter(balloons_of(of.design, of.laminate, of.factors, of.form))
+
+
 @lru_cache(maxsize=256)
-def _free_shapes(kind: Balloon, pressures: tuple[float, ...]) -> Shapes | DesignError:
-    return _attempt(free_shapes, kind, [*pressures])
+def _free_shapes(kind: Balloon, pressures: tuple[float, ...]) -> FreeShapes:
+    """Return the free balloon at each pressure, or why it has no equilibrium there."""
+    together = _attempt(free_shapes, kind, [*pressures])
+    if isinstance(together, DesignError):
+        # A balloon without an equilibrium spoils no other.
+        return {p: _attempt(free_shapes, kind, p) for p in pressures}
+    return {p: together.rows(slice(row, row + 1)) for row, p in enumerate(pressures)}
 
 
 def _rise(
-    kinds: Counter[Balloon],
-    shapes: Mapping[tuple[Balloon, float], Shapes | DesignError],
-    pressure: float,
-    ratio: float,
+    kinds: Counter[Balloon], shapes: Mapping[Balloon, FreeShapes], pressure: float, ratio: float
 ) -> Rise:
     total = np.zeros(3)
     for kind, count in kinds.items():
-        shape = shapes[kind, pressure / ratio]
+        shape = shapes[kind][pressure / ratio]
         if isinstance(shape, DesignError):
             raise shape
         refuse_stretched(float(stretch(kind, shape)[0]))
@@ -229,7 +228,9 @@ def free_rise(kinds: Counter[Balloon], pressure: float) -> Rise:
     """Return the rise of the counted balloons of each kind at a pressure in kPa. Raises BeyondError
     if a film would be stretched too far.
     """
-    shapes = {(kind, pressure): free_shapes(kind, pressure) for kind in kinds}
+    shapes: dict[Balloon, FreeShapes] = {
+        kind: {pressure: free_shapes(kind, pressure)} for kind in kinds
+    }
     return _rise(kinds, shapes, pressure, 1.0)
 
 
@@ -259,42 +260,28 @@ def chamber_clearances(posed: Sequence[tuple[Stack, Pose]]) -> list[float]:
     of other levels lie beyond a plate, so that axes and largest radii suffice. Raises DesignError
     for a balloon without an equilibrium.
     """
-    firsts: dict[Balloon, BalloonMap] = {}
-    states = [_balloon_states(*each, firsts) for each in posed]
-    radii: dict[Balloon, dict[tuple[float, float], float]] = {}
-    for balloon, state in (each for levels in states for row in levels for each in row):
-        radii.setdefault(balloon, {})[state] = 0.0
-    for balloon, radius_at in radii.items():
-        pressures, heights = np.array([*radius_at]).T
+    places = [
+        (kind.drawn.balloon, pressure / kind.ratio, round(max(gap, LEAST_GAP), 4))
+        for whole, pose in posed
+        for kind, gaps in zip((whole.maps[of] for of in whole.levels), pose.gaps, strict=True)
+        for pressure, gap in zip(pose.pressures, gaps.tolist(), strict=True)
+    ]
+    radii = dict.fromkeys(places, 0.0)
+    for balloon in {place[0]: None for place in radii}:
+        same = [place for place in radii if place[0] == balloon]
+        _, pressures, heights = zip(*same, strict=True)
         shapes = inflate(balloon, pressures, heights, tied=True)
         widest = shapes.r[:, balloon.neck_edge : balloon.edge + 1].max(-1)
-        radius_at.update(zip([*radius_at], widest.tolist(), strict=True))
-    rooms = []
-    for (whole, _), levels in zip(posed, states, strict=True):
-        wide = np.array([[radii[balloon][state] for balloon, state in row] for row in levels])
+        radii.update(zip(same, widest.tolist(), strict=True))
+    each, rooms = iter(places), []
+    for whole, pose in posed:
+        wide = np.array([radii[next(each)] for _ in pose.gaps.flat]).reshape(pose.gaps.shape)
         nearest = min(
             float(np.hypot(*(whole.axes[i] - whole.axes[j])) - (wide[:, i] + wide[:, j]).max())
             for i, j in combinations(range(whole.chambers), 2)
         )
         rooms.append(nearest - max(kind.balloon.thickness for kind in whole.maps))
     return rooms
-
-
-def _balloon_states(
-    whole: Stack, pose: Pose, firsts: dict[Balloon, BalloonMap]
-) -> list[list[tuple[Balloon, tuple[float, float]]]]:
-    """Return each balloon by level and chamber: one of equal sizes, and the pressure in kPa and the
-    height in mm at which that has the same shape. Those are the ``firsts`` of each size.
-    """
-    rows = []
-    for level, gaps in zip(whole.levels, pose.gaps.tolist(), strict=True):
-        kind = whole.maps[level]
-        first = firsts.setdefault((kind.base or kind).balloon, kind)
-        ratio = kind.most_pressure / first.most_pressure
-        heights = (round(max(gap, LEAST_GAP), 4) for gap in gaps)
-        pairs = zip((p / ratio for p in pose.pressures), heights, strict=True)
-        rows.append([(first.balloon, pair) for pair in pairs])
-    return rows
 
 
 def rim_gap(stack: Stack, pose: Pose) -> float:
