@@ -260,16 +260,20 @@ def chamber_clearances(posed: Sequence[tuple[Stack, Pose]]) -> list[float]:
     of other levels lie beyond a plate, so that axes and largest radii suffice. Raises DesignError
     for a balloon without an equilibrium.
     """
-    places = [
-        (kind.drawn.balloon, pressure / kind.ratio, round(max(gap, LEAST_GAP), 4))
-        for whole, pose in posed
-        for kind, gaps in zip((whole.maps[of] for of in whole.levels), pose.gaps, strict=True)
-        for pressure, gap in zip(pose.pressures, gaps.tolist(), strict=True)
-    ]
+    firsts: dict[Balloon, BalloonMap] = {}
+    places: list[tuple[Balloon, float, float]] = []
+    for whole, pose in posed:
+        for kind, gaps in zip((whole.maps[of] for of in whole.levels), pose.gaps, strict=True):
+            # One of equal sizes has the same shape at equal pressure over modulus.
+            first = firsts.setdefault(kind.drawn.balloon, kind)
+            ratio = kind.most_pressure / first.most_pressure
+            heights = np.maximum(gaps, LEAST_GAP).round(4).tolist()
+            scaled = [pressure / ratio for pressure in pose.pressures]
+            places += zip([first.balloon] * len(heights), scaled, heights, strict=True)
     radii = dict.fromkeys(places, 0.0)
     for balloon in {place[0]: None for place in radii}:
         same = [place for place in radii if place[0] == balloon]
-        _, pressures, heights = zip(*same, strict=True)
+        pressures, heights = np.array([place[1:] for place in same]).T
         shapes = inflate(balloon, pressures, heights, tied=True)
         widest = shapes.r[:, balloon.neck_edge : balloon.edge + 1].max(-1)
         radii.update(zip(same, widest.tolist(), strict=True))
