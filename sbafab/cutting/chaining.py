@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 
 from sbafab.cutting.cut_settings import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
+from sbafab.geometry.chaining import LooseEndError, chained
 from sbafab.geometry.contour import LEAST_AREA, Contour, circle, tidy
-from sbafab.geometry.edges import (
-    EPSILON,
-    Edge,
-    Point,
-    edge_from_bulge,
-    meeting_points,
-    same_support,
-)
+from sbafab.geometry.edges import EPSILON, Edge, Point, meeting_points, same_support
 from sbafab.geometry.region import Region
 from sbafab.geometry.spatial_index import close_pairs
 
 JOINED = 0.002
 """mm: largest distance of two ends within 1 um of one corner, as cut files promise."""
-CELL = 16.0
-"""Width of the cells that known ends are kept in, over the distance at which they are joined."""
 
 
 def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
@@ -31,86 +22,16 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
 
     Raises OutputError at an end that does not meet exactly one other end.
     """
-    joints = _joints([p for edge in edges for p in (edge.start, edge.end)])
-    snapped: list[Edge] = []
-    at: dict[Point, list[int]] = {}
-    for edge in edges:
-        start, end = joints[edge.start], joints[edge.end]
-        if start == end and edge.length <= 2 * JOINED:
-            # Shorter than ends may lie apart: a part of the corner that others make.
-            at.setdefault(start, [])
-        else:
-            snapped.append(_between(edge, start, end))
-    for index, edge in enumerate(snapped):
-        at.setdefault(edge.start, []).append(index)
-        at.setdefault(edge.end, []).append(index)
-    for (x, y), ends in at.items():
-        if len(ends) < 2:
-            raise OutputError(f"contour open at x {x:.3f}, y {y:.3f}; close it.")
-        if len(ends) > 2:
-            raise OutputError(
-                f"{len(ends)} edges end at x {x:.3f}, y {y:.3f}, where a contour has two; "
-                "remove what is drawn twice."
-            )
-    unused = set(range(len(snapped)))
-    contours = []
-    for index, edge in enumerate(snapped):
-        if index not in unused:
-            continue
-        unused.remove(index)
-        loop = [edge]
-        while loop[-1].end != edge.start:
-            here = loop[-1].end
-            follower = next(i for i in at[here] if i in unused)
-            unused.remove(follower)
-            step = snapped[follower]
-            loop.append(step if step.start == here else step.reversed())
-        contours.append(Contour(tuple(loop)))
-    return contours
-
-
-def _joints(ends: Sequence[Point]) -> dict[Point, Point]:
-    """Return the joint of each end.
-
-    Two ends that meet exactly stay in place, however near others lie; the remaining ends are joined
-    within JOINED.
-    """
-    joints = _nearest_known(ends, EPSILON)
-    meeting = Counter(joints[p] for p in ends)
-    apart = [joints[p] for p in ends if meeting[joints[p]] != 2]
-    moved = _nearest_known(apart, JOINED)
-    return {p: moved.get(joint, joint) for p, joint in joints.items()}
-
-
-def _nearest_known(points: Sequence[Point], within: float) -> dict[Point, Point]:
-    """For each point the nearest one known before it, if that is near enough, or itself."""
-    # Cells wide enough that most points are near only to points of the same cell.
-    side = CELL * within
-    cells: dict[tuple[int, int], list[Point]] = {}
-    joints: dict[Point, Point] = {}
-    for p in points:
-        if p in joints:
-            continue
-        x, y = p
-        near = [
-            q
-            for i in range(math.floor((x - within) / side), math.floor((x + within) / side) + 1)
-            for j in range(math.floor((y - within) / side), math.floor((y + within) / side) + 1)
-            for q in cells.get((i, j), ())
-        ]
-        joint = min(near, key=lambda q: math.dist(p, q), default=p)
-        joints[p] = joint if math.dist(p, joint) <= within else p
-        if joints[p] is p:
-            cells.setdefault((math.floor(x / side), math.floor(y / side)), []).append(p)
-    return joints
-
-
-def _between(edge: Edge, start: Point, end: Point) -> Edge:
-    """The edge with its ends moved onto joints; an arc keeps its turn, so that it still fits."""
-    moved = max(math.dist(edge.start, start), math.dist(edge.end, end))
-    if moved < 2 * EPSILON:
-        return edge.part(start, end)
-    return edge_from_bulge(start, end, edge.bulge)
+    try:
+        return [Contour(tuple(loop)) for loop in chained(edges, JOINED)]
+    except LooseEndError as error:
+        x, y = error.place
+        if error.ends < 2:
+            raise OutputError(f"contour open at x {x:.3f}, y {y:.3f}; close it.") from None
+        raise OutputError(
+            f"{error.ends} edges end at x {x:.3f}, y {y:.3f}, where a contour has two; "
+            "remove what is drawn twice."
+        ) from None
 
 
 def check_clear(contours: Sequence[Contour]) -> None:

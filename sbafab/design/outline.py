@@ -6,7 +6,7 @@ A DXF or SVG file holds polylines, chains of edges, whose ends make loops. All c
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -21,12 +21,11 @@ from sbafab.design.polylines import (
     Polyline,
     counted,
     is_closed,
-    joined,
-    sealed,
 )
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import FitError
 from sbafab.geometry.arrangement import split_edges
+from sbafab.geometry.chaining import LooseEndError, chained
 from sbafab.geometry.contour import Contour, in_reading_order, tidy
 from sbafab.geometry.edges import EPSILON, Bounds, Point, box_round, meeting_points
 from sbafab.geometry.region import Region, centroid
@@ -138,10 +137,7 @@ def _drawn(path: Path, content: bytes, layer: str | None) -> Region:
     contours = _contours(polylines, MOST_EDGES)
     p = crossing(tuple(edge for contour in contours for edge in contour.edges))
     if p is not None:
-        raise DesignError(
-            f"has contours that cross or touch each other at x {p[0]:.4f}, y {p[1]:.4f}; draw them "
-            "apart, or join them"
-        )
+        raise _contact(p, of_several=True)
     _extent(box_round([contour.bounds for contour in contours]), 0.0, LARGEST_DRAWING)
     return _nested(contours)
 
@@ -188,12 +184,13 @@ def _traced(
 
 def _contours(polylines: Iterable[Polyline], most: int) -> list[Contour]:
     """Return the contours that polylines of at most ``most`` edges close to. Raises DesignError."""
+    chains = [c for c in counted(polylines, most) if sum(edge.length for edge in c) > JOIN]
     contours = []
-    for loop in map(sealed, _closed_loops(list(counted(polylines, most)))):
+    for loop in _closed_loops(chains):
         refuse_crossings(loop)
-        contour = tidy(loop) if loop else None
+        contour = tidy(loop)
         if contour is None:
-            x, y = loop[0].start if loop else (0.0, 0.0)
+            x, y = loop[0].start
             raise DesignError(
                 f"has a contour without area at x {x:.4f}, y {y:.4f}; delete it, or check the units"
             )
@@ -201,10 +198,10 @@ def _contours(polylines: Iterable[Polyline], most: int) -> list[Contour]:
     return contours
 
 
-def _closed_loops(polylines: list[Polyline]) -> list[Polyline]:
+def _closed_loops(chains: Sequence[Polyline]) -> list[Polyline]:
     """Return the loops that polylines close to. Raises DesignError if one is open or doubled."""
-    drawn = set()
-    for edge in (edge for chain in polylines for edge in chain):
+    drawn, edges = set(), [edge for chain in chains for edge in chain]
+    for edge in edges:
         x, y = edge.at(0.5)
         ends = sorted((round(px, 4), round(py, 4)) for px, py in (edge.start, edge.end))
         key = (*ends, round(x, 4), round(y, 4))
@@ -213,21 +210,22 @@ def _closed_loops(polylines: list[Polyline]) -> list[Polyline]:
                 f"draws an edge twice, at x {x:.4f}, y {y:.4f}; delete one of the two"
             )
         drawn.add(key)
-    loops, opens = joined(polylines)
-    if opens:
-        x, y = opens[0][-1].end
-        ends = [p for chain in opens for p in (chain[0].start, chain[-1].end)]
-        # All but the end itself.
-        gap = min(math.dist((x, y), p) for p in (ends[0], *ends[2:]))
+    try:
+        loops = chained(edges, JOIN)
+    except LooseEndError as error:
+        x, y = error.place
+        if error.ends > 2:
+            meet = [c for c in chains if any(math.dist(e.start, (x, y)) <= JOIN for e in c)]
+            raise _contact(error.place, of_several=len(meet) > 1) from None
         raise DesignError(
-            f"is open: a gap of {gap:.4f} mm at x {x:.4f}, y {y:.4f}, where {JOIN} is allowed; "
-            "join the ends, or delete what is not the outline"
-        )
+            f"is open: a gap of {error.gap:.4f} mm at x {x:.4f}, y {y:.4f}, where {JOIN} is "
+            "allowed; join the ends, or delete what is not the outline"
+        ) from None
     if not loops:
         raise DesignError(
             "holds no closed path; draw one of lines, arcs or curves, and explode blocks"
         )
-    return loops
+    return list(map(tuple, loops))
 
 
 def _nested(contours: list[Contour]) -> Region:
@@ -245,9 +243,16 @@ def refuse_crossings(loop: Polyline) -> None:
     """Raises DesignError if a closed loop crosses or touches itself."""
     p = crossing(loop)
     if p is not None:
-        raise DesignError(
-            f"crosses or touches itself at x {p[0]:.4f}, y {p[1]:.4f}; draw it without the loop"
+        raise _contact(p, of_several=False)
+
+
+def _contact(p: Point, of_several: bool) -> DesignError:
+    place = f"x {p[0]:.4f}, y {p[1]:.4f}"
+    if of_several:
+        return DesignError(
+            f"has contours that cross or touch each other at {place}; draw them apart, or join them"
         )
+    return DesignError(f"crosses or touches itself at {place}; draw it without the loop")
 
 
 def crossing(loop: Polyline) -> Point | None:

@@ -1,4 +1,4 @@
-"""Polylines: the chains of lines and arcs that a drawing holds, and how their ends join.
+"""Polylines: the chains of lines and arcs that a drawing holds.
 
 All coordinates are mm.
 """
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
 from sbafab.errors import DesignError
-from sbafab.geometry.edges import EPSILON, Edge, Line, Point, edge_from_bulge
+from sbafab.geometry.edges import EPSILON, Edge, Point, edge_from_bulge
 
 Polyline = tuple[Edge, ...]
 
@@ -29,7 +29,8 @@ def place(x: float, y: float) -> Point:
             f"has a coordinate of x {x:g}, y {y:g} mm, where at most {FARTHEST:g} is allowed; "
             "check its units"
         )
-    return float(x), float(y)
+    # Adding 0 makes -0 a plain 0.
+    return float(x) + 0.0, float(y) + 0.0
 
 
 def nothing_on(layer: str, others: Iterable[str]) -> DesignError:
@@ -73,60 +74,4 @@ def polyline(vertices: Sequence[tuple[float, float, float]], closed: bool) -> Po
 
 
 def is_closed(chain: Polyline) -> bool:
-    return _near(chain[0].start, chain[-1].end)
-
-
-def joined(polylines: Iterable[Polyline]) -> tuple[list[Polyline], list[Polyline]]:
-    """Closed loops, and the remaining open polylines, after joining ends that meet."""
-    whole = [chain for chain in polylines if sum(edge.length for edge in chain) > JOIN]
-    loops = [chain for chain in whole if is_closed(chain)]
-    rest = [chain for chain in whole if not is_closed(chain)]
-    opens: list[Polyline] = []
-    while rest:
-        chain = _extended(rest.pop(0), rest)
-        if not is_closed(chain):
-            chain = _extended(_reversed(chain), rest)
-        (loops if is_closed(chain) else opens).append(chain)
-    return loops, opens
-
-
-def _reversed(chain: Polyline) -> Polyline:
-    return tuple(edge.reversed() for edge in reversed(chain))
-
-
-def _extended(chain: Polyline, rest: list[Polyline]) -> Polyline:
-    """The polyline extended by every one of ``rest`` that goes on, which is removed from it."""
-    while not is_closed(chain):
-        end = chain[-1].end
-        ends = (n for n, c in enumerate(rest) if _near(end, c[0].start) or _near(end, c[-1].end))
-        number = next(ends, None)
-        if number is None:
-            return chain
-        follower = rest.pop(number)
-        chain += follower if _near(end, follower[0].start) else _reversed(follower)
-    return chain
-
-
-def _near(a: Point, b: Point) -> bool:
-    return math.dist(a, b) <= JOIN
-
-
-def sealed(loop: Polyline) -> Polyline:
-    """The loop with exactly matching ends and no edge shorter than JOIN."""
-    edges: list[Edge] = []
-    here = loop[-1].end
-    for edge in loop:
-        if edge.length > 2 * JOIN or not _near(here, edge.end):
-            edges.append(_from(here, edge))
-            here = edge.end
-    if edges:
-        edges[0] = _from(here, edges[0])
-    return tuple(edges)
-
-
-def _from(start: Point, edge: Edge) -> Edge:
-    if edge.start == start:
-        return edge
-    if isinstance(edge, Line):
-        return Line(start, edge.end)
-    return edge_from_bulge(start, edge.end, edge.bulge)
+    return math.dist(chain[0].start, chain[-1].end) <= JOIN
