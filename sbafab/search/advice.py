@@ -7,7 +7,7 @@ seed, so that it does not rest on the draws it was chosen by.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, get_args
@@ -127,136 +127,116 @@ def reach_yield(
     """
     targeted = design.with_({TARGET: target})
     free = (key for key in (BOND, OVERHANG) if key not in fixed and targeted.uses(key))
-    start = {key: _value_of(targeted, key) for key in free}
-    as_given = _Trials(targeted, start, target, progress)
-    broken = as_given.broken(AS_GIVEN)
+    trials = _Trials(targeted, {key: _value_of(targeted, key) for key in free}, target, progress)
+    broken = trials.broken((), AS_GIVEN)
     if broken - {WORST_CASE, PIN_FIT}:
         return YieldDesign(target, design, targeted)
-    if as_given.is_enough(AS_GIVEN) and not broken:
-        return YieldDesign(target, design, targeted, share=as_given.share(AS_GIVEN))
-    tried: dict[tuple[str, ...], _Trials] = {}
-    for words, most in _ways(targeted, fixed):
-        name = tuple(words.values())
-        if name not in tried:
-            try:
-                changed = targeted.with_(words)
-            except DesignError:
-                continue
-            tried[name] = _Trials(changed, start, target, progress)
-        trials = tried[name]
-        least = _smallest(trials, most if start else 0)
-        if least is not None:
-            changes = _changes(targeted, {**trials.lengths(least), **words})
-            changed = targeted.with_({change.key: change.values[1] for change in changes})
-            share = trials.share(least, CHECK_SEED)
-            return YieldDesign(target, design, changed, changes, share)
+    if trials.is_enough((), AS_GIVEN) and not broken:
+        return YieldDesign(target, design, targeted, share=trials.share((), AS_GIVEN))
+    for way, most in _ways(targeted, fixed):
+        steps = _smallest(trials, way, most if trials.start else 0)
+        if steps is not None:
+            changes, share = trials.changes(way, steps), trials.share(way, steps, CHECK_SEED)
+            return YieldDesign(target, design, trials.changed(way, steps), changes, share)
     useful = tuple(key for key in (BOND, OVERHANG, METHOD, SEQUENCE, PLATE) if key in fixed)
-    return YieldDesign(target, design, None, *_best(targeted, tried.values()), useful)
+    return YieldDesign(target, design, None, *trials.best(), useful)
 
 
-def _changes(design: Design, values: Mapping[str, Any]) -> tuple[KeyDifference, ...]:
-    """Return the keys whose values a design does not have."""
-    both = {key: (_value_of(design, key), value) for key, value in values.items()}
-    return tuple(KeyDifference(key, two) for key, two in both.items() if two[0] != two[1])
-
-
-def _ways(design: Design, fixed: Collection[str]) -> Iterator[tuple[dict[str, str], int]]:
-    """Yield words for keys, and by how many steps bond and overhang may grow with them."""
-    registration = design.registration
-    orders: list[dict[str, str]] = [{}]
-    if SEQUENCE not in fixed:
-        orders += [{SEQUENCE: word} for word in REGISTRATIONS["sequence"][1:]]
-    plates: list[dict[str, str]] = [{}]
-    if registration.pin_error is None and not {PLATE, PIN_ERROR} & set(fixed):
-        machines = get_args(PlateMachine)
-        better = machines[: machines.index(registration.plate_made_by)]
-        plates += [{PLATE: machine} for machine in reversed(better)]
-    ears: list[dict[str, str]] = []
-    if registration.method == "channel-pin" and METHOD not in fixed:
-        ears = [{METHOD: "ears", **plate} for plate in plates]
-    with_pins = [[{**plate, **order} for order in orders] for plate in plates]
-    groups = [*with_pins, *([way] for way in ears)]
-    yield from ((way, most) for group in groups for most in (0, FEW_STEPS) for way in group)
-    yield from ((way, MOST_STEPS) for group in groups for way in group)
-
-
-def _best(
-    design: Design, tried: Iterable[_Trials]
-) -> tuple[tuple[KeyDifference, ...], Share | None]:
-    """Return the changes of the best share that passes the other rules, and the share; of equal
-    ones the first.
-    """
-    every = (
-        (share, trials, steps)
-        for trials in tried
-        for (steps, seed), share in trials.shares.items()
-        if share is not None and seed == SEED
-    )
-    for share, trials, steps in sorted(every, key=lambda each: -each[0].value)[:MOST_CHECKED]:
-        if not trials.broken(steps):
-            words = {key: _value_of(trials.design, key) for key in (METHOD, SEQUENCE, PLATE)}
-            return _changes(design, {**trials.lengths(steps), **words}), share
-    return (), None
-
-
-# Bond and overhang by steps, each tried once.
-
-
+Way = tuple[tuple[str, str], ...]
+"""Words for keys."""
 Steps = tuple[int, int]
 """Steps by which bond and overhang are wider than at the start."""
 AS_GIVEN = (0, 0)
 
 
+def _ways(design: Design, fixed: Collection[str]) -> Iterator[tuple[Way, int]]:
+    """Yield words for keys, and by how many steps bond and overhang may grow with them."""
+    registration = design.registration
+    orders: list[Way] = [()]
+    if SEQUENCE not in fixed:
+        orders += [((SEQUENCE, word),) for word in REGISTRATIONS["sequence"][1:]]
+    plates: list[Way] = [()]
+    if registration.pin_error is None and not {PLATE, PIN_ERROR} & set(fixed):
+        machines = get_args(PlateMachine)
+        better = machines[: machines.index(registration.plate_made_by)]
+        plates += [((PLATE, machine),) for machine in reversed(better)]
+    groups = [[plate + order for order in orders] for plate in plates]
+    if registration.method == "channel-pin" and METHOD not in fixed:
+        groups += [[((METHOD, "ears"), *plate)] for plate in plates]
+    yield from ((way, most) for group in groups for most in (0, FEW_STEPS) for way in group)
+    yield from ((way, MOST_STEPS) for group in groups for way in group)
+
+
 @dataclass(frozen=True)
 class _Trials:
-    """A design with wider bond and overhang, of which those without a ``start`` stay.
+    """A design in other ways and with wider bond and overhang, of which those without a ``start``
+    stay.
 
-    ``shares`` of good builds by steps and seed; None if the design cannot be built.
+    ``shares`` of good builds by way, steps and seed; None if the design cannot be built.
     """
 
     design: Design
     start: Mapping[str, float]
     target: float
     progress: Progress
-    shares: dict[tuple[Steps, int], Share | None] = field(default_factory=dict)
+    shares: dict[tuple[Way, Steps, int], Share | None] = field(default_factory=dict)
 
-    def lengths(self, steps: Steps) -> dict[str, float]:
-        """Return bond and overhang in mm, by key."""
+    def values(self, way: Way, steps: Steps) -> dict[str, Any]:
+        """Return bond and overhang in mm, and the words, by key."""
         by_key = dict(zip((BOND, OVERHANG), steps, strict=True))
-        return {key: round(length + by_key[key] * STEP, 6) for key, length in self.start.items()}
+        lengths = {key: round(mm + by_key[key] * STEP, 6) for key, mm in self.start.items()}
+        return {**lengths, **dict(way)}
 
-    def share(self, steps: Steps, seed: int = SEED) -> Share | None:
+    def changed(self, way: Way, steps: Steps) -> Design:
+        """Return the changed design. Raises DesignError."""
+        return self.design.with_(self.values(way, steps))
+
+    def changes(self, way: Way, steps: Steps) -> tuple[KeyDifference, ...]:
+        """Return the keys whose values the design does not have."""
+        values = self.values(way, steps).items()
+        both = {key: (_value_of(self.design, key), value) for key, value in values}
+        return tuple(KeyDifference(key, two) for key, two in both.items() if two[0] != two[1])
+
+    def share(self, way: Way, steps: Steps, seed: int = SEED) -> Share | None:
         """Return the share of good builds, counted once."""
         steps = steps[0] * (BOND in self.start), steps[1] * (OVERHANG in self.start)
-        if (steps, seed) not in self.shares:
+        if (way, steps, seed) not in self.shares:
             # The number of trials is not known in advance.
             trial = f"bond and overhang that reach the yield, trial {len(self.shares) + 1}"
             self.progress(trial, 0, 0)
             try:
-                design = self.design.with_(self.lengths(steps))
+                design = self.changed(way, steps)
                 share = simulate(build(design), design, seed).whole
             except DesignError:
                 share = None
-            self.shares[steps, seed] = share
-        return self.shares[steps, seed]
+            self.shares[way, steps, seed] = share
+        return self.shares[way, steps, seed]
 
-    def is_enough(self, steps: Steps, seed: int = SEED) -> bool:
-        share = self.share(steps, seed)
+    def is_enough(self, way: Way, steps: Steps, seed: int = SEED) -> bool:
+        share = self.share(way, steps, seed)
         return share is not None and share.interval[0] >= self.target
 
-    def is_short(self, steps: Steps) -> bool:
-        """Return True if the design can be built and does not reach the target."""
-        return self.share(steps) is not None and not self.is_enough(steps)
-
-    def broken(self, steps: Steps) -> set[str]:
+    def broken(self, way: Way, steps: Steps) -> set[str]:
         """Return the rules that the design fails, but for the one that limits the yield."""
-        design = self.design.with_(self.lengths(steps))
+        design = self.changed(way, steps)
         rules = design.rules.model_copy(update={"target_yield": None})
         findings = run_deck(build(design), design.model_copy(update={"rules": rules}))
         return {finding.rule for finding in findings if finding.verdict == "fail"}
 
+    def best(self) -> tuple[tuple[KeyDifference, ...], Share | None]:
+        """Return the changes of the best share that passes the other rules, and the share; of equal
+        ones the first.
+        """
+        items = self.shares.items()
+        every = [(s, way, steps) for (way, steps, seed), s in items if s and seed == SEED]
+        counted = sorted(every, key=lambda row: -row[0].value)
+        for share, way, steps in counted[:MOST_CHECKED]:
+            if not self.broken(way, steps):
+                return self.changes(way, steps), share
+        return (), None
 
-def _smallest(trials: _Trials, most: int) -> Steps | None:
+
+def _smallest(trials: _Trials, way: Way, most: int) -> Steps | None:
     """Return the least bond and overhang, up to ``most`` steps, whose interval lies above the
     target.
 
@@ -264,16 +244,23 @@ def _smallest(trials: _Trials, most: int) -> Steps | None:
     the bond, is taken back as far as the target allows. Neither can then be smaller by itself.
     Where the other seed falls short, or the worst case does, both grow by one step more.
     """
-    both = _least(lambda steps: trials.is_short((steps, steps)), most)
-    if both is None or not trials.is_enough((both, both)):
+
+    def is_short(bond: int, overhang: int) -> bool:
+        """Return True if the design can be built and does not reach the target."""
+        steps = bond, overhang
+        return trials.share(way, steps) is not None and not trials.is_enough(way, steps)
+
+    both = _least(lambda steps: is_short(steps, steps), most)
+    if both is None or not trials.is_enough(way, (both, both)):
         return None
-    overhang = _least(lambda steps: trials.is_short((both, steps)), both) or 0
-    bond = _least(lambda steps: trials.is_short((steps, overhang)), both) or 0
+    overhang = _least(lambda steps: is_short(both, steps), both) or 0
+    bond = _least(lambda steps: is_short(steps, overhang), both) or 0
     for more in range(most - max(bond, overhang) + 1):
         steps = bond + more, overhang + more
-        if trials.share(steps, CHECK_SEED) is None:
+        if trials.share(way, steps, CHECK_SEED) is None:
             return None
-        broken = trials.broken(steps) if trials.is_enough(steps, CHECK_SEED) else {WORST_CASE}
+        is_enough = trials.is_enough(way, steps, CHECK_SEED)
+        broken = trials.broken(way, steps) if is_enough else {WORST_CASE}
         if broken != {WORST_CASE}:
             return None if broken else steps
     return None

@@ -33,20 +33,15 @@ from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import MOST_PRESSURE, stack
 from sbafab.reports.solid_pictures import WHY, PictureRequest, pictures_at_one_scale, solid_png
 from sbafab.runtime import Progress, ignore_progress
-from sbafab.search.sweep_report import PageSection, page_html
+from sbafab.search.sweep_report import FIRST, PageSection, page_html
 from sbafab.search.trials import margin, worst_findings
 from sbafab.search.vary import NOTHING, KeyDifference, format_value, key_values
 from sbafab.version import GENERATOR
 
 FOLDER, PAGE = "compare", "compare.html"
 MAIN = {
-    Quantity.OUTLINE_DIAMETER: ANYWHERE,
-    Quantity.OVERALL_DIAMETER: ANYWHERE,
-    Quantity.REACHED_DIAMETER: ANYWHERE,
-    Quantity.FOLDED_HEIGHT: ANYWHERE,
-    Quantity.MASS: ANYWHERE,
+    **dict.fromkeys(FIRST, ANYWHERE),
     Quantity.FREE_STROKE: ANYWHERE,
-    Quantity.REFERENCE_STROKE: ANYWHERE,
     Quantity.BEND: Conditions(chambers=1),
     Quantity.BLOCKED_FORCE: Conditions(share=0.0),
     Quantity.WATER_TIME: ANYWHERE,

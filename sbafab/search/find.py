@@ -85,7 +85,6 @@ class FoundDesign:
     on_front: int
     tries: int
     is_cut_short: bool
-    free: tuple[Free, ...]
     figures: Mapping[str, Figure]
 
     @property
@@ -113,15 +112,10 @@ class FoundDesign:
         return f"FoundDesign({format_keys(self.best.values)}{missed})"
 
     def _repr_html_(self) -> str:
-        rows = [
-            (row.quantity.label, figure_text(self.request, self.best, row), row.bound, met)
-            for row in self.request.requirements
-            for met in ("holds" if self.best.meets(row) else "missed",)
-        ]
-        rows += [("", rule, "", "missed") for rule in self.best.broken_rules]
+        texts = [*(text for text, _ in self.lines), *self.best.broken_rules]
         title = "Best design" if self.holds else "Nearest miss"
-        head = ("quantity", "value", "requirement", "")
-        return table_html(head, rows, f"{title}: {format_keys(self.best.values)}")
+        rows = [(text,) for text in texts]
+        return table_html(("",), rows, f"{title}: {format_keys(self.best.values)}")
 
     @property
     def without_room(self) -> list[Spare]:
@@ -242,7 +236,6 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
         count,
         len(space.trials),
         request.tries <= len(space.trials) < space.size,
-        space.free,
         dict(_figures(request, best)),
     )
 

@@ -94,40 +94,33 @@ def quantity_lines() -> str:
     )
 
 
-FIGURES: dict[str, tuple[Quantity, Conditions]] = {
+CALIBRATED = "calibrated"
+FIGURES: dict[str, tuple[Quantity, Conditions, str]] = {
     **{
-        of.key: (of, ANYWHERE)
+        of.key: (of, ANYWHERE, "")
         for of in (
             *(Quantity.OVERALL_DIAMETER, Quantity.OUTLINE_DIAMETER, Quantity.WIDTH),
             *(Quantity.DEFLATED_DIAMETER, Quantity.INFLATED_DIAMETER, Quantity.REACHED_DIAMETER),
-            *(Quantity.LENGTH, Quantity.MASS, Quantity.REFERENCE_STROKE),
-            *(Quantity.CONTRACTION, Quantity.FREE_BEND),
+            *(Quantity.LENGTH, Quantity.MASS, Quantity.REFERENCE_STROKE, Quantity.BURST),
         )
     },
-    "height": (Quantity.FOLDED_HEIGHT, ANYWHERE),
-    "stroke": (Quantity.FREE_STROKE, ANYWHERE),
-    "bend": (Quantity.BEND, Conditions(chambers=1)),
-    "force": (Quantity.BLOCKED_FORCE, ANYWHERE),
-    "burst": (Quantity.BURST, ANYWHERE),
-    "lateral_stiffness": (Quantity.SHUT_STIFFNESS, ANYWHERE),
-    "time": (Quantity.WATER_TIME, Conditions(kpa=FULL_KPA)),
-    "pull": (Quantity.PULL, Conditions(share=0.1)),
-    "moment": (Quantity.MOMENT, Conditions(share=0.0)),
-    "load": (Quantity.WRINKLING_LOAD, ANYWHERE),
-    "slip": (Quantity.SLIP_LOAD, ANYWHERE),
-    "push": (Quantity.FORCE_BOUND, ANYWHERE),
+    "height": (Quantity.FOLDED_HEIGHT, ANYWHERE, CALIBRATED),
+    "stroke": (Quantity.FREE_STROKE, ANYWHERE, CALIBRATED),
+    "bend": (Quantity.BEND, Conditions(chambers=1), CALIBRATED),
+    "force": (Quantity.BLOCKED_FORCE, ANYWHERE, CALIBRATED),
+    "lateral_stiffness": (Quantity.SHUT_STIFFNESS, ANYWHERE, CALIBRATED),
+    "time": (Quantity.WATER_TIME, Conditions(kpa=FULL_KPA), CALIBRATED),
+    "contraction": (Quantity.CONTRACTION, ANYWHERE, "pouch-motor"),
+    "pull": (Quantity.PULL, Conditions(share=0.1), "pouch-motor"),
+    "free_bend": (Quantity.FREE_BEND, ANYWHERE, "hinge"),
+    "moment": (Quantity.MOMENT, Conditions(share=0.0), "hinge"),
+    "load": (Quantity.WRINKLING_LOAD, ANYWHERE, "beam"),
+    "slip": (Quantity.SLIP_LOAD, ANYWHERE, "jamming"),
+    "push": (Quantity.FORCE_BOUND, ANYWHERE, "push"),
 }
-"""Figures of ``predict`` with the conditions that a requirement does not name."""
-OF_MECHANISMS = {
-    **dict.fromkeys(("contraction", "pull"), "pouch-motor"),
-    **dict.fromkeys(("free_bend", "moment"), "hinge"),
-    "load": "beam",
-    "slip": "jamming",
-    "push": "push",
-}
-"""Kinds of mechanisms by their quantities."""
-CALIBRATED = ("height", "stroke", "bend", "force", "lateral_stiffness", "time")
-"""Quantities that calibrated models give: of oblong pockets the height alone."""
+"""Figures of ``predict`` with the conditions that a requirement does not name, and what gives them:
+a calibrated model (of oblong pockets of the height alone), or a kind of mechanism.
+"""
 USUAL_KPA = 10.0
 COUNT = "chamber.count"
 """Key of the number of chambers side by side."""
@@ -135,6 +128,8 @@ _CHAMBERS = re.compile(r"\s*([1-9]\d?)\s*chambers?\s*", re.IGNORECASE)
 NAMES = {row.name: row for row in QUANTITIES}
 AT_PRESSURE = tuple(row.name for row in QUANTITIES if "@" in row.written)
 """Quantities that take a pressure."""
+TAKES = {"bend": ("kpa", "chambers"), "force": ("kpa", "rise", "share"), "time": ("flow",)}
+"""Conditions of quantities that take others than a pressure."""
 UNITS = {
     "g": {"g": 1.0, "mg": 0.001, "kg": 1000.0},
     "N": {"N": 1.0, "mN": 0.001, "kN": 1000.0},
@@ -154,6 +149,7 @@ HOW = (
     'for example overall_diameter, mass, stroke, "stroke@50kPa", "bend@2chambers@5kPa", '
     '"force@12.5mm@50kPa", "force@50%@50kPa" or chamber.diameter'
 )
+ONE_STROKE = f"a force needs one stroke, and only a force takes one; {HOW}"
 
 
 @dataclass(frozen=True)
@@ -193,7 +189,7 @@ class RequestedQuantity:
         """The figure of ``predict`` and its conditions; None of the drawing and its keys."""
         if self.name not in FIGURES:
             return None
-        of, usual = FIGURES[self.name]
+        of, usual, _ = FIGURES[self.name]
         at = Conditions(**{**usual.as_dict(), **self.at.as_dict()})
         # Flat is no rise, and no share of a reference stroke, which may not be known.
         return of, at._replace(rise=None, share=0.0) if at.rise == 0 else at
@@ -206,7 +202,7 @@ class RequestedQuantity:
     def is_calibrated(self, form: Form) -> bool:
         """Return True if a calibrated model gives the quantity."""
         is_oblong = isinstance(form.pockets, Slots) and self.name != "height"
-        return self.name in CALIBRATED and not is_oblong
+        return FIGURES.get(self.name, ("",))[-1] == CALIBRATED and not is_oblong
 
 
 def read_quantity(
@@ -217,16 +213,17 @@ def read_quantity(
     """
     name, *places = (part.strip() for part in text.split("@"))
     name = name if "." in name else name.replace("-", "_").lower()
-    if name in AT_PRESSURE:
-        return RequestedQuantity(name, _conditions(name, places, text, kpa))
-    if name == "time":
-        return RequestedQuantity(name, Conditions(flow=_flow(places, text, flow_ml_min)))
-    if places:
+    takes = TAKES.get(name, ("kpa",) if name in AT_PRESSURE else ())
+    if places and not takes:
         named = f"{', '.join(AT_PRESSURE[:-1])} and {AT_PRESSURE[-1]}"
         raise DesignError(f"{shown(text)}: only {named} take a pressure; {HOW}")
     if name not in NAMES and "." not in name:
         raise DesignError(f"{shown(text)} is not a quantity; {hint(name, [*NAMES, 'any key'])}")
-    return RequestedQuantity(name)
+    try:
+        read = [_condition(place, takes) for place in places]
+        return RequestedQuantity(name, _conditions(name, read, takes, kpa, flow_ml_min))
+    except ValueError as error:
+        raise DesignError(f"{shown(text)}: {error}") from None
 
 
 def read_measured(text: str) -> MeasuredValue:
@@ -258,60 +255,52 @@ def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:
     return RequestedQuantity(REACHED if at_least else WIDEST)
 
 
-def _conditions(name: str, places: list[str], text: str, kpa: float | None) -> Conditions:
-    is_vacuum = name == "slip"
-    read: dict[str, Any] = {}
-    for place in places:
-        try:
-            field, value = _place(place, name)
-        except ValueError as error:
-            raise DesignError(f"{shown(text)}: {shown(place)} {error}") from None
-        if field == "kpa" and field in read:
-            raise DesignError(f"{shown(text)} names two pressures; name one")
-        read[field] = value
+def _conditions(
+    name: str,
+    named: Sequence[tuple[str, float]],
+    takes: Sequence[str],
+    kpa: float | None,
+    flow_ml_min: float,
+) -> Conditions:
+    """Return all conditions of a quantity. Raises ValueError with the end of a sentence."""
+    read: dict[str, Any] = dict(named)
+    if len(read) < len(named):
+        raise ValueError("names two pressures, strokes or flows; name one")
     if len({"rise", "share"} & read.keys()) != (name == "force"):
-        raise DesignError(
-            f"{shown(text)}: a force needs one stroke, and only a force takes one; {HOW}"
-        )
-    usual = kpa if kpa is not None and (kpa < 0) == is_vacuum else USUAL_KPA * (1 - 2 * is_vacuum)
-    read.setdefault("kpa", usual)
-    try:
+        raise ValueError(ONE_STROKE)
+    if "flow" in takes:
+        seconds(0.0, read.setdefault("flow", flow_ml_min))
+    if "kpa" in takes:
+        is_vacuum = name == "slip"
+        is_usable = kpa is not None and (kpa < 0) == is_vacuum
+        read.setdefault("kpa", kpa if is_usable else USUAL_KPA * (1 - 2 * is_vacuum))
         refuse_pressure(read["kpa"], is_vacuum)
-    except DesignError as error:
-        raise DesignError(f"{shown(text)}: {error}") from None
     return Conditions(**read)
 
 
-def _place(place: str, name: str) -> tuple[str, float]:
-    """Return the condition that a place in a quantity names, and its value.
-
-    Raises ValueError with the end of a sentence.
+def _condition(place: str, takes: Sequence[str]) -> tuple[str, float]:
+    """Return the condition that a place in a quantity names, of those that it ``takes``, and its
+    value. Raises ValueError with the end of a sentence.
     """
-    count = _CHAMBERS.fullmatch(place)
-    if count is not None and name == "bend":
+    is_bare = place.replace(".", "", 1).isdecimal()
+    count, kilopascals = _CHAMBERS.fullmatch(place), _kilopascals(place)
+    if "flow" in takes:
+        flow = None if is_bare else in_first_unit(place, MILLILITRES_PER_MINUTE)
+        if flow is None:
+            raise ValueError("a time takes one flow, such as time@35ml/min")
+        return "flow", flow
+    if count is not None and "chambers" in takes:
         return "chambers", int(count[1])
-    kilopascals = _kilopascals(place)
     if kilopascals is not None:
         return "kpa", kilopascals
-    if place.replace(".", "", 1).isdecimal():
-        length = f" or {place}mm" if name == "force" else ""
-        raise ValueError(f"has no unit; write {place}kPa{length}")
+    if is_bare:
+        length = f" or {place}mm" if "rise" in takes else ""
+        raise ValueError(f"{shown(place)} has no unit; write {place}kPa{length}")
     try:
         return ("share", read_share(place)) if place.endswith("%") else ("rise", millimetres(place))
     except ValueError as error:
         reason = error if place.endswith("%") else "is neither a pressure nor a length"
-        raise ValueError(f"{reason}; {HOW}") from None
-
-
-def _flow(places: list[str], text: str, flow_ml_min: float) -> float:
-    """Return the flow of water of a time in ml/min. Raises DesignError."""
-    for place in places:
-        read = in_first_unit(place, {"": math.nan, **MILLILITRES_PER_MINUTE})
-        if len(places) > 1 or read is None or math.isnan(read):
-            raise DesignError(f"{shown(text)}: a time takes one flow, such as time@35ml/min")
-        flow_ml_min = read
-    seconds(0.0, flow_ml_min)
-    return flow_ml_min
+        raise ValueError(f"{shown(place)} {reason}; {HOW}") from None
 
 
 def _kilopascals(place: str) -> float | None:
@@ -484,8 +473,9 @@ def measured(
             return float(value), None
         raise DesignError(f"{design.name} has no {name} that is a number")
     of, at = quantity.figure
-    kind = OF_MECHANISMS.get(name)
-    if kind and (form.mechanism is None or form.mechanism.kind != kind):
+    kind = FIGURES[name][-1]
+    is_of_stack = kind in ("", CALIBRATED)
+    if not is_of_stack and (form.mechanism is None or form.mechanism.kind != kind):
         has = f"a mechanism of {form.mechanism.kind}" if form.mechanism else "no mechanism"
         raise DesignError(f"{name} is of a {kind}, and the design has {has}")
     if of is Quantity.BEND:

@@ -34,7 +34,7 @@ from sbafab.models.figures import PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.plugins import FAMILIES, RULES, installed
 from sbafab.rules.deck import AT_MOST
-from sbafab.rules.finding import Finding, Verdict
+from sbafab.rules.finding import Finding, decisive
 from sbafab.runtime import prepare, processors
 from sbafab.search.quantities import RequestedQuantity, read_quantity
 from sbafab.search.quantities import measured as measured_quantity
@@ -122,9 +122,6 @@ def _one_line(error: Exception) -> str:
 # The margin of each rule: its findings as one verdict and one margin.
 
 
-ORDER: tuple[Verdict, ...] = ("fail", "waived", "warn", "pass")
-
-
 def margin(finding: Finding) -> float | None:
     """Return the margin of the value to its limit in its unit, below 0 if the rule fails; None if
     nothing was measured, or without a limit.
@@ -145,14 +142,9 @@ def worst_findings(findings: Iterable[Finding]) -> dict[str, Finding]:
     """Return the worst finding of each rule, in the deck's order; findings waived by the rule
     itself are ignored.
     """
-    each: dict[str, list[Finding]] = {}
-    for finding in findings:
-        if finding.verdict != "waived" or finding.by_user:
-            each.setdefault(finding.rule, []).append(finding)
-    return {
-        name: min(group, key=lambda one: (ORDER.index(one.verdict), margin_share(one) or 0.0))
-        for name, group in each.items()
-    }
+    judged = [finding for finding in findings if finding.verdict != "waived" or finding.by_user]
+    worst = decisive(sorted(judged, key=lambda finding: margin_share(finding) or 0.0))
+    return {finding.rule: worst[finding.rule] for finding in judged}
 
 
 # The exact version of the program: rows of different versions are never mixed.
