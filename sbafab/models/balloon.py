@@ -307,7 +307,7 @@ def total_energy(balloon: Balloon, load: BalloonLoad, x: Array) -> TotalEnergy:
     p, elements = load.pressure, Elements.of(x)
     bend, joined = bending(balloon, elements)
     stretch, content = membrane(balloon, elements, load.cap), air_volume(balloon, elements)
-    eased = ripple_energy(balloon, load.ripple, x[0::2])
+    eased, relief, rim = ripple_energy(balloon, load.ripple, x[0::2])
     slopes, curves = (
         [a - p * b for a, b in zip(*both, strict=True)]
         for both in ((stretch.slopes, content.slopes), (stretch.curves, content.curves))
@@ -324,13 +324,13 @@ def total_energy(balloon: Balloon, load: BalloonLoad, x: Array) -> TotalEnergy:
         stiff[held] = PLATE_STIFFNESS * np.maximum(p, 1.0) * balloon.node_areas[held]
     over, stiff = np.where(touches, over, 0.0), np.where(touches, stiff, 0.0)
     pressed = stiff * over
-    energy = bend.energy + stretch.energy + eased.energy
+    energy = bend.energy + stretch.energy + eased
     energy = energy - p * content.energy + (pressed * over).sum(0) / 2
     by_place, band = assembled_gradient(slopes), assembled_tangent(curves, joined)
     by_place[1::2] += pressed
-    by_place[2 * balloon.edge :: 2] += eased.slopes
+    by_place[2 * balloon.edge :: 2] += relief
     band[1::2, 0] += stiff
-    return TotalEnergy(energy, by_place, band, eased.curves, pressed.sum(0))
+    return TotalEnergy(energy, by_place, band, rim, pressed.sum(0))
 
 
 FilmPair = tuple["Balloon", ...]
@@ -557,23 +557,16 @@ def bonded_bending_stiffness(pair: Sequence[Balloon]) -> float:
     return (e1**2 * t1**4 + e2**2 * t2**4 + mixed) / (12 * (e1 * t1 + e2 * t2))
 
 
-class RippleEnergy(NamedTuple):
-    """The squared ``tilt`` a^2 of least energy and the energy (rows,), less that of a smooth rim:
-    at most 0; derivatives by the rim's radii (nodes, rows), (nodes, nodes, rows).
+def ripple_energy(balloon: Balloon, ripple: Ripple, r: Array) -> tuple[Array, Array, Array]:
+    """Return the energy (rows,) of a rippled rim at the radii of a film's nodes (nodes, rows), less
+    that of a smooth one: at most 0; and its derivatives by the rim's radii, (nodes, rows) and
+    (nodes, nodes, rows).
     """
-
-    tilt: Array
-    energy: Array
-    slopes: Array
-    curves: Array
-
-
-def ripple_energy(balloon: Balloon, ripple: Ripple, r: Array) -> RippleEnergy:
-    """Return the energy of a rippled rim at the radii of a film's nodes (nodes, rows)."""
     rim, middles = r[balloon.edge :], balloon.middles[balloon.edge :, None]
     wide = (rim[1:] + rim[:-1]) / (2 * middles)
     drive = ripple.cost + ((wide * wide - 1) / 2 * ripple.pull).sum(0)
     drive = np.maximum(-drive, 0.0)
+    # Squared, that of least energy.
     tilt = drive / ripple.stiff
     # By the radius of either node of an element.
     pulled = ripple.pull * wide / (2 * middles)
@@ -585,4 +578,4 @@ def ripple_energy(balloon: Balloon, ripple: Ripple, r: Array) -> RippleEnergy:
     number = np.arange(len(bent))
     for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
         curves[number + i, number + j] += bent
-    return RippleEnergy(tilt, -drive * tilt / 2, tilt * steep, curves)
+    return -drive * tilt / 2, tilt * steep, curves

@@ -77,7 +77,11 @@ MOST_STRETCH = 0.15
 
 
 POWERS = np.arange(DEGREE + 1.0)
-PIECES = np.array(
+BASIS = np.zeros((3, DEGREE + 1, DEGREE + 1))
+"""Weights of a piece's coefficients by powers of the place in it, from 0 to 1: of the value of a
+uniform B-spline, its first and its second derivative.
+"""
+BASIS[0] = np.array(
     [
         [1, -5, 10, -10, 5, -1],
         [26, -50, 20, 20, -20, 5],
@@ -87,12 +91,6 @@ PIECES = np.array(
         [0, 0, 0, 0, 0, 1],
     ]
 ) / math.factorial(DEGREE)
-"""Weights of a piece's coefficients by powers of the place in it, from 0 to 1, of a uniform
-B-spline.
-"""
-BASIS = np.zeros((3, *PIECES.shape))
-"""The same of its value, its first and its second derivative."""
-BASIS[0] = PIECES
 for _order in (1, 2):
     BASIS[_order, :, :-1] = BASIS[_order - 1, :, 1:] * POWERS[1:]
 EVEN = np.linspace(0, 1, DEGREE + 1)
@@ -268,7 +266,7 @@ def pieces(coefficients: Array) -> Array:
 
     The first extends below the spline and the last above it, with the second derivative there.
     """
-    inner = coefficients[..., WINDOWS] @ PIECES
+    inner = coefficients[..., WINDOWS] @ BASIS[0]
     polynomials = np.zeros((*inner.shape[:-2], PIECES_IN_ALL, DEGREE + 1))
     polynomials[..., 1:-1, :] = inner
     polynomials[..., 0, :3] = inner[..., 0, :3] @ BELOW.T

@@ -10,7 +10,6 @@ whose waves were resolved (docs/prediction.md): pockets of 4 to 17 ring widths i
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,19 +33,11 @@ def is_corrected(balloon: Balloon) -> bool:
     return usual and balloon.mate is None and balloon.pocket > WIDE * balloon.ring
 
 
-class Waves(NamedTuple):
-    """What waves do to free balloons (n,): ``rise``, the share by which they rise higher than those
-    of ``inflate``, and the power of the pressure with which it grows; and the force in mN that
-    would pull those of ``inflate`` as high.
+def waves_of(balloon: Balloon, pressure: Array) -> tuple[Array, Array, Array]:
+    """Return what waves do to ``is_corrected`` balloons at pressures (n,) in kPa, above 0: the
+    share by which free ones rise higher than those of ``inflate``, and the power of the pressure
+    with which it grows; and the force in mN that would pull those of ``inflate`` as high.
     """
-
-    rise: Array
-    power: Array
-    pull: Array
-
-
-def waves_of(balloon: Balloon, pressure: Array) -> Waves:
-    """Return the waves of ``is_corrected`` balloons at pressures (n,) in kPa, above 0."""
     strain = pressure * balloon.pocket / balloon.membrane_stiffness
     rings, thick = balloon.pocket / balloon.ring, balloon.thickness / balloon.ring / 0.05
     late, early = (strain / 0.034) ** 1.75, (0.33 * thick**3 / rings**2 / strain) ** 3
@@ -54,7 +45,7 @@ def waves_of(balloon: Balloon, pressure: Array) -> Waves:
     # The pull is within 10 % of that of balloons between plates.
     hard = 0.25 + 2 * max(balloon.neck / balloon.pocket, LEAST_GRIP)
     pull = hard * math.pi * balloon.pocket**2 * pressure * rise
-    return Waves(rise, 3 * early / (1 + early) - 1.75 * late / (1 + late), pull)
+    return rise, 3 * early / (1 + early) - 1.75 * late / (1 + late), pull
 
 
 def free_shapes(balloon: Balloon, pressure: ArrayLike) -> Shapes:
