@@ -31,7 +31,7 @@ LONG = paper.LONGEST_STROKE.value
 FULL_STROKES = {"17.5 mm high, Sec. 4.6": SHORT, "almost 20 mm, Sec. 4.2": LONG}
 """Full strokes in mm of 15 balloons that the paper gives."""
 ORDERS = (2, 6, 12)
-"""Orders of the film's law (``FlatFilm``); the models have 2."""
+"""Orders of the film's law (``Balloon``); the models have 2."""
 STRAIN = 0.1
 """Strain at which the stiffening is stated."""
 FLAT = 2e-3

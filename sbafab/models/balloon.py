@@ -36,6 +36,7 @@ from sbafab.models.film_elements import (
     curvature,
     membrane,
     strain,
+    strain_measure,
 )
 from sbafab.models.least_energy import NoEquilibrium, Packing, equilibrium, packing
 from sbafab.runtime import one_blas_thread
@@ -62,7 +63,9 @@ class Balloon:
     ``neck`` is the radius bonded to the next balloon, ``bore`` the radius of its hole; both are 0
     for a lone balloon. Without ``wrinkles`` films stay as smooth as in an axisymmetric mesh.
     ``inextensible`` is the limit of a film, rim included, that neither bends nor carries
-    compression: the modulus must then be large.
+    compression: the modulus must then be large. ``order`` m selects the strain in which the energy
+    is quadratic, (stretch^m - 1) / m: 2 is Saint Venant's and Kirchhoff's law, as in programs for
+    linear films; films of higher orders stiffen.
     """
 
     pocket: float = 2.5
@@ -74,6 +77,7 @@ class Balloon:
     poisson: float = PAPER_TPE[1]
     wrinkles: bool = True
     inextensible: bool = False
+    order: int = 2
     mate: Balloon | None = None
     """The second film if the two differ: of the same sizes, and without a mate itself."""
 
@@ -564,17 +568,18 @@ def ripple_energy(balloon: Balloon, ripple: Ripple, r: Array) -> tuple[Array, Ar
     """
     rim, middles = r[balloon.edge :], balloon.middles[balloon.edge :, None]
     wide = (rim[1:] + rim[:-1]) / (2 * middles)
-    drive = ripple.cost + ((wide * wide - 1) / 2 * ripple.pull).sum(0)
+    drive = ripple.cost + (strain_measure(balloon, wide * wide) * ripple.pull).sum(0)
     drive = np.maximum(-drive, 0.0)
     # Squared, that of least energy.
     tilt = drive / ripple.stiff
     # By the radius of either node of an element.
-    pulled = ripple.pull * wide / (2 * middles)
+    pulled = ripple.pull * wide ** (balloon.order - 1) / (2 * middles)
     steep = np.zeros_like(rim)
     steep[:-1] += pulled
     steep[1:] += pulled
     curves = np.where(drive > 0, -1 / ripple.stiff, 0.0) * steep[:, None] * steep
-    bent = tilt * ripple.pull / (2 * middles) ** 2
+    bent = tilt * ripple.pull * (balloon.order - 1) * wide ** (balloon.order - 2)
+    bent /= (2 * middles) ** 2
     number = np.arange(len(bent))
     for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
         curves[number + i, number + j] += bent

@@ -4,8 +4,7 @@ A film is a chain of nodes r, z (mm). Many films are computed at once: arrays ha
 each. Functions return an energy (uJ: kPa mm3) for each film with its first and second derivatives
 by the coordinates of an element: the differences of its two nodes in r and z, and their mean
 radius. Kinks couple neighbours. ``assembled_gradient`` and ``assembled_tangent`` turn these into
-derivatives by the coordinates of nodes. Strains are Green's, so that the law of films is Saint
-Venant's and Kirchhoff's.
+derivatives by the coordinates of nodes.
 """
 
 from __future__ import annotations
@@ -57,8 +56,19 @@ class EnergyTerm(NamedTuple):
 
 def strain(flat: Balloon, at: Elements) -> tuple[Array, Array]:
     """Return the meridional and the hoop strain of each element."""
-    along, around = at.square / flat.squares[0], at.middle * at.middle / flat.squares[1]
-    return (along - 1) / 2, (around - 1) / 2
+    along, around = _squared_stretches(flat, at)
+    return strain_measure(flat, along), strain_measure(flat, around)
+
+
+def _squared_stretches(flat: Balloon, at: Elements) -> tuple[Array, Array]:
+    length2, middle2, _ = flat.squares
+    return at.square / length2, at.middle * at.middle / middle2
+
+
+def strain_measure(flat: Balloon, square: Array) -> Array:
+    """Return the strain of squared stretches, of the family of Seth (1964) and Hill (1968)."""
+    power = square if flat.order == 2 else square ** (flat.order / 2)
+    return np.asarray((power - 1) / flat.order)
 
 
 def curvature(flat: Balloon, at: Elements) -> Array:
@@ -76,7 +86,8 @@ def membrane(flat: Balloon, at: Elements, cap: Array) -> EnergyTerm:
     tension field (Pipkin, 1986), with what the wrinkles themselves carry.
     """
     nu, plane = flat.poisson, flat.modulus / (1 - flat.poisson**2)
-    e1, e2 = strain(flat, at)
+    sq1, sq2 = _squared_stretches(flat, at)
+    e1, e2 = strain_measure(flat, sq1), strain_measure(flat, sq2)
     lateral = nu * e1
     wrinkled = plane * (e2 + lateral) < -cap
     # The hoop strain of the film itself, the wrinkles' waste of length left out.
@@ -91,6 +102,12 @@ def membrane(flat: Balloon, at: Elements, cap: Array) -> EnergyTerm:
     g1, g2 = by1 * s1, by2 * s2
     k1, k2 = by1 / length2 * np.where(wrinkled, flat.modulus, plane), by2 / middle2 * c22
     k12 = nu * by1 / middle2 * c22
+    if flat.order != 2:
+        half = flat.order / 2 - 1
+        f1, f2 = sq1**half, sq2**half
+        k1 = k1 * f1 * f1 + 2 * half * g1 * f1 / (length2 * sq1)
+        k2 = k2 * f2 * f2 + 2 * half * g2 * f2 / (middle2 * sq2)
+        g1, g2, k12 = g1 * f1, g2 * f2, k12 * f1 * f2
     dr, dz, middle = at.dr, at.dz, at.middle
     k1_dr, k12_middle = k1 * dr, k12 * middle
     return EnergyTerm(

@@ -28,8 +28,8 @@ POWER = 4
 
 
 def is_corrected(balloon: Balloon) -> bool:
-    """Return True for a wide pocket of equal films."""
-    usual = balloon.wrinkles and not balloon.inextensible
+    """Return True for a wide pocket of equal films of the usual law."""
+    usual = balloon.wrinkles and not balloon.inextensible and balloon.order == 2
     return usual and balloon.mate is None and balloon.pocket > WIDE * balloon.ring
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -59,8 +60,9 @@ def test_unknowns_that_are_equal_are_joined_and_those_that_are_held_are_none() -
     assert least_energy.dense(packing.band(band.reshape(-1, 3))) == pytest.approx(whole)
 
 
-def test_slopes_are_what_the_energy_changes_by() -> None:
-    one = INNER
+@pytest.mark.parametrize("order", [2, 6])
+def test_slopes_are_what_the_energy_changes_by(order: int) -> None:
+    one = replace(INNER, order=order)
     (ripple,) = rim_ripples((one,), np.full((RIM_ELEMENTS, 2), -0.04), [np.array([1.0, 9.0])])
     load = BalloonLoad(
         np.array([3.0, 50.0]),

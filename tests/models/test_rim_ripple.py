@@ -49,17 +49,20 @@ def test_what_ripples_take_off_has_the_slopes_that_it_says() -> None:
     lone = Balloon()
     found = inflate(lone, 6.0)
     (ripple,) = ripples_at((lone,), [coordinates(found.r, found.z)])
-    energy, slopes, curves = balloon.ripple_energy(lone, ripple, found.r.T)
-    assert energy[0] < 0
-    for node in (lone.edge, lone.edge + 2, len(lone.nodes) - 1):
-        step = np.zeros_like(found.r.T)
-        step[node] = 1e-5
-        up, down = (
-            balloon.ripple_energy(lone, ripple, found.r.T + sign * step) for sign in (1, -1)
-        )
-        own = node - lone.edge
-        assert slopes[own] == pytest.approx((up[0] - down[0]) / 2e-5, rel=1e-5)
-        assert curves[own] == pytest.approx((up[1] - down[1]) / 2e-5, rel=1e-5, abs=1e-6)
+    for order in (2, 6):
+        flat = replace(lone, order=order)
+        energy, slopes, curves = balloon.ripple_energy(flat, ripple, found.r.T)
+        assert energy[0] < 0
+        for node in (lone.edge, lone.edge + 2, len(lone.nodes) - 1):
+            step = np.zeros_like(found.r.T)
+            step[node] = 1e-5
+            up, down = (
+                balloon.ripple_energy(flat, ripple, found.r.T + sign * step) for sign in (1, -1)
+            )
+            own = node - lone.edge
+            assert slopes[own] == pytest.approx((up[0] - down[0]) / 2e-5, rel=1e-5)
+            change = (up[1] - down[1]) / 2e-5
+            assert curves[own] == pytest.approx(change, rel=1e-5, abs=1e-6)
 
 
 def test_the_amplitude_is_the_one_of_least_energy_and_the_waves_too() -> None:
