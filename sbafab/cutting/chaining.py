@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from sbafab.cutting.cut_settings import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
-from sbafab.geometry.chaining import LooseEndError, chained
+from sbafab.geometry.chaining import LooseEndError, chained, depths
 from sbafab.geometry.contour import LEAST_AREA, Contour, circle, tidy
 from sbafab.geometry.edges import EPSILON, Edge, Point, meeting_points, same_support
 from sbafab.geometry.region import Region
@@ -66,7 +66,7 @@ def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
     """
     drawn = [*inner, *outer]
     turned = []
-    for index, (contour, depth) in enumerate(zip(drawn, _depths(drawn), strict=True)):
+    for index, (contour, depth) in enumerate(zip(drawn, depths(drawn), strict=True)):
         is_hole = index < len(inner)
         x, y = contour.edges[0].start
         if (depth % 2 == 1) != is_hole:
@@ -92,16 +92,3 @@ def _whole(contour: Contour, centre: Point, radius: float) -> Contour:
         return contour
     whole = circle(centre, radius)
     return whole.reversed() if is_hole else whole
-
-
-def _depths(contours: Sequence[Contour]) -> list[int]:
-    """Return the number of other contours that enclose each contour."""
-    count = len(contours)
-    places = [contour.edges[0].at(0.5) for contour in contours]
-    depths = [0] * count
-    boxes = [*(contour.bounds for contour in contours), *((*p, *p) for p in places)]
-    for pair in close_pairs(boxes, 0.0):
-        holder, inner = min(pair), max(pair) - count
-        if holder < count and inner >= 0 and inner != holder:
-            depths[inner] += contours[holder].winding(places[inner]) != 0
-    return depths

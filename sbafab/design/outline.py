@@ -17,6 +17,7 @@ from sbafab.design.outline_dxf import dxf_polylines
 from sbafab.design.outline_svg import svg_polylines
 from sbafab.design.polylines import (
     JOIN,
+    MOST_BYTES,
     MOST_EDGES,
     Polyline,
     counted,
@@ -25,13 +26,12 @@ from sbafab.design.polylines import (
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import FitError
 from sbafab.geometry.arrangement import split_edges
-from sbafab.geometry.chaining import LooseEndError, chained
+from sbafab.geometry.chaining import LooseEndError, chained, depths
 from sbafab.geometry.contour import Contour, in_reading_order, tidy
 from sbafab.geometry.edges import EPSILON, Bounds, Point, box_round, meeting_points
 from sbafab.geometry.region import Region, centroid
 from sbafab.geometry.spatial_index import close_pairs
 
-MOST_BYTES = 2_000_000
 MOST_OUTLINE_EDGES = 500
 LARGEST = 150.0
 SMALLEST = 1.0
@@ -230,13 +230,11 @@ def _closed_loops(chains: Sequence[Polyline]) -> list[Polyline]:
 
 def _nested(contours: list[Contour]) -> Region:
     """Return the region enclosed by disjoint contours: each inside an odd number is a hole."""
-    oriented = []
-    for contour in contours:
-        place = contour.edges[0].at(0.5)
-        around = sum(other is not contour and other.winding(place) != 0 for other in contours)
-        is_hole = around % 2 == 1
-        oriented.append(contour if contour.is_hole == is_hole else contour.reversed())
-    return Region(in_reading_order(oriented))
+    oriented = (
+        contour if contour.is_hole == (depth % 2 == 1) else contour.reversed()
+        for contour, depth in zip(contours, depths(contours), strict=True)
+    )
+    return Region(in_reading_order([*oriented]))
 
 
 def refuse_crossings(loop: Polyline) -> None:

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from sbafab.design.polylines import Polyline, nothing_on, place, refuse_more_than_limit
+from sbafab.design.files import read_text
+from sbafab.design.polylines import MOST_BYTES, Polyline, nothing_on, place, refuse_more_than_limit
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import bezier, elliptical_arc, fit_arcs
 from sbafab.geometry.edges import EPSILON, Edge, Line, Point
@@ -226,10 +227,7 @@ def local(element: ElementTree.Element) -> str:
 
 
 def _root(path: Path) -> ElementTree.Element:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise DesignError("is not text in UTF-8; save it as plain SVG") from None
+    text = read_text(path, MOST_BYTES)
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise DesignError("declares a DOCTYPE or entities; save it as plain SVG without them")
     if "<?xml-stylesheet" in text:
@@ -248,16 +246,13 @@ def _root(path: Path) -> ElementTree.Element:
         if local(element) in CHANGING:
             raise DesignError(f"holds <{local(element)}>; {PLAIN}")
         if local(element) == "style":
-            _refuse_sheet("{" + "".join(element.itertext()))
+            # A sheet that sets more than paint is refused, wherever it applies.
+            sheet = "{" + "".join(element.itertext())
+            names = [n for n in _DECLARATION.findall(sheet) if not _PAINT.fullmatch(n)]
+            if names or any(mark in sheet for mark in ("@", "\\", "/*")):
+                what = names[0] if names else "imports, escapes or comments"
+                raise DesignError(f"has {what[:40]} in a style sheet; {PLAIN}")
     return root
-
-
-def _refuse_sheet(text: str) -> None:
-    """Raise DesignError for a style sheet that sets more than paint, wherever it applies."""
-    extra_names = [name for name in _DECLARATION.findall(text) if not _PAINT.fullmatch(name)]
-    if "@" in text or "\\" in text or "/*" in text or extra_names:
-        what = extra_names[0] if extra_names else "imports, escapes or comments"
-        raise DesignError(f"has {what[:40]} in a style sheet; {PLAIN}")
 
 
 def _names(element: ElementTree.Element) -> list[str]:

@@ -16,6 +16,7 @@ Polyline = tuple[Edge, ...]
 
 JOIN = 0.001
 """Largest gap between joined ends, mm."""
+MOST_BYTES = 2_000_000
 MOST_EDGES = 5000
 """Most edges of a whole drawing, or of one of its entities."""
 FARTHEST = 10_000.0

@@ -1,4 +1,4 @@
-"""Loose edges chained to closed loops."""
+"""Loose edges chained to closed loops, and how deep loops lie in each other."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import EPSILON, Edge, Point, edge_from_bulge
+from sbafab.geometry.spatial_index import close_pairs
 
 CELL = 16.0
 """Width of the cells that known ends are kept in, over the distance at which they are joined."""
@@ -106,3 +108,16 @@ def _between(edge: Edge, start: Point, end: Point) -> Edge:
     if moved < 2 * EPSILON:
         return edge.part(start, end)
     return edge_from_bulge(start, end, edge.bulge)
+
+
+def depths(contours: Sequence[Contour]) -> list[int]:
+    """Return the number of other contours that enclose each contour."""
+    count = len(contours)
+    places = [contour.edges[0].at(0.5) for contour in contours]
+    depths = [0] * count
+    boxes = [*(contour.bounds for contour in contours), *((*p, *p) for p in places)]
+    for pair in close_pairs(boxes, 0.0):
+        holder, inner = min(pair), max(pair) - count
+        if holder < count and inner >= 0 and inner != holder:
+            depths[inner] += contours[holder].winding(places[inner]) != 0
+    return depths
