@@ -26,7 +26,7 @@ DEFAULT_KIT = "paper"
     "--target-yield",
     "Fail if fewer random builds are good than this share, e.g. 0.99, and say what `sbafab "
     "generate` would change for it with the same option.",
-    opt.PartialShare("SHARE"),
+    opt.PARTIAL_SHARE,
 )
 @opt.option(
     "--nets FILE",

@@ -117,13 +117,13 @@ def _listed(pressures: str | None, chambers: int) -> tuple[float, ...]:
 @opt.option(
     "--elevation",
     "Viewing angle above the bench, degrees.",
-    opt.FiniteFloat(),
+    opt.FINITE,
     default=api.PictureRequest.elevation,
 )
 @opt.option(
     "--azimuth",
     "Viewing angle round the vertical axis, degrees.",
-    opt.FiniteFloat(),
+    opt.FINITE,
     default=api.PictureRequest.azimuth,
 )
 @opt.option(

@@ -61,7 +61,7 @@ def cut_options(command: opt.Command) -> opt.Command:
     "--target-yield",
     "Change the design as little as this share of good random builds needs, e.g. 0.95: order of "
     "stacking, bond and overhang, plate, ears. Keys of --set stay.",
-    opt.PartialShare("SHARE"),
+    opt.PARTIAL_SHARE,
 )
 @opt.option("--decks", "Also write the input files of the simulators.", bool)
 def generate(source: Design | Assembly, target_yield: float | None, **settings: Any) -> None:

@@ -29,67 +29,67 @@ Decorator = Callable[[Command], Command]
 # Types of values.
 
 
-class _Type(click.ParamType):  # type: ignore[type-arg]  # generic in newer clicks only
-    """A type that says what stands for its value in the help."""
+class Parsed(click.ParamType):  # type: ignore[type-arg]  # generic in newer clicks only
+    """A value that ``read`` makes of a text; its ValueError says what is allowed.
 
-    def __init__(self, metavar: str) -> None:
-        self.name = metavar
+    ``name`` stands for the value in the help.
+    """
+
+    def __init__(self, name: str, read: Callable[[str], Any]) -> None:
+        self.name, self.read = name, read
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
         return self.name
 
-
-class MeasuredQuantity(_Type):
-    """A number with or without a unit; ``units`` gives the size of each in the first unit."""
-
-    def __init__(
-        self,
-        metavar: str,
-        noun: str,
-        units: Mapping[str, float],
-        example: str,
-        positive: bool = False,
-    ) -> None:
-        super().__init__(metavar)
-        self.noun, self.units, self.example, self.positive = noun, units, example, positive
-
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the quantity in the first unit; raises BadParameter for other text."""
-        number = in_first_unit(str(value), self.units)
+        try:
+            return self.read(str(value))
+        except ValueError as error:
+            self.fail(f"{value!r} must be {error}", param, ctx)
+
+
+def quantity(
+    metavar: str, noun: str, units: Mapping[str, float], example: str, positive: bool = False
+) -> Parsed:
+    """Return the type of a number with or without a unit; ``units`` gives the size of each in the
+    first unit, that of the value.
+    """
+
+    def read(text: str) -> float:
+        number = in_first_unit(text, units)
         if number is None:
-            units = ", ".join(self.units)
-            allowed = f"a {self.noun} such as {self.example}; the units are {units}"
-            self.fail(f"{value!r} must be {allowed}", param, ctx)
+            raise ValueError(f"a {noun} such as {example}; the units are {', '.join(units)}")
         if not math.isfinite(number):
-            self.fail(f"{value!r} must be a finite {self.noun}", param, ctx)
-        if self.positive and number <= 0:
-            self.fail(f"must be a {self.noun} above 0 {next(iter(self.units))}", param, ctx)
+            raise ValueError(f"a finite {noun}")
+        if positive and number <= 0:
+            raise ValueError(f"a {noun} above 0 {next(iter(units))}")
         return number
+
+    return Parsed(metavar, read)
 
 
 MICROLITRES = {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}
-LENGTH = MeasuredQuantity("MM", "length", MILLIMETRES, '0.35 or "350 um"')
-POSITIVE_LENGTH = MeasuredQuantity("MM", "length", MILLIMETRES, '0.35 or "350 um"', positive=True)
-PRESSURE = MeasuredQuantity("P", "pressure", KILOPASCALS, '6, "6 kPa" or "60 mbar"')
-VOLUME = MeasuredQuantity("V", "volume", MICROLITRES, '5, 5ul or "0.005 ml"')
-FLOW = MeasuredQuantity("Q", "flow", MILLILITRES_PER_MINUTE, '35, "35 ml/min" or "0.6 ml/s"')
+LENGTH = quantity("MM", "length", MILLIMETRES, '0.35 or "350 um"')
+POSITIVE_LENGTH = quantity("MM", "length", MILLIMETRES, '0.35 or "350 um"', positive=True)
+PRESSURE = quantity("P", "pressure", KILOPASCALS, '6, "6 kPa" or "60 mbar"')
+VOLUME = quantity("V", "volume", MICROLITRES, '5, 5ul or "0.005 ml"')
+FLOW = quantity("Q", "flow", MILLILITRES_PER_MINUTE, '35, "35 ml/min" or "0.6 ml/s"')
 
 
-class OfChamber(_Type):
+class OfChamber(Parsed):
     """``NAME=QUANTITY``, or with ``all_chambers`` a quantity alone, whose name is ""."""
 
-    def __init__(self, quantity: MeasuredQuantity, all_chambers: bool = False) -> None:
-        unit = next(iter(quantity.units)).upper()
-        super().__init__(f"{unit}|CHAMBER={unit}" if all_chambers else f"NAME={unit}")
-        self.quantity, self.all_chambers = quantity, all_chambers
+    def __init__(self, each: Parsed, all_chambers: bool = False) -> None:
+        noun, unit = ("PRESSURE", "KPA") if each is PRESSURE else ("VOLUME", "UL")
+        super().__init__(f"{unit}|CHAMBER={unit}" if all_chambers else f"NAME={unit}", self.pair)
+        self.each, self.noun, self.all_chambers = each, noun, all_chambers
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        chamber, equals, text = str(value).rpartition("=")
+    def pair(self, text: str) -> tuple[str, float]:
+        """Return the chamber's name and the quantity."""
+        chamber, equals, number = text.rpartition("=")
         if not (chamber.strip() if equals else self.all_chambers):
-            short = self.quantity.example.split(",")[0]
-            pattern = f"NAME={self.quantity.noun.upper()}"
-            self.fail(f"{value!r} must be {pattern}, such as chamber1={short}", param, ctx)
-        return chamber.strip(), self.quantity.convert(text, param, ctx)
+            raise ValueError(f"NAME={self.noun}, such as chamber1=5")
+        return chamber.strip(), self.each.read(number)
 
 
 def by_chamber(
@@ -102,30 +102,36 @@ def by_chamber(
     return chambers
 
 
-class PartialShare(_Type):
-    """A share such as 0.95 or 95%, neither none nor all."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        share = share_of(str(value))
-        if share is None or not 0 < share < 1:
-            self.fail(f"{value!r} must be a share above 0 and below 1, as 0.95 or 95%", param, ctx)
-        return share
+def _share(text: str) -> float:
+    share = share_of(text)
+    if share is None or not 0 < share < 1:
+        raise ValueError("a share above 0 and below 1, as 0.95 or 95%")
+    return share
 
 
-class _Finite(click.ParamType):  # type: ignore[type-arg]  # generic in newer clicks only
+def _finite(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError("a finite number")
+    return number
+
+
+PARTIAL_SHARE = Parsed("SHARE", _share)
+"""A share such as 0.95 or 95%, neither none nor all."""
+FINITE = Parsed("FLOAT", _finite)
+
+
+class FiniteRange(click.FloatRange):
+    """A finite number in a range; ``FloatRange`` accepts nan."""
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         number = super().convert(value, param, ctx)
         if not math.isfinite(number):
             self.fail("must be a finite number", param, ctx)
         return number
-
-
-class FiniteFloat(_Finite, click.types.FloatParamType):
-    """A finite number."""
-
-
-class FiniteRange(_Finite, click.FloatRange):
-    """A finite number in a range; ``FloatRange`` accepts nan."""
 
 
 def file_path(**settings: bool) -> click.Path:

@@ -48,7 +48,7 @@ MOST = opt.option(
 @opt.option(
     "--sure P",
     "Probability with which each requirement on a predicted quantity must hold, e.g. 0.9.",
-    opt.PartialShare("P"),
+    opt.PARTIAL_SHARE,
 )
 @opt.flow_option("Flow of water in all, for the time")
 @opt.option(

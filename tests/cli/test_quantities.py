@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 import pytest
 
-from sbafab.cli.options import FLOW, PRESSURE, VOLUME, MeasuredQuantity, OfChamber, by_chamber
+from sbafab.cli.options import FLOW, PRESSURE, VOLUME, OfChamber, Parsed, by_chamber
 
 
 @pytest.mark.parametrize(
@@ -22,7 +22,7 @@ from sbafab.cli.options import FLOW, PRESSURE, VOLUME, MeasuredQuantity, OfChamb
         (FLOW, "0.035 l/min", 35),
     ],
 )
-def test_units(quantity: MeasuredQuantity, written: str, value: float) -> None:
+def test_units(quantity: Parsed, written: str, value: float) -> None:
     assert quantity.convert(written, None, None) == pytest.approx(value)
 
 
