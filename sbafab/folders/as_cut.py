@@ -155,18 +155,11 @@ def property_differences(actual: Mapping[str, str], expected: Mapping[str, str])
 
 def _snapped(part: CutPart, designed: Iterable[Contour]) -> CutPart:
     """Return a part with contours that agree with one of the ``designed`` replaced by it."""
-    contours = (
-        next(
-            (
-                contour_designed
-                for contour_designed in designed
-                if _agree(contour, contour_designed)
-            ),
-            contour,
-        )
+    snapped = (
+        next((like for like in designed if _agree(contour, like)), contour)
         for contour in part.region.contours
     )
-    return replace(part, region=Region(tuple(contours)))
+    return replace(part, region=Region(tuple(snapped)))
 
 
 def _agree(contour: Contour, designed: Contour) -> bool:

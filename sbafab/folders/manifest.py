@@ -149,18 +149,13 @@ class FilmUseClaim(_Claim):
     density: Annotated[float, _rounded(4)] = 0.0
 
 
-class FilmClaim(_Claim):
-    """A design's need of a film and the sheets it is cut from, as in ``FilmUseClaim``."""
+class FilmClaim(FilmUseClaim):
+    """A design's need of a film, and the sheets it is cut from."""
 
-    material: Material
     product: str
     thickness: Thickness
     layers: int
     area: Six
-    sheets: int = 0
-    sheet_area: Three = 0.0
-    waste: Three = 0.0
-    density: Annotated[float, _rounded(4)] = 0.0
 
 
 class SheetPinClaim(_Claim):
@@ -411,13 +406,8 @@ def _film_use(sheets: Sequence[SheetFile]) -> dict[Material, dict[str, float]]:
         of_material = [sheet for sheet in sheets if sheet.material == material]
         area = sum(sheet.width * sheet.length for sheet in of_material)
         parts = sum(sheet.parts_area for sheet in of_material)
-        waste, density = area - parts, parts / area
-        use[material] = {
-            "sheets": len(of_material),
-            "sheet_area": area,
-            "waste": waste,
-            "density": density,
-        }
+        use[material] = {"sheets": len(of_material), "sheet_area": area}
+        use[material] |= {"waste": area - parts, "density": parts / area}
     return use
 
 
