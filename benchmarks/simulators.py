@@ -30,7 +30,7 @@ def sofa() -> Stepped | None:
     """Scene A, every film as a shell; None where runSofa is not there."""
     if shutil.which("runSofa") is None:
         return None
-    from sbafab.simulators.sofa.run import DT, SECONDS, run
+    from sbafab.simulators.sofa import DT, SECONDS, run
 
     laminate = sbafab.build(DESIGN)
     taken = []
@@ -46,7 +46,7 @@ def mujoco(sectors: int) -> Stepped | None:
     """Its flexes with rings of so many nodes; None where the package is not there."""
     if find_spec("mujoco") is None:
         return None
-    from sbafab.simulators.mujoco.run import DT, LEAST_TIME, SECONDS, run
+    from sbafab.simulators.mujoco import DT, LEAST_TIME, SECONDS, run
 
     laminate = sbafab.build(DESIGN)
     with tempfile.TemporaryDirectory() as place:

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import OutputError
-from sbafab.simulators.calculix.deck import TPE, Elastic
-from sbafab.simulators.calculix.run import read_frd, run_ccx
+from sbafab.simulators.calculix import TPE, Elastic, read_frd, run_ccx
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

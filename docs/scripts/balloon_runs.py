@@ -25,8 +25,7 @@ from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
 from sbafab.models.rim_correction import free_shapes
-from sbafab.simulators.calculix.deck import deck_settings
-from sbafab.simulators.calculix.run import simulate
+from sbafab.simulators.calculix import deck_settings, simulate
 
 PATH = FOLDER / "balloons.csv"
 PRESSURES = (0.5, 2.0, 6.0, 10.0)

@@ -19,8 +19,7 @@ from docs.scripts.measured import Record, keep, record
 from docs.scripts.tables import Table
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
-from sbafab.simulators.calculix.deck import deck_settings
-from sbafab.simulators.calculix.run import State, simulate
+from sbafab.simulators.calculix import State, deck_settings, simulate
 
 COMMAND = "python -m docs.scripts.calculix_runs"
 PICTURE = Path(__file__).parents[1] / "images" / "calculix.svg"

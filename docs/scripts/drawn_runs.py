@@ -28,8 +28,18 @@ from docs.scripts.tables import Table
 from sbafab.errors import OutputError
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
 from sbafab.runtime import Progress
-from sbafab.simulators.calculix.deck import JOB, RING, DeckSettings, Procedure, deck_settings
-from sbafab.simulators.calculix.run import DIVERGED, SAME_TIME, deck_mesh, read_frd, simulate
+from sbafab.simulators.calculix import (
+    DIVERGED,
+    JOB,
+    RING,
+    SAME_TIME,
+    DeckSettings,
+    Procedure,
+    deck_mesh,
+    deck_settings,
+    read_frd,
+    simulate,
+)
 from sbafab.simulators.simulator import Result, SimulationRequest
 
 COMMAND = "python -m docs.scripts.drawn_runs"

@@ -15,7 +15,7 @@ import sbafab
 from docs.scripts.measured import Record, keep, record, texts, versions
 from docs.scripts.tables import Table
 from sbafab.runtime import ignore_progress
-from sbafab.simulators.mujoco.run import run
+from sbafab.simulators.mujoco import run
 from sbafab.simulators.simulator import Result, SimulationRequest
 
 COMMAND = "python -m docs.scripts.mujoco_runs"

@@ -22,8 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sbafab.simulators.calculix.deck import TPE
-from sbafab.simulators.calculix.run import SAME_TIME, read_frd, run_ccx
+from sbafab.simulators.calculix import SAME_TIME, TPE, read_frd, run_ccx
 
 JOB = "sector"
 PRESSURES = (0.1, 0.15, 0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 10.0)

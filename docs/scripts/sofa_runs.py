@@ -22,10 +22,10 @@ from docs.scripts.axisymmetric import MeridianSection, axisymmetric_strokes
 from docs.scripts.measured import Record, keep
 from docs.scripts.tables import Table
 from sbafab.runtime import ignore_progress
+from sbafab.simulators import sofa as scene_files
 from sbafab.simulators.shell_model import Shell, round_stack
 from sbafab.simulators.simulator import Result, SimulationRequest
-from sbafab.simulators.sofa import run as scene_files
-from sbafab.simulators.sofa.run import run
+from sbafab.simulators.sofa import run
 
 COMMAND = "python -m docs.scripts.sofa_runs"
 PROGRAMS = {"SOFA": "25.06", "CalculiX": "2.20"}

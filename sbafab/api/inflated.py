@@ -23,7 +23,7 @@ from sbafab.reports.solid_pictures import (
     write_flat_picture,
     write_picture,
 )
-from sbafab.simulators.mujoco.mjcf import chain_text
+from sbafab.simulators.mujoco_chain import chain_text
 from sbafab.spreadsheet import csv_text
 
 MAP = ("balloon", "pressure_kpa", "height_mm", "force_mn", "volume_ul", "potential_uj")

@@ -40,7 +40,7 @@ SIMULATORS = Plugins(
     plugins.SIMULATORS,
     "simulator",
     ModuleType,
-    {name: f"sbafab.simulators.{name}.run" for name in ("calculix", "sofa", "mujoco")},
+    {name: f"sbafab.simulators.{name}" for name in ("calculix", "sofa", "mujoco")},
 )
 """The modules of all simulators by name, each a ``Simulator``."""
 NAMES = tuple(SIMULATORS)
@@ -664,8 +664,11 @@ def tilt_of(flat: Floats, points: Floats) -> float | None:
 # Files of models from templates.
 
 
+TEMPLATES = Path(__file__).parent / "templates"
+
+
 def model_file(
-    template: Path,
+    template: str,
     name: str,
     finish: Callable[[ET.Element], None] = lambda root: None,
     **values: object,
@@ -684,14 +687,19 @@ def model_file(
     return f"{head}{end}{ET.tostring(root, encoding='unicode')}\n"
 
 
-def rendered(template: Path, **values: object) -> str:
+def rendered(template: str, **values: object) -> str:
     """Return a template with its values; the filter ``numbers`` is the function of that name."""
-    return _environment(template.parent).get_template(template.name).render(values)
+    return _environment().get_template(template).render(values)
+
+
+def template_text(name: str) -> str:
+    """Return a file beside the templates, which has no values."""
+    return (TEMPLATES / name).read_text("utf-8")
 
 
 @cache
-def _environment(folder: Path) -> Environment:
-    templates = environment(folder)
+def _environment() -> Environment:
+    templates = environment(TEMPLATES)
     templates.filters |= {"numbers": numbers, "shown": lambda value, digits: f"{value:.{digits}g}"}
     return templates
 

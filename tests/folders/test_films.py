@@ -20,10 +20,10 @@ from sbafab.folders.check import check_folder
 from sbafab.folders.run import Run, RunRequest, generate
 from sbafab.pressing.schedule import schedule
 from sbafab.rules.deck import has_failed
-from sbafab.simulators.calculix.deck import deck_settings
-from sbafab.simulators.mujoco.run import model_text
+from sbafab.simulators.calculix import deck_settings
+from sbafab.simulators.mujoco import model_text
 from sbafab.simulators.shell_model import coarse_shell, round_stack, why_not_round
-from sbafab.simulators.sofa.run import why_not
+from sbafab.simulators.sofa import why_not
 
 FILMS = """
 [films.tpu50]

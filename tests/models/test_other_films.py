@@ -14,7 +14,7 @@ from sbafab.models.figures import EXTRAPOLATION, Prediction, PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import Quantity
 from sbafab.models.stack import stack
-from sbafab.simulators.calculix.deck import deck_settings
+from sbafab.simulators.calculix import deck_settings
 from sbafab.simulators.shell_model import coarse_shell, round_stack
 
 TPU = ("films.tpe.product=TPU 85A", "films.tpe.thickness=0.05")

@@ -11,7 +11,7 @@ import pytest
 
 import sbafab
 from sbafab.models.balloon import Balloon, inflate
-from sbafab.simulators.calculix.run import read_frd, run_ccx
+from sbafab.simulators.calculix import read_frd, run_ccx
 
 SMOOTH = Balloon(wrinkles=False)
 THICK = replace(SMOOTH, thickness=0.050, modulus=40_000.0)

@@ -12,8 +12,7 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
 from sbafab.meshing.conforming.mesh import Mesh
-from sbafab.simulators.calculix.deck import DeckSettings, deck_settings, started, write_deck
-from sbafab.simulators.calculix.run import deck_mesh
+from sbafab.simulators.calculix import DeckSettings, deck_mesh, deck_settings, started, write_deck
 
 pytest.importorskip("netgen")
 

@@ -16,16 +16,19 @@ from docs.scripts.measured import record
 from sbafab.actuators import build, load_design
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.meshing.conforming.mesh import Mesh
-from sbafab.simulators.calculix.deck import DeckSettings, deck_settings, started, write_deck
-from sbafab.simulators.calculix.run import (
+from sbafab.simulators.calculix import (
+    DeckSettings,
     Frame,
     deck_mesh,
+    deck_settings,
     films_meet,
     find_ccx,
     history,
     read_frd,
     run_ccx,
     simulate,
+    started,
+    write_deck,
 )
 from sbafab.simulators.simulator import SimulationRequest
 

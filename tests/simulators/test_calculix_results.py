@@ -14,8 +14,8 @@ from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
 from sbafab.meshing.conforming.mesh import Mesh
-from sbafab.simulators.calculix.deck import DeckSettings
-from sbafab.simulators.calculix.run import (
+from sbafab.simulators.calculix import (
+    DeckSettings,
     Frame,
     deck_mesh,
     history,

@@ -18,8 +18,8 @@ from sbafab.actuators import build, load_design
 from sbafab.cli import app
 from sbafab.errors import OutputError, VoidError
 from sbafab.meshing.conforming.layup import MeshSettings
-from sbafab.simulators.calculix.deck import DeckSettings
-from sbafab.simulators.calculix.run import (
+from sbafab.simulators.calculix import (
+    DeckSettings,
     deck_mesh,
     run_ccx,
     simulate,
@@ -159,9 +159,9 @@ def test_a_run_of_hours_is_warned_of_before_it(
         simulate(small, MeshSettings(0.75), settings, tmp_path / "run", 60, lambda *_: None)
     mesh = deck_mesh(small, MeshSettings(0.75))
     large = replace(mesh, points=np.zeros((127_618 * 3, 3)))
-    monkeypatch.setattr("sbafab.simulators.calculix.run.deck_mesh", lambda *_: large)
-    monkeypatch.setattr("sbafab.simulators.calculix.run.write_deck", lambda *_: None)
-    monkeypatch.setattr("sbafab.simulators.calculix.run.started", lambda *_: large)
+    monkeypatch.setattr("sbafab.simulators.calculix.deck_mesh", lambda *_: large)
+    monkeypatch.setattr("sbafab.simulators.calculix.write_deck", lambda *_: None)
+    monkeypatch.setattr("sbafab.simulators.calculix.started", lambda *_: large)
     with pytest.warns(UserWarning, match="not end in an hour") as told, pytest.raises(OutputError):
         simulate(small, MeshSettings(0.75), settings, tmp_path / "run", 60, lambda *_: None)
     (hours,) = re.findall(r"take (\S+) hours, right within", str(told[0].message))

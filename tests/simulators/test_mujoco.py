@@ -16,8 +16,8 @@ import pytest
 import sbafab
 from sbafab.errors import OutputError
 from sbafab.runtime import ignore_progress
-from sbafab.simulators.mujoco import run as of_mujoco
-from sbafab.simulators.mujoco.run import export, inflate, run, shell_of, why_not
+from sbafab.simulators import mujoco as of_mujoco
+from sbafab.simulators.mujoco import export, inflate, run, shell_of, why_not
 from sbafab.simulators.shell_model import round_stack
 from sbafab.simulators.simulator import Result, SimulationRequest
 from tests.quick import few

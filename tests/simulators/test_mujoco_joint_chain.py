@@ -10,7 +10,7 @@ import pytest
 
 import sbafab
 from sbafab.models.stack import Stack
-from sbafab.simulators.mujoco.mjcf import ACCURACY, JOINTS, chain_text, joint_values, length_of
+from sbafab.simulators.mujoco_chain import ACCURACY, JOINTS, chain_text, joint_values, length_of
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 

@@ -26,7 +26,7 @@ from sbafab.simulators.simulator import (
     run_program,
     tilt_of,
 )
-from sbafab.simulators.sofa.run import read_log, run, scenes_of
+from sbafab.simulators.sofa import read_log, run, scenes_of
 from tests.simulators.conftest import StandIn
 
 SOFA = """

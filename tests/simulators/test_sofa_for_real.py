@@ -12,7 +12,7 @@ import sbafab
 from sbafab.laminate.laminate import Laminate
 from sbafab.runtime import ignore_progress
 from sbafab.simulators.simulator import Result, SimulationRequest
-from sbafab.simulators.sofa.run import run
+from sbafab.simulators.sofa import run
 
 pytestmark = pytest.mark.skipif(shutil.which("runSofa") is None, reason="runSofa is not installed")
 

@@ -16,7 +16,7 @@ import pytest
 import sbafab
 from sbafab.errors import DesignError
 from sbafab.simulators.simulator import SimulationRequest
-from sbafab.simulators.sofa.run import (
+from sbafab.simulators.sofa import (
     conforming_shell,
     export,
     scenes_of,

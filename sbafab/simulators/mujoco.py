@@ -40,10 +40,10 @@ from sbafab.simulators.simulator import (
     model_file,
     refuse_time,
     run_model,
+    template_text,
     write_files,
 )
 
-TEMPLATES = Path(__file__).parent / "templates"
 MODEL, DATA, PYTHON = "actuator.xml", "actuator.json", "inflate.py"
 DT = 0.01
 """Time step, s. The integrator is implicit; a step four times as long works too."""
@@ -98,7 +98,7 @@ def model_text(
         flex = {"name": name, "colour": colour, "nodes": nodes.tolist(), "elements": elements}
         flexes.append({**flex, "thickness": FILMS[group.name] * stack.film.thickness})
     return model_file(
-        TEMPLATES / f"{MODEL}.j2",
+        f"{MODEL}.j2",
         stack.name,
         stack=stack,
         sectors=sectors,
@@ -164,7 +164,7 @@ def export(
     texts = {
         MODEL: model_text(stack, shell, pressures, sectors),
         DATA: json.dumps(data, separators=(",", ":")) + "\n",
-        PYTHON: (TEMPLATES / f"{PYTHON}.txt").read_text("utf-8"),
+        PYTHON: template_text(f"{PYTHON}.txt"),
     }
     write_files(texts, folder)
     return RecordedFilms(laminate, shell, shell.poles, pressures, pressures.values())

@@ -8,7 +8,6 @@ plates stand as in ``stack_loads.plate_chain`` up to the third order of a level'
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from sbafab.models.stack import GRAVITY, Pose, Stack
 from sbafab.models.stack_loads import plate_chain
 from sbafab.simulators.simulator import model_file
 
-TEMPLATE = Path(__file__).parent / "templates" / "chain.xml.j2"
 ACCURACY = 0.02
 """Largest error of the tip's position, as a share of the stack's length."""
 LINEAR_SHARE = 0.9
@@ -68,7 +66,7 @@ def chain_text(name: str, stack: Stack, pressures: Sequence[float]) -> str:
     center = np.array(pose.pressures)[:, None]
     ends = np.clip(center + np.array([-span, span]), 0.0, stack.most_pressure) - center
     return model_file(
-        TEMPLATE,
+        "chain.xml.j2",
         name,
         pressures=listed,
         pose=pose,

@@ -50,6 +50,7 @@ from sbafab.simulators.simulator import (
     refuse_time,
     refuse_unknown,
     run_model,
+    template_text,
     write_files,
 )
 
@@ -196,7 +197,6 @@ def _marks(stack: Layup, mesh: Mesh, number: Ints) -> list[int]:
 
 
 SceneName = Literal["shell", "frames", "volume"]
-TEMPLATES = Path(__file__).parent / "templates"
 DATA, PYTHON = "actuator.json", "scene.py"
 
 PLUGINS = {
@@ -240,9 +240,8 @@ class Scene:
         films = self.films
         values = {"dt": self.dt, "ramp": RAMP, "period": PERIOD, "nodes_file": NODES_FILE}
         values |= {"shell": films.shell, "pressures": films.pressures, "record": record}
-        template = TEMPLATES / f"{self.name}.j2"
         name = films.laminate.name
-        return model_file(template, name, _add_plugins, **values, **self.values)
+        return model_file(f"{self.name}.j2", name, _add_plugins, **values, **self.values)
 
 
 def _add_plugins(root: ET.Element) -> None:
@@ -364,7 +363,7 @@ def write_scenes(scenes: Mapping[str, Scene], folder: Path) -> list[Path]:
     """Write the scenes of a design and the files they load; return them, the default one first."""
     texts = {scene.file: scene.text() for scene in scenes.values()}
     texts[DATA] = json.dumps(_data(scenes["shell"]), separators=(",", ":")) + "\n"
-    texts[PYTHON] = (TEMPLATES / f"{PYTHON}.txt").read_text("utf-8")
+    texts[PYTHON] = template_text(f"{PYTHON}.txt")
     return write_files(texts, folder)
 
 

@@ -1,1 +1,0 @@
-"""MuJoCo: a model of a whole actuator made of flexes, and running it."""

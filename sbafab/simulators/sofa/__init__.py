@@ -1,1 +1,0 @@
-"""SOFA: scenes of a whole actuator, and running them where SOFA is installed."""
