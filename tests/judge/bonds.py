@@ -105,42 +105,39 @@ def narrow_places(region: BaseGeometry, limit: float) -> Iterator[tuple[float, f
                 break
 
 
-def _samples(part: Polygon) -> tuple[Array, Array]:
-    """Points along the edges with the normals into the material; at concave corners a fan."""
-    points: list[tuple[float, float]] = []
-    normals: list[tuple[float, float]] = []
-    part = shapely.geometry.polygon.orient(part)
-    for ring in (part.exterior, *part.interiors):
-        _along(np.asarray(ring.coords), points, normals)
-    return np.array(points).reshape(-1, 2), np.array(normals).reshape(-1, 2)
-
-
-def _along(
-    corners: Array,
-    points: list[tuple[float, float]],
-    normals: list[tuple[float, float]],
-) -> None:
-    """The material lies to the left of a ring's corners."""
+def sampled(corners: Array, step: float, with_ends: bool) -> tuple[Array, Array]:
+    """Points along a ring, at most a step apart, with the normals to the left of its edges: with
+    the ends of every edge, or the middles of its steps.
+    """
     ways = np.diff(corners, axis=0)
     lengths = np.hypot(ways[:, 0], ways[:, 1])
     keep = lengths > 1e-7
     starts, ways, lengths = corners[:-1][keep], ways[keep], lengths[keep]
-    headings = np.arctan2(ways[:, 1], ways[:, 0])
-    before_all = np.roll(headings, 1)
-    for number in range(len(starts)):
-        start, way, length = starts[number], ways[number], lengths[number]
-        heading, before = headings[number], before_all[number]
-        count = max(1, math.ceil(length / STEP))
-        inward = (-math.sin(heading), math.cos(heading))
-        for i in range(count + 1):
-            points.append(tuple(start + way * i / count))
-            normals.append(inward)
-        turn = (heading - before + math.pi) % (2 * math.pi) - math.pi
-        if turn < -0.02:  # to the right: the material bulges round a corner of the void
-            for i in range(1, math.ceil(-turn / FAN)):
-                at = before + turn * i / math.ceil(-turn / FAN) + math.pi / 2
-                points.append(tuple(start))
-                normals.append((math.cos(at), math.sin(at)))
+    counts = np.maximum(1, np.ceil(lengths / step)).astype(int)
+    places = [(np.arange(n + 1) if with_ends else np.arange(n) + 0.5) / n for n in counts.tolist()]
+    owner = np.repeat(np.arange(len(counts)), counts + with_ends)
+    left = np.stack([-ways[:, 1], ways[:, 0]], axis=1) / lengths[:, None]
+    return starts[owner] + ways[owner] * np.concatenate(places)[:, None], left[owner]
+
+
+def _samples(part: Polygon) -> tuple[Array, Array]:
+    """Points along the edges with the normals into the material; at concave corners a fan."""
+    part = shapely.geometry.polygon.orient(part)
+    found = []
+    for ring in (part.exterior, *part.interiors):
+        # The material lies to the left.
+        points, normals = sampled(np.asarray(ring.coords), STEP, True)
+        found.append((points, normals))
+        headings = np.arctan2(normals[:, 1], normals[:, 0])
+        before = np.roll(headings, 1)
+        turns = (headings - before + math.pi) % (2 * math.pi) - math.pi
+        for number in np.flatnonzero(turns < -0.02):  # the material bulges round a corner
+            count = math.ceil(-turns[number] / FAN)
+            at = before[number] + turns[number] * np.arange(1, count) / count
+            fan = np.stack([np.cos(at), np.sin(at)], axis=1)
+            found.append((np.tile(points[number], (len(fan), 1)), fan))
+    points, normals = (np.concatenate(columns) for columns in zip(*found, strict=True))
+    return points, normals
 
 
 # Films that face each other in the press with nothing between: they weld there.

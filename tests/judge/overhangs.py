@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from tests.judge.bonds import sampled
 from tests.judge.folder import Folder, Hole, Interface, Layer, pieces
 
 STEP = 0.1
@@ -101,10 +102,10 @@ def _edges(film: Layer, exempt: tuple[Hole, ...], slack: float) -> tuple[Array, 
     for part in map(shapely.geometry.polygon.orient, pieces(film.profile)):
         rings = [part.exterior]
         rings += [ring for ring in part.interiors if not _is_pinned(ring, exempt, slack)]
-        found += [_ring(np.asarray(ring.coords)) for ring in rings]
-    points = np.vstack([points for points, _ in found]) if found else np.empty((0, 2))
-    normals = np.vstack([normals for _, normals in found]) if found else np.empty((0, 2))
-    return points, normals
+        found += [sampled(np.asarray(ring.coords), STEP, False) for ring in rings]
+    points, left = (np.vstack(rows) for rows in zip((np.empty((0, 2)),) * 2, *found, strict=True))
+    # The material lies to the left.
+    return points, -left
 
 
 def _is_pinned(ring: shapely.LinearRing, exempt: tuple[Hole, ...], slack: float) -> bool:
@@ -115,18 +116,3 @@ def _is_pinned(ring: shapely.LinearRing, exempt: tuple[Hole, ...], slack: float)
         and math.dist(hole.centroid.coords[0], (pin.x, pin.y)) <= slack
         for pin in exempt
     )
-
-
-def _ring(corners: Array) -> tuple[Array, Array]:
-    """The material lies to the left, so that outward is to the right."""
-    ways = np.diff(corners, axis=0)
-    lengths = np.hypot(ways[:, 0], ways[:, 1])
-    keep = lengths > 1e-6
-    starts, ways, lengths = corners[:-1][keep], ways[keep], lengths[keep]
-    counts = np.maximum(1, np.ceil(lengths / STEP)).astype(int)
-    owner = np.repeat(np.arange(len(counts)), counts)
-    first = np.cumsum(counts) - counts
-    share = (np.arange(counts.sum()) - first[owner] + 0.5) / counts[owner]
-    points = starts[owner] + ways[owner] * share[:, None]
-    outward = np.stack([ways[:, 1], -ways[:, 0]], axis=1) / lengths[:, None]
-    return points, outward[owner]
