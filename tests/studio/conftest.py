@@ -17,9 +17,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def link(folder: Path) -> Iterator[str]:
-    (folder / FILE).write_text(DESIGN, encoding="utf-8")
-    with served(folder, FILE) as found:
+def link(folder: Path, request: pytest.FixtureRequest) -> Iterator[str]:
+    """Of a studio that shows the DESIGN of a module in its FILE, or those of browsing."""
+    file, design = (getattr(request.module, k, v) for k, v in (("FILE", FILE), ("DESIGN", DESIGN)))
+    (folder / file).write_text(design, encoding="utf-8")
+    with served(folder, file) as found:
         yield found
 
 
@@ -30,8 +32,8 @@ def chrome() -> Iterator[Any]:
 
 
 @pytest.fixture(scope="module")
-def tab(chrome: Any) -> Iterator[Watched]:
-    watched = Watched(chrome, "about:blank")
+def tab(chrome: Any, request: pytest.FixtureRequest) -> Iterator[Watched]:
+    watched = Watched(chrome, "about:blank", **getattr(request.module, "VIEW", {}))
     yield watched
     watched.close()
 

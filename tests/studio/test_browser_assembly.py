@@ -11,23 +11,15 @@ import pytest
 
 from sbafab import api
 from sbafab.assemblies.shapes import placed_surface
-from tests.studio.browsing import BROWSED, Watched, colours, picture, served, share_changed
+from tests.studio.browsing import BROWSED, Watched, colours, picture, share_changed
 
 pytestmark = BROWSED
-BRACE = api.template("brace")
-
-
-@pytest.fixture(scope="module")
-def served_brace(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
-    folder = tmp_path_factory.mktemp("assembly")
-    (folder / "brace.toml").write_text(BRACE, encoding="utf-8")
-    with served(folder, "brace.toml") as link:
-        yield link, folder
+DESIGN, FILE = api.template("brace"), "brace.toml"
 
 
 @pytest.fixture
-def brace(tab: Watched, served_brace: tuple[str, Path]) -> Iterator[Watched]:
-    tab.load(served_brace[0])
+def brace(tab: Watched, link: str) -> Iterator[Watched]:
+    tab.load(link)
     current(tab)
     yield tab
     assert tab.complaints == []
@@ -115,9 +107,7 @@ def test_an_error_stands_at_the_part_it_is_about(brace: Watched) -> None:
     assert brace.page.locator(".row.bad").count() == 0
 
 
-def test_a_part_is_opened_saved_and_put_back(
-    brace: Watched, served_brace: tuple[str, Path]
-) -> None:
+def test_a_part_is_opened_saved_and_put_back(brace: Watched, folder: Path) -> None:
     page = brace.page
     brace.say("studio.edit([['parts.arm.set.stack.balloons', '4']])")
     current(brace)
@@ -134,7 +124,7 @@ def test_a_part_is_opened_saved_and_put_back(
     current(brace)
     assert brace.say("studio.values.parts.arm.set") in ({}, None)
     assert brace.say(kept) == 0
-    found = api.loads(brace.say("studio.text"), served_brace[1] / "brace.toml")
+    found = api.loads(brace.say("studio.text"), folder / "brace.toml")
     arm = api.assemble(found)["arm"].made  # type: ignore[arg-type]
     assert arm is not None
     assert arm.laminate.balloons == 4
@@ -160,7 +150,7 @@ def test_the_plan_is_cut_open_and_the_cut_is_the_parts_own(brace: Watched) -> No
     assert share_changed(whole, picture(brace, "#view-plan .surface")) > 0.05
     label = view.locator("svg[role=img]").get_attribute("aria-label") or ""
     # Through the axis: two walls of a tube of 15 by 11 mm, 40 mm long; a line of 1.04 and 0.4 mm.
-    tube = api.loads(BRACE).parts["tube"]  # type: ignore[union-attr]
+    tube = api.loads(DESIGN).parts["tube"]  # type: ignore[union-attr]
     wall = (tube.outer_diameter - tube.inner_diameter) * tube.length
     (area,) = re.findall(r"tube ([0-9.]+) mm", label)
     assert float(area) == pytest.approx(wall, rel=0.005)

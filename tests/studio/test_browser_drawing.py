@@ -14,33 +14,17 @@ from typing import Any
 import pytest
 
 from sbafab import api
-from tests.studio.browsing import BROWSED, Watched, served
+from tests.studio.browsing import BROWSED, Watched
 
 pytestmark = BROWSED
-POUCH = api.template("pouch")
-FILE = "pouch.toml"
-
-
-@pytest.fixture(scope="module")
-def drawing_link(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
-    folder = tmp_path_factory.mktemp("drawn")
-    (folder / FILE).write_text(POUCH, encoding="utf-8")
-    with served(folder, FILE) as link:
-        yield link, folder
-
-
-@pytest.fixture(scope="module")
-def tab(chrome: Any) -> Iterator[Watched]:
-    watched = Watched(chrome, "about:blank", viewport={"width": 1280, "height": 800})
-    yield watched
-    watched.close()
+DESIGN, FILE = api.template("pouch"), "pouch.toml"
+VIEW = {"viewport": {"width": 1280, "height": 800}}
 
 
 @pytest.fixture
-def sketch(tab: Watched, drawing_link: tuple[str, Path]) -> Iterator[Sketch]:
+def sketch(tab: Watched, link: str, folder: Path) -> Iterator[Sketch]:
     """The pouch in the view Draw, as its template has it."""
-    link, folder = drawing_link
-    (folder / FILE).write_text(POUCH, encoding="utf-8")
+    (folder / FILE).write_text(DESIGN, encoding="utf-8")
     tab.load(link)
     tab.ready()
     tab.page.get_by_role("tab", name="Draw").click()
@@ -111,7 +95,7 @@ def test_a_dragged_point_snaps_to_the_grid_and_an_edge_becomes_an_arc(sketch: Sk
     assert min(mask) == pytest.approx(40 * 30 + math.pi * 15**2 / 2 + 2 * 9.5, abs=1e-3)
     # Comments and order stay.
     text = sketch.seen.say("studio.text")
-    assert text.splitlines()[:15] == POUCH.splitlines()[:15]
+    assert text.splitlines()[:15] == DESIGN.splitlines()[:15]
     assert "# Bonds of 1 mm beside pocket and strip" in text
 
 
@@ -206,7 +190,7 @@ def test_a_crossing_is_shown_at_its_place_and_undone(sketch: Sketch) -> None:
     sketch.page.keyboard.press("Control+z")
     sketch.seen.ready()
     assert not alert.is_visible()
-    assert sketch.seen.say("studio.text") == POUCH
+    assert sketch.seen.say("studio.text") == DESIGN
 
 
 def test_circles_have_a_diameter_and_any_outline_goes_on_as_points(sketch: Sketch) -> None:

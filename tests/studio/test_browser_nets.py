@@ -6,17 +6,16 @@ These start a server, its workers and a browser, and so run at length (``long``)
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import pytest
 
 from sbafab import api
-from tests.studio.browsing import BROWSED, Watched, colours, picture, served
+from tests.studio.browsing import BROWSED, Watched, colours, picture
 
 pytestmark = BROWSED
 # Two nets, each from a pocket of the lower gap through a hole of the middle film into the upper.
-ROUTED = """
+FILE, VIEW = "routed.toml", {"viewport": {"width": 1280, "height": 800}}
+DESIGN = """
 name = "routed"
 family = "drawn"
 layers = [
@@ -57,28 +56,13 @@ high = {union = ["way-a", "way-b"]}
 LOW = 'low = {union = ["pocket-a", "pocket-b", "strip-a", "strip-b"'
 
 
-@pytest.fixture(scope="module")
-def nets_link(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    folder: Path = tmp_path_factory.mktemp("nets")
-    (folder / "routed.toml").write_text(ROUTED, encoding="utf-8")
-    with served(folder, "routed.toml") as link:
-        yield link
-
-
-@pytest.fixture(scope="module")
-def tab(chrome: Any) -> Iterator[Watched]:
-    watched = Watched(chrome, "about:blank", viewport={"width": 1280, "height": 800})
-    yield watched
-    watched.close()
-
-
 @pytest.fixture
-def nets(tab: Watched, nets_link: str) -> Iterator[Watched]:
+def nets(tab: Watched, link: str) -> Iterator[Watched]:
     """The routed laminate in the view Nets."""
-    tab.load(nets_link)
+    tab.load(link)
     tab.ready()
     tab.page.get_by_role("tab", name="Nets").click()
-    opened(tab, ROUTED)
+    opened(tab, DESIGN)
     yield tab
     assert tab.complaints == []
 
@@ -123,7 +107,7 @@ def test_nets_are_coloured_through_the_stack(nets: Watched) -> None:
 
 
 def test_a_short_is_striped_marked_and_led_to_from_the_rules(nets: Watched) -> None:
-    opened(nets, ROUTED.replace(LOW, LOW + ', "link"'))
+    opened(nets, DESIGN.replace(LOW, LOW + ', "link"'))
     assert {owner for owner, _ in fills(nets)} == {"a b"}
     assert all(fill.startswith("url(#short-") for _, fill in fills(nets))
     assert nets.page.locator("#view-nets .fault-place[data-kind=short]").count() == 1
@@ -149,7 +133,7 @@ def test_a_short_is_striped_marked_and_led_to_from_the_rules(nets: Watched) -> N
 
 
 def test_an_open_is_named_where_the_hole_is_missing(nets: Watched) -> None:
-    opened(nets, ROUTED.replace('["film", "via-a", "via-b"]', '["film", "via-a"]'))
+    opened(nets, DESIGN.replace('["film", "via-a", "via-b"]', '["film", "via-a"]'))
     faults = nets.say("studio.nets.faults")
     assert "open" in {fault["kind"] for fault in faults}
     assert all(fault["nets"] in ([], ["b"]) for fault in faults)
