@@ -30,8 +30,7 @@ from sbafab.search.sweep_report import (
     JOURNAL,
     PAGE,
     Table,
-    refuse_foreign,
-    stale_designs,
+    designs_before,
     sweep_html,
     write_table,
 )
@@ -152,7 +151,7 @@ def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress
     values = designs_of(request)
     folder = out / f"{request.design.name}-sweep"
     with _locked(folder):
-        refuse_foreign(folder / CSV)
+        before = designs_before(folder / CSV)
         with closing(Journal(folder / JOURNAL, request.seconds)) as journal:
             keys = _keys(request, values)
             missing = {
@@ -170,18 +169,16 @@ def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress
             lambda: map(judge, journal.rows(keys)),
             values,
             request.pressures_kpa,
-            is_calibrated=bool(factors_of(request.design).calibration),
-            limited=_labels(request),
+            bool(factors_of(request.design).calibration),
+            _labels(request),
         )
-        gone = stale_designs(folder / CSV, table)
         write_table(table, folder / CSV)
         limit_lines = [f"{row.quantity.label}: {row.bound}" for row in request.requirements]
         page = sweep_html(request.design, request.varied, table, limit_lines)
         replace_text(folder / PAGE, page)
+    files, gone = (CSV, PAGE, JOURNAL), len(before - table.hashes)
     outcomes = dict(table.outcomes)
-    return SweptDesigns(
-        folder, len(values), len(missing), outcomes, (CSV, PAGE, JOURNAL), table, gone
-    )
+    return SweptDesigns(folder, len(values), len(missing), outcomes, files, table, gone)
 
 
 def _measure(

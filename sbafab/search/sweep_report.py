@@ -169,28 +169,20 @@ def write_table(table: Table, path: Path) -> None:
     replace_text(path, csv_text(chain([table.written], table.cells(table.written))))
 
 
-# The tables of an earlier sweep in the folder.
-
-
-def refuse_foreign(path: Path) -> None:
-    """Raises OutputError if there is a table that no sweep has written."""
+def designs_before(path: Path) -> set[str]:
+    """Return the hashes of the designs in a table that is there. Raises OutputError for one that no
+    sweep has written.
+    """
     if not path.exists():
-        return
+        return set()
     with path.open(newline="", encoding="utf-8", errors="replace") as opened:
-        first = opened.readline(200)
-    if not first.startswith(",".join(HEAD)):
-        raise OutputError(
-            f"{path} was not written by sbafab sweep; move it away, or choose another folder "
-            "with -o"
-        )
-
-
-def stale_designs(path: Path, table: Table) -> int:
-    """Return the number of designs in the CSV file at the path that are not in the table."""
-    if not path.exists():
-        return 0
-    with path.open(newline="", encoding="utf-8") as opened:
-        return len({row.get("sha256", "") for row in csv.DictReader(opened)} - table.hashes)
+        if not opened.readline(200).startswith(",".join(HEAD)):
+            raise OutputError(
+                f"{path} was not written by sbafab sweep; move it away, or choose another folder "
+                "with -o"
+            )
+        opened.seek(0)
+        return {row.get("sha256", "") for row in csv.DictReader(opened)}
 
 
 # Pictures of the page: outcomes by the varied keys, and trade-offs.
