@@ -15,6 +15,8 @@ from sbafab.geometry.spatial_index import close_pairs
 
 JOINED = 0.002
 """mm: largest distance of two ends within 1 um of one corner, as cut files promise."""
+TANGENT = 0.1
+"""mm: so near the joint of two edges they may meet again if they are tangent and rounded."""
 
 
 def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
@@ -40,22 +42,21 @@ def check_clear(contours: Sequence[Contour]) -> None:
     for pair in close_pairs([box for contour in contours for box in contour.boxes], EPSILON):
         (first, i), (second, j) = (places[number] for number in pair)
         a, b, count = first.edges[i], second.edges[j], len(first.edges)
-        neighbours = first is second and (i - j) % count in (1, count - 1)
-        # One goes on where the other ends, and neither is more than half a turn: of neighbours,
-        # only those that turn back run along each other.
-        if not neighbours or same_support(a, b.reversed()):
-            _check_edges(a, b, neighbours)
+        _check_edges(a, b, first is second and (i - j) % count in (1, count - 1))
 
 
 def _check_edges(a: Edge, b: Edge, neighbours: bool) -> None:
-    points = meeting_points(a, b)
+    goes_on, turns_back = same_support(a, b), same_support(a, b.reversed())
+    points = [] if neighbours and goes_on else meeting_points(a, b)
+    if neighbours and not turns_back:
+        ends = {a.start, a.end} & {b.start, b.end}
+        points = [p for p in points if min(math.dist(p, end) for end in ends) > TANGENT]
     if not points:
         return
     x, y = points[0]
-    along = same_support(a, b) or same_support(a, b.reversed())
-    if along and max(math.dist(points[0], p) for p in points) > 2 * EPSILON:
+    if (goes_on or turns_back) and max(math.dist(points[0], p) for p in points) > 2 * EPSILON:
         raise OutputError(f"edge drawn twice at x {x:.3f}, y {y:.3f}; remove one.")
-    if not neighbours:
+    if not (neighbours and turns_back):
         raise OutputError(f"contours touch or cross at x {x:.3f}, y {y:.3f}; part them.")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from io import StringIO
@@ -19,7 +20,8 @@ from sbafab.cutting.dxf_read import _as_written, read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Line, Point
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import Arc, Line, Point
 from sbafab.geometry.region import Region, disc
 from tests.quick import few
 
@@ -328,3 +330,14 @@ def test_circles_that_just_touch_are_refused(centre: float) -> None:
             check_clear([*disc((0, 0), 1.0).contours, *small.contours])
     small = disc((centre + way * 1e-4, 0.0), 0.5)
     check_clear([*disc((0, 0), 1.0).contours, *small.contours])
+
+
+def test_an_edge_that_crosses_the_one_before_it_is_refused() -> None:
+    """A line along y = 0 to x = 1, and an arc round (0.5, 0.2) from there back over x = 0."""
+    radius, past = math.hypot(0.5, 0.2), math.atan2(-0.2, -0.5) - math.radians(30)
+    end = 0.5 + radius * math.cos(past), 0.2 + radius * math.sin(past)
+    arc = Arc((1.0, 0.0), end, (0.5, 0.2), radius, ccw=False)
+    corners = [end, (-1.0, 1.0), (-1.0, 0.0), (1.0, 0.0)]
+    lines = [Line(a, b) for a, b in pairwise(corners)]
+    with pytest.raises(OutputError, match=r"contours touch or cross at x -?0\.000, y -?0\.000"):
+        check_clear([Contour((arc, *lines))])
