@@ -37,7 +37,6 @@ SOFT_PLATES = (1e3, 1e4, 1e5)
 """Stiffness in mN/mm of an outer plate in the first solutions."""
 ROUGH_STEP = 1e-3
 """Last step (mm, rad) against a soft plate."""
-MOST_STEPS, SOFT_STEPS = 300, 60
 RIM_POINTS = 24
 """Least number of points round a level's outline where its rims may meet the next level's."""
 LOADS: dict[str, Any] = {"tip_load": (0.0, 0.0, 0.0), "gravity": False, "plate": None}
@@ -52,7 +51,8 @@ class Plate:
     """An outer plate that the tip may push on: through ``point`` (mm), ``normal`` pointing away.
 
     ``Plate.at(height)`` lies level. With ``sticks`` friction holds the middle of the tip on the
-    line through the point along the normal; without, it slides along the plate.
+    line through the point along the normal, also above or below the plate; without, it slides along
+    the plate.
     """
 
     point: tuple[float, float, float]
@@ -409,7 +409,7 @@ class Column:
         some, p = springs.at(rest), pressures[rest]
         for stiffness in SOFT_PLATES:
             softer = load._replace(stiffness=stiffness)
-            at = self._balanced(some, p, softer, at, ROUGH_STEP, SOFT_STEPS).freedoms
+            at = self._balanced(some, p, softer, at, ROUGH_STEP).freedoms
         last = self._balanced(some, p, load, at)
         return last if start is None else states.replaced(rest, last)
 
@@ -420,7 +420,6 @@ class Column:
         load: Load | None,
         start: Array,
         enough: float = 0.0,
-        most: int = MOST_STEPS,
     ) -> BatchPoses:
         """Return the ``descent`` of freedoms (n, rows, 3)."""
 
@@ -430,7 +429,7 @@ class Column:
             return now.value, now.gradient, now.matrix, now.push
 
         is_at_plate = load is not None and load.wall is not None
-        at, pushes, *which = descent(energies, start, enough, most, is_at_plate)
+        at, pushes, *which = descent(energies, start, enough, is_at_plate)
         freedoms = at[:, self.levels] if load is None else at
         return BatchPoses(self, load, pressures, freedoms, pushes, *which)
 

@@ -48,6 +48,8 @@ DAMPING = 1e-3
 LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e3
 PLATE_DAMPING = 1e-4
 """Damping against an outer plate, a mm away from the place."""
+UNSTABLE = 1e6
+"""mm by which an unstable pose counts as farther away, so that any stable one is preferred."""
 STILL = 1e-6
 """Step (mm, rad, asinh) that counts as no change."""
 TOGETHER = 128
@@ -71,7 +73,7 @@ def reached(
 
 class Search:
     """The ``best`` poses of a column under a load for places (n, 3), with coordinates of pressures
-    up to ``most``; how far ``away`` (n) their tips are in mm, and where the search is over.
+    up to ``most``; how far ``away`` (n) their tips count in mm, and where the search is over.
     """
 
     def __init__(self, column: Column, load: Load | None, places: Array, most: float) -> None:
@@ -212,6 +214,7 @@ class Search:
         """Keep states for some of the places if they are nearer."""
         missing = self.places[which] - states.tips
         away = np.where(states.is_met, np.linalg.norm(missing, axis=-1), math.inf)
+        away += np.where(states.is_stable, 0.0, UNSTABLE)
         is_end = away < NEAR
         if self.wall is not None:
             along = np.linalg.norm(movable(self.wall, missing), axis=-1)
@@ -225,7 +228,9 @@ class Search:
         self.is_over |= self.away < MET
 
     def _refuse_missed(self) -> None:
-        """Raise UnreachableError for the first place that is not met."""
+        """Raise UnreachableError for the first place that no pose meets, stable or not."""
+        is_unstable = np.isfinite(self.away) & ~self.best.is_stable
+        self.away[is_unstable] -= UNSTABLE
         self._settle_for_met()
         for number in self.rest[:1].tolist():
             away, place = float(self.away[number]), self.places[number]
@@ -258,7 +263,7 @@ class Search:
 
 def further_starts(guess: Array, most: float) -> list[Array]:
     """Return starts all over the range, the nearer to the middle the earlier: (n, chambers)."""
-    shares = [np.full(guess.shape[-1], share) for share in (0.6, 0.85, 0.3)]
+    shares = [np.full(guess.shape[-1], share) for share in (0.6, 0.85, 0.3, 0.1)]
     for one in np.eye(guess.shape[-1]):
         shares += [0.3 + 0.6 * one, 0.9 - 0.6 * one]
     return [np.zeros(guess.shape) + share * most for share in shares]

@@ -14,7 +14,7 @@ LARGEST_MOVE = np.array([0.4, 0.15, 0.15])
 """Largest rise (mm) and tilts (rad) in one step."""
 FINE = 5e-8
 """Error (mm, rad) at which a descent ends; those of all levels add up."""
-HALVINGS = 14
+MOST_STEPS, HALVINGS = 300, 14
 RESIDUAL = 1e-7
 """Tolerance of the residual, mN or mN mm."""
 
@@ -23,7 +23,6 @@ def descent(
     energies: Callable[[Any, Array], tuple[Array, ...]],
     start: Array,
     enough: float,
-    most: int,
     is_at_plate: bool,
 ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return the equilibria downhill of freedoms (n, rows, 3), once their errors are below ``FINE``
@@ -38,9 +37,9 @@ def descent(
     is_stable, is_found = np.zeros((2, count), dtype=bool)
     live, at, before = np.arange(count), start, np.full(count, FINE)
     now = energies(live, at)
-    for _ in range(most if count else 0):
+    for _ in range(MOST_STEPS if count else 0):
         value, gradient, matrix, push = now
-        flat = newton_step(gradient, matrix, is_at_plate)
+        flat = newton_step(gradient, matrix)
         move, slope = flat.reshape(at.shape), (flat * gradient).sum(-1)
         largest = np.abs(flat).max(1)
         is_still = np.abs(gradient).max(1) < RESIDUAL * (1 + 1e-3 * push)
@@ -82,15 +81,12 @@ def descent(
     return equilibria, pushes, is_stable, is_found
 
 
-def newton_step(gradient: Array, matrix: Array, is_strict: bool) -> Array:
+def newton_step(gradient: Array, matrix: Array) -> Array:
     """Return Newton's steps (n, freedoms) by gradients and second derivatives (n, groups, size,
-    size): descent directions even where these are not positive definite, and where that leads
-    uphill or, ``is_strict``, anywhere not towards a saddle.
+    size), made definite: downhill, and never towards a saddle.
     """
     slopes = gradient.reshape(matrix.shape[:3])
-    step = -np.linalg.solve(matrix, slopes[..., None])[..., 0]
-    if is_strict or not ((step * slopes).sum(-1) < 0).all():
-        step = -np.linalg.solve(definite(matrix), slopes[..., None])[..., 0]
+    step = -np.linalg.solve(definite(matrix), slopes[..., None])[..., 0]
     return np.asarray(step.reshape(gradient.shape))
 
 

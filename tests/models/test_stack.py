@@ -15,7 +15,7 @@ from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.elastic import blocked_force, pose_bent_by
 from sbafab.models.figures import Factors
 from sbafab.models.rim_correction import free_shapes
-from sbafab.models.stack import Plate, Stack, stack
+from sbafab.models.stack import Plate, Stack, StackBatch, stack
 from sbafab.models.stack_loads import WALL_RIM, energy
 
 LOADS: dict[str, dict[str, Any]] = {
@@ -342,3 +342,38 @@ def test_following_a_path_ends_where_a_fresh_start_does(three: Stack) -> None:
     fresh = three.pose((5, 4, 1), **load)  # type: ignore[arg-type]
     assert followed.tip == pytest.approx(fresh.tip, abs=1e-4)
     assert followed.volumes == pytest.approx(fresh.volumes, rel=1e-5)
+
+
+def test_a_tall_column_under_load_stands_alone_as_it_does_among_others() -> None:
+    """Newton's steps alone would end on a saddle beside it (found by another program)."""
+    column = sbafab.stack("1dof-10mm", {"stack.balloons": 19, "chamber.diameter": 10.35})
+    tip_load, gravity = (0.000798, 0.000145, -0.001776), (-0.4935, -0.514, -0.7016)
+    alone = column.pose((0.6336,), tip_load, gravity)
+    pressures = [[0.6336], [1.0], [0.3], [5.0], [0.05], [12.0]]
+    among = StackBatch(column).poses(pressures, tip_load=tip_load, gravity=gravity)
+    assert alone.stable
+    assert alone.tip == pytest.approx(among.tips[0], abs=1e-4)
+    # What the other program found: the gradient of its own energy is 0 there.
+    assert alone.tip == pytest.approx((-2.96, -19.69, -10.09), abs=0.01)
+
+
+def test_a_tall_column_meets_a_plate_that_it_sticks_to() -> None:
+    column = sbafab.stack("1dof-5mm", {"stack.balloons": 19, "chamber.diameter": 9.27})
+    plate = Plate((1.5, -3.61, 32.987), (-0.037, -0.0946, 0.9948))
+    pose = column.pose((9.37964,), plate=plate)
+    assert pose.stable
+    assert pose.force > 0
+
+
+def test_a_stable_pose_is_preferred_where_an_unstable_one_is_at_the_place() -> None:
+    column = sbafab.stack("1dof-5mm", {"stack.balloons": 11, "chamber.diameter": 8.8})
+    load: dict[str, Any] = {
+        "tip_load": (-0.000141, 0.00609, 0.006814),
+        "plate": Plate((0.64, -0.554, 8.858), (-0.0004, -0.0029, 1.0)),
+    }
+    for pressure in (9.32286, 18.75875):
+        pose = column.pose((pressure,), **load)
+        reached = column.reach(pose.tip, **load)
+        assert pose.stable
+        assert reached.stable
+        assert reached.tip == pytest.approx(pose.tip, abs=1e-3)
