@@ -26,6 +26,7 @@ from sbafab.folders.check import check_folder
 from sbafab.folders.manifest import file_hashes
 from sbafab.folders.run import RunRequest, generate
 from sbafab.geometry.contour import Contour
+from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.rules.rule import Explanation, Rule
 from tests.folders.doctoring import Doctor
 
@@ -109,6 +110,21 @@ def test_a_mistake_of_the_program_is_no_finding(doctor: Doctor) -> None:
 def as_designed(folder: Path) -> list[str]:
     found = check_folder(folder)
     return [f.message for f in found if f.rule == "as-designed" and f.verdict == "fail"]
+
+
+def test_conforming_meshes_are_no_fault_of_a_folder(tmp_path: Path) -> None:
+    """Their cavities are surfaces too, which the design alone does not make."""
+    pytest.importorskip("netgen")
+    design = load_design("1dof-5mm", FEW)
+    generate(RunRequest(design, tmp_path, ("cut", "mesh")))
+    filled = MeshSettings(h=0.75, fill_ul=5.0)
+    generate(RunRequest(design, tmp_path, ("mesh",), meshes=filled, formats=("stl",)))
+    doctor = Doctor(tmp_path / "1dof-5mm")
+    assert "mesh/cavity_chamber1_conforming.stl" in doctor.manifest["files"]
+    assert [f.message for f in check_folder(doctor.folder) if f.verdict == "fail"] == []
+    doctor.set_manifest(lambda m: m["meshes"].append({**m["meshes"][0], "file": "mesh/none.stl"}))
+    (told,) = (f.message for f in check_folder(doctor.folder) if f.verdict == "fail")
+    assert "meshes lists mesh/none.stl, which is not in files" in told
 
 
 @pytest.mark.parametrize(
