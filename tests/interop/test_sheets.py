@@ -8,8 +8,9 @@ import math
 import os
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 import ezdxf
 import numpy as np
@@ -17,8 +18,11 @@ import pypdfium2
 import pytest
 import shapely
 from ezdxf.addons.drawing import Frontend, RenderContext, layout, svg
+from numpy.typing import NDArray
 from PIL import Image
 from pyogrio import raw
+from svgelements import SVG, Move, PathSegment, Shape
+from svgelements import Path as SvgPath
 
 from sbafab.cutting.beam_paths import beam_runs
 from sbafab.cutting.cut_settings import PLAIN
@@ -28,7 +32,7 @@ from sbafab.cutting.laser_programs import LaserSheet, laser_text
 from sbafab.cutting.sequence import cutting_sequence
 from tests.interop.made import BORDER, EXACT, LENGTH, PROFILES, WIDTH, Sheet, outline_bounds
 from tests.interop.painting import painted
-from tests.interop.svg_contours import svg_contours
+from tests.shared import CHROMIUM, chromium
 
 pytestmark = pytest.mark.usefixtures("fine_arcs")
 
@@ -41,6 +45,50 @@ def program(*names: str) -> str:
     """The path of an installed program; the test is skipped without it."""
     found = next(filter(None, map(shutil.which, names)), None)
     return found or pytest.skip(f"no {names[0]} here")
+
+
+# The contours of an SVG as svgelements reads them, in millimetres.
+
+
+STEPS = 128
+"""Chords a curve of a quarter turn: 3e-5 of a disc's area."""
+CLOSED = 1e-3
+"""mm between the ends of a closed contour; ezdxf rounds every step to an eighth of that."""
+
+
+class Drawing(NamedTuple):
+    """Size of the page in mm, and the closed contours by the colour of their lines."""
+
+    width: float
+    height: float
+    contours: dict[str, list[shapely.Polygon]]
+
+    def areas(self, colour: str) -> list[float]:
+        """In mm2, least first."""
+        return sorted(polygon.area for polygon in self.contours.get(colour, []))
+
+
+def svg_contours(file: Path) -> Drawing:
+    page = SVG.parse(file, ppi=25.4)
+    found: dict[str, list[shapely.Polygon]] = {}
+    for shape in page.elements():
+        if isinstance(shape, Shape):
+            colour = shape.stroke.hex if shape.stroke.value is not None else ""
+            rings = [_points(subpath) for subpath in SvgPath(shape).as_subpaths()]
+            found.setdefault(colour, []).extend(
+                shapely.Polygon(ring) for ring in rings if _closes(ring)
+            )
+    return Drawing(float(page.width), float(page.height), found)
+
+
+def _points(edges: Iterable[PathSegment]) -> NDArray[np.float64]:
+    places = np.linspace(0.0, 1.0, STEPS + 1)
+    drawn = [edge for edge in edges if not isinstance(edge, Move) and edge.length() > 0]
+    return np.concatenate([np.asarray(edge.npoint(places), dtype=float) for edge in drawn])
+
+
+def _closes(ring: NDArray[np.float64]) -> bool:
+    return len(ring) > 2 * (STEPS + 1) and bool(np.hypot(*(ring[0] - ring[-1])) < CLOSED)
 
 
 # Programs that read contours.
@@ -224,25 +272,21 @@ def inkscape_svg(drawing: Path, folder: Path) -> Picture:
     return picture, dots
 
 
-FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run")
-FLAGS += ("--disable-background-networking", "--hide-scrollbars")
-
-
-def chromium(page: Path, folder: Path, finer: int = 4) -> Picture:
-    """What the browser shows of a page, cut to the size of the sheet."""
-    dots = finer * PIXELS_PER_MM
+def shown(page: Path, folder: Path, finer: int = 4) -> Picture:
+    """What Chromium shows of a page, cut to the size of the sheet."""
+    if CHROMIUM is None:
+        pytest.skip("no chromium here")
+    dots, shot = finer * PIXELS_PER_MM, folder / "shot.png"
     window = f"{math.ceil(WIDTH * PIXELS_PER_MM)},{math.ceil(LENGTH * PIXELS_PER_MM)}"
-    command = [program("chromium", "chromium-browser", "google-chrome"), *FLAGS]
-    command += [f"--user-data-dir={folder / 'profile'}", f"--window-size={window}"]
-    command += [f"--force-device-scale-factor={finer}", f"--screenshot={folder / 'shot.png'}"]
-    subprocess.run([*command, page.as_uri()], capture_output=True, timeout=60, check=True)
-    with Image.open(folder / "shot.png") as opened:
+    look = ("--hide-scrollbars", f"--force-device-scale-factor={finer}", f"--screenshot={shot}")
+    chromium(folder, page, f"--window-size={window}", *look)
+    with Image.open(shot) as opened:
         size = (0, 0, round(WIDTH * dots), round(LENGTH * dots))
         return opened.convert("RGB").crop(size), dots
 
 
 def chromium_svg(drawing: Path, folder: Path) -> Picture:
-    return chromium(drawing.with_suffix(".svg"), folder)
+    return shown(drawing.with_suffix(".svg"), folder)
 
 
 @pytest.mark.long
@@ -285,7 +329,7 @@ body { margin: 0 } svg { display: block } g { display: none }
 def test_what_lines_enclose_in_chromium_has_the_area(sheet: Sheet, tmp_path: Path) -> None:
     page = tmp_path / "filled.html"
     page.write_text(FILLED + sheet.picture.read_text(encoding="utf-8"), encoding="utf-8")
-    picture, dots = chromium(page, tmp_path, 8)
+    picture, dots = shown(page, tmp_path, 8)
     red, green, _ = (int(np.asarray(channel).sum(dtype=np.int64)) for channel in picture.split())
     assert (red - green) / 255 / dots**2 == pytest.approx(sheet.film, rel=EXACT)
 

@@ -22,30 +22,12 @@ from sbafab.reports.traveller.page import record_text, traveller_html
 from sbafab.version import GENERATOR
 from tests.quick import few
 from tests.reports.pages import work_of
+from tests.shared import CHROMIUM, chromium
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
-FLAGS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--disable-background-networking",
-    "--no-first-run",
-)
 # Points, as the browser rounds them.
 PAPERS = {"A4": (595, 842), "letter": (612, 792)}
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
-
-
-def chromium(folder: Path, page: Path, *flags: str) -> str:
-    """Opens a page headless and returns what the browser prints to its standard output."""
-    command = [str(CHROMIUM), *FLAGS, f"--user-data-dir={folder / 'profile'}", *flags]
-    done = subprocess.run(
-        [*command, page.as_uri()], capture_output=True, text=True, timeout=60, check=True
-    )
-    return done.stdout
 
 
 @pytest.fixture(scope="module")
