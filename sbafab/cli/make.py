@@ -406,9 +406,9 @@ def _film_text(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], cop
 def simulate(design: Design, as_json: bool, **settings: Any) -> None:
     """Inflate a design in an installed simulator.
 
-    OUT/<name>/calculix/ receives stroke, air volume and wall stress over pressure as a table,
-    and the deformed shape as VTU; OUT/<name>/sofa/ or mujoco/ the input files of
-    the run. result.json holds height, tip, tilt and volumes over time. If a run stops early, its
+    OUT/<name>/calculix/ receives stroke, air volume and wall stress over pressure as a table, and
+    the deformed shape as VTU; OUT/<name>/sofa/ or mujoco/ the input files of the run. result.json
+    holds height, tip, tilt and volumes over time. If a run stops early, its
     results are kept and the exit code is 1. A result that cannot be, such as air below 0, is void:
     the reason is printed, the log is kept beside, and the exit code is 1.
     """
