@@ -174,17 +174,6 @@ class Shapes(NamedTuple):
         return Shapes(*(part[these] for part in self))
 
 
-def distinct(states: Array) -> tuple[Array, NDArray[np.int_]]:
-    """Return the distinct rows of states (n, values), and the index of each row in them: (n,).
-
-    Replaces np.unique, whose import takes as long as computing some balloons.
-    """
-    rows = list(map(tuple, states.tolist()))
-    numbers = {row: number for number, row in enumerate(dict.fromkeys(rows))}
-    unique = np.array(list(numbers)).reshape(-1, states.shape[1])
-    return unique, np.array([numbers[row] for row in rows], dtype=np.int_)
-
-
 class BalloonLoad(NamedTuple):
     """Pressure, half the height between the plates, both (rows,); the hoop stress that wrinkles
     carry, ``cap`` (elements, rows); whether plates hold the necks (``tied``); the rim's ripple.
@@ -484,13 +473,8 @@ def ripples_at(films: Sequence[Balloon], shapes: Sequence[Array]) -> list[Ripple
 
 WAVE_NUMBERS = np.arange(2, 201)
 """Numbers of waves round the rim that are compared."""
-GAUSS_PLACES = np.array([-1.0, -1.0, 0.0, 1.0, 1.0]) * [
-    math.sqrt(5 + far * 2 * math.sqrt(10 / 7)) / 3 for far in (1, -1, 0, -1, 1)
-]
-GAUSS_WEIGHTS = np.array(
-    [(322 - far * 13 * math.sqrt(70)) / 900 if far else 128 / 225 for far in (1, -1, 0, -1, 1)]
-)
-"""Five Gauss points an element, from -1 to 1 (Abramowitz and Stegun, 25.4.30)."""
+GAUSS_POINTS = 5
+"""Points an element at which a rim's integrals are taken."""
 
 
 class Ripple(NamedTuple):
@@ -541,9 +525,10 @@ def _rim_modes(pair: tuple[Balloon, Balloon]) -> tuple[Array, Array, Array]:
     """
     balloon = pair[0]
     nodes = balloon.nodes[balloon.edge :]
-    length = np.diff(nodes)
-    r = nodes[:-1, None] + length[:, None] * (GAUSS_PLACES + 1) / 2
-    area = math.tau * r * length[:, None] * GAUSS_WEIGHTS / 2
+    length = np.diff(nodes)[:, None]
+    places, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    r = nodes[:-1, None] + length * (places + 1) / 2
+    area = math.tau * r * length * weights / 2
     s, n = r - balloon.pocket, WAVE_NUMBERS[:, None, None]
     around = 1 / r - n**2 * s / r**2
     twist = n * (1 / r - s / r**2)

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon import Balloon, Shapes, distinct
+from sbafab.models.balloon import Balloon, Shapes
 from sbafab.models.film_elements import Array
 from sbafab.models.rim_correction import compressed_shapes, free_shapes
 from sbafab.runtime import one_blas_thread
@@ -556,7 +556,7 @@ def holds_at(made: BalloonMap, pressure: Array, height: Array) -> NDArray[np.boo
     """
     base = made.drawn
     places = np.stack([np.maximum(pressure / made.ratio, 0.0), np.maximum(height, FLAT)], -1)
-    unique, back = distinct(places.round(PLACE_DIGITS))
+    unique, back = np.unique(places.round(PLACE_DIGITS), axis=0, return_inverse=True)
     holds, inside = np.zeros(len(unique), bool), unique[:, 1] <= base.most_height
     if inside.any():
         p, h = np.minimum(unique[inside, 0], base.most_pressure), unique[inside, 1]

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sbafab.models.balloon import Balloon, Shapes, distinct, inflate
+from sbafab.models.balloon import Balloon, Shapes, inflate
 from sbafab.models.film_elements import Array
 
 WIDE = 3.8
@@ -82,9 +82,9 @@ def compressed_shapes(
         return shapes
     p, h = np.broadcast_arrays(shapes.pressure, np.asarray(height, dtype=float))
     p = np.maximum(p, LEAST_STRAIN * balloon.membrane_stiffness / balloon.pocket)
-    unique, back = distinct(p[:, None])
+    unique, back = np.unique(p, return_inverse=True)
     rise, power, pull = waves_of(balloon, p)
-    top = inflate(balloon, unique[:, 0]).height[back] * (1 + rise)
+    top = inflate(balloon, unique).height[back] * (1 + rise)
     low = np.minimum(h / top, 1.0)
     eased = pull * top * (low**POWER / POWER + h / top - low)
     falls = pull * top * (1 / 3 + power * rise / (1 + rise)) * (1 - 1 / POWER) * low**POWER
