@@ -217,7 +217,7 @@ class Result(State, schema="sbafab/simulate@2"):
 
 
 class Simulator(Protocol):
-    """Interface of the module ``run`` in a simulator's folder."""
+    """Interface of a simulator's module."""
 
     USES: tuple[str, ...]
 
@@ -225,7 +225,7 @@ class Simulator(Protocol):
         """Return the reason why no input can be made for a laminate, or None."""
 
     def export(self, laminate: Laminate, request: SimulationRequest, folder: Path) -> None:
-        """Write the simulator's input, and every file that it loads."""
+        """Write the simulator's input, and every file that it loads, into a folder that exists."""
 
     def run(
         self, laminate: Laminate, request: SimulationRequest, folder: Path, progress: Progress
