@@ -16,11 +16,11 @@ from sbafab.actuators import load_design
 from sbafab.errors import DesignError
 from sbafab.models import paper
 from sbafab.models.balloon_map import balloon_map
-from sbafab.models.calibration import load_calibration
+from sbafab.models.calibration import PAPER, load_calibration
 from sbafab.models.elastic import blocked_force, pose_bent_by
 from sbafab.models.figures import Factors
 from sbafab.models.stack import Plate, Pose, Stack, stack
-from sbafab.validation.paper_table import PAPER
+from sbafab.validation.evidence import load_evidence
 
 COLUMNS = (
     "section",
@@ -38,7 +38,8 @@ LEAN = 6.0
 """Degrees by which a force sensor might lean."""
 TALLER = 20.0
 """Full height in mm that 25 and 75 % might be of."""
-MEASURED = (*paper.FORCE_3DOF, *(value for _, value in paper.FORCE_BENT))
+BENT = load_evidence(PAPER).curve("force-bent")
+MEASURED = (*(value.value for value in paper.FORCE_3DOF), *BENT.y)
 
 
 def calibrated() -> Factors:
@@ -116,7 +117,7 @@ def _straight(found: Stack, full: float) -> list[float]:
 def _bent(found: Stack, one: Variant) -> Iterator[float]:
     rest = paper.FORCE_KPA if one.all_push else 0.0
     pressed = [paper.FORCE_KPA] * one.pushing + [rest] * (found.chambers - one.pushing)
-    for angle, _ in paper.FORCE_BENT:
+    for angle in BENT.x:
         pose = pose_bent_by(found, one.pushing, angle)
         yield math.nan if pose is None else _held(found, pose, pressed, one.sticks)
 
@@ -140,8 +141,7 @@ def _free(found: Stack) -> Iterator[float]:
 
 def table() -> Table:
     """Return docs/measured/sensitivity.csv: the 3-DoF's variants, then the 1-DoF's."""
-    wanted = [value.value for value in MEASURED]
-    wanted += [paper.FULL_HEIGHT.value, paper.LARGEST_BEND.value]
+    wanted = [*MEASURED, paper.FULL_HEIGHT.value, paper.LARGEST_BEND.value]
     lines = [_cells("3-DoF", "**measured**", wanted)]
     lines += [_cells("3-DoF", name, values) for name, values in rows()]
     wanted = [value.value for value in paper.FORCE_1DOF]

@@ -172,7 +172,7 @@ def _check_name(name: str) -> None:
             f"--name is {api.shown(name)}; use letters, digits, dot, dash and underscore, such "
             "as lab"
         )
-    if name in (api.NONE, *api.shipped_names()):
+    if name in (api.NONE, api.PAPER):
         raise DesignError(
             f"--name is {api.shown(name)}, which stands for another one; give another name"
         )

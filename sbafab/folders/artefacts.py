@@ -41,7 +41,7 @@ from sbafab.folders.swap import SCHEMA
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.formats import MeshFile, Node, write_meshes, write_scene, write_stl
 from sbafab.models.calibration import FILE as CALIBRATION_FILE
-from sbafab.models.calibration import NONE, load_calibration, shipped_names
+from sbafab.models.calibration import NONE, PAPER, load_calibration
 from sbafab.models.figures import Prediction, PredictionDocument
 from sbafab.pressing.cycles import batch_entry
 from sbafab.pressing.schedule_files import PressDocument, press_csv, press_json
@@ -365,7 +365,7 @@ def _design(folder: DesignFolder) -> str:
         (folder.path / KIT_FILE).write_bytes(kit_of(design).text)
         design = design.model_copy(update={"kit": KIT_FILE})
     calibration = design.models.calibration
-    if calibration not in (NONE, *shipped_names()):
+    if calibration not in (NONE, PAPER):
         load_calibration(calibration, design.folder)  # Says what is wrong with it, if anything.
         shutil.copyfile(design.folder / calibration, folder.path / CALIBRATION_FILE)
         models = design.models.model_copy(update={"calibration": CALIBRATION_FILE})

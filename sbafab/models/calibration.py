@@ -40,6 +40,8 @@ from sbafab.models.quantity import Quantity
 FOLDER = Path(__file__).parent / "calibrations"
 NONE: Literal["none"] = "none"
 """The name for using no calibration: films as drawn and bought, without intervals."""
+PAPER = "paper"
+"""The name of the paper's evidence, and of the calibration that ships."""
 FILE = "calibration.toml"
 """A calibration's copy in the output folder of a design."""
 FLAT, BENT = "flat height", "force in bending"
@@ -131,13 +133,6 @@ class SizeRange(Section):
     diameters: _Range | None = None
     thicknesses: _Range
     balloons: _Range
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        for name, ends in self:
-            if ends is not None and ends[0] > ends[1]:
-                raise ValueError(f"has {name} that are not in order; give the least one first")
-        return self
 
     @classmethod
     def of(cls, diameters: Sequence[float], thicknesses: Sequence[float], balloons: int) -> Self:
@@ -233,8 +228,6 @@ class ModelCalibration(Section):
     set_ups: dict[str, dict[str, Annotated[float, Field(ge=0, le=1)]]]
     sizes: dict[str, SizeRange]
     held_out: HeldOut
-    offsets: _Row = (0.0,) * len(GROUPS)
-    joint: Annotated[tuple[_Row, ...] | None, Field(strict=False)] = None
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Self:
@@ -258,8 +251,6 @@ class ModelCalibration(Section):
                 )
         if set(self.discrepancy) != set(GROUPS) or not set(self.sizes) <= set(GROUPS):
             raise ValueError(f"must have a discrepancy, and may have sizes, of {listed(GROUPS)}")
-        if self.held_out.inside > self.held_out.points:
-            raise ValueError("has more held-out points inside than there are")
         return self
 
     @cached_property
@@ -299,89 +290,15 @@ class ModelCalibration(Section):
             moved.append((change, self._factors_at({**self.values, unknown.field: value})))
         return moved
 
-    @cached_property
-    def _joint(self) -> Array:
-        """Covariance (n + groups) of the coordinates, and of what the values of each group miss in
-        common on one actuator.
-        """
-        if self.joint is not None:
-            return np.array(self.joint)
-        count = len(UNKNOWNS)
-        joint = np.diag([0.0] * count + [SHARED * self.discrepancy[each] ** 2 for each in GROUPS])
-        joint[:count, :count] = self.covariance
-        return joint
-
-    def rates(self, group: str, slopes: Sequence[float], size: float = 1.0) -> Array:
-        """Return the rates (n + groups,) of a quantity of a group with these ``slopes`` by the
-        coordinates; left-out ones at the end are 0. ``size`` is the rate by what the group misses:
-        1 for a logarithm, the value for a value.
-        """
-        rates = np.zeros(len(UNKNOWNS) + len(GROUPS))
-        rates[: len(slopes)] = slopes
-        rates[len(UNKNOWNS) + GROUPS.index(group)] = size
-        return rates
-
-    def factor(self, group: str) -> float:
-        """Return the factor by which an actuator's measured values exceed the models'."""
-        return math.exp(self.offsets[GROUPS.index(group)])
-
-    def own_miss(self, group: str, farther: float = 0.0) -> float:
-        """Return the relative standard deviation that the models miss of one value of a group for
-        itself; ``farther`` is assumed off the evidence.
-        """
-        return math.hypot(math.sqrt(1 - SHARED) * self.discrepancy[group], farther)
-
-    def parts(self, rates: Array) -> Array:
-        """Return the variances (m, n + groups) of quantities of these ``rates`` (m, n + groups) by
-        each unknown, and by what the values of a group miss in common.
-        """
-        return np.asarray(rates * (rates @ self._joint))
-
-    def conditioned(self, rates: Array, missed: Array, own: Array) -> ModelCalibration:
-        """Return the calibration of an actuator by values that were measured on it: the logarithms
-        ``missed`` (m,) of measured over predicted ones, their ``rates`` (m, n + groups), and the
-        standard deviations ``own`` (m,) of each for itself, by models and measurement. The normal
-        posterior of a linear model.
-        """
-        joint = self._joint
-        gain = np.linalg.solve(rates @ joint @ rates.T + np.diag(own**2), rates @ joint).T
-        mean = np.array([*self.mean, *self.offsets]) + gain @ missed
-        joint = joint - gain @ rates @ joint
-        count = len(UNKNOWNS)
-        ends = [[u.coordinate(u.least or 1e-9), u.coordinate(u.most)] for u in UNKNOWNS]
-        built = {
-            "mean": np.clip(mean[:count], *np.transpose(ends)).tolist(),
-            "covariance": joint[:count, :count].tolist(),
-            "offsets": mean[count:].tolist(),
-            "joint": joint.tolist(),
-        }
-        return ModelCalibration.model_validate({**self.as_dict(), **built})
-
-    def interval(
-        self,
-        group: str,
-        value: float,
-        slopes: Sequence[float],
-        is_log: bool,
-        share: float = SHARE,
-        farther: float = 0.0,
-    ) -> tuple[float, float]:
-        """Return the interval that holds the measured value with a probability of ``share``.
-
-        ``slopes`` are the slopes of the logarithm of the value (``is_log``) or of the value, by
-        coordinate; ``farther`` is the relative standard deviation assumed off the evidence.
-        """
-        size = 1.0 if is_log else abs(value)
-        rates, own = self.rates(group, slopes, size), size * self.own_miss(group, farther)
-        half = deviations(share) * math.sqrt(float(rates @ self._joint @ rates) + own**2)
-        if is_log:
-            return value * math.exp(-half), value * math.exp(half)
-        return value - half, value + half
-
     def as_dict(self) -> dict[str, Any]:
         """Return the tables of the file."""
-        own = {"offsets", "joint"} if self.joint is None else set()
-        return self.model_dump(mode="json", by_alias=True, exclude_none=True, exclude=own)
+        return self.model_dump(mode="json", by_alias=True, exclude_none=True)
+
+    def moved_to(self, mean: Array, covariance: Array) -> ModelCalibration:
+        """Return the calibration with another posterior of the coordinates."""
+        rows = tuple(map(tuple, covariance.tolist()))
+        posterior = {"mean": tuple(mean.tolist()), "covariance": rows}
+        return ModelCalibration.model_construct(**{**dict(self), **posterior})
 
     def for_films(self, products: Collection[str]) -> ModelCalibration:
         """Return the calibration adapted to films that bond, by their products; if the evidence's
@@ -397,20 +314,13 @@ class ModelCalibration(Section):
             mean[row] = unknown.coordinate(unknown.middle if middle is None else middle)
             covariance[row] = covariance[:, row] = 0.0
             covariance[row, row] = unknown.spread**2
-        changed = {"mean": mean.tolist(), "covariance": covariance.tolist()}
-        return ModelCalibration.model_validate({**self.as_dict(), **changed})
+        return self.moved_to(mean, covariance)
 
 
 @cache
 def deviations(share: float) -> float:
     """Return the half width of the middle ``share`` of a normal distribution, in deviations."""
     return NormalDist().inv_cdf((1 + share) / 2)
-
-
-@cache
-def shipped_names() -> list[str]:
-    """Return the names of the calibrations that ship."""
-    return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
 def load_calibration(
@@ -427,13 +337,12 @@ def load_calibration(
         )
     if name == NONE:
         return None
-    if name in shipped_names():
-        return _shipped(name)
+    if name == PAPER:
+        return _papers()
     path = (folder or Path()) / name
     if not is_file(path):
         raise DesignError(
-            f'{key} = {shown(name)} is neither "none", nor one that ships '
-            f"({', '.join(shipped_names())}), nor a file"
+            f'{key} = {shown(name)} is neither "none", nor one that ships ({PAPER}), nor a file'
             + (" beside the design" if folder else "")
             + "; sbafab calibrate writes one"
         )
@@ -441,8 +350,8 @@ def load_calibration(
 
 
 @cache
-def _shipped(name: str) -> ModelCalibration:
-    return read_calibration(FOLDER / f"{name}.toml")
+def _papers() -> ModelCalibration:
+    return read_calibration(FOLDER / f"{PAPER}.toml")
 
 
 def read_calibration(path: Path) -> ModelCalibration:
@@ -487,16 +396,85 @@ class Reading(NamedTuple):
     figures: Sequence[Figure]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Uncertainty:
     """A calibration for a ``laminate`` of a ``form``, by default like its evidence, with exactly
     ``tip_load`` g on the tip; None if a probe is on it, as in the evidence.
+
+    Of an actuator on which values were ``measured`` it has the mean logarithms by which these
+    exceed the models' values, by group, and the covariance (n + groups) of ``joint``.
     """
 
     calibration: ModelCalibration
     laminate: Laminate | None = None
     form: Form | None = None
     tip_load: float | None = 0.0
+    measured: tuple[Array, Array] | None = None
+
+    @cached_property
+    def joint(self) -> Array:
+        """Covariance (n + groups) of the coordinates, and of what the values of each group miss in
+        common on one actuator.
+        """
+        if self.measured is not None:
+            return self.measured[1]
+        count, missed = len(UNKNOWNS), self.calibration.discrepancy
+        joint = np.diag([0.0] * count + [SHARED * missed[each] ** 2 for each in GROUPS])
+        joint[:count, :count] = self.calibration.covariance
+        return joint
+
+    def factor(self, group: str) -> float:
+        """Return the factor by which an actuator's measured values exceed the models'."""
+        return 1.0 if self.measured is None else math.exp(self.measured[0][GROUPS.index(group)])
+
+    def rates(self, group: str, slopes: Sequence[float], size: float = 1.0) -> Array:
+        """Return the rates (n + groups,) of a quantity of a group with these ``slopes`` by the
+        coordinates; left-out ones at the end are 0. ``size`` is the rate by what the group misses:
+        1 for a logarithm, the value for a value.
+        """
+        rates = np.zeros(len(UNKNOWNS) + len(GROUPS))
+        rates[: len(slopes)] = slopes
+        rates[len(UNKNOWNS) + GROUPS.index(group)] = size
+        return rates
+
+    def own_miss(self, group: str) -> float:
+        """Return the relative standard deviation that the models miss of one value of a group for
+        itself, off the evidence too.
+        """
+        missed = math.sqrt(1 - SHARED) * self.calibration.discrepancy[group]
+        return math.hypot(missed, self.farther(group))
+
+    def interval(
+        self,
+        group: str,
+        value: float,
+        slopes: Sequence[float],
+        is_log: bool,
+        share: float = SHARE,
+    ) -> tuple[float, float]:
+        """Return the interval that holds the measured value with a probability of ``share``;
+        ``slopes`` are those of the logarithm of the value (``is_log``) or of the value, by
+        coordinate.
+        """
+        size = 1.0 if is_log else abs(value)
+        rates, own = self.rates(group, slopes, size), size * self.own_miss(group)
+        half = deviations(share) * math.sqrt(float(rates @ self.joint @ rates) + own**2)
+        if is_log:
+            return value * math.exp(-half), value * math.exp(half)
+        return value - half, value + half
+
+    def conditioned(self, rates: Array, missed: Array, own: Array) -> Uncertainty:
+        """Return what is known of an actuator by values that were measured on it: the logarithms
+        ``missed`` (m,) of measured over predicted ones, their ``rates`` (m, n + groups), and the
+        standard deviations ``own`` (m,) of each for itself, by models and measurement. The normal
+        posterior of a linear model.
+        """
+        gain = np.linalg.solve(rates @ self.joint @ rates.T + np.diag(own**2), rates @ self.joint).T
+        change, joint, count = gain @ missed, self.joint - gain @ rates @ self.joint, len(UNKNOWNS)
+        ends = [[u.coordinate(u.least or 1e-9), u.coordinate(u.most)] for u in UNKNOWNS]
+        mean = np.clip(np.array(self.calibration.mean) + change[:count], *np.transpose(ends))
+        posterior = self.calibration.moved_to(mean, joint[:count, :count])
+        return replace(self, calibration=posterior, measured=(change[count:], joint))
 
     def farther(self, group: str) -> float:
         """Return the relative standard deviation assumed for a group of quantities, off what the
@@ -538,7 +516,7 @@ class Uncertainty:
 
     def _with_tip(self, factors: Factors) -> Factors:
         label = self.calibration.name
-        if self.calibration.joint is not None:
+        if self.measured is not None:
             label += " with values of this actuator"
         if self.tip_load is None:
             return replace(factors, calibration=label)
@@ -561,9 +539,7 @@ class Uncertainty:
         vanished with other factors, such as a force near the end of the stroke.
         """
         value, slopes, is_log = self.slopes(group, value_at, term, may_be_negative)
-        low, high = self.calibration.interval(
-            group, value, slopes, is_log, share, self.farther(group)
-        )
+        low, high = self.interval(group, value, slopes, is_log, share)
         if group == FLAT and self.laminate is not None:
             # From all films flown away to the films as bought.
             folded = folded_height(self.laminate, 1.0, self.calibration.film)
@@ -580,7 +556,7 @@ class Uncertainty:
         """Return a value at the median, its slopes by the coordinates of the unknowns, and True if
         these are of its logarithm; arguments as of ``interval_of``.
         """
-        factor = self.calibration.factor(group)
+        factor = self.factor(group)
         value = factor * value_at(self.factors)
         moved = [
             (change, factor * value_at(of) if change else value) for change, of in self.shifted()
@@ -618,19 +594,18 @@ class Uncertainty:
             term = TERMS.get(reading.figures[0].quantity, "")
             value, slopes, is_log = self.slopes(group, by_factors.__getitem__, term)
             logs = slopes if is_log else [slope / value for slope in slopes]
-            rows.append(self.calibration.rates(group, logs))
+            rows.append(self.rates(group, logs))
             missed.append(math.log(reading.measured / value))
-            own.append(
-                math.hypot(self.calibration.own_miss(group, self.farther(group)), reading.error)
-            )
+            own.append(math.hypot(self.own_miss(group), reading.error))
         rates, misses, alone = np.array(rows), np.array(missed), np.array(own)
         self._refuse_contradictions(readings, rates, misses, alone)
-        return replace(self, calibration=self.calibration.conditioned(rates, misses, alone))
+        return self.conditioned(rates, misses, alone)
 
     def _refuse_contradictions(
         self, readings: Sequence[Reading], rates: Array, missed: Array, own: Array
     ) -> None:
-        variances = self.calibration.parts(rates)
+        # By each unknown, and by what the values of a group miss in common.
+        variances = rates * (rates @ self.joint)
         for reading, miss, part, alone in zip(readings, missed, variances, own, strict=True):
             away = float(miss) / math.sqrt(float(part.sum()) + float(alone) ** 2)
             if abs(away) > CONTRADICTION:

@@ -7,8 +7,9 @@ from __future__ import annotations
 import csv
 import difflib
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
@@ -349,14 +350,19 @@ class PredictionRequest:
 @dataclass(frozen=True, repr=False)
 class Prediction:
     """The prediction of one design; if it is that of an actuator on which values were measured,
-    ``before`` has the figures without these.
+    ``before`` has the figures without these. ``curves`` computes its relations.
     """
 
     asked: PredictionRequest
     figures: tuple[Figure, ...]
-    relations: tuple[Relation, ...]
     left_out: tuple[LeftOut, ...]
     before: tuple[Figure, ...] = ()
+    curves: Callable[[], Iterable[Relation]] = field(default=tuple, compare=False)
+
+    @cached_property
+    def relations(self) -> tuple[Relation, ...]:
+        """The curves, computed when they are first asked for."""
+        return tuple(self.curves())
 
     def figure(self, quantity: Quantity | str, model: str = "", **at: Any) -> Figure:
         """Return the figure of a quantity at conditions (fields of ``Conditions``, those that tell
@@ -421,7 +427,7 @@ class Prediction:
 
     def __repr__(self) -> str:
         omitted = f", {len(self.left_out)} left out" if self.left_out else ""
-        return f"Prediction({len(self.figures)} figures, {len(self.relations)} curves{omitted})"
+        return f"Prediction({len(self.figures)} figures{omitted})"
 
     def _repr_html_(self) -> str:
         rows: list[tuple[str, float | None, str, str, str]] = []

@@ -42,11 +42,6 @@ FORCE_3DOF = tuple(
     Measured(value, error, "N", "Sec. 4.3")
     for value, error in ((4.87, 0.02), (4.07, 0.07), (2.40, 0.03))
 )
-FORCE_BENT = (
-    (30, Measured(3.22, 0.12, "N", "Sec. 4.3")),
-    (60, Measured(1.41, 0.05, "N", "Sec. 4.3")),
-    (90, Measured(0.55, 0.02, "N", "Sec. 4.3")),
-)
 BENDING = (
     (0.56, Measured(30.3, 1.3, "deg", "Sec. 4.6")),
     (0.78, Measured(58.5, 1.2, "deg", "Sec. 4.6")),
@@ -66,14 +61,8 @@ AIR_FLOW = 2500.0
 """ml/min (Sec. 7)."""
 FULL_KPA = 10.0
 """Pressure that counts as full actuation (Sec. 4.5)."""
-WATER_TIME = Measured(0.92, 0.08, "s", "Sec. 4.5")
-AIR_TIME = Measured(0.067, 0.011, "s", "Sec. 4.5")
 MODULUS_1DOF = Measured(35, 0, "kPa", "Sec. 4.4")
 MODULUS_3DOF = Measured(60, 0, "kPa", "Sec. 4.4")
-SUCCESS = Measured(0.9, 0, "", "Sec. 6")
-"""Share of the actuators built that held."""
-WORK = Measured(45.3, 0, "mJ", "Sec. 4.1")
-"""Pneumatic input work at 10 kPa, 6 balloons of d = 10."""
 BURST = Measured(*PAPER_BURST, "kPa", "Sec. 4")
 RADIAL_FULL = Measured(28, 0, "mm", "Sec. 2.1")
 VALID = (
@@ -101,8 +90,6 @@ MISFIT = 0.25
 """Relative error up to which a figure may stand without its measured counterpart."""
 CALIBRATED_MODELS = (*OF_STACK, ModelId.ELASTIC_BALLOON, ModelId.FILMS)
 """Models that a calibration changes; its intervals say how far they may be off."""
-CALIBRATION = "paper"
-"""The calibration of ``Counterpart.calibrated``."""
 
 
 @dataclass(frozen=True)
@@ -235,7 +222,7 @@ def counterpart(
         return None
     if not calibration:
         return row if abs(row.ratio - 1) > MISFIT else None
-    if calibration == CALIBRATION and row.calibrated is not None:
+    if calibration == "paper" and row.calibrated is not None:
         return replace(row, gave=row.calibrated)
     # A calibration changes these models, and its intervals give their possible error.
     return None if set(row.models) & set(CALIBRATED_MODELS) else row

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from typing import NamedTuple
 
@@ -114,18 +115,17 @@ def predict(
     request: PredictionRequest | None = None,
     laminate: Laminate | None = None,
     quick: bool = False,
-    curves: bool = True,
 ) -> Prediction:
-    """Return the figures and ``curves`` of a design of any family; ``quick`` leaves out curves and
-    the elastic stack. If factors are given, intervals are not computed, and figures are not flagged
-    for lying outside the checked part of a balloon's map.
+    """Return the figures of a design of any family, and its curves when these are asked for;
+    ``quick`` leaves out curves and the elastic stack. If factors are given, intervals are not
+    computed, and figures are not flagged for lying outside the checked part of a balloon's map.
 
     Raises DesignError if the design cannot be built, or for pressures, a flow or volumes that
     are out of range.
     """
     asked_request = request or PredictionRequest()
-    uncertainty, wanted = None, asked_request.wanted
-    checks_maps = asked_request.calibration is None and wanted is None
+    uncertainty = None
+    checks_maps = asked_request.calibration is None and asked_request.wanted is None
     try:
         flat = laminate or build(design)
     except GeometryError as error:
@@ -156,8 +156,6 @@ def predict(
     if uncertainty is not None:
         moved_items = (_figures(each, request, guides, checks_films=False) for each in others)
         items = uncertainty.bounded(items, moved_items, request.probability)
-    has_curves = curves and not quick and not wanted
-    relations = tuple(_relations(state, request)) if has_curves else ()
     if discs is not None:
         ends = []
         for diameter in (discs.inner, discs.outer):
@@ -166,7 +164,6 @@ def predict(
             [there] = [state] if is_same else _states(end, (), request, quick)
             ends.append(items if is_same else _figures(there, request, guides))
         items = list(_by_discs(items, ends, discs))
-        relations = tuple(_relation_by_disc(relation, discs) for relation in relations)
     items = [*(_flagged(item, flat) for item in items), *past]
     figures = chosen(
         (item for item in items if isinstance(item, Figure)),
@@ -176,9 +173,9 @@ def predict(
     return Prediction(
         asked_request,
         tuple(replace(figure, measured=_measured(figure, subject)) for figure in figures),
-        relations,
         tuple(item for item in items if isinstance(item, LeftOut)),
         before,
+        tuple if quick else partial(_relations, state, request, discs),
     )
 
 
@@ -416,13 +413,6 @@ def _by_disc(model: Model, discs: NearDiscs) -> Model:
         f"bounds by the discs within and round it, {discs.inner:.4g} and {discs.outer:.4g} mm, "
         "where a wider pocket rises more and pushes harder",
     )
-
-
-def _relation_by_disc(relation: Relation, discs: NearDiscs) -> Relation:
-    lines = [
-        replace(line, model=line.model and _by_disc(line.model, discs)) for line in relation.lines
-    ]
-    return replace(relation, title=f"{relation.title}, {BY_DISC}", lines=lines)
 
 
 def _flat_forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
@@ -709,7 +699,21 @@ def _stiffness(actuator: Actuator) -> Iterator[FigureItem]:
 # Curves.
 
 
-def _relations(state: elastic.Inflated, request: PredictionRequest) -> Iterator[Relation]:
+def _relations(
+    state: elastic.Inflated, request: PredictionRequest, discs: NearDiscs | None
+) -> Iterator[Relation]:
+    """Yield the curves, of a drawn pocket those by the disc of equal area."""
+    for each in _curves(state, request):
+        if discs is None:
+            yield each
+            continue
+        lines = [
+            replace(line, model=line.model and _by_disc(line.model, discs)) for line in each.lines
+        ]
+        yield replace(each, title=f"{each.title}, {BY_DISC}", lines=lines)
+
+
+def _curves(state: elastic.Inflated, request: PredictionRequest) -> Iterator[Relation]:
     actuator, factors = state.actuator, state.actuator.factors
     together = state.stack if isinstance(state.stack, Stack) else None
     if not actuator.pockets:

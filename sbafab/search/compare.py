@@ -186,7 +186,7 @@ def compare(
         request = PredictionRequest(pressures, flow_ml_min)
         figures = {
             (figure.quantity, figure.at): figure
-            for figure in predict(design, request, made.laminate, curves=False).figures
+            for figure in predict(design, request, made.laminate).figures
             if not figure.other or (figure.interval and _is_main(figure.quantity, figure.at))
         }
         rules = worst_findings(made.findings)

@@ -79,7 +79,7 @@ def measured(
         row["yield"] = next(shares, [])
         # Figures have no intervals here: with the factors given, none are computed.
         request = PredictionRequest(tuple(pressures), calibration=factors_of(design))
-        figures = predict(design, request, made_build.laminate, curves=False).figures
+        figures = predict(design, request, made_build.laminate).figures
         row["figures"] = {str(figure.key): figure.as_dict()["value"] for figure in figures}
         _add_quantities(row, [read_quantity(text) for text in quantities], made_build)
         failed = {name: rule.message for name, rule in worst.items() if rule.verdict == "fail"}

@@ -18,11 +18,9 @@ from pydantic import Field, model_validator
 from sbafab.design.files import checked, hint, listed, read_toml, shown
 from sbafab.design.toml_table import NAME_PATTERN, Section
 from sbafab.errors import DesignError
-from sbafab.models.calibration import BENT
+from sbafab.models.calibration import BENT, PAPER
 from sbafab.spreadsheet import plain_text, table_rows
 
-PAPER = "paper"
-"""Name of the paper's evidence, and of the calibration that is fitted to it."""
 MOST_POINTS = 10_000
 
 
@@ -220,8 +218,16 @@ class MeasuredCurve(Section):
     def discrepancy_group(self) -> str:
         """The group of the discrepancy of its values; "" if calibrations are not fitted to it."""
         group = QUANTITIES[self.quantity].group
-        is_bent = self.x_name == "bend_deg" or self.setup.bend_deg is not None
-        return BENT if group == "force" and is_bent else group
+        return BENT if group == "force" and self.at("bend_deg") else group
+
+    def at(self, name: str) -> tuple[float, ...] | None:
+        """Return a number of the set-up for each value: its axis, or what the set-up states; None
+        if neither does.
+        """
+        stated = getattr(self.setup, name)
+        if self.x_name == name:
+            return self.x
+        return None if stated is None else (stated,) * len(self.y)
 
     def points(self) -> Iterator[tuple[float | None, float, float | None]]:
         """Yield the values: the place on the axis (None without one), value, and standard error."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,7 @@ from sbafab.models.figures import Factors, Model, PredictionRequest
 from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line, usual_pressures
 from sbafab.models.prediction import plate_of, predict
-from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count
+from sbafab.models.quantity import Quantity, chamber_count
 from sbafab.models.rim_correction import free_shapes
 from sbafab.models.stack import Pose, Stack, stack
 from sbafab.validation.evidence import QUANTITIES, MeasuredCurve
@@ -215,12 +215,10 @@ def _by_pressure(curve: MeasuredCurve, value: Callable[[float], float]) -> Serie
 
     OPEN_PRESSURES are assumed if neither axis nor set-up gives a pressure.
     """
-    reached = partial(_tried, value)
-    if curve.x_name == "pressure_kpa":
-        return {"": tuple(map(reached, curve.x))}
+    reached, pressures = partial(_tried, value), curve.at("pressure_kpa")
+    if pressures is not None:
+        return {"": tuple(map(reached, pressures))}
     count = len(curve.y)
-    if curve.setup.pressure_kpa is not None:
-        return {"": (reached(curve.setup.pressure_kpa),) * count}
     return {f"{p:g} kPa in the chambers": (reached(p),) * count for p in OPEN_PRESSURES}
 
 
@@ -229,9 +227,12 @@ def _by_pressure(curve: MeasuredCurve, value: Callable[[float], float]) -> Serie
 
 def _forces(of: ModelledActuator) -> NamedSeries:
     curve = of.curve
-    if curve.x_name == "bend_deg" or curve.setup.bend_deg is not None:
-        return _bent_forces(of)
-    pressures, pushing = _pressures(curve), curve.setup.chambers or of.actuator.form.pushing
+    angles, pressures = curve.at("bend_deg"), curve.at("pressure_kpa")
+    if pressures is None:
+        raise DesignError("the set-up names no pressure")
+    if angles is not None:
+        return of.model(), _bent_forces(of, list(zip(angles, pressures, strict=True)))
+    pushing = curve.setup.chambers or of.actuator.form.pushing
 
     def force(stroke: ModelValue, pressure: float) -> ModelValue:
         if stroke is None:
@@ -244,36 +245,17 @@ def _forces(of: ModelledActuator) -> NamedSeries:
     }
 
 
-def _pressures(curve: MeasuredCurve) -> tuple[float, ...]:
-    """Return a pressure in kPa for each value of a force. Raises DesignError."""
-    if curve.x_name == "pressure_kpa":
-        return curve.x
-    if curve.setup.pressure_kpa is None:
-        raise DesignError("the set-up names no pressure")
-    return (curve.setup.pressure_kpa,) * len(curve.y)
-
-
 def _blocked_states(of: ModelledActuator) -> Series:
-    """Return the strokes in mm at which a force was measured, by assumption on the full stroke.
-    Raises DesignError if none is named.
-    """
-    curve = of.curve
-    for name, stated in (
-        ("stroke_mm", curve.setup.stroke_mm),
-        ("height_share", curve.setup.height_share),
-    ):
-        if curve.x_name == name or (stated is not None and curve.x_name != "height_share"):
-            values = curve.x if curve.x_name == name else (stated or 0.0,) * len(curve.y)
-            return _shares(of, values) if name == "height_share" else {"": values}
-    raise DesignError("the set-up names no height at which the tip is held")
-
-
-def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> Series:
-    """Return the strokes in mm at shares of the full stroke, by the assumption on the full stroke.
+    """Return the strokes in mm at which a force was measured, by the assumption on the full stroke.
 
     Assumptions are a free stroke at each of OPEN_PRESSURES, or one that the paper gives. Values
-    are None if the actuator does not rise freely.
+    are None if the actuator does not rise freely. Raises DesignError if no stroke is named.
     """
+    shares, strokes = of.curve.at("height_share"), of.curve.at("stroke_mm")
+    if strokes is not None and of.curve.x_name != "height_share":
+        return {"": strokes}
+    if shares is None:
+        raise DesignError("the set-up names no height at which the tip is held")
     if not any(shares):
         return {"": shares}
 
@@ -293,16 +275,12 @@ def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> Series:
     }
 
 
-def _bent_forces(of: ModelledActuator) -> NamedSeries:
-    """Return forces on a plate square to the bent tip, with the chambers that bend it, or all of
-    them, pressurised further.
+def _bent_forces(of: ModelledActuator, pairs: Sequence[tuple[float, float]]) -> Series:
+    """Return forces at pairs of angle and pressure on a plate square to the bent tip, with the
+    chambers that bend it, or all of them, pressurised further.
     """
-    curve, bending = of.curve, of.chambers_that_bend
-    stated = curve.setup.bend_deg or 0.0
-    angles = curve.x if curve.x_name == "bend_deg" else (stated,) * len(curve.y)
-    pairs = list(zip(angles, _pressures(curve), strict=True))
-
-    bends = list(product(bending.values(), angles))
+    bending = of.chambers_that_bend
+    bends = [(count, angle) for count in bending.values() for angle, _ in pairs]
     poses = dict(zip(bends, elastic.poses_bent_by(of.stack, bends), strict=True))
 
     def force(bent: int, filled: int, angle: float, pressure: float) -> float:
@@ -314,11 +292,11 @@ def _bent_forces(of: ModelledActuator) -> NamedSeries:
     series: Series = {}
     for phrase, count in bending.items():
         further = [(count, phrase)]
-        if curve.setup.chambers is None:
+        if of.curve.setup.chambers is None:
             further.append((of.stack.chambers, f"{phrase} to bend it and then all"))
         for filled, named in further:
             series[named] = tuple(_tried(force, count, filled, *pair) for pair in pairs)
-    return of.model(), series
+    return series
 
 
 # Strokes, heights and bends.
@@ -379,11 +357,9 @@ def _by_volume(
     poses = of.filling(chambers)
     held = poses.volumes[:, :chambers].sum(1)
     at = values(poses)
-    return tuple(
-        None if volume > added[-1] else float(np.interp(volume, added, at))
-        for added in (np.maximum.accumulate(held - held[0]),)
-        for volume in volumes
-    )
+    added = np.maximum.accumulate(held - held[0])
+    reached = np.interp(volumes, added, at, right=np.nan).tolist()
+    return tuple(None if math.isnan(value) else value for value in reached)
 
 
 def _balloon_strokes(of: ModelledActuator) -> NamedSeries:
@@ -490,12 +466,8 @@ def _of_prediction(quantity: Quantity, of: ModelledActuator) -> NamedSeries:
     """Return the prediction's figure of a quantity. Raises DesignError if it does not exist."""
     pressures = usual_pressures(of.design.form)[-1:]
     request = PredictionRequest(pressures, calibration=of.factors)
-    prediction = predict(of.design, request, of.laminate, quick=True)
-    for figure in prediction.figures:
-        if figure.quantity is quantity:
-            return figure.model.name, {"": (figure.value,) * len(of.curve.y)}
-    reasons = (item.reason for item in prediction.left_out if quantity in item.quantities)
-    raise DesignError(next(reasons, f"no {quantity.named(ANYWHERE)}"))
+    figure = predict(of.design, request, of.laminate, quick=True).figure(quantity)
+    return figure.model.name, {"": (figure.value,) * len(of.curve.y)}
 
 
 ANSWERS: dict[str, Callable[[ModelledActuator], NamedSeries]] = {

@@ -23,7 +23,7 @@ from sbafab.errors import OutputError
 from sbafab.markup import environment
 from sbafab.models import paper
 from sbafab.models.balloons import balloons_of
-from sbafab.models.calibration import UNKNOWNS, HeldOut, ModelCalibration, load_calibration
+from sbafab.models.calibration import PAPER, UNKNOWNS, HeldOut, ModelCalibration, load_calibration
 from sbafab.models.closed_forms import eq_4, eqs_1_to_3, modulus
 from sbafab.models.elastic import air_time, pose_bent_by, time_to_fill
 from sbafab.models.figures import Factors, Prediction, PredictionRequest
@@ -38,7 +38,7 @@ from sbafab.validation.comparison import (
     ComparedCurve,
     compare,
 )
-from sbafab.validation.evidence import AXES, PAPER, QUANTITIES, load_evidence
+from sbafab.validation.evidence import AXES, QUANTITIES, load_evidence
 
 TITLE = "Calibrated on the paper"
 COLUMNS = ("figure", "paper", "", "predicted", "residual", "model", "why they part")

@@ -34,6 +34,7 @@ from sbafab.models.prediction import predict
 from sbafab.models.quantity import Conditions, FigureKey, Quantity
 from sbafab.studio.answers import stack_model
 from sbafab.studio.jobs import elastic
+from sbafab.validation.evidence import load_evidence
 from tests.shared import shared
 from tests.studio.asking import job
 from tests.validation.commands import run_predict
@@ -114,16 +115,18 @@ def _measured_figures() -> Iterator[tuple[str, str, float]]:
         for share, measured in zip(paper.HEIGHTS, values, strict=True):
             at = f"at {100 * share:g} % of the reference stroke" if share else "flat"
             yield template, f"blocked force at 100 kPa, {at}", measured.value
-    for angle, measured in paper.FORCE_BENT:
+    evidence = load_evidence("paper")
+    bent = evidence.curve("force-bent")
+    for angle, force in zip(bent.x, bent.y, strict=True):
         for chambers in ("one chamber", "2 chambers"):
-            name = f"force at 100 kPa in {chambers}, bent by {angle} deg"
-            yield "3dof-15mm", name, measured.value
+            name = f"force at 100 kPa in {chambers}, bent by {angle:g} deg"
+            yield "3dof-15mm", name, force
     yield "3dof-15mm", "folded height", paper.FLAT_HEIGHT.value
     yield "3dof-15mm", "free height at 10 kPa", paper.FULL_HEIGHT.value
     # Sec. 4.6 names neither pressure nor chambers.
     for where in ("10 kPa in one chamber", "100 kPa in 2 chambers"):
         yield "3dof-15mm", f"bend at {where}, the others empty", paper.LARGEST_BEND.value
-    yield "1dof-10mm", "pneumatic input work at 10 kPa, free", paper.WORK.value
+    yield "1dof-10mm", "pneumatic input work at 10 kPa, free", *evidence.curve("energy-10kpa").y
 
 
 @pytest.mark.parametrize("is_calibrated", [False, True])

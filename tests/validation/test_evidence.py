@@ -95,10 +95,7 @@ def test_the_paper_and_the_constants_of_the_models_agree() -> None:
     for name, values in (
         ("force-1dof", paper.FORCE_1DOF),
         ("force-3dof", paper.FORCE_3DOF),
-        ("force-bent", [value for _, value in paper.FORCE_BENT]),
         ("largest-bend", [paper.LARGEST_BEND]),
-        ("time-water", [paper.WATER_TIME]),
-        ("time-air", [paper.AIR_TIME]),
         ("burst", [paper.BURST]),
     ):
         assert curves[name].y == tuple(value.value for value in values)
