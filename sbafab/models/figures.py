@@ -364,6 +364,10 @@ class Prediction:
         """The curves, computed when they are first asked for."""
         return tuple(self.curves())
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Functions that compute curves are not pickled.
+        return {**self.__dict__, "relations": self.relations, "curves": tuple}
+
     def figure(self, quantity: Quantity | str, model: str = "", **at: Any) -> Figure:
         """Return the figure of a quantity at conditions (fields of ``Conditions``, those that tell
         figures apart), by a model (its id), or by the one to design with.
