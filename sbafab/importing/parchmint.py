@@ -341,8 +341,7 @@ class Circuit:
         layers = {numbers[layer]: (self.titles[layer], mask) for layer, mask in masks.items()}
         films = range(1, top + 1, 2)
         layers |= {number: ("film", plain - union(holes.get(number, ()))) for number in films}
-        rows = [(_role(number, top), *layers[number]) for number in sorted(layers)]
-        shapes, drawings, layer_rows = _drawn_layers(rows)
+        shapes, drawings, layer_rows = _drawn_layers([layers[number] for number in sorted(layers)])
         tables: dict[str, Any] = {
             "name": self.name,
             "family": DRAWN,
@@ -409,28 +408,24 @@ def _refuse_unplaced(rows: Sequence[ComponentRow], placed: Mapping[Any, object])
         )
 
 
-def _role(number: int, top: int) -> str:
-    if number % 2 == 0:
-        return "chamber-mask"
-    return "base" if number == 1 else "cap" if number == top else "wall"
-
-
 def _drawn_layers(
-    rows: Sequence[tuple[str, str, Region]],
+    layers: Sequence[tuple[str, Region]],
 ) -> tuple[dict[str, dict[str, str]], dict[str, bytes], list[dict[str, Any]]]:
-    """Return shapes, drawings and layers for the role, title and profile of each layer."""
+    """Return shapes, drawings and rows of films and masks in turn, given as title and profile."""
     shapes: dict[str, dict[str, str]] = {}
     drawings: dict[str, bytes] = {}
     names: dict[Region, str] = {}
-    layers = []
-    for role, title, region in rows:
+    rows = []
+    ends = {1: "base", len(layers): "cap"}
+    for number, (title, region) in enumerate(layers, start=1):
         if region not in names:
             names[region] = name = key_name(title, shapes, "layer-")
             shapes[name] = {"file": f"{name}.dxf"}
             drawings[f"{name}.dxf"] = dxf_text(region.contours, {}).encode()
+        role = ends.get(number, "wall") if number % 2 else "chamber-mask"
         pieces = {"pieces": len(region.pieces)} if len(region.pieces) > 1 else {}
-        layers.append({"role": role, "shape": names[region], **pieces})
-    return shapes, drawings, layers
+        rows.append({"role": role, "shape": names[region], **pieces})
+    return shapes, drawings, rows
 
 
 def _hole(radius: float) -> float:
