@@ -59,7 +59,7 @@ from sbafab.search.space import (
     misses,
     searched,
 )
-from sbafab.search.sweep_report import front
+from sbafab.search.sweep_report import LITTLE, front
 from sbafab.search.trials import margin_share
 from sbafab.search.vary import format_keys, key_values
 
@@ -378,8 +378,6 @@ SHOWN = 8
 """Most designs of the Pareto front that are shown."""
 TIGHT = ("bond-width", "mask-overhang", "tube-fit", "film-limits", "press-fit", "pin-fit")
 """Rules with margins that a design change can widen."""
-LITTLE = 0.005
-"""Largest share of a limit that counts as nothing to spare."""
 
 
 def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[Binding]:
