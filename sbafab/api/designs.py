@@ -153,7 +153,7 @@ def schema_keys(
 
 
 def _tables(rule: JsonSchema, schema: JsonSchema) -> Iterator[tuple[str, JsonSchema]]:
-    """Yield the tables that a key may hold, each with what stands between their keys and it."""
+    """Yield the tables that a key may hold, each with the infix between the key and its own."""
     for choice in (rule, *rule.get("anyOf", ())):
         resolved = _resolved(choice, schema)
         if isinstance(more := resolved.get("additionalProperties"), dict):

@@ -1,4 +1,4 @@
-"""What rules, keys of design files, quantities and terms mean."""
+"""Meanings of rules, keys of design files, quantities and terms."""
 
 from __future__ import annotations
 

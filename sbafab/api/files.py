@@ -1,4 +1,4 @@
-"""What every command needs: templates, keys and units of design files, and findings."""
+"""Templates, keys and units of design files, and findings, for every command."""
 
 from __future__ import annotations
 

@@ -165,7 +165,7 @@ def _run(
 ) -> None:
     """Write a folder, print it and exit with 1 if a rule failed.
 
-    ``before`` prints what comes before the files, ``more`` has further keys of the document.
+    ``before`` prints the text above the files, ``more`` has further keys of the document.
     """
     with show.progress(as_json) as progress:
         run = write(source, progress=progress, **settings)

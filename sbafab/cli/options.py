@@ -30,7 +30,7 @@ Decorator = Callable[[Command], Command]
 
 
 class Parsed(click.ParamType):  # type: ignore[type-arg]  # generic in newer clicks only
-    """A value that ``read`` makes of a text; its ValueError says what is allowed.
+    """A value that ``read`` makes of a text; its ValueError names the allowed values.
 
     ``name`` stands for the value in the help.
     """
@@ -52,7 +52,7 @@ def quantity(
     metavar: str, noun: str, units: Mapping[str, float], example: str, positive: bool = False
 ) -> Parsed:
     """Return the type of a number with or without a unit; ``units`` gives the size of each in the
-    first unit, that of the value.
+    first unit, which the value is in.
     """
 
     def read(text: str) -> float:
@@ -182,8 +182,8 @@ def completions(typed: str, candidates: Iterable[tuple[str, str | None]]) -> lis
 def option(flags: str, words: str, kind: Any = None, **settings: Any) -> Decorator:
     """Return an option.
 
-    ``flags`` are its names, then that of its parameter if that has another one, then in capitals
-    what stands for its value, with dots if it is repeatable, such as "--vary varied KEY=VALUES...".
+    ``flags`` are its names, then its parameter's name if that differs, then in capitals the
+    placeholder of its value, with dots if it is repeatable, such as "--vary varied KEY=VALUES...".
     ``words`` are its help, ``kind`` is bool for a flag, a type, or a tuple of choices.
     """
     names = flags.removesuffix("...").split()

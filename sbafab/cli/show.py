@@ -1,4 +1,4 @@
-"""What commands print: lines, tables, JSON, findings, verdicts; and their progress meanwhile."""
+"""Output of commands: lines, tables, JSON, findings, verdicts; and their progress meanwhile."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def line(words: str, style: str = "") -> None:
 
 
 def _print_styled(words: str) -> None:
-    """Print a line, plain if there is no terminal or none that shows styles."""
+    """Print a line, plain without a terminal that shows styles."""
     is_plain = "NO_COLOR" in os.environ or os.environ.get("TERM") == "dumb"
     click.echo(words, color=False if is_plain else None)
 

@@ -29,7 +29,7 @@ class TemplateEntry(Document):
 
 
 TEMPLATES = list[TemplateEntry]
-"""What ``new --json`` prints."""
+"""Output of ``new --json``."""
 
 
 def templates(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:

@@ -1,5 +1,5 @@
 """Designs: what the user asks for.
 
 In: a TOML file, changes of keys, kits and drawings. Out: a ``Design``, frozen and validated, whose
-sections are the settings of all that follows; or a ``DesignError`` with one sentence.
+sections are the settings of every later stage; or a ``DesignError`` with one sentence.
 """

@@ -146,7 +146,7 @@ ALLOWED = {
     "tuple_type": "must be a list in brackets",
     "list_type": "must be a list in brackets",
 }
-"""What a value must be, by pydantic's type of problem."""
+"""The allowed values, by pydantic's type of problem."""
 
 
 def _allowed(problem: Any) -> str:

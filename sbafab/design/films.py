@@ -401,7 +401,7 @@ class Recipe(Section):
 
     @property
     def purpose(self) -> tuple[str, float, str, str]:
-        """What it is for: film, thickness, machine and operation."""
+        """Its use: film, thickness, machine and operation."""
         return self.film, round(self.thickness_mm, 6), self.machine, self.operation
 
 

@@ -227,7 +227,7 @@ def _is_number(value: object) -> bool:
 def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return a design's tables with every key filled in that its kit gives and the design lacks.
 
-    Raises DesignError if there is no such kit, it is faulty, or it lacks the tube.
+    Raises DesignError if the kit is missing or faulty, or lacks the tube.
     """
     kit = load_kit(data.get("kit", DEFAULT), folder)
     filled = {**data}

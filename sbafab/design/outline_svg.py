@@ -51,7 +51,7 @@ def svg_polylines(path: Path, layer: str | None = None) -> tuple[Iterator[Polyli
 # Numbers, paths and transforms as SVG 2 writes them: the library reads damaged ones in its own way.
 
 
-# Numbers and what stands between them are atomic, so that repetitions of them cannot backtrack.
+# Numbers and separators are atomic, so that repetitions of them cannot backtrack.
 # Possessive repetitions of groups would say the same, and end in the wrong place before Python
 # 3.11.5 (python/cpython issue 106052).
 _SPACE = r"[ \t\r\n]*+"
@@ -175,7 +175,7 @@ UNDRAWN = frozenset(
         *("foreignObject", "image", "text"),
     }
 )
-"""Never drawn in place, whatever they contain; and lettering and pictures, which are no outline."""
+"""Never drawn in place, whatever they contain; and lettering and pictures, never an outline."""
 CHANGING = frozenset({"animate", "animateMotion", "animateTransform", "script", "set", "link"})
 """Elements that change others, wherever they are."""
 SHAPES = {
@@ -264,7 +264,7 @@ def _names(element: ElementTree.Element) -> list[str]:
 def _drawn(
     root: ElementTree.Element, layer: str | None
 ) -> Iterator[tuple[ElementTree.Element, str]]:
-    """Yield the drawn shapes, or those of a layer, in order, each with its transforms, the
+    """Yield the drawn shapes, of one layer if it is named, in order, each with its transforms, the
     outermost first.
     """
     space = root.tag.removesuffix("svg")

@@ -55,7 +55,7 @@ class NamedTables(Section):
     names: ClassVar[str]
     """Pattern of a name."""
     names_are: ClassVar[str]
-    """The same in words."""
+    """Its description."""
     most: ClassVar[int] = 200
 
     @model_validator(mode="after")

@@ -40,11 +40,10 @@ PORT = "PORT"
 ROUND = {PORT: "portRadius", VIA: "radius", "VALVE3D": "valveRadius"}
 """Components that are discs, with the parameter that gives their radius."""
 PLAIN = frozenset({PORT, VIA, "NODE", "VALVE", "VALVE3D", "REACTION CHAMBER"})
-"""Components whose outline is all that matters; for others a remark says the inside is not
-drawn."""
+"""Components that are their outline; for others a remark says that the inside is not drawn."""
 
 
-# The file: what is read of it. Other keys are ignored.
+# The keys of the file that are read; others are ignored.
 
 
 def _pair(value: object) -> object:
@@ -75,7 +74,7 @@ class Params(JsonRow):
 
 
 class CircuitLayer(JsonRow):
-    """A layer; those of one group are below those of the next."""
+    """A layer; layers of one group are below the next group's."""
 
     id: str
     name: str | None = None
@@ -183,7 +182,7 @@ class Component(NamedTuple):
 
 class Circuit:
     """A placed and routed circuit. ``titles`` of layers by id, bottom to top; ``channels`` as
-    layer, points and width, um; ``remarks`` on what is not imported as drawn.
+    layer, points and width, um; ``remarks`` on parts that are not imported as drawn.
     """
 
     def __init__(self, document: Mapping[str, Any], stem: str) -> None:

@@ -250,13 +250,13 @@ def _polygon(points: Sequence[Point], holes: Sequence[Sequence[Point]]) -> Regio
 
 
 Sketch = list[tuple[str, CadRecord]]
-"""Shapes, each with its place after that of its operation."""
+"""Shapes, each with its place within its operation."""
 
 
 class CadDesign:
     """A design: layers bottom to top with their material, operations in order with their places.
 
-    ``remarks`` name what was interpreted.
+    ``remarks`` name the interpreted parts.
     """
 
     def __init__(self, root: CadRecord, place: str, depth: int = 0) -> None:
@@ -377,7 +377,7 @@ def _laminates(design: CadDesign, operation: CadRecord) -> CadLayers:
 
 
 def _of_rows(function: str, first: Sequence[Flat], second: Sequence[Flat]) -> Flat:
-    """Combine all of the first row; for a difference, its union and that of the second row."""
+    """Combine all of the first row; for a difference, its union and the second row's."""
     if function in ("union", "intersection"):
         return reduce(lambda a, b: _combined(function, a, b), first)
     return _combined(function, _joined(first), _joined(second))

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 LAYERS = "layers.csv"
 """The table of layers in a folder of drawings."""
 UNNAMED = "import"
-"""A design's name if its source has none."""
+"""Name of a design whose source names none."""
 MOST_NAMED = 20
 """At most this many places of one kind are named one by one."""
 
@@ -34,8 +34,8 @@ MOST_NAMED = 20
 class Imported:
     """A design of drawn layers as ``tables`` of its file, and the content of its ``drawings``.
 
-    Shapes, kit and calibration name a drawing by its key. ``remarks`` name, by place, what was not
-    carried over and how ambiguous input was read.
+    Shapes, kit and calibration name a drawing by its key. ``remarks`` name, by place, omissions,
+    and how ambiguous input was read.
     """
 
     tables: Mapping[str, Any]

@@ -53,7 +53,7 @@ def import_to(
 ) -> tuple[str, tuple[str, ...], Written]:
     """Write a source as a design into ``file``, by default into ``folder`` under its own name.
 
-    Return the format, remarks on what is not carried over, and the design. Raises DesignError and
+    Return the format, remarks on omissions, and the design. Raises DesignError and
     OutputError.
     """
     name, imported = import_source(source)
@@ -93,5 +93,5 @@ _OWN = (
 
 @cache
 def _formats() -> tuple[SourceFormat, ...]:
-    """All formats, those of other packages last."""
+    """All formats, of other packages last."""
     return _OWN + plugins.added(plugins.IMPORTERS, "import format", SourceFormat)
