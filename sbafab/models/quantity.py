@@ -169,21 +169,17 @@ def _texts(at: Conditions) -> dict[str, str]:
     """Return conditions as texts for the names of figures."""
     numbers = {name: f"{value:g}" for name, value in at.as_dict().items() if name not in _NAMES}
     share = at.share or 0.0
+    stroke = f"at {100 * share:g} % of the reference stroke" if share else "flat"
     return numbers | {
         "of": f" of {at.of}" if at.of else "",
         "each": {"sba": " of one SBA", "pouch": " a pouch"}.get(at.each, ""),
         "chambers": chamber_count(at.chambers or 0),
         "hinges": f", {at.hinges} hinges" if at.hinges else "",
         "percent": f"{100 * share:g}",
-        "stroke": share_of_stroke(share) if at.rise is None else f"at {at.rise:g} mm",
+        "stroke": stroke if at.rise is None else f"at {at.rise:g} mm",
         "bent": "half bent" if share else "straight",
         "litres": f"{(at.flow or 0.0) / 1000:g}",
     }
-
-
-def share_of_stroke(share: float) -> str:
-    """Return a share of the reference stroke as text."""
-    return f"at {100 * share:g} % of the reference stroke" if share else "flat"
 
 
 def chamber_count(number: int) -> str:

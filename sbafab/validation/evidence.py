@@ -194,11 +194,6 @@ class MeasuredCurve(Section):
         return QUANTITIES[self.quantity].title
 
     @property
-    def x_unit(self) -> str:
-        """The unit of the axis."""
-        return AXES[self.x_name]
-
-    @property
     def errors(self) -> tuple[float | None, ...]:
         """Standard errors of the values, in their unit; None if the source does not state them."""
         stated = self.error
