@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from tests.faults.catalogue import FAULTS, PAGE, TEMPLATES, caught_by, cell, good_folders, text
 from tests.faults.once import remembering
-from tests.faults.record import quick
+from tests.faults.specimen import quick
 
 
 def main() -> int:

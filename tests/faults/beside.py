@@ -16,7 +16,8 @@ from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.sequence import cutting_sequence
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from tests.faults.record import Fault, Kind, Specimen, edited, of_text
+from tests.faults.record import Fault, Kind, edited, of_text
+from tests.faults.specimen import Specimen
 
 RULE, CLAIMS = "as-designed", "manifest-claims"
 PROJECT = "sheets/TPE_1.lbrn2"

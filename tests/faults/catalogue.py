@@ -18,7 +18,8 @@ from sbafab.folders.check import read_folder
 from sbafab.folders.differences import DESIGNED
 from sbafab.folders.run import RunRequest, generate
 from tests.faults import beside, claims, files, holes, joints, layers, masks, sheets
-from tests.faults.record import PAPER, Fault, Kind, Specimen, failing, unabridged
+from tests.faults.record import PAPER, Fault, Kind
+from tests.faults.specimen import Specimen, failing, unabridged
 from tests.folders.doctoring import Doctor
 
 TEMPLATES = (*PAPER, joints.TEMPLATE)

@@ -4,18 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from tests.faults.record import (
-    Fault,
-    Kind,
-    Specimen,
-    edited,
-    mask,
-    no_lumen,
-    of_text,
-    separator,
-    told,
-    wall,
-)
+from tests.faults.record import Fault, Kind, edited, no_lumen, of_text, told
+from tests.faults.specimen import Specimen, mask, separator, wall
 
 Claims = dict[str, Any]
 

@@ -15,18 +15,8 @@ from sbafab.geometry.edges import Line, meeting_points
 from sbafab.geometry.region import Region, disc
 from tests.faults import record
 from tests.faults.holes import bore
-from tests.faults.record import (
-    Change,
-    Fault,
-    Kind,
-    Pick,
-    Specimen,
-    mask,
-    of_text,
-    separator,
-    tabbed_wall,
-    wall,
-)
+from tests.faults.record import Fault, Kind, of_text
+from tests.faults.specimen import Change, Pick, Specimen, mask, separator, tabbed_wall, wall
 
 CLAIMS = "manifest-claims"
 POLYLINE = "AcDbPolyline\n"

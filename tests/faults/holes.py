@@ -8,18 +8,8 @@ from collections.abc import Iterable
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.laminate.laminate import Laminate, Pin, Role
-from tests.faults.record import (
-    Change,
-    Kind,
-    Picks,
-    base,
-    cap,
-    mask,
-    no_lumen,
-    redrawn,
-    separator,
-    wall,
-)
+from tests.faults.record import Kind, no_lumen, redrawn
+from tests.faults.specimen import Change, Picks, base, cap, mask, separator, wall
 
 CLEAR = "channel-clear"
 NOMINAL = "registration-nominal"

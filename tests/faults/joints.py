@@ -9,7 +9,8 @@ from sbafab.cutting.layer_files import read_seam, seam_path
 from sbafab.geometry.edges import Edge, Line, Point
 from sbafab.geometry.region import Region, strip
 from sbafab.laminate.laminate import Laminate, Layer
-from tests.faults.record import Fault, Kind, Specimen, redrawn
+from tests.faults.record import Fault, Kind, redrawn
+from tests.faults.specimen import Specimen
 
 TEMPLATE = "folded"
 DESIGNED = "as-designed"

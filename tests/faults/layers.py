@@ -7,19 +7,8 @@ from collections.abc import Sequence
 from sbafab.geometry.offset import grow, shrink
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
-from tests.faults.record import (
-    Change,
-    Fault,
-    Kind,
-    base,
-    cap,
-    inlet_mask,
-    mask,
-    redrawn,
-    separator,
-    tabbed_wall,
-    wall,
-)
+from tests.faults.record import Fault, Kind, redrawn
+from tests.faults.specimen import Change, base, cap, inlet_mask, mask, separator, tabbed_wall, wall
 
 KERF = 0.2
 NOMINAL = "registration-nominal"

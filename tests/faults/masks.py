@@ -15,19 +15,14 @@ from sbafab.geometry.offset import grow, shrink
 from sbafab.geometry.region import Region, disc, polygon, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate
 from tests.faults.holes import aside, bore, cut_in_two
-from tests.faults.record import (
-    Fault,
-    Kind,
+from tests.faults.record import Fault, Kind, no_lumen, no_sheet, one_chamber, redrawn
+from tests.faults.specimen import (
     Pick,
     Specimen,
     base,
     cap,
     inlet_mask,
     mask,
-    no_lumen,
-    no_sheet,
-    one_chamber,
-    redrawn,
     separator,
     sheet_mask,
     wall,

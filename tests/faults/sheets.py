@@ -18,7 +18,8 @@ from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region
 from tests.faults.files import inches
 from tests.faults.holes import EARS
-from tests.faults.record import Fault, Kind, Specimen, edited, of_text, told
+from tests.faults.record import Fault, Kind, edited, of_text, told
+from tests.faults.specimen import Specimen
 
 INTEGRITY, DESIGNED = "file-integrity", "as-designed"
 KERF = 0.2

@@ -28,7 +28,8 @@ from tests.faults.catalogue import (
     cells_of,
     text,
 )
-from tests.faults.record import LEFT_OUT, PAPER, Fault, failing, quick, unabridged
+from tests.faults.record import PAPER, Fault
+from tests.faults.specimen import LEFT_OUT, failing, quick, unabridged
 from tests.quick import few
 
 MOST, WIDER = "1dof-5mm", "1dof-10mm"
